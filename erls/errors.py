@@ -1,0 +1,56 @@
+"""Failures of scenes and simulations: the causes, and the exception that carries place, value, limit, remedy."""
+
+from __future__ import annotations
+
+import enum
+
+from fe_import.errors import ReportedError
+
+
+class Cause(enum.StrEnum):
+    """Why a scene was refused or a simulation stopped. A test provokes each."""
+
+    FILE_NOT_FOUND = "file not found"
+    NOT_READABLE = "file not readable"
+    NOT_WRITABLE = "file not writable"
+    SYNTAX = "syntax error"
+    UNKNOWN_FIELD = "unknown field"
+    BAD_FIELD = "bad field"
+    BAD_REFERENCE = "reference to something that does not exist"
+    TABLE = "faulty table"
+    RUN_FILE = "faulty run file"
+    TIME_OUT_OF_RANGE = "time outside the run"
+    SINGULAR_MASS = "mass matrix not positive definite"
+    NO_EQUILIBRIUM = "no static equilibrium"
+    NEWTON_FAILED = "Newton iteration did not converge"
+    NOT_FINITE = "solution is no longer finite"
+    STEP_TOO_SMALL = "step size became too small"
+    LINEAR_RANGE = "deformation left the range of small displacements"
+    NO_PICTURE = "picture could not be made"
+    INTERRUPTED = "interrupted"
+
+
+_NUMERICAL = {
+    Cause.SINGULAR_MASS,
+    Cause.NO_EQUILIBRIUM,
+    Cause.NEWTON_FAILED,
+    Cause.NOT_FINITE,
+    Cause.STEP_TOO_SMALL,
+    Cause.LINEAR_RANGE,
+    Cause.NO_PICTURE,
+}
+
+
+class SceneError(ReportedError):
+    """A faulty scene, table, run file or command line."""
+
+
+class SimulationError(ReportedError):
+    """A failed simulation: says when, why and what to try."""
+
+    @property
+    def exit_code(self) -> int:
+        """3 for a numerical failure, 130 after an interrupt, otherwise 2."""
+        if self.cause == Cause.INTERRUPTED:
+            return 130
+        return 3 if self.cause in _NUMERICAL else 2

@@ -1,0 +1,161 @@
+"""The contract between equations of motion and integrators.
+
+Rules for adding an integrator:
+
+1. One file with one function ``integrate(system, times, y, v, options, observer) -> Solution`` and one line in the
+   registry of ``erls/integrators/__init__.py``.
+2. An integrator knows the system only through `SecondOrderSystem`; it never asks what the coordinates mean. Norms
+   are taken in metres, through ``system.length_scales``.
+3. It never steps over a member of ``breakpoints(system, times)``: forces jump there. At such a time the solution
+   holds two knots, one with the acceleration on either side.
+4. Knots lie densely enough that quintic Hermite interpolation through (y, v, a) is as accurate as the method.
+5. It never raises for a numerical failure: it returns what was computed with ``Solution.failure`` set, whose
+   message says when, why and what to try. ``KeyboardInterrupt`` likewise ends in a failure with cause INTERRUPTED.
+6. It counts its work honestly in `Work`; tests assert budgets on it.
+7. It calls ``observer(t, knots)`` after each accepted step, where ``knots()`` returns the `Solution` so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from erls.errors import SimulationError
+
+Array = NDArray[np.float64]
+
+
+class SecondOrderSystem(Protocol):
+    """Equations of motion M(y, t) a = f(t, y, v) in independent coordinates."""
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates n."""
+
+    @property
+    def length_scales(self) -> Array:
+        """(n,) largest displacement in metres of any point of the mechanism per unit of each coordinate."""
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times at which forces or prescribed accelerations jump, in rising order."""
+
+    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        """(n,) generalized forces M(y, t) a - f(t, y, v)."""
+
+    def mass_matrix(self, t: float, y: Array) -> Array:
+        """(n, n) symmetric positive definite."""
+
+    def acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """(n,) solution a of M a = f.
+
+        Raises
+        ------
+        SimulationError
+            With cause SINGULAR_MASS, naming the coordinate.
+        """
+
+    def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """(n, n) twice: the stiff parts of -∂f/∂y and -∂f/∂v (modal stiffness, springs, controller gains).
+
+        They enter the iteration matrix of implicit methods only; terms left out cost iterations, not accuracy.
+        """
+
+
+@dataclass
+class Work:
+    """What an integration cost."""
+
+    steps: int = 0
+    rejected_steps: int = 0
+    rhs_calls: int = 0  # evaluations of residual or acceleration
+    newton_iterations: int = 0
+    factorizations: int = 0
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of an integration.
+
+    Attributes
+    ----------
+    step : float or None
+        Step of a fixed-step method [s]; largest step of an adaptive one.
+    rtol, atol : float
+        Relative tolerance, and absolute tolerance in metres, of an adaptive method.
+    spectral_radius : float
+        ρ∞ of generalized-α: numerical damping at infinite frequency, 1 none, 0 full.
+    newton_tolerance : float
+        Newton iterations stop when the remaining error is estimated below this [m].
+    """
+
+    step: float | None = None
+    rtol: float = 1e-8
+    atol: float = 1e-10
+    spectral_radius: float = 0.8
+    newton_tolerance: float = 1e-11
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Knots of the motion: times (k,) in rising order (twice at a jump), y, v, a (k, n)."""
+
+    t: Array
+    y: Array
+    v: Array
+    a: Array
+    work: Work = field(default_factory=Work)
+    failure: SimulationError | None = None
+    warnings: tuple[str, ...] = ()
+
+
+Observer = Callable[[float, Callable[[], Solution]], None]
+Integrator = Callable[[SecondOrderSystem, tuple[float, float], Array, Array, Options, Observer | None], Solution]
+
+
+def breakpoints(system: SecondOrderSystem, times: tuple[float, float]) -> list[float]:
+    """Breakpoints strictly inside ``times``, and its end, in rising order; the legs of an integration."""
+    start, end = times
+    margin = 1e-12 * max(abs(start), abs(end), 1e-300)
+    inner = sorted({b for b in system.breakpoints if start + margin < b < end - margin})
+    return [*inner, end]
+
+
+def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, Array]:
+    """Quintic Hermite interpolation through knots of position, velocity and acceleration.
+
+    Parameters
+    ----------
+    t : (k,) array
+        Knots in rising order; a time that stands twice marks a jump of ``a``.
+    y, v, a : (k, n) arrays
+    at : (m,) array
+        Times within [t[0], t[-1]].
+
+    Returns
+    -------
+    y, v : (m, n) arrays
+        Interpolated positions and velocities (the derivative of the interpolant).
+    """
+    right = np.clip(np.searchsorted(t, at, side="right"), 1, len(t) - 1)
+    # a zero-length interval (a jump) is never asked for: step back over it at the end of the knots
+    right = np.where(t[right] == t[right - 1], right - 1, right).clip(1)
+    left = right - 1
+    h = (t[right] - t[left])[:, None]
+    h = np.where(h > 0, h, 1.0)
+    s = (at - t[left])[:, None] / h
+    y0, y1 = y[left], y[right]
+    v0, v1 = v[left] * h, v[right] * h
+    a0, a1 = a[left] * h**2, a[right] * h**2
+    # y0 + v0 s + a0 s²/2 + c3 s³ + c4 s⁴ + c5 s⁵ with the three conditions at s = 1
+    dy, dv, da = y1 - y0 - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
+    c3 = 10 * dy - 4 * dv + da / 2
+    c4 = -15 * dy + 7 * dv - da
+    c5 = 6 * dy - 3 * dv + da / 2
+    position = y0 + s * (v0 + s * (a0 / 2 + s * (c3 + s * (c4 + s * c5))))
+    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
+    return position, velocity

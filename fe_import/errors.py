@@ -1,0 +1,97 @@
+"""Failures that a user can act on: one enumeration of causes, one exception with place, value, limit, remedy."""
+
+from __future__ import annotations
+
+import enum
+from typing import Any
+
+
+class ReportedError(Exception):
+    """A failure that is reported to the user as one message, without a traceback.
+
+    Parameters
+    ----------
+    cause : enum.StrEnum
+        Member of the package's enumeration of causes.
+    message : str
+        What is wrong, in one sentence.
+    where : str
+        File and field (``links/l.toml: sections.leg.width``), or time and coordinate of a failed integration.
+    value, limit : object
+        The offending value and what it was held against.
+    remedy : str
+        What would be right, or what to try.
+    """
+
+    def __init__(
+        self,
+        cause: enum.StrEnum,
+        message: str,
+        *,
+        where: str = "",
+        value: Any = None,
+        limit: Any = None,
+        remedy: str = "",
+    ) -> None:
+        self.cause, self.message, self.where = cause, message, where
+        self.value, self.limit, self.remedy = value, limit, remedy
+        super().__init__(message)
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of the command line: 2 bad input, 3 numerical failure, 4 no convergence where asked for."""
+        return 2
+
+    def __str__(self) -> str:
+        parts = [f"{self.where}: {self.message}" if self.where else self.message]
+        if self.value is not None:
+            parts.append(f"got {self.value!r}" + ("" if self.limit is None else f", limit {self.limit}"))
+        elif self.limit is not None:
+            parts.append(f"limit {self.limit}")
+        if self.remedy:
+            parts.append(self.remedy)
+        return "; ".join(parts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The error object that ``--json`` prints."""
+        return {
+            "cause": str(self.cause),
+            "message": self.message,
+            "where": self.where,
+            "value": None if self.value is None else str(self.value),
+            "limit": None if self.limit is None else str(self.limit),
+            "remedy": self.remedy,
+        }
+
+
+class Cause(enum.StrEnum):
+    """Why a finite-element model could not be read or reduced. A test provokes each."""
+
+    FILE_NOT_FOUND = "file not found"
+    NOT_READABLE = "file not readable"
+    SYNTAX = "syntax error"
+    UNKNOWN_FIELD = "unknown field"
+    BAD_FIELD = "bad field"
+    BAD_REFERENCE = "reference to something that does not exist"
+    MESH = "faulty mesh"
+    UNSUPPORTED_ELEMENT = "unsupported element type"
+    INTERFACE = "faulty interface"
+    NOT_DEFINITE = "matrix not definite"
+    GROUNDED = "stiffness resists rigid-body motion"
+    DISCONNECTED = "parts not connected"
+    MODE_COUNT = "mode count out of range"
+    EIGENSOLVER = "eigensolver failed"
+    MODAL_FILE = "faulty modal file"
+    NOT_WRITABLE = "file not writable"
+
+
+_NUMERICAL = {Cause.EIGENSOLVER}
+
+
+class FEImportError(ReportedError):
+    """A faulty link description, mesh, matrix, reduction or modal file."""
+
+    @property
+    def exit_code(self) -> int:
+        """2 for bad input, 3 when a solver failed on valid input."""
+        return 3 if self.cause in _NUMERICAL else 2

@@ -1,0 +1,118 @@
+"""The finite-element model of one link, before reduction: data only.
+
+Degrees of freedom ("dofs") are numbered over *all* nodal components first (``mass`` and ``stiffness`` live there);
+``coupling`` maps the independent dofs to them where nodes follow an interface node (rigid coupling).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class InterfaceNode:
+    """A node where a joint sits: it carries three displacements and three rotations.
+
+    Attributes
+    ----------
+    name : str
+    node : int
+        Index of the node in ``FEModel.nodes``.
+    position : (3,) array
+        Position in the mesh frame [m].
+    coupled_nodes : (n,) int array
+        Nodes that the interface node moves or averages; only itself when it sits on a frame node.
+    weights : (n,) array
+        Weights of the coupled nodes, sum 1.
+    coupling : str
+        ``"node"`` (a frame node), ``"rigid"`` (RBE2) or ``"averaged"`` (RBE3).
+    """
+
+    name: str
+    node: int
+    position: Array
+    coupled_nodes: IntArray
+    weights: Array
+    coupling: str
+
+
+@dataclass(frozen=True)
+class FEModel:
+    """Mass and stiffness matrices of a free link with what is needed to interpret their rows.
+
+    Attributes
+    ----------
+    name : str
+    nodes : (n, 3) array
+        Undeformed positions in the mesh frame [m].
+    dof_map : (n, 6) int array
+        Row of each nodal component (ux, uy, uz, rx, ry, rz), -1 where the node lacks it. A node has all three
+        displacements, and all three rotations or none.
+    mass, stiffness : (d, d) sparse CSC
+        Over all nodal components [kg, kg m, kg m²; N/m, N, N m], symmetric.
+    interface_nodes : tuple of InterfaceNode
+    coupling : (d, f) sparse CSC or None
+        All nodal components = ``coupling`` @ independent dofs; None when all are independent.
+    independent : (f,) int array
+        Rows of the nodal components that are the independent dofs.
+    node_names : dict
+        Nodes that the user named.
+    lines : (m, 2) int array
+        Line segments for pictures (frames).
+    triangles : (m, 3) int array
+        Surface triangles for pictures (solids).
+    kind : str
+        ``"frame"``, ``"solid"`` or ``"matrices"``.
+    source : str
+        File that the model came from.
+    """
+
+    name: str
+    nodes: Array
+    dof_map: IntArray
+    mass: sp.csc_array
+    stiffness: sp.csc_array
+    interface_nodes: tuple[InterfaceNode, ...]
+    independent: IntArray
+    coupling: sp.csc_array | None = None
+    node_names: dict[str, int] = field(default_factory=dict)
+    lines: IntArray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+    triangles: IntArray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    kind: str = "frame"
+    source: str = ""
+
+    @property
+    def interface_dofs(self) -> IntArray:
+        """(6 n_interfaces,) rows of the interface displacements and rotations, among all nodal components."""
+        return np.concatenate([self.dof_map[i.node] for i in self.interface_nodes]).astype(np.int64)
+
+    def rigid_body_modes(self) -> Array:
+        """(d, 6) displacement fields of unit translations and of unit rotations about the mesh origin.
+
+        A rotation ω moves a node at x by ω × x and turns it by ω.
+        """
+        modes = np.zeros((self.mass.shape[0], 6))
+        x, y, z = self.nodes.T
+        zero = np.zeros_like(x)
+        for axis in range(3):
+            modes[self.dof_map[:, axis], axis] = 1.0
+            turning = self.dof_map[:, 3 + axis]
+            modes[turning[turning >= 0], 3 + axis] = 1.0
+        for component, fields in enumerate(((zero, z, -y), (-z, zero, x), (y, -x, zero))):
+            for axis in range(3):
+                modes[self.dof_map[:, component], 3 + axis] = fields[axis]
+        return modes
+
+    def reduced_matrices(self) -> tuple[sp.csc_array, sp.csc_array]:
+        """Mass and stiffness over the independent dofs, the coupling eliminated."""
+        if self.coupling is None:
+            return self.mass, self.stiffness
+        c = self.coupling
+        return (c.T @ self.mass @ c).tocsc(), (c.T @ self.stiffness @ c).tocsc()
