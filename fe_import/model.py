@@ -68,6 +68,8 @@ class FEModel:
         Line segments for pictures (frames).
     triangles : (m, 3) int array
         Surface triangles for pictures (solids).
+    stiffness_parts : dict of sparse CSC
+        The stiffness split by kind of strain energy (frames), to name the modes; may be empty.
     kind : str
         ``"frame"``, ``"solid"`` or ``"matrices"``.
     source : str
@@ -85,6 +87,7 @@ class FEModel:
     node_names: dict[str, int] = field(default_factory=dict)
     lines: IntArray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     triangles: IntArray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    stiffness_parts: dict[str, sp.csc_array] = field(default_factory=dict)
     kind: str = "frame"
     source: str = ""
 

@@ -1,0 +1,301 @@
+"""Link descriptions (TOML): the schema, its defaults, and reading it.
+
+Every record below is one table of the file; unknown keys are errors with a suggestion.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from fe_import.errors import Cause, FEImportError
+from fe_import.sections import Section
+from fe_import.toml_file import convert, read_toml
+
+Vector = tuple[float, float, float]
+Inertia = tuple[float | Vector, float | Vector, float | Vector]  # [Ixx, Iyy, Izz] or a 3x3 matrix
+
+
+class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    pass
+
+
+class Units(_Record):
+    """Units of the description and its mesh; converted to SI at the border."""
+
+    length: str = "m"
+    mass: str = "kg"
+    time: str = "s"
+
+
+class Material(_Record):
+    """Isotropic linear elastic material: E [Pa], ν, ρ [kg/m³] (in the stated units)."""
+
+    youngs_modulus: float
+    poissons_ratio: float
+    density: float
+
+
+class Member(_Record):
+    """A straight member between two named nodes, divided into ``elements`` equal elements.
+
+    ``local_z`` is the direction of the section's height; the default is z, or y for members along z. Inner nodes
+    are named ``FROM-TO/1`` ... in order.
+    """
+
+    start: str = msgspec.field(name="from")
+    end: str = msgspec.field(name="to")
+    material: str = ""
+    section: str = ""
+    elements: int = 1
+    local_z: Vector | None = None
+
+
+class Frame(_Record):
+    """A link made of beams.
+
+    ``theory``: ``timoshenko`` or ``euler-bernoulli``; ``mass``: ``consistent`` or ``lumped``; ``rotary_inertia``:
+    cross sections resist turning; ``torsion``: ``saint-venant`` or ``polar``.
+    """
+
+    nodes: dict[str, Vector]
+    members: list[Member]
+    theory: str = "timoshenko"
+    mass: str = "consistent"
+    rotary_inertia: bool = True
+    torsion: str = "saint-venant"
+
+
+class Region(_Record):
+    """The elements of a named set of the mesh, and their material."""
+
+    set: str
+    material: str
+
+
+class Solid(_Record):
+    """A link meshed with solid elements; ``mesh`` is any file that meshio reads.
+
+    ``material`` holds for the whole mesh, or ``regions`` give one per element set. ``nodes`` names positions
+    (nearest mesh node) that scenes may refer to.
+    """
+
+    mesh: str
+    material: str = ""
+    regions: list[Region] = []
+    nodes: dict[str, Vector] = {}
+
+
+class PointMass(_Record):
+    """Mass and inertia ([Ixx, Iyy, Izz] or a 3x3 matrix about the node) added to a node or interface."""
+
+    node: str
+    mass: float = 0.0
+    inertia: Inertia = (0.0, 0.0, 0.0)
+
+
+class Interface(_Record):
+    """A node where a joint sits: on a frame ``node``, or on a ``face`` (node or face set) of a solid.
+
+    ``coupling``: how the face follows the interface node (``rigid``). ``position`` defaults to the centre of the
+    face's nodes.
+    """
+
+    name: str
+    node: str = ""
+    face: str = ""
+    coupling: str = "rigid"
+    position: Vector | None = None
+
+
+class Reduction(_Record):
+    """How the model is reduced.
+
+    Attributes
+    ----------
+    method : str
+        ``craig-bampton``, or ``none`` (all nodal dofs kept: ERLS-FEM).
+    fixed_interface_modes : int, optional
+        Modes with clamped interfaces in the Craig-Bampton basis; 12, or all there are if fewer, unless given.
+    elastic_modes : int, optional
+        Elastic modes kept after orthonormalization; all unless given.
+    truncation : str
+        Which modes are kept when there are more: the lowest ``free-free`` ones, or the span of the lowest with the
+        inboard interface ``clamped`` (converges faster once a joint holds that interface).
+    inboard : str
+        The interface that ``truncation = "clamped"`` clamps; the first unless given.
+    form : str
+        ``orthonormal``, or ``physical`` (interface displacements kept as coordinates; for other programs).
+    """
+
+    method: str = "craig-bampton"
+    fixed_interface_modes: int | None = None
+    elastic_modes: int | None = None
+    truncation: str = "free-free"
+    inboard: str = ""
+    form: str = "orthonormal"
+
+
+class Rayleigh(_Record):
+    """Damping matrix ``alpha`` M + ``beta`` K, in 1/s and s."""
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+
+class Damping(_Record):
+    """Modal damping: one ``ratio`` for all elastic modes, ``ratios`` from the lowest on, or ``rayleigh``."""
+
+    ratio: float | None = None
+    ratios: list[float] | None = None
+    rayleigh: Rayleigh | None = None
+
+
+class LinkDescription(_Record):
+    """A link: exactly one of ``frame`` and ``solid``, its interfaces and its reduction."""
+
+    interfaces: list[Interface]
+    name: str = ""
+    units: Units = Units()
+    materials: dict[str, Material] = {}
+    sections: dict[str, Section] = {}
+    frame: Frame | None = None
+    solid: Solid | None = None
+    masses: list[PointMass] = []
+    reduction: Reduction = Reduction()
+    damping: Damping = Damping()
+
+
+@dataclass(frozen=True)
+class LinkFile:
+    """A link description with the file that it came from; relative paths start at ``folder``."""
+
+    path: Path
+    description: LinkDescription
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the file."""
+        return self.path.parent
+
+    def content_hash(self) -> str:
+        """SHA-256 of everything that the reduction depends on: the description and the files it names."""
+        digest = hashlib.sha256(msgspec.json.encode(self.description, order="deterministic"))
+        if self.description.solid is not None:
+            try:
+                digest.update((self.folder / self.description.solid.mesh).read_bytes())
+            except OSError:
+                pass  # reported with its name when the mesh is read
+        return digest.hexdigest()
+
+
+def load_link(path: Path | str, overrides: dict[str, Any] | None = None) -> LinkFile:
+    """Read and check a link description.
+
+    Parameters
+    ----------
+    path : Path or str
+    overrides : dict, optional
+        Fields of the ``reduction`` table that replace those of the file (``method``, ``elastic_modes`` ...).
+
+    Raises
+    ------
+    FEImportError
+        Naming file, field, value and remedy.
+    """
+    path = Path(path)
+    data = read_toml(path)
+    if overrides:
+        table = data.setdefault("reduction", {})
+        if isinstance(table, dict):
+            table.update(overrides)
+    description = convert(data, LinkDescription, str(path))
+    if not description.name:
+        description = msgspec.structs.replace(description, name=path.name.removesuffix(".toml"))
+    _check(description, str(path))
+    return LinkFile(path, description)
+
+
+def _fail(where: str, message: str, value: Any = None, remedy: str = "", limit: Any = None) -> FEImportError:
+    return FEImportError(Cause.BAD_FIELD, message, where=where, value=value, limit=limit, remedy=remedy)
+
+
+_CHOICES = {
+    "frame.theory": ("timoshenko", "euler-bernoulli"),
+    "frame.mass": ("consistent", "lumped"),
+    "frame.torsion": ("saint-venant", "polar"),
+    "reduction.truncation": ("free-free", "clamped"),
+    "reduction.form": ("orthonormal", "physical"),
+}
+
+
+def _check(link: LinkDescription, file: str) -> None:
+    """The conditions that the types cannot state."""
+    if (link.frame is None) == (link.solid is None):
+        raise _fail(file, "give exactly one of the tables 'frame' and 'solid'", remedy="a link has one model")
+    for field, options in _CHOICES.items():
+        table, name = field.split(".")
+        record = getattr(link, table)
+        if record is not None and getattr(record, name) not in options:
+            raise _fail(
+                f"{file}: {field}", "unknown choice", getattr(record, name), remedy="one of " + ", ".join(options)
+            )
+    for name, m in link.materials.items():
+        place = f"{file}: materials.{name}"
+        for field in ("youngs_modulus", "density"):
+            value = getattr(m, field)
+            if not (math.isfinite(value) and value > 0):
+                raise _fail(f"{place}.{field}", f"{field} must be positive", value, "give a value above 0")
+        if not -1 < m.poissons_ratio < 0.5:
+            raise _fail(
+                f"{place}.poissons_ratio", "Poisson's ratio out of range", m.poissons_ratio, "between -1 and 0.5"
+            )
+    if not link.interfaces:
+        raise _fail(f"{file}: interfaces", "a link needs at least one interface", remedy="add [[interfaces]]")
+    seen: set[str] = set()
+    for k, i in enumerate(link.interfaces):
+        if i.name in seen or not i.name:
+            raise _fail(f"{file}: interfaces[{k}].name", "interface names must differ", i.name, "rename one")
+        seen.add(i.name)
+    r = link.reduction
+    for field in ("fixed_interface_modes", "elastic_modes"):
+        value = getattr(r, field)
+        if value is not None and value < 0:
+            raise _fail(f"{file}: reduction.{field}", "a mode count cannot be negative", value, "give 0 or more")
+    if r.inboard and r.inboard not in seen:
+        raise FEImportError(
+            Cause.BAD_REFERENCE,
+            "no such interface",
+            where=f"{file}: reduction.inboard",
+            value=r.inboard,
+            remedy="interfaces: " + ", ".join(sorted(seen)),
+        )
+    for k, p in enumerate(link.masses):
+        if not (math.isfinite(p.mass) and p.mass >= 0):
+            raise _fail(f"{file}: masses[{k}].mass", "a mass cannot be negative", p.mass, "give 0 or more")
+    _check_damping(link.damping, file)
+
+
+def _check_damping(d: Damping, file: str) -> None:
+    given = [n for n in ("ratio", "ratios", "rayleigh") if getattr(d, n) is not None]
+    if len(given) > 1:
+        raise _fail(f"{file}: damping", "more than one kind of damping", " and ".join(given), "keep one")
+    for field, value in _damping_numbers(d):
+        if not (math.isfinite(value) and value >= 0):
+            raise _fail(f"{file}: damping.{field}", "damping cannot be negative", value, "give 0 or more")
+
+
+def _damping_numbers(d: Damping) -> Iterator[tuple[str, float]]:
+    if d.ratio is not None:
+        yield "ratio", d.ratio
+    for k, value in enumerate(d.ratios or []):
+        yield f"ratios[{k}]", value
+    if d.rayleigh is not None:
+        yield "rayleigh.alpha", d.rayleigh.alpha
+        yield "rayleigh.beta", d.rayleigh.beta

@@ -1,0 +1,213 @@
+"""The one door of the package: a link description in, a modal model (and file) out."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from fe_import.build import build_model
+from fe_import.errors import Cause, FEImportError
+from fe_import.health import check_model, check_reduction
+from fe_import.inertia import inertia_invariants, mass_properties
+from fe_import.link import LinkFile, load_link
+from fe_import.modal_file import SCHEMA_VERSION, ModalModel, read_modal_file, write_modal_file
+from fe_import.model import Array, FEModel, IntArray
+from fe_import.modes import damping_ratios, mode_kinds, orthonormal_modes, reduced_matrices
+from fe_import.reduction import REDUCTIONS, Basis
+from fe_import.toml_file import choose
+
+
+def reduce_link(link: LinkFile | Path | str) -> ModalModel:
+    """Reduce the finite-element model of a link.
+
+    Parameters
+    ----------
+    link : LinkFile, Path or str
+        A link description, or its file.
+
+    Returns
+    -------
+    ModalModel
+
+    Raises
+    ------
+    FEImportError
+        A faulty description, mesh or model.
+
+    Examples
+    --------
+    >>> from fe_import import reduce_link
+    >>> modal = reduce_link("data/l_shape/links/steel_tall.toml")
+    >>> modal.elastic_modes
+    18
+    >>> round(modal.mass_properties.mass, 6)
+    2.34
+    """
+    if not isinstance(link, LinkFile):
+        link = load_link(link)
+    return reduce_model(build_model(link), link)
+
+
+def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
+    """Reduce a model as the description of its link says. See `reduce_link`."""
+    where, options = str(link.path), link.description.reduction
+    choose(options.method, REDUCTIONS, f"{where}: reduction.method")
+    checks = check_model(model, where)
+    basis = REDUCTIONS[options.method](model, options, where)
+    mass, stiffness = reduced_matrices(model, basis)
+    modes = orthonormal_modes(mass, stiffness, basis, options, _inboard_columns(model, basis, link), where)
+    shapes = basis.vectors @ modes.coordinates
+    invariants = inertia_invariants(model.mass, shapes, model.dof_map, modes.rigid)
+    reduced_stiffness = modes.coordinates.T @ stiffness @ modes.coordinates
+    checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants)
+    kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
+    if options.form == "physical":
+        shapes, reduced_stiffness = basis.vectors, stiffness
+        invariants = inertia_invariants(model.mass, shapes, model.dof_map, basis.rigid)
+        omega, kinds = _physical_table(basis)
+        damping = np.zeros(len(omega))
+    else:
+        omega = modes.omega
+        reduced_stiffness = np.diag(omega**2)
+        damping = damping_ratios(link.description.damping, omega, where)
+    rigid = model.rigid_body_modes()
+    turning = np.flatnonzero(model.dof_map[:, 3] >= 0)
+    return ModalModel(
+        name=model.name,
+        form=options.form,
+        nodes=model.nodes,
+        node_names=model.node_names,
+        translation_shapes=_nodal(shapes, model.dof_map[:, :3]),
+        rotation_nodes=turning,
+        rotation_shapes=_nodal(shapes, model.dof_map[turning, 3:]),
+        interface_nodes=model.interface_nodes,
+        stiffness=reduced_stiffness,
+        invariants=invariants,
+        frequencies_hz=omega / (2 * np.pi),
+        kinds=kinds,
+        damping_ratios=damping,
+        full_mass_properties=mass_properties(rigid.T @ (model.mass @ rigid)),
+        fixed_interface=basis.fixed_interface,
+        health=checks,
+        lines=model.lines,
+        triangles=model.triangles,
+        provenance=provenance(link, model),
+    )
+
+
+def _nodal(shapes: Array, rows: IntArray) -> Array:
+    """(nodes, 3, m) from rows of the shapes."""
+    return np.ascontiguousarray(shapes[rows.ravel()].reshape(len(rows), 3, shapes.shape[1]))
+
+
+def _inboard_columns(model: FEModel, basis: Basis, link: LinkFile) -> Array | None:
+    options = link.description.reduction
+    if options.truncation != "clamped":
+        return None
+    if basis.interface_columns == 0:
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            "truncation = 'clamped' needs a method that keeps the interface displacements",
+            where=f"{link.path}: reduction.truncation",
+            value=options.method,
+            remedy="use method = 'craig-bampton'",
+        )
+    names = [i.name for i in model.interface_nodes]
+    first = names.index(options.inboard) if options.inboard else 0
+    return 6 * first + np.arange(6)
+
+
+def _physical_table(basis: Basis) -> tuple[Array, tuple[str, ...]]:
+    """Frequencies [rad/s] and kinds of the columns of the basis."""
+    fixed = 2 * np.pi * basis.fixed_interface.frequencies_hz
+    count = basis.vectors.shape[1] - len(fixed)
+    kind = "interface displacement" if basis.interface_columns else "nodal displacement"
+    return np.concatenate([np.zeros(count), fixed]), (kind,) * count + ("fixed-interface",) * len(fixed)
+
+
+def provenance(link: LinkFile, model: FEModel) -> dict[str, str]:
+    """Where a modal file came from: source, content hash, versions, method, options."""
+    packages = ("erls", "numpy", "scipy", "scikit-fem", "meshio")
+    options = msgspec.to_builtins(link.description.reduction)
+    return {
+        "source": link.path.name,
+        "sha256": link.content_hash(),
+        "dofs": str(len(model.independent)),
+        "interface_dofs": str(len(model.interface_dofs)),
+        "kind": model.kind,
+        "method": options["method"],
+        "options": json.dumps(options, sort_keys=True),
+        "versions": ", ".join(f"{p} {_version(p)}" for p in packages),
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def cache_key(link: LinkFile) -> str:
+    """Key of a reduction: content of the description and its files, package version and file schema."""
+    text = f"{SCHEMA_VERSION} {_version('erls')} {link.content_hash()} {_sources_hash()}"
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _sources_hash() -> str:
+    """Hash of this package's own code, so that a changed reduction never meets an old cache."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def reduce_cached(link: LinkFile, folder: Path) -> tuple[ModalModel, bool]:
+    """Reduce, or read the earlier reduction of the same content from a cache folder.
+
+    Returns
+    -------
+    model : ModalModel
+    cached : bool
+        Whether it came from the cache. An unreadable cache entry is made anew.
+    """
+    path = folder / f"{cache_key(link)}.modal.h5"
+    if path.exists():
+        try:
+            return read_modal_file(path), True
+        except FEImportError:
+            path.unlink(missing_ok=True)
+    model = reduce_link(link)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_modal_file(path, model)
+    except (OSError, FEImportError):
+        pass  # a cache that cannot be written costs time, not the result
+    return model, False
+
+
+def reduction_summary(model: ModalModel) -> dict[str, Any]:
+    """The JSON of ``erls reduce`` without what only the command knows."""
+    properties = model.mass_properties
+    return {
+        "link": model.name,
+        "method": model.provenance.get("method", ""),
+        "form": model.form,
+        "dofs": int(model.provenance.get("dofs", 0)),
+        "interface_dofs": int(model.provenance.get("interface_dofs", 0)),
+        "elastic_modes": model.elastic_modes if model.form == "orthonormal" else None,
+        "frequencies_hz": model.frequencies_hz[6:].tolist() if model.form == "orthonormal" else [],
+        "mass": properties.mass,
+        "centre_of_mass": properties.centre_of_mass.tolist(),
+        "inertia": properties.inertia.tolist(),
+        "health": {
+            "ok": all(c.ok for c in model.health),
+            "checks": [{"name": c.name, "value": c.value, "limit": c.limit, "ok": c.ok} for c in model.health],
+        },
+    }

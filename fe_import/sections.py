@@ -1,0 +1,183 @@
+"""Cross sections of frame links: schema records and the constants that the element needs.
+
+Local axes: x along the member, width along y, height along z. I_y = ∫ z² dA bends in the x-z plane.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import msgspec
+
+from fe_import.errors import Cause, FEImportError
+
+
+@dataclass(frozen=True)
+class SectionConstants:
+    """Area [m²], second moments [m⁴], torsion constant [m⁴], shear factors (effective / full area)."""
+
+    area: float
+    inertia_y: float
+    inertia_z: float
+    torsion_constant: float
+    shear_factor_y: float
+    shear_factor_z: float
+
+
+class Rectangular(msgspec.Struct, tag="rectangular", tag_field="shape", forbid_unknown_fields=True, frozen=True):
+    """Solid rectangle.
+
+    Attributes
+    ----------
+    width, height : float
+        Along local y and along local z.
+    shear_factor : float
+        5/6 unless given.
+    torsion_constant : float, optional
+        Instead of Saint-Venant's.
+    """
+
+    width: float
+    height: float
+    shear_factor: float = 5 / 6
+    torsion_constant: float | None = None
+
+
+class Circular(msgspec.Struct, tag="circular", tag_field="shape", forbid_unknown_fields=True, frozen=True):
+    """Solid circle; shear factor after Cowper (1966) unless given."""
+
+    diameter: float
+    shear_factor: float | None = None
+    torsion_constant: float | None = None
+
+
+class Tubular(msgspec.Struct, tag="tubular", tag_field="shape", forbid_unknown_fields=True, frozen=True):
+    """Circular tube; shear factor after Cowper (1966) unless given."""
+
+    outer_diameter: float
+    thickness: float
+    shear_factor: float | None = None
+    torsion_constant: float | None = None
+
+
+class RectangularTube(
+    msgspec.Struct, tag="rectangular-tube", tag_field="shape", forbid_unknown_fields=True, frozen=True
+):
+    """Thin-walled rectangular tube (Bredt's torsion constant; shear carried by the walls along the force)."""
+
+    width: float
+    height: float
+    thickness: float
+    shear_factor_y: float | None = None
+    shear_factor_z: float | None = None
+    torsion_constant: float | None = None
+
+
+class Constants(msgspec.Struct, tag="constants", tag_field="shape", forbid_unknown_fields=True, frozen=True):
+    """Given constants of any section."""
+
+    area: float
+    inertia_y: float
+    inertia_z: float
+    torsion_constant: float
+    shear_factor_y: float = 5 / 6
+    shear_factor_z: float = 5 / 6
+
+
+Section = Rectangular | Circular | Tubular | RectangularTube | Constants
+
+
+def rectangle_torsion_constant(width: float, height: float) -> float:
+    """Saint-Venant torsion constant of a rectangle [m⁴] (Timoshenko & Goodier, Theory of Elasticity, art. 109)."""
+    long, short = max(width, height), min(width, height)
+    series = sum(math.tanh(n * math.pi * long / (2 * short)) / n**5 for n in range(1, 60, 2))
+    return long * short**3 * (1 / 3 - 64 / math.pi**5 * (short / long) * series)
+
+
+def _cowper_tube(ratio: float, nu: float) -> float:
+    """Shear factor of a hollow circle with inner/outer radius ``ratio`` (Cowper 1966)."""
+    s = (1 + ratio**2) ** 2
+    return 6 * (1 + nu) * s / ((7 + 6 * nu) * s + (20 + 12 * nu) * ratio**2)
+
+
+def _constants(section: Section, poissons_ratio: float) -> SectionConstants:
+    match section:
+        case Rectangular(width=b, height=h):
+            k = section.shear_factor
+            return SectionConstants(b * h, b * h**3 / 12, b**3 * h / 12, rectangle_torsion_constant(b, h), k, k)
+        case Circular(diameter=d):
+            k = section.shear_factor or _cowper_tube(0.0, poissons_ratio)
+            i = math.pi * d**4 / 64
+            return SectionConstants(math.pi * d**2 / 4, i, i, 2 * i, k, k)
+        case Tubular(outer_diameter=d, thickness=t):
+            inner = d - 2 * t
+            k = section.shear_factor or _cowper_tube(inner / d, poissons_ratio)
+            i = math.pi * (d**4 - inner**4) / 64
+            return SectionConstants(math.pi * (d**2 - inner**2) / 4, i, i, 2 * i, k, k)
+        case RectangularTube(width=b, height=h, thickness=t):
+            bi, hi = b - 2 * t, h - 2 * t
+            area = b * h - bi * hi
+            bm, hm = b - t, h - t
+            return SectionConstants(
+                area,
+                (b * h**3 - bi * hi**3) / 12,
+                (b**3 * h - bi**3 * hi) / 12,
+                2 * t * (bm * hm) ** 2 / (bm + hm),
+                section.shear_factor_y or 2 * t * bm / area,
+                section.shear_factor_z or 2 * t * hm / area,
+            )
+        case Constants():
+            return SectionConstants(
+                section.area,
+                section.inertia_y,
+                section.inertia_z,
+                section.torsion_constant,
+                section.shear_factor_y,
+                section.shear_factor_z,
+            )
+
+
+def section_constants(section: Section, poissons_ratio: float, torsion: str, where: str) -> SectionConstants:
+    """Constants of a section, checked.
+
+    Parameters
+    ----------
+    section : Section
+    poissons_ratio : float
+        Enters the shear factor of round sections.
+    torsion : str
+        ``"saint-venant"`` or ``"polar"`` (I_y + I_z, as some programs take it).
+    where : str
+        File and field, for messages.
+
+    Raises
+    ------
+    FEImportError
+        A dimension that is not positive and finite, or a wall thicker than the section.
+    """
+    for name in section.__struct_fields__:
+        value = getattr(section, name)
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise FEImportError(
+                Cause.BAD_FIELD,
+                f"{name} must be positive",
+                where=f"{where}.{name}",
+                value=value,
+                remedy="give a length, area or factor above 0",
+            )
+    if isinstance(section, (Tubular, RectangularTube)):
+        outer = section.outer_diameter if isinstance(section, Tubular) else min(section.width, section.height)
+        if 2 * section.thickness > outer:
+            raise FEImportError(
+                Cause.BAD_FIELD,
+                "the wall is thicker than half the section",
+                where=f"{where}.thickness",
+                value=section.thickness,
+                limit=outer / 2,
+                remedy="give a wall below half the outer size",
+            )
+    c = _constants(section, poissons_ratio)
+    given = section.torsion_constant
+    j = given if given is not None else c.inertia_y + c.inertia_z if torsion == "polar" else c.torsion_constant
+    return SectionConstants(c.area, c.inertia_y, c.inertia_z, j, c.shear_factor_y, c.shear_factor_z)
