@@ -1,0 +1,344 @@
+"""From a scene to its mechanism: links reduced or read, placed on Denavit-Hartenberg frames, loaded with payloads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+
+from erls.errors import Cause, SceneError
+from erls.lie.se3 import inverse, pose
+from erls.lie.so3 import Array, fixed_axes
+from erls.mechanism.chain import Mechanism, Point
+from erls.mechanism.dh import DHRow, split
+from erls.mechanism.drives import build_drive
+from erls.mechanism.joints import JOINT_TYPES, Joint, JointForces
+from erls.mechanism.links import Link, payload_invariants, rigid_model, truncated
+from erls.mechanism.place import Place
+from erls.scene import Joint as JointRecord
+from erls.scene import Link as LinkRecord
+from erls.scene import Scene
+from fe_import.build import inertia_matrix
+from fe_import.errors import FEImportError, ReportedError
+from fe_import.link import load_link
+from fe_import.modal_file import ModalModel, read_modal_file
+from fe_import.model import InterfaceNode
+from fe_import.modes import damping_ratios
+from fe_import.reduce import reduce_cached
+from fe_import.toml_file import choose
+
+Message = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Built:
+    """A mechanism, and what the user should know about how it came about."""
+
+    mechanism: Mechanism
+    warnings: tuple[str, ...]
+
+
+def cache_folder() -> Path:
+    """Folder of reductions made on the fly: ``ERLS_CACHE``, or the user's cache folder."""
+    import os
+
+    given = os.environ.get("ERLS_CACHE")
+    return Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
+
+
+def build_mechanism(scene: Scene, tell: Message = lambda text: None) -> Built:
+    """Read or reduce the links and put the mechanism together.
+
+    Parameters
+    ----------
+    scene : Scene
+    tell : callable
+        Told about each step that takes time.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Naming file, field, value and remedy.
+    """
+    record, file = scene.record, str(scene.path)
+    warnings: list[str] = []
+    models = [_modal_model(scene, k, item, tell) for k, item in enumerate(record.links)]
+    rotation = fixed_axes(*_finite(np.radians(record.base.rotation_deg), f"{file}: base.rotation_deg"))
+    ground = pose(rotation, _finite(record.base.position, f"{file}: base.position"))
+    joints: list[Joint] = []
+    links: list[Link] = []
+    before = ground
+    for k, (joint_record, link_record, model) in enumerate(zip(record.joints, record.links, models, strict=True)):
+        place = f"{file}: joints[{k}]"
+        choose(joint_record.type, JOINT_TYPES, f"{place}.type", SceneError)
+        first, second = split(_dh_row(joint_record, place))
+        mesh = link_record.mesh_pose
+        mesh_pose = pose(
+            fixed_axes(*_finite(np.radians(mesh.rotation_deg), f"{file}: links[{k}].mesh_pose.rotation_deg")),
+            _finite(mesh.position, f"{file}: links[{k}].mesh_pose.position"),
+        )
+        after = second @ mesh_pose if mesh.frame == "dh" else mesh_pose
+        joints.append(_joint(joint_record, before @ first, after, Place(scene.folder, place)))
+        links.append(_link(link_record, model, k, len(models), file))
+        before = inverse(mesh_pose) if mesh.frame == "dh" else inverse(mesh_pose) @ second
+        warnings += _arm_warnings(joints[-1], links[-1])
+    points = [_point(scene, k, links) for k in range(len(record.points))]
+    links = _with_payloads(scene, links, points)
+    return Built(
+        Mechanism(
+            name=scene.name,
+            joints=tuple(joints),
+            links=tuple(links),
+            points=tuple(points),
+            gravity=_finite(record.gravity, f"{file}: gravity"),
+            static_start=record.initial.deformation == "static",
+        ),
+        tuple(warnings),
+    )
+
+
+def _finite(value: object, where: str) -> Array:
+    array = np.asarray(value, dtype=float)
+    if not (np.isfinite(array).all() and np.abs(array).max(initial=0.0) < 1e30):
+        raise SceneError(Cause.BAD_FIELD, "numbers must be finite", where=where, value=value, remedy="give numbers")
+    return array
+
+
+def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> ModalModel:
+    """The link's modal model in the modes that the scene asks for."""
+    place = f"{scene.path}: links[{k}]"
+    if link.rigid is not None:
+        rigid = link.rigid
+        for name in ("mass",):
+            if not (math.isfinite(rigid.mass) and rigid.mass >= 0):
+                raise SceneError(
+                    Cause.BAD_FIELD, "a mass cannot be negative", where=f"{place}.rigid.{name}", value=rigid.mass,
+                    remedy="give 0 or more",
+                )  # fmt: skip
+        if not rigid.points:
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "a rigid link needs named points",
+                where=f"{place}.rigid.points",
+                remedy="give the inboard one at least, points = { root = [0, 0, 0] }",
+            )
+        return rigid_model(
+            link.name,
+            rigid.mass,
+            _finite(rigid.centre_of_mass, f"{place}.rigid.centre_of_mass"),
+            inertia_matrix(rigid.inertia, f"{place}.rigid.inertia", SceneError),
+            {n: _finite(p, f"{place}.rigid.points.{n}") for n, p in rigid.points.items()},
+        )
+    if link.modal_file:
+        path = scene.folder / link.modal_file
+        model = _within(f"{place}.modal_file", lambda: read_modal_file(path))
+        if model.form != "orthonormal":
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "this modal file is in physical form; ERLS needs rigid-body and elastic modes apart",
+                where=f"{place}.modal_file",
+                value=link.modal_file,
+                remedy="reduce with form = 'orthonormal'",
+            )
+    else:
+        path = scene.folder / link.model
+        description = _within(f"{place}.model", lambda: load_link(path, {"form": "orthonormal"}))
+        model, cached = reduce_cached(description, cache_folder())
+        tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({path.name})")
+    wanted = 0 if not link.flexible else link.elastic_modes
+    if wanted is None:
+        return model
+    if not 0 <= wanted <= model.elastic_modes:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "the modal model has fewer elastic modes",
+            where=f"{place}.elastic_modes",
+            value=wanted,
+            limit=model.elastic_modes,
+            remedy="ask for fewer, or reduce with more",
+        )
+    return truncated(model, wanted)
+
+
+def _within(place: str, read: Callable[[], ModalModel]) -> ModalModel:
+    """Say which field of the scene named a file that does not exist."""
+    try:
+        return read()
+    except FEImportError as problem:
+        if problem.cause == Cause.FILE_NOT_FOUND:
+            problem.remedy = f"named by {place}; " + problem.remedy
+        raise
+
+
+def _dh_row(joint: JointRecord, place: str) -> DHRow:
+    at = Place(Path(), f"{place}.dh")
+    dh = joint.dh
+    return DHRow(
+        dh.convention,
+        at.number("a", dh.a),
+        _angle(at, "alpha", dh.alpha, dh.alpha_deg),
+        at.number("d", dh.d),
+        _angle(at, "theta", dh.theta, dh.theta_deg),
+    )
+
+
+def _angle(place: Place, name: str, plain: float | None, degrees: float | None) -> float:
+    """A quantity in SI or in degrees; 0 unless given."""
+    if plain is not None and degrees is not None:
+        raise place.error(name, f"both {name} and {name}_deg", remedy="keep one")
+    if degrees is not None:
+        if not place.revolute:
+            raise place.error(f"{name}_deg", "degrees at a prismatic joint", degrees, remedy=f"give {name} in metres")
+        return math.radians(place.number(f"{name}_deg", degrees))
+    return place.number(name, plain or 0.0)
+
+
+def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joint:
+    kind = JOINT_TYPES[joint.type]
+    place = replace(place, revolute=kind.revolute)
+    drive = build_drive(joint.drive, place.folder, place.field("drive"), kind.revolute)
+    start = place.at("initial")
+    position = _angle(start, "position", joint.initial.position, joint.initial.position_deg)
+    rate = _angle(start, "rate", joint.initial.rate, joint.initial.rate_deg)
+    if drive.prescribed:
+        if any(getattr(joint.initial, f) is not None for f in joint.initial.__struct_fields__):
+            raise place.error(
+                "initial", "a prescribed motion fixes its own start", remedy="remove 'initial', or change the motion"
+            )
+        position, rate, _ = drive.reference(0.0)  # type: ignore[misc]
+    friction = joint.friction
+    forces = JointForces(
+        stiffness=place.not_negative("stiffness", joint.stiffness),
+        rest=_angle(place, "rest", joint.rest, joint.rest_deg),
+        damping=place.not_negative("damping", joint.damping),
+        friction=place.at("friction").not_negative("force", friction.force) if friction else 0.0,
+        transition_rate=place.at("friction").positive("transition_rate", friction.transition_rate) if friction else 1.0,
+    )
+    motor = place.at("motor")
+    rotor = motor.not_negative("rotor_inertia", joint.motor.rotor_inertia)
+    ratio = motor.number("gear_ratio", joint.motor.gear_ratio)
+    return Joint(joint.name, kind, before, after, forces, rotor * ratio**2, drive, position, rate)
+
+
+def _link(link: LinkRecord, model: ModalModel, k: int, count: int, file: str) -> Link:
+    place = f"{file}: links[{k}]"
+    names = [i.name for i in model.interface_nodes]
+    inboard = _interface(model, link.inboard or names[0], f"{place}.inboard")
+    others = [n for n in names if n != inboard.name]
+    outboard: InterfaceNode | None = None
+    if k < count - 1 or link.outboard:
+        if not link.outboard and not others:
+            raise SceneError(
+                Cause.BAD_REFERENCE,
+                "this link has no second interface for the next joint",
+                where=f"{place}.outboard",
+                value=link.name,
+                remedy="add an interface to the link description",
+            )
+        outboard = _interface(model, link.outboard or others[0], f"{place}.outboard")
+    omega = 2 * np.pi * model.frequencies_hz
+    ratios = model.damping_ratios
+    if link.damping is not None:
+        ratios = damping_ratios(link.damping, omega, place)
+    return Link(
+        name=link.name,
+        model=model,
+        invariants=model.invariants,
+        inboard=inboard,
+        outboard=outboard,
+        stiffness=np.diag(model.stiffness)[6:].copy(),
+        damping=(2 * ratios * omega)[6:],
+    )
+
+
+def _interface(model: ModalModel, name: str, where: str) -> InterfaceNode:
+    choose(name, [i.name for i in model.interface_nodes], where, SceneError)
+    found = model.interface(name)
+    if found is None:
+        raise ReportedError(Cause.BAD_REFERENCE, "no such interface", where=where, value=name)
+    return found
+
+
+def _arm_warnings(joint: Joint, link: Link) -> list[str]:
+    """A joint axis that misses its interface is bridged by a rigid arm; often a wrong mesh pose."""
+    frame = inverse(joint.after)
+    arm = link.inboard.position - frame[:3, 3]
+    off_axis = arm - (arm @ frame[:3, 2]) * frame[:3, 2]
+    size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
+    if np.linalg.norm(off_axis) <= 1e-6 * max(size, 1e-9):
+        return []
+    return [
+        f"link {link.name!r}: interface {link.inboard.name!r} lies {np.linalg.norm(off_axis):.4g} m off the axis of "
+        f"joint {joint.name!r}; a rigid arm bridges the gap (check mesh_pose if this is not meant)"
+    ]
+
+
+def _point(scene: Scene, k: int, links: list[Link]) -> Point:
+    """Resolve a named point to a node of a link."""
+    point, place = scene.record.points[k], f"{scene.path}: points[{k}]"
+    names = [link.name for link in links]
+    choose(point.link, names, f"{place}.link", SceneError)
+    number = names.index(point.link)
+    model = links[number].model
+    if bool(point.node) == (point.position is not None):
+        raise SceneError(
+            Cause.BAD_FIELD, "give exactly one of 'node' and 'position'", where=place, remedy="name a node or place"
+        )
+    if point.position is not None:
+        target = _finite(point.position, f"{place}.position")
+        distance = np.linalg.norm(model.nodes - target, axis=1)
+        node = int(distance.argmin())
+        limit = 0.05 * float(np.linalg.norm(np.ptp(model.nodes, axis=0)))
+        if distance[node] > limit:
+            raise SceneError(
+                Cause.BAD_REFERENCE,
+                "no mesh node near this position",
+                where=f"{place}.position",
+                value=point.position,
+                limit=f"{limit:.4g} m, nearest {distance[node]:.4g} m",
+                remedy="positions are in the link's mesh frame",
+            )
+        return Point(point.name, number, node)
+    known = {**{i.name: i.node for i in model.interface_nodes}, **model.node_names}
+    choose(point.node, known, f"{place}.node", SceneError)
+    return Point(point.name, number, known[point.node])
+
+
+def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list[Link]:
+    """Payloads on points, and motors on the outboard interface before their joint."""
+    result = list(links)
+    names = {p.name: p for p in points}
+
+    def add(number: int, node: int, offset: Array, mass: float, inertia: Array, place: str) -> None:
+        link = result[number]
+        turning = node in link.model.rotation_nodes
+        if not turning and (inertia.any() or offset.any()):
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "this node has no rotation, so it cannot carry an inertia or an offset",
+                where=place,
+                value=link.name,
+                remedy="put the payload on an interface, or give mass only",
+            )
+        extra = payload_invariants(link.model, node, offset, mass, inertia)
+        result[number] = replace(link, invariants=link.invariants + extra)
+
+    for k, payload in enumerate(scene.record.payloads):
+        place = f"{scene.path}: payloads[{k}]"
+        choose(payload.point, names, f"{place}.point", SceneError)
+        point = names[payload.point]
+        mass = Place(scene.folder, place).not_negative("mass", payload.mass)
+        inertia = inertia_matrix(payload.inertia, f"{place}.inertia", SceneError)
+        add(point.link, point.node, _finite(payload.offset, f"{place}.offset"), mass, inertia, place)
+    for k, joint in enumerate(scene.record.joints):
+        place = f"{scene.path}: joints[{k}].motor"
+        mass = Place(scene.folder, place).not_negative("mass", joint.motor.mass)
+        inertia = inertia_matrix(joint.motor.inertia, f"{place}.inertia", SceneError)
+        outboard = links[k - 1].outboard if k else None
+        if outboard is not None and (mass or inertia.any()):  # the first motor stands on the ground
+            add(k - 1, outboard.node, np.zeros(3), mass, inertia, place)
+    return result

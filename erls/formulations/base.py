@@ -1,0 +1,91 @@
+"""The contract of a formulation: what equations of motion must offer so that runs, studies and reports can use them.
+
+Rules for adding a formulation:
+
+1. One file (more beside it if it needs them) and one line in the registry of ``erls/formulations/__init__.py``.
+2. It imports no other formulation; it shares the mechanism, the modal models, the drives and nothing else.
+3. It is a `erls.integrators.base.SecondOrderSystem` in independent coordinates; prescribed motions are eliminated.
+4. Everything that a run reports goes through `State`: whoever samples a run never asks which formulation made it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from erls.integrators.base import SecondOrderSystem
+from erls.lie.so3 import Array
+from erls.mechanism.chain import Mechanism
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies of a state [J]: kinetic (rotors included), elastic (links), gravity, springs (joints)."""
+
+    kinetic: float
+    elastic: float
+    gravity: float
+    springs: float
+
+    @property
+    def total(self) -> float:
+        """Their sum; constant without drives, damping and friction."""
+        return self.kinetic + self.elastic + self.gravity + self.springs
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """What link k-1 (or the ground) does to link k in a joint.
+
+    ``force`` (3,) [N] and ``moment`` (3,) [N m] about the displaced inboard interface node, world axes; ``effort``
+    [N m or N] is the generalized force of drive, spring, damper and friction on the joint coordinate, rotor
+    inertia not subtracted; for prescribed motion what the motor must give.
+    """
+
+    force: Array
+    moment: Array
+    effort: float
+
+
+@dataclass(frozen=True)
+class State:
+    """The mechanism at one time.
+
+    Attributes
+    ----------
+    time : float
+    poses : list of (4, 4) arrays
+        Link frames in the world.
+    modal : list of (m,) arrays
+        Modal coordinates of each link (6 rigid-body, then elastic).
+    coordinates, angles, rates : (n,) arrays
+        Joint coordinates θ, physical joint angles and their rates [rad or m].
+    """
+
+    time: float
+    poses: list[Array]
+    modal: list[Array]
+    coordinates: Array
+    angles: Array
+    rates: Array
+
+
+class Formulation(SecondOrderSystem, Protocol):
+    """Equations of motion of a mechanism with what is asked of its states."""
+
+    mechanism: Mechanism
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """(y, v) at time 0."""
+
+    def state(self, t: float, y: Array, v: Array) -> State:
+        """Poses, modal coordinates and joint angles."""
+
+    def energy(self, t: float, y: Array, v: Array) -> Energy:
+        """Energies."""
+
+    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
+        """Joint reactions, with the acceleration from the equations of motion."""
+
+    def describe(self) -> dict[str, Any]:
+        """Names and sizes for reports."""

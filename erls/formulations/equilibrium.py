@@ -1,0 +1,69 @@
+"""Static equilibrium of the links with the joints held."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from erls.errors import Cause, SimulationError
+from erls.lie.so3 import Array
+
+if TYPE_CHECKING:
+    from erls.formulations.erls import Erls
+
+_ITERATIONS = 20
+_TOLERANCE = 1e-12  # change of the coordinates in metres; quadratic convergence reaches rounding
+
+
+def held_equilibrium(equations: Erls, y: Array) -> Array:
+    """Elastic coordinates in equilibrium under gravity while every physical joint angle keeps its initial value.
+
+    Parameters
+    ----------
+    equations : Erls
+    y : (n,) array
+        Independent coordinates with the joints in place and the links undeformed.
+
+    Returns
+    -------
+    (n,) array
+
+    Raises
+    ------
+    SimulationError
+        NO_EQUILIBRIUM: the links are too soft for small displacements to carry the load.
+    """
+    f, size = len(equations.free_joints), equations.size
+    held = y[:f].copy()
+    zero = np.zeros(size)
+    scales = equations.length_scales
+
+    def out_of_balance(trial: Array) -> Array:
+        """Held angles first, then forces on the elastic coordinates."""
+        forces = equations.residual(0.0, trial, zero, zero)
+        return np.concatenate([equations.state(0.0, trial, zero).angles[equations.free_joints] - held, forces[f:]])
+
+    y = y.copy()
+    change = np.inf
+    for _ in range(_ITERATIONS):
+        value = out_of_balance(y)
+        slope = np.empty((size, size))
+        for k in range(size):
+            step = 1e-6 / scales[k]
+            trial = y.copy()
+            trial[k] += step
+            slope[:, k] = (out_of_balance(trial) - value) / step
+        update = np.linalg.solve(slope, -value)
+        y += update
+        change = float(np.abs(scales * update).max())
+        if change < _TOLERANCE:
+            return y
+    raise SimulationError(
+        Cause.NO_EQUILIBRIUM,
+        "no static equilibrium within small displacements",
+        where="initial.deformation",
+        value=change,
+        limit=_TOLERANCE,
+        remedy="start from deformation = 'zero', or check stiffness and gravity",
+    )

@@ -1,0 +1,167 @@
+"""Motions of a joint over time in a scene file, with two derivatives.
+
+Each shape is one record, which a scene selects by ``shape = "..."``, and its ``build``, which checks the
+numbers and returns a `Curve`. To add a shape: one record with ``build``, one name in `Motion`, one row in the
+table of ``tests/erls/test_profiles.py``. A motion is continuous, and its end values hold outside.
+Times in s; coordinates in rad, at a prismatic joint in m, where fields in degrees are refused.
+"""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from erls.mechanism.curves import Curve, Harmonic, Piecewise, piecewise, spline
+from erls.mechanism.place import Place
+from erls.mechanism.profiles import ProfileRecord
+from erls.mechanism.tables import samples
+
+_REST_TO_REST: dict[int, tuple[float, ...]] = {
+    3: (0.0, 0.0, 3.0, -2.0),
+    5: (0.0, 0.0, 0.0, 10.0, -15.0, 6.0),
+    7: (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0),
+}
+"""From 0 to 1 over x = 0..1, with 1, 2 and 3 vanishing derivatives at both ends; rising powers of x."""
+
+
+class Polynomial(ProfileRecord, frozen=True, tag="polynomial"):
+    """One motion from rest to rest.
+
+    from: coordinate before the motion, rad or m.
+    from_deg: the same in degrees.
+    to: coordinate after it, rad or m.
+    to_deg: the same in degrees.
+    start: time at which it starts, s.
+    duration: how long it takes, s.
+    degree: 3 (acceleration jumps at the ends), 5 (acceleration is continuous) or 7 (jerk is continuous too).
+    """
+
+    duration: float
+    from_: float | None = msgspec.field(name="from", default=None)
+    from_deg: float | None = None
+    to: float | None = None
+    to_deg: float | None = None
+    start: float = 0.0
+    degree: int = 7
+
+    def build(self, place: Place) -> Curve:
+        """Check and build."""
+        start = place.time("start", self.start)
+        times = np.array([start, start + place.span("duration", self.duration)])
+        values = np.array(
+            [place.quantity("from", self.from_, self.from_deg), place.quantity("to", self.to, self.to_deg)]
+        )
+        return _legs(times, values, place.choice("degree", self.degree, tuple(_REST_TO_REST)))
+
+
+class Waypoints(ProfileRecord, frozen=True, tag="waypoints"):
+    """Motions from rest to rest through a list of coordinates.
+
+    times: times of the stops, s.
+    values: coordinates at the stops, rad or m.
+    values_deg: the same in degrees.
+    degree: 3, 5 or 7, of each leg, see polynomial.
+    """
+
+    times: tuple[float, ...]
+    values: tuple[float, ...] | None = None
+    values_deg: tuple[float, ...] | None = None
+    degree: int = 7
+
+    def build(self, place: Place) -> Curve:
+        """Check and build."""
+        degree = place.choice("degree", self.degree, tuple(_REST_TO_REST))
+        values = place.quantities("values", self.values, self.values_deg)
+        return _legs(*samples(place, None, 1, self.times, values, 2), degree)
+
+
+class Sine(ProfileRecord, frozen=True, tag="sine"):
+    """A sine motion without end; before its start the first value holds.
+
+    The rate jumps at the start unless the phase is 90 or -90 degrees.
+
+    amplitude: rad or m.
+    amplitude_deg: the same in degrees.
+    frequency_hz: cycles per second.
+    offset: coordinate about which it swings, rad or m; 0 unless given.
+    offset_deg: the same in degrees.
+    phase_deg: phase at the start, degrees.
+    start: time at which it starts, s.
+    """
+
+    frequency_hz: float
+    amplitude: float | None = None
+    amplitude_deg: float | None = None
+    offset: float | None = None
+    offset_deg: float | None = None
+    phase_deg: float = 0.0
+    start: float = 0.0
+
+    def build(self, place: Place) -> Curve:
+        """Check and build."""
+        amplitude = place.quantity("amplitude", self.amplitude, self.amplitude_deg)
+        centred = self.offset is None and self.offset_deg is None
+        offset = 0.0 if centred else place.quantity("offset", self.offset, self.offset_deg)
+        phase = math.radians(place.number("phase_deg", self.phase_deg))
+        return Harmonic(
+            breakpoints=(place.time("start", self.start),),
+            amplitude=amplitude,
+            omega=2.0 * math.pi * place.positive("frequency_hz", self.frequency_hz),
+            phase=phase,
+            offset=offset,
+            before=offset + amplitude * math.sin(phase),
+            after=0.0,
+        )
+
+
+class MotionTable(ProfileRecord, frozen=True, tag="table"):
+    """A motion through at least 4 samples, by a cubic spline with continuous rate and acceleration.
+
+    file: CSV file, relative to the scene; first column time.
+    column: column of the coordinate in the file; column 0 is the time.
+    degrees: the file holds degrees.
+    times: times of the samples instead of a file, s.
+    values: coordinates at these times, rad or m.
+    values_deg: the same in degrees.
+    rates: rate at the first and at the last sample, rad/s or m/s; at rest unless given.
+    rates_deg: the same in degrees per second.
+    """
+
+    file: str | None = None
+    column: int = 1
+    degrees: bool = False
+    times: tuple[float, ...] | None = None
+    values: tuple[float, ...] | None = None
+    values_deg: tuple[float, ...] | None = None
+    rates: tuple[float, float] | None = None
+    rates_deg: tuple[float, float] | None = None
+
+    def build(self, place: Place) -> Curve:
+        """Check and build."""
+        if self.degrees:
+            place.angular("degrees", "degrees = false")
+            if self.file is None:
+                raise place.error("degrees", "applies to a file", True, remedy="use 'values_deg' for lists")
+        listed = self.values is not None or self.values_deg is not None
+        given = place.quantities("values", self.values, self.values_deg) if listed else None
+        t, v = samples(place, self.file, self.column, self.times, given, 4)
+        rest = self.rates is None and self.rates_deg is None
+        rates = np.zeros(2) if rest else place.quantities("rates", self.rates, self.rates_deg)
+        return spline(t, v * (math.pi / 180.0) if self.degrees else v, rates)
+
+
+Motion = Polynomial | Waypoints | Sine | MotionTable
+"""Shapes of a joint coordinate (rad or m), with two derivatives."""
+
+
+def _legs(times: NDArray[np.float64], values: NDArray[np.float64], degree: int) -> Piecewise:
+    shape = np.array(_REST_TO_REST[degree])
+    pieces: list[ArrayLike] = [values[0]]
+    for span, first, last in zip(np.diff(times), values, values[1:], strict=False):
+        row = (last - first) * shape / span ** np.arange(len(shape))
+        row[0] = first
+        pieces.append(row)
+    return piecewise(times, [*pieces, values[-1]])

@@ -1,0 +1,320 @@
+"""Scene files (TOML): the schema and its defaults, overrides, and the checks that types cannot state.
+
+Every record below is one table of the file; unknown keys are errors with a suggestion.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from erls.errors import Cause, SceneError
+from erls.integrators import DEFAULT as DEFAULT_INTEGRATOR
+from erls.integrators import INTEGRATORS
+from erls.mechanism.drives import DriveRecord, FreeDrive
+from fe_import.link import Damping, Inertia, Vector
+from fe_import.toml_file import choose, convert, read_toml
+
+
+class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    pass
+
+
+class Simulation(_Record):
+    """How the motion is computed.
+
+    Attributes
+    ----------
+    duration : float
+        [s]
+    formulation : str
+        ``erls``.
+    gauge : str
+        ``joint-angle`` (θ is the joint angle) or ``minimum-norm`` (five rows per joint, as in the paper).
+    integrator : str
+        ``generalized_alpha`` or one of SciPy's: ``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``.
+    step : float, optional
+        Step of generalized-α [s], largest step of the others.
+    rtol, atol : float
+        Tolerances of SciPy's integrators, ``atol`` in metres.
+    spectral_radius : float
+        ρ∞ of generalized-α: 1 no numerical damping, 0 the most.
+    """
+
+    duration: float
+    formulation: str = "erls"
+    gauge: Literal["joint-angle", "minimum-norm"] = "joint-angle"
+    integrator: str = DEFAULT_INTEGRATOR
+    step: float | None = None
+    rtol: float = 1e-8
+    atol: float = 1e-10
+    spectral_radius: float = 0.8
+
+
+class Base(_Record):
+    """Pose of the first Denavit-Hartenberg frame in the world; rotation about fixed x, then y, then z."""
+
+    position: Vector = (0.0, 0.0, 0.0)
+    rotation_deg: Vector = (0.0, 0.0, 0.0)
+
+
+class DH(_Record):
+    """Denavit-Hartenberg row; ``convention`` is ``standard`` or ``modified``, with no default."""
+
+    convention: Literal["standard", "modified"]
+    a: float = 0.0
+    alpha: float | None = None
+    alpha_deg: float | None = None
+    d: float = 0.0
+    theta: float | None = None
+    theta_deg: float | None = None
+
+
+class JointInitial(_Record):
+    """Joint coordinate and rate at time 0; ``_deg`` for revolute joints."""
+
+    position: float | None = None
+    position_deg: float | None = None
+    rate: float | None = None
+    rate_deg: float | None = None
+
+
+class Friction(_Record):
+    """Coulomb friction ``force`` [N m or N], smooth around zero over ``transition_rate`` [rad/s or m/s]."""
+
+    force: float
+    transition_rate: float = 0.01
+
+
+class Motor(_Record):
+    """Rotor inertia [kg m²] behind a gear (reflected inertia: rotor_inertia · gear_ratio²), and the motor's own
+    ``mass`` and ``inertia`` (about its centre, mesh axes), which sit on the outboard interface of the link before.
+    """
+
+    rotor_inertia: float = 0.0
+    gear_ratio: float = 1.0
+    mass: float = 0.0
+    inertia: Inertia = (0.0, 0.0, 0.0)
+
+
+class Joint(_Record):
+    """A joint between the link before it (or the ground) and its own link."""
+
+    name: str
+    dh: DH
+    type: str = "revolute"
+    initial: JointInitial = JointInitial()
+    drive: DriveRecord = FreeDrive()
+    stiffness: float = 0.0
+    rest: float | None = None
+    rest_deg: float | None = None
+    damping: float = 0.0
+    friction: Friction | None = None
+    motor: Motor = Motor()
+
+
+class RigidBody(_Record):
+    """A rigid link: mass [kg], centre of mass, inertia about it, and named positions, all in the link's frame."""
+
+    mass: float
+    points: dict[str, Vector]
+    centre_of_mass: Vector = (0.0, 0.0, 0.0)
+    inertia: Inertia = (0.0, 0.0, 0.0)
+
+
+class MeshPose(_Record):
+    """Pose of the link's mesh frame.
+
+    ``frame``: in the link's Denavit-Hartenberg frame (``dh``), or in the frame of its inboard joint (``joint``).
+    """
+
+    position: Vector = (0.0, 0.0, 0.0)
+    rotation_deg: Vector = (0.0, 0.0, 0.0)
+    frame: Literal["dh", "joint"] = "dh"
+
+
+class Link(_Record):
+    """A link: exactly one of ``model`` (link description, reduced on the fly), ``modal_file`` and ``rigid``.
+
+    ``elastic_modes`` keeps only the lowest ones; ``flexible = false`` none. ``inboard`` and ``outboard`` name the
+    interfaces where the joints sit; the first and the second one unless given. ``damping`` replaces that of the
+    modal file.
+    """
+
+    name: str
+    model: str = ""
+    modal_file: str = ""
+    rigid: RigidBody | None = None
+    flexible: bool = True
+    elastic_modes: int | None = None
+    inboard: str = ""
+    outboard: str = ""
+    mesh_pose: MeshPose = MeshPose()
+    damping: Damping | None = None
+
+
+class Point(_Record):
+    """A named point whose position is reported: a named node or interface of a link, or the mesh node nearest to a
+    ``position`` in the mesh frame.
+    """
+
+    name: str
+    link: str
+    node: str = ""
+    position: Vector | None = None
+
+
+class Payload(_Record):
+    """A rigid body on a named point: mass [kg], inertia about its centre, centre from the point (mesh axes) [m]."""
+
+    point: str
+    mass: float = 0.0
+    inertia: Inertia = (0.0, 0.0, 0.0)
+    offset: Vector = (0.0, 0.0, 0.0)
+
+
+class Initial(_Record):
+    """``deformation``: links start undeformed (``zero``) or in static equilibrium, joints held (``static``)."""
+
+    deformation: Literal["zero", "static"] = "zero"
+
+
+class SceneRecord(_Record):
+    """A scene: a serial chain of joints and links, what drives it, and how it is simulated."""
+
+    simulation: Simulation
+    joints: list[Joint]
+    links: list[Link]
+    name: str = ""
+    gravity: Vector = (0.0, 0.0, -9.81)
+    base: Base = Base()
+    points: list[Point] = []
+    payloads: list[Payload] = []
+    initial: Initial = Initial()
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A checked scene and its file; relative paths start at ``folder``."""
+
+    path: Path
+    record: SceneRecord
+
+    @property
+    def name(self) -> str:
+        """Its name, or that of its file."""
+        return self.record.name or self.path.name.removesuffix(".toml")
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the file."""
+        return self.path.parent
+
+
+def load_scene(path: Path | str, overrides: Iterable[str] = ()) -> Scene:
+    """Read and check a scene.
+
+    Parameters
+    ----------
+    path : Path or str
+    overrides : iterable of str
+        ``KEY=VALUE`` as on the command line: ``simulation.step=1e-4``, ``links.arm.elastic_modes=8``,
+        ``joints.0.drive.type="free"``. Members of lists go by name or number.
+
+    Raises
+    ------
+    SceneError
+        Naming file, field, value and remedy.
+
+    Examples
+    --------
+    >>> from erls import load_scene
+    >>> scene = load_scene("data/l_shape/steel_tall.toml", ["simulation.duration=0.5"])
+    >>> scene.record.simulation.duration
+    0.5
+    """
+    path = Path(path)
+    data = read_toml(path, SceneError)
+    for text in overrides:
+        _override(data, text)
+    record = convert(data, SceneRecord, str(path), SceneError)
+    _check(record, str(path))
+    return Scene(path, record)
+
+
+def _override(data: dict[str, Any], text: str) -> None:
+    """Set one KEY=VALUE in parsed TOML."""
+    key, equals, value = text.partition("=")
+    where = f"--set {text}"
+    if not equals or not key.strip():
+        raise SceneError(Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4")
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        parsed = value.strip()  # a bare word is a string
+    at: Any = data
+    steps = key.strip().split(".")
+    for step, following in zip(steps, [*steps[1:], None], strict=True):
+        if isinstance(at, list):
+            named = [k for k, item in enumerate(at) if isinstance(item, dict) and item.get("name") == step]
+            place: Any = named[0] if named else int(step) if step.isdigit() and int(step) < len(at) else None
+            if place is None:
+                known = ", ".join(str(i.get("name")) for i in at if isinstance(i, dict))
+                raise SceneError(
+                    Cause.BAD_REFERENCE, f"no member {step!r}", where=where, value=step, remedy=f"known: {known}"
+                )
+        elif isinstance(at, dict):
+            place = step
+            if following is not None:
+                at.setdefault(step, {})
+        else:
+            raise SceneError(Cause.BAD_FIELD, f"{step!r} is not inside a table", where=where, remedy="check the key")
+        if following is None:
+            at[place] = parsed
+        else:
+            at = at[place]
+
+
+def _check(scene: SceneRecord, file: str) -> None:
+    """The conditions that the types cannot state, apart from those that need the links."""
+    s = scene.simulation
+    choose(s.integrator, INTEGRATORS, f"{file}: simulation.integrator", SceneError)
+    for name in ("duration", "step", "rtol", "atol"):
+        value = getattr(s, name)
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise _bad(f"{file}: simulation.{name}", f"{name} must be positive", value, "give a number above 0")
+    if not 0 <= s.spectral_radius <= 1:
+        raise _bad(f"{file}: simulation.spectral_radius", "out of range", s.spectral_radius, "give 0 to 1")
+    if not scene.joints:
+        raise _bad(f"{file}: joints", "a scene needs at least one joint", None, "add [[joints]]")
+    if len(scene.joints) != len(scene.links):
+        raise _bad(
+            f"{file}: links",
+            "joint k carries link k, so there must be as many links as joints",
+            f"{len(scene.links)} links, {len(scene.joints)} joints",
+            "add or remove one",
+        )
+    for kind in ("joints", "links", "points"):
+        seen: set[str] = set()
+        for k, item in enumerate(getattr(scene, kind)):
+            if not item.name or item.name in seen:
+                raise _bad(f"{file}: {kind}[{k}].name", "names must differ", item.name, "rename one")
+            seen.add(item.name)
+    for k, link in enumerate(scene.links):
+        if bool(link.model) + bool(link.modal_file) + (link.rigid is not None) != 1:
+            raise _bad(
+                f"{file}: links[{k}]",
+                "give exactly one of 'model', 'modal_file' and 'rigid'",
+                link.name,
+                "a link has one source",
+            )
+
+
+def _bad(where: str, message: str, value: Any, remedy: str) -> SceneError:
+    return SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)
