@@ -1,0 +1,31 @@
+"""Mechanisms and robots with flexible links: Equivalent Rigid Link System and component mode synthesis.
+
+The command line in three lines::
+
+    import erls
+
+    scene = erls.load_scene("data/l_shape/steel_tall.toml")
+    run = erls.simulate(scene)
+    run.position("tip", [0.5, 1.0])  # dense output, at any time
+"""
+
+from typing import Any
+
+__all__ = ["load_run", "load_scene", "save_run", "simulate"]
+
+_HOME = {
+    "load_scene": ("erls.scene", "load_scene"),
+    "simulate": ("erls.simulate", "simulate"),
+    "load_run": ("erls.run_file", "load_run"),
+    "save_run": ("erls.run_file", "write_run"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load the public names when first used: importing the package stays cheap."""
+    import importlib
+
+    if name in _HOME:
+        module, attribute = _HOME[name]
+        return getattr(importlib.import_module(module), attribute)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -50,7 +50,9 @@ def cache_folder() -> Path:
     return Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
 
 
-def build_mechanism(scene: Scene, tell: Message = lambda text: None) -> Built:
+def build_mechanism(
+    scene: Scene, tell: Message = lambda text: None, models: Sequence[ModalModel] | None = None
+) -> Built:
     """Read or reduce the links and put the mechanism together.
 
     Parameters
@@ -58,6 +60,8 @@ def build_mechanism(scene: Scene, tell: Message = lambda text: None) -> Built:
     scene : Scene
     tell : callable
         Told about each step that takes time.
+    models : sequence of ModalModel, optional
+        Modal models of the links, instead of the ones that the scene names (a run file holds its own).
 
     Raises
     ------
@@ -66,7 +70,8 @@ def build_mechanism(scene: Scene, tell: Message = lambda text: None) -> Built:
     """
     record, file = scene.record, str(scene.path)
     warnings: list[str] = []
-    models = [_modal_model(scene, k, item, tell) for k, item in enumerate(record.links)]
+    if models is None:
+        models = link_models(scene, tell)
     rotation = fixed_axes(*_finite(np.radians(record.base.rotation_deg), f"{file}: base.rotation_deg"))
     ground = pose(rotation, _finite(record.base.position, f"{file}: base.position"))
     joints: list[Joint] = []
@@ -106,6 +111,18 @@ def _finite(value: object, where: str) -> Array:
     if not (np.isfinite(array).all() and np.abs(array).max(initial=0.0) < 1e30):
         raise SceneError(Cause.BAD_FIELD, "numbers must be finite", where=where, value=value, remedy="give numbers")
     return array
+
+
+def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
+    """Modal model of every link; links from the same source in the same modes share one."""
+    made: dict[tuple[object, ...], ModalModel] = {}
+    result = []
+    for k, link in enumerate(scene.record.links):
+        key = (link.model, link.modal_file, link.flexible, link.elastic_modes, link.name if link.rigid else "")
+        if key not in made:
+            made[key] = _modal_model(scene, k, link, tell)
+        result.append(made[key])
+    return result
 
 
 def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> ModalModel:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import enum
+from typing import TYPE_CHECKING
 
 from fe_import.errors import ReportedError
+
+if TYPE_CHECKING:
+    from erls.run import Run
 
 
 class Cause(enum.StrEnum):
@@ -46,7 +50,9 @@ class SceneError(ReportedError):
 
 
 class SimulationError(ReportedError):
-    """A failed simulation: says when, why and what to try."""
+    """A failed simulation: says when, why and what to try; ``run`` holds what was computed, if anything."""
+
+    run: Run | None = None
 
     @property
     def exit_code(self) -> int:

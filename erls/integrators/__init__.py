@@ -1,0 +1,27 @@
+"""The registry of integrators; `erls.integrators.base` states the contract for the next member."""
+
+from __future__ import annotations
+
+from erls.integrators.base import Integrator
+from erls.integrators.generalized_alpha import generalized_alpha
+from erls.integrators.scipy_ivp import scipy_method
+
+INTEGRATORS: dict[str, Integrator] = {
+    "generalized_alpha": generalized_alpha,
+    "rk45": scipy_method("rk45"),
+    "dop853": scipy_method("dop853"),
+    "radau": scipy_method("radau"),
+    "bdf": scipy_method("bdf"),
+    "lsoda": scipy_method("lsoda"),
+}
+
+DEFAULT = "generalized_alpha"
+
+DESCRIPTIONS: dict[str, str] = {
+    "generalized_alpha": "implicit, order 2, fixed steps, numerical damping of unresolved modes",
+    "rk45": "explicit, order 5, adaptive: for soft mechanisms and moderate accuracy",
+    "dop853": "explicit, order 8, adaptive: for soft mechanisms and references",
+    "radau": "implicit, order 5, adaptive, damps unresolved modes: for references of stiff mechanisms",
+    "bdf": "implicit, order 1 to 5, adaptive; poor at undamped vibration",
+    "lsoda": "switches between explicit Adams and implicit BDF, adaptive",
+}

@@ -7,26 +7,32 @@ Rules for adding an integrator:
 2. An integrator knows the system only through `SecondOrderSystem`; it never asks what the coordinates mean. Norms
    are taken in metres, through ``system.length_scales``.
 3. It never steps over a member of ``breakpoints(system, times)``: forces jump there. At such a time the solution
-   holds two knots, one with the acceleration on either side.
+   holds two knots, one with the acceleration on either side. Forces are asked for only at times inside
+   ``[leg.first, leg.last]`` of the current member of ``legs(system, times)``, a hair away from the jump, so that
+   it does not matter to which side a force counts its own jump.
 4. Knots lie densely enough that quintic Hermite interpolation through (y, v, a) is as accurate as the method.
 5. It never raises for a numerical failure: it returns what was computed with ``Solution.failure`` set, whose
    message says when, why and what to try. ``KeyboardInterrupt`` likewise ends in a failure with cause INTERRUPTED.
 6. It counts its work honestly in `Work`; tests assert budgets on it.
-7. It calls ``observer(t, knots)`` after each accepted step, where ``knots()`` returns the `Solution` so far.
+7. It calls ``observer(t, knots)`` after each accepted step, where ``knots()`` returns the `Solution` so far. A
+   `SimulationError` that the observer or the system raises ends the run and becomes its failure.
+
+`erls.integrators.driver.integrate_legs` keeps rules 3, 5 and 7 for a method that can advance over one leg.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from erls.errors import SimulationError
+from erls.errors import Cause, SceneError, SimulationError
 
 Array = NDArray[np.float64]
+_HAIR = 1e-12  # of the largest time: breakpoints this close are one
 
 
 class SecondOrderSystem(Protocol):
@@ -68,7 +74,7 @@ class SecondOrderSystem(Protocol):
 
 @dataclass
 class Work:
-    """What an integration cost."""
+    """What an integration cost; what a foreign solver does not tell stays 0."""
 
     steps: int = 0
     rejected_steps: int = 0
@@ -90,7 +96,13 @@ class Options:
     spectral_radius : float
         ρ∞ of generalized-α: numerical damping at infinite frequency, 1 none, 0 full.
     newton_tolerance : float
-        Newton iterations stop when the remaining error is estimated below this [m].
+        Newton iterations stop when the remaining error is estimated below this [m]; at steps below 1 ms it falls
+        with the cube of the step, so that convergence keeps its order.
+
+    Raises
+    ------
+    SceneError
+        With cause BAD_FIELD, naming the setting.
     """
 
     step: float | None = None
@@ -98,6 +110,22 @@ class Options:
     atol: float = 1e-10
     spectral_radius: float = 0.8
     newton_tolerance: float = 1e-11
+
+    def __post_init__(self) -> None:
+        # NaN fails every comparison, so that it is refused too
+        checks = (
+            ("step", self.step, self.step is None or 0 < self.step, "a positive number of seconds"),
+            ("rtol", self.rtol, 3e-14 <= self.rtol < 1, "between 3e-14 (rounding) and 1"),
+            ("atol", self.atol, self.atol > 0, "a positive number of metres"),
+            ("spectral_radius", self.spectral_radius, 0 <= self.spectral_radius <= 1, "between 0 and 1"),
+            ("newton_tolerance", self.newton_tolerance, self.newton_tolerance >= 0, "zero or more metres"),
+        )
+        for name, value, ok, right in checks:
+            if not ok:
+                message = "the integrator cannot work with this value"
+                raise SceneError(
+                    Cause.BAD_FIELD, message, where=f"options.{name}", value=value, remedy=f"must be {right}"
+                )
 
 
 @dataclass(frozen=True)
@@ -117,12 +145,59 @@ Observer = Callable[[float, Callable[[], Solution]], None]
 Integrator = Callable[[SecondOrderSystem, tuple[float, float], Array, Array, Options, Observer | None], Solution]
 
 
+class Leg(NamedTuple):
+    """A stretch of time without jumps: its ends, and the first and last time at which to ask for forces."""
+
+    start: float
+    end: float
+    first: float
+    last: float
+
+
 def breakpoints(system: SecondOrderSystem, times: tuple[float, float]) -> list[float]:
-    """Breakpoints strictly inside ``times``, and its end, in rising order; the legs of an integration."""
+    """Breakpoints strictly inside ``times``, and its end, in rising order; the legs of an integration.
+
+    Breakpoints that only rounding tells apart (0.3 and 0.1 + 0.2) count once.
+    """
     start, end = times
-    margin = 1e-12 * max(abs(start), abs(end), 1e-300)
-    inner = sorted({b for b in system.breakpoints if start + margin < b < end - margin})
-    return [*inner, end]
+    margin = _HAIR * max(abs(start), abs(end))
+    found: list[float] = []
+    for b in sorted(system.breakpoints):
+        if (found[-1] if found else start) + margin < b < end - margin:
+            found.append(b)
+    return [*found, end]
+
+
+def legs(system: SecondOrderSystem, times: tuple[float, float]) -> list[Leg]:
+    """Stretches between breakpoints; none when ``times`` has no length.
+
+    Raises
+    ------
+    SceneError
+        With cause BAD_FIELD when the times are not finite or fall.
+    """
+    start, end = times
+    if not (np.isfinite(start) and np.isfinite(end) and start <= end):
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "the end of a run must be finite and not before its start",
+            where="times",
+            value=times,
+            remedy="give (start, end) in seconds with start <= end",
+        )
+    if start == end:
+        return []
+    ends = breakpoints(system, times)
+    hair = _HAIR * max(abs(start), abs(end))
+    pairs = zip([start, *ends[:-1]], ends, strict=True)
+    return [Leg(s, e, min(s + hair, (s + e) / 2), max(e - hair, (s + e) / 2)) for s, e in pairs]
+
+
+def metre_scales(system: SecondOrderSystem) -> Array:
+    """(n,) ``system.length_scales``, bounded away from zero: a coordinate that moves no point has no metres."""
+    scales = np.array(system.length_scales, dtype=float)
+    largest = float(scales.max(initial=0.0)) or 1.0
+    return np.maximum(scales, 1e-6 * largest)
 
 
 def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, Array]:
@@ -134,13 +209,15 @@ def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, A
         Knots in rising order; a time that stands twice marks a jump of ``a``.
     y, v, a : (k, n) arrays
     at : (m,) array
-        Times within [t[0], t[-1]].
+        Times within [t[0], t[-1]]; outside, the first and last polynomial are continued.
 
     Returns
     -------
     y, v : (m, n) arrays
         Interpolated positions and velocities (the derivative of the interpolant).
     """
+    if len(t) == 1:  # a run that failed at once
+        return np.repeat(y, len(at), axis=0), np.repeat(v, len(at), axis=0)
     right = np.clip(np.searchsorted(t, at, side="right"), 1, len(t) - 1)
     # a zero-length interval (a jump) is never asked for: step back over it at the end of the knots
     right = np.where(t[right] == t[right - 1], right - 1, right).clip(1)

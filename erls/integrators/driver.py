@@ -1,0 +1,123 @@
+"""What every integrator shares: the walk from breakpoint to breakpoint, the record of knots, the end of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from erls.errors import Cause, SimulationError
+from erls.integrators.base import Array, Leg, Observer, SecondOrderSystem, Solution, Work, legs
+
+
+class Recorder:
+    """Knots and work of a run so far, in arrays that grow.
+
+    Parameters
+    ----------
+    size : int
+        Number of coordinates n.
+    observer : callable or None
+        See rule 7 of `erls.integrators.base`.
+    capacity : int
+        Knots to reserve.
+    """
+
+    def __init__(self, size: int, observer: Observer | None, capacity: int = 1024) -> None:
+        self.work = Work()
+        self.warnings: list[str] = []
+        self._size, self._observer = size, observer
+        self._count = 0
+        self._t = np.empty(capacity)
+        self._knots = np.empty((capacity, 3, size))
+
+    def append(self, t: float, y: Array, v: Array, a: Array) -> None:
+        """Add a copy of a knot."""
+        k = self._count
+        if k == len(self._t):
+            self._t = np.concatenate([self._t, np.empty(k)])
+            self._knots = np.concatenate([self._knots, np.empty((k, 3, self._size))])
+        knot = self._knots[k]
+        knot[0], knot[1], knot[2] = y, v, a
+        self._t[k] = t
+        self._count = k + 1  # last, so that an interrupt never leaves half a knot
+
+    def accept(self, t: float) -> None:
+        """Count an accepted step, whose knots were added, and tell the observer."""
+        self.work.steps += 1
+        if self._observer is not None:
+            self._observer(t, self.solution)
+
+    @property
+    def time(self) -> float | None:
+        """Time of the last knot."""
+        return float(self._t[self._count - 1]) if self._count else None
+
+    def solution(self, failure: SimulationError | None = None) -> Solution:
+        """The run so far; its arrays are views that later knots leave unchanged."""
+        k = self._count
+        knots = self._knots[:k]
+        return Solution(
+            self._t[:k], knots[:, 0], knots[:, 1], knots[:, 2], replace(self.work), failure, tuple(self.warnings)
+        )
+
+
+Advance = Callable[[Leg, Array, Array, Array, Recorder], tuple[Array, Array]]
+
+
+def not_finite(t: float, values: Array) -> SimulationError:
+    """Failure because ``values`` (n,) holds an infinity or NaN at time ``t``."""
+    bad = int(np.argmin(np.isfinite(values)))
+    return SimulationError(
+        Cause.NOT_FINITE,
+        f"coordinate {bad} (counted from 0) is no longer finite",
+        where=f"t = {t:.9g} s",
+        value=float(values[bad]),
+        remedy="check forces, drives and initial velocities; a motion that grows without bound needs a shorter run",
+    )
+
+
+def integrate_legs(
+    system: SecondOrderSystem,
+    times: tuple[float, float],
+    y: Array,
+    v: Array,
+    recorder: Recorder,
+    advance: Advance,
+) -> Solution:
+    """Walk over all legs and turn whatever ends the run early into the failure of its solution.
+
+    Parameters
+    ----------
+    advance : callable
+        ``advance(leg, y, v, a, recorder) -> (y, v)`` adds the knots after the first one of a leg and returns the
+        state at its end; raises `SimulationError` when it cannot.
+    """
+    failure: SimulationError | None = None
+    y, v = np.array(y, dtype=float), np.array(v, dtype=float)
+    start, end = times
+    walk = legs(system, times) or [Leg(start, end, start, end)]
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are checked for and reported
+        try:
+            for leg in walk:
+                recorder.work.rhs_calls += 1
+                a = system.acceleration(leg.first, y, v)
+                if not np.isfinite(a).all():
+                    raise not_finite(leg.start, a)
+                recorder.append(leg.start, y, v, a)
+                if leg.end > leg.start:
+                    y, v = advance(leg, y, v, a, recorder)
+        except KeyboardInterrupt:
+            failure = SimulationError(
+                Cause.INTERRUPTED,
+                "the run was interrupted",
+                remedy="the motion up to this time was kept",
+            )
+        except SimulationError as error:
+            failure = error
+    if recorder.time is None:  # failed at once; a solution always has a knot
+        recorder.append(start, y, v, np.zeros_like(y))
+    if failure is not None and not failure.where:
+        failure.where = f"t = {recorder.time:.9g} s"
+    return recorder.solution(failure)

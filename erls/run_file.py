@@ -1,0 +1,177 @@
+"""Run files (HDF5): a run that can be read again without the files it came from.
+
+Inside: the scene as JSON with its tables inlined, the modal models, the knots of the motion, and for readers that
+only want curves (MATLAB, Julia, a plot) the group ``output`` with points, joints and energies at even times.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import msgspec
+import numpy as np
+
+from erls.build import build_mechanism
+from erls.errors import Cause, SceneError, SimulationError
+from erls.formulations import FORMULATIONS
+from erls.integrators.base import Solution, Work
+from erls.mechanism.tables import read_csv
+from erls.run import Run
+from erls.scene import Scene, SceneRecord
+from fe_import.hdf5 import open_for_reading, write_array, write_atomically, write_attribute, write_strings
+from fe_import.modal_file import ModalModel, read_modal_group, write_modal_group
+from fe_import.toml_file import choose, convert
+
+SCHEMA = "erls run"
+SCHEMA_VERSION = 1
+_OUTPUT_TIMES = 1001
+
+
+def write_run(path: Path | str, run: Run, status: str = "") -> None:
+    """Write a run, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path or str
+    run : Run
+    status : str
+        ``complete`` or the cause of the failure, unless given.
+
+    Raises
+    ------
+    SceneError
+        NOT_WRITABLE.
+    """
+    if not status:
+        status = "complete" if run.failure is None else str(run.failure.cause)
+    write_atomically(path, lambda group: _fill(group, run, status), SceneError, Cause.NOT_WRITABLE)
+
+
+def _fill(group: h5py.Group, run: Run, status: str) -> None:
+    solution = run.solution
+    write_attribute(group, "schema", SCHEMA)
+    write_attribute(group, "schema_version", SCHEMA_VERSION)
+    write_attribute(group, "units", "SI")
+    write_attribute(group, "status", status)
+    write_attribute(group, "message", "" if run.failure is None else str(run.failure))
+    write_attribute(group, "scene_file", run.scene.path.name)
+    write_attribute(group, "wall_s", run.wall_s)
+    write_strings(group, "scene", _self_contained(run.scene), "the scene as JSON")
+    write_strings(group, "warnings", run.warnings, "what the user was told")
+    write_array(group, "knots/time", solution.t, "s", "times of the steps; twice where forces jump")
+    for name, values, unit in (
+        ("position", solution.y, "rad, m, m sqrt(kg)"),
+        ("velocity", solution.v, "per s"),
+        ("acceleration", solution.a, "per s^2"),
+    ):
+        write_array(group, f"knots/{name}", values, unit, "independent coordinates; knot, coordinate")
+    for name, count in msgspec.to_builtins(solution.work).items():
+        write_attribute(group["knots"], name, int(count))
+    stored: list[ModalModel] = []
+    numbers: list[int] = []
+    models = group.create_group("models")
+    for link in run.formulation.mechanism.links:
+        known = [k for k, other in enumerate(stored) if other is link.model]
+        if not known:
+            known = [len(stored)]
+            stored.append(link.model)
+            write_modal_group(models.create_group(f"{len(stored):04d}"), link.model)
+        numbers.append(known[0] + 1)
+    write_array(group, "model_of_link", np.array(numbers, dtype=np.int64), "1", "group of models/ of each link")
+    _fill_output(group, run)
+
+
+def _fill_output(group: h5py.Group, run: Run) -> None:
+    """Curves at even times."""
+    times = np.linspace(float(run.solution.t[0]), run.end, _OUTPUT_TIMES)
+    states = run.states(times)
+    write_array(group, "output/time", times, "s", "even times")
+    for k, name in enumerate(run.point_names):
+        positions = np.array([run.point_position(s, k) for s in states])
+        write_array(group, f"output/points/{_key(name)}", positions, "m", "world position; time, axis")
+    for k, name in enumerate(run.joint_names):
+        for what in ("coordinates", "angles", "rates"):
+            values = np.array([getattr(s, what)[k] for s in states])
+            write_array(group, f"output/joints/{_key(name)}/{what}", values, "rad or m, per s", "joint motion")
+    energy = run.energy(times)
+    for kind in ("kinetic", "elastic", "gravity", "springs", "total"):
+        write_array(group, f"output/energy/{kind}", getattr(energy, kind), "J", f"{kind} energy")
+
+
+def _key(name: str) -> str:
+    """A name that cannot be taken for a path inside the file."""
+    return name.replace("/", "_") if name not in (".", "") else "_"
+
+
+def _self_contained(scene: Scene) -> str:
+    """The scene as JSON, tables from CSV files written into it."""
+    data = msgspec.to_builtins(scene.record)
+
+    def inline(value: Any) -> Any:
+        if isinstance(value, list):
+            return [inline(v) for v in value]
+        if not isinstance(value, dict):
+            return value
+        if value.get("shape") == "table" and value.get("file"):
+            table = read_csv(scene.folder / value["file"], "table")
+            value = dict(value)
+            values = table[:, value.pop("column", 1)]
+            times = table[:, 0].tolist()
+            degrees = value.pop("degrees", False)
+            value.pop("file")
+            return {**value, "times": times, "values_deg" if degrees else "values": values.tolist()}
+        return {k: inline(v) for k, v in value.items()}
+
+    return msgspec.json.encode(inline(data)).decode()
+
+
+def load_run(path: Path | str) -> Run:
+    """Read a run file.
+
+    Raises
+    ------
+    SceneError
+        FILE_NOT_FOUND, NOT_READABLE, or RUN_FILE: anything wrong inside.
+    FEImportError
+        A faulty modal model inside.
+    """
+    path = Path(path)
+    with open_for_reading(path, SceneError, Cause.RUN_FILE) as file:
+        if file.attribute("schema", str) != SCHEMA or file.attribute("schema_version", int) != SCHEMA_VERSION:
+            raise file.fail("@schema", "not a run file of this version", file.attribute("schema", str), SCHEMA)
+        text = file.text("scene")
+        try:
+            data = msgspec.json.decode(text)
+        except msgspec.DecodeError as problem:
+            raise file.fail("scene", f"not JSON: {problem}") from None
+        record = convert(data, SceneRecord, f"{path}: /scene", SceneError)
+        scene = Scene(Path(file.attribute("scene_file", str) or path.name), record)
+        count = len(record.links)
+        numbers = file.integers("model_of_link", (count,), 1, count + 1)
+        models = file.subgroup("models")
+        read = {
+            int(n): read_modal_group(models.subgroup(f"{n:04d}").group, str(path)) for n in sorted(set(numbers.tolist()))
+        }
+        built = build_mechanism(scene, models=[read[int(n)] for n in numbers])
+        settings = record.simulation
+        choose(settings.formulation, FORMULATIONS, f"{path}: /scene simulation.formulation", SceneError)
+        formulation = FORMULATIONS[settings.formulation](built.mechanism, settings.gauge)
+        knots = file.subgroup("knots")
+        t = knots.array("time", (None,))
+        shape = (len(t), formulation.size)
+        if not len(t) or (np.diff(t) < 0).any():
+            raise file.fail("knots/time", "times must rise", None)
+        work = Work(**{name: knots.attribute(name, int) for name in msgspec.to_builtins(Work())})
+        status = file.attribute("status", str)
+        failure = None
+        if status != "complete":
+            cause = next((c for c in Cause if str(c) == status), Cause.INTERRUPTED)
+            failure = SimulationError(cause, file.attribute("message", str) or f"the run is {status}")
+        solution = Solution(
+            t, knots.array("position", shape), knots.array("velocity", shape), knots.array("acceleration", shape),
+            work, failure,
+        )  # fmt: skip
+        warnings = file.names("warnings")
+        return Run(scene, formulation, solution, file.attribute("wall_s", float), warnings)

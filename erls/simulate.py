@@ -1,0 +1,146 @@
+"""Scene in, run out: the one door to a simulation."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from erls.build import Built, Message, build_mechanism
+from erls.errors import SceneError, SimulationError
+from erls.formulations import FORMULATIONS
+from erls.integrators import INTEGRATORS
+from erls.integrators.base import Options, Solution
+from erls.mechanism.chain import Mechanism
+from erls.run import Run, node_positions
+from erls.run_file import write_run
+from erls.scene import Scene, load_scene
+from fe_import.toml_file import choose
+
+Progress = Callable[[float, float], None]  # (time, duration)
+
+_LARGE_DEFLECTION = 0.1  # of the link's size; the second-order error of a small-displacement model is then about 1 %
+_LARGE_ROTATION = 0.2  # rad
+CHECKPOINT_S = 20.0  # a killed run loses at most this much work
+
+
+def simulate(
+    scene: Scene | Path | str,
+    *,
+    progress: Progress | None = None,
+    tell: Message = lambda text: None,
+    checkpoint: Path | None = None,
+) -> Run:
+    """Simulate a scene.
+
+    Parameters
+    ----------
+    scene : Scene, Path or str
+    progress : callable, optional
+        Called with (time, duration) after each step.
+    tell : callable, optional
+        Told about each preparation that takes time.
+    checkpoint : Path, optional
+        Run file to which a long run saves what it has, every 20 s of work.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Bad input: names file, field, value and remedy.
+    SimulationError
+        The integration failed or was interrupted: says when, why and what to try. What was computed is in its
+        attribute ``run``.
+
+    Examples
+    --------
+    >>> import erls
+    >>> scene = erls.load_scene("data/l_shape/steel_tall.toml", ["simulation.duration=0.01"])
+    >>> run = erls.simulate(scene)
+    >>> bool(run.position("tip", 0.01)[2] < 0)
+    True
+    """
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
+    settings = scene.record.simulation
+    choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
+    built = build_mechanism(scene, tell)
+    formulation = FORMULATIONS[settings.formulation](built.mechanism, settings.gauge)
+    y, v = formulation.initial_state()
+    options = Options(settings.step, settings.rtol, settings.atol, settings.spectral_radius)
+    begun = time.perf_counter()
+
+    def make_run(solution: Solution, warnings: tuple[str, ...]) -> Run:
+        return Run(scene, formulation, solution, time.perf_counter() - begun, warnings)
+
+    saved = begun
+
+    def observe(t: float, knots: Callable[[], Solution]) -> None:
+        nonlocal saved
+        if progress is not None:
+            progress(t, settings.duration)
+        if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
+            write_run(checkpoint, make_run(knots(), built.warnings), "unfinished")
+            saved = time.perf_counter()
+
+    observer = observe if progress is not None or checkpoint is not None else None
+    times = (0.0, settings.duration)
+    solution = INTEGRATORS[settings.integrator](formulation, times, y, v, options, observer)
+    run = make_run(solution, ())
+    warnings = (*built.warnings, *solution.warnings, *impulse_warnings(built), *range_warnings(run))
+    run = Run(scene, formulation, solution, run.wall_s, warnings)
+    if solution.failure is not None:
+        solution.failure.run = run
+        raise solution.failure
+    return run
+
+
+def impulse_warnings(built: Built) -> list[str]:
+    """Prescribed motions whose rate jumps would need an infinite force."""
+    result = []
+    for joint in built.mechanism.joints:
+        if not joint.drive.prescribed:
+            continue
+        for t in joint.drive.breakpoints:
+            before, after = joint.drive.reference(t, left=True), joint.drive.reference(t)
+            if before is not None and after is not None and abs(before[1] - after[1]) > 1e-9 * max(1, abs(after[1])):
+                result.append(
+                    f"joint {joint.name!r}: the prescribed rate jumps at t = {t:.6g} s; the links do not feel the "
+                    "blow (use a motion with continuous rate)"
+                )
+    return result
+
+
+def range_warnings(run: Run) -> list[str]:
+    """Links whose displacement left the range of small displacements, in which a modal model holds."""
+    mechanism: Mechanism = run.formulation.mechanism
+    largest = np.zeros(len(mechanism.links))
+    turned = np.zeros(len(mechanism.links))
+    for state in run.states(np.linspace(float(run.solution.t[0]), run.end, 101)):
+        for k, link in enumerate(mechanism.links):
+            frame = state.poses[k]
+            undeformed = link.model.nodes @ frame[:3, :3].T + frame[:3, 3]
+            moved = node_positions(run, state, k) - undeformed
+            moved -= moved[link.inboard.node]
+            largest[k] = max(largest[k], np.linalg.norm(moved, axis=1).max())
+            rotations = link.model.rotation_shapes @ state.modal[k]
+            if len(rotations):
+                turned[k] = max(turned[k], np.linalg.norm(rotations, axis=1).max())
+    result = []
+    for k, link in enumerate(mechanism.links):
+        size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
+        if largest[k] > _LARGE_DEFLECTION * size or turned[k] > _LARGE_ROTATION:
+            result.append(
+                f"link {link.name!r} moves by up to {largest[k]:.3g} m and turns by up to "
+                f"{np.degrees(turned[k]):.2g} deg against its rigid shape: beyond small displacements, expect errors "
+                "of second order in the deflection"
+            )
+    return result
+
+
+__all__ = ["SimulationError", "simulate"]
