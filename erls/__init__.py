@@ -15,7 +15,7 @@ __all__ = ["load_run", "load_scene", "save_run", "simulate"]
 
 _HOME = {
     "load_scene": ("erls.scene", "load_scene"),
-    "simulate": ("erls.simulate", "simulate"),
+    "simulate": ("erls.simulation", "simulate"),
     "load_run": ("erls.run_file", "load_run"),
     "save_run": ("erls.run_file", "write_run"),
 }

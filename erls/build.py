@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import platformdirs
@@ -32,6 +33,7 @@ from fe_import.reduce import reduce_cached
 from fe_import.toml_file import choose
 
 Message = Callable[[str], None]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,9 @@ def build_mechanism(
     joints: list[Joint] = []
     links: list[Link] = []
     before = ground
-    for k, (joint_record, link_record, model) in enumerate(zip(record.joints, record.links, models, strict=True)):
+    for k, (joint_record, link_record, model) in enumerate(
+        zip(record.joints, record.links, models, strict=True)
+    ):
         place = f"{file}: joints[{k}]"
         choose(joint_record.type, JOINT_TYPES, f"{place}.type", SceneError)
         first, second = split(_dh_row(joint_record, place))
@@ -109,7 +113,9 @@ def build_mechanism(
 def _finite(value: object, where: str) -> Array:
     array = np.asarray(value, dtype=float)
     if not (np.isfinite(array).all() and np.abs(array).max(initial=0.0) < 1e30):
-        raise SceneError(Cause.BAD_FIELD, "numbers must be finite", where=where, value=value, remedy="give numbers")
+        raise SceneError(
+            Cause.BAD_FIELD, "numbers must be finite", where=where, value=value, remedy="give numbers"
+        )
     return array
 
 
@@ -118,7 +124,13 @@ def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
     made: dict[tuple[object, ...], ModalModel] = {}
     result = []
     for k, link in enumerate(scene.record.links):
-        key = (link.model, link.modal_file, link.flexible, link.elastic_modes, link.name if link.rigid else "")
+        key = (
+            link.model,
+            link.modal_file,
+            link.flexible,
+            link.elastic_modes,
+            link.name if link.rigid else "",
+        )
         if key not in made:
             made[key] = _modal_model(scene, k, link, tell)
         result.append(made[key])
@@ -181,7 +193,7 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
     return truncated(model, wanted)
 
 
-def _within(place: str, read: Callable[[], ModalModel]) -> ModalModel:
+def _within(place: str, read: Callable[[], T]) -> T:
     """Say which field of the scene named a file that does not exist."""
     try:
         return read()
@@ -209,7 +221,9 @@ def _angle(place: Place, name: str, plain: float | None, degrees: float | None) 
         raise place.error(name, f"both {name} and {name}_deg", remedy="keep one")
     if degrees is not None:
         if not place.revolute:
-            raise place.error(f"{name}_deg", "degrees at a prismatic joint", degrees, remedy=f"give {name} in metres")
+            raise place.error(
+                f"{name}_deg", "degrees at a prismatic joint", degrees, remedy=f"give {name} in metres"
+            )
         return math.radians(place.number(f"{name}_deg", degrees))
     return place.number(name, plain or 0.0)
 
@@ -224,7 +238,9 @@ def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joi
     if drive.prescribed:
         if any(getattr(joint.initial, f) is not None for f in joint.initial.__struct_fields__):
             raise place.error(
-                "initial", "a prescribed motion fixes its own start", remedy="remove 'initial', or change the motion"
+                "initial",
+                "a prescribed motion fixes its own start",
+                remedy="remove 'initial', or change the motion",
             )
         position, rate, _ = drive.reference(0.0)  # type: ignore[misc]
     friction = joint.friction
@@ -233,7 +249,9 @@ def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joi
         rest=_angle(place, "rest", joint.rest, joint.rest_deg),
         damping=place.not_negative("damping", joint.damping),
         friction=place.at("friction").not_negative("force", friction.force) if friction else 0.0,
-        transition_rate=place.at("friction").positive("transition_rate", friction.transition_rate) if friction else 1.0,
+        transition_rate=place.at("friction").positive("transition_rate", friction.transition_rate)
+        if friction
+        else 1.0,
     )
     motor = place.at("motor")
     rotor = motor.not_negative("rotor_inertia", joint.motor.rotor_inertia)
@@ -303,7 +321,10 @@ def _point(scene: Scene, k: int, links: list[Link]) -> Point:
     model = links[number].model
     if bool(point.node) == (point.position is not None):
         raise SceneError(
-            Cause.BAD_FIELD, "give exactly one of 'node' and 'position'", where=place, remedy="name a node or place"
+            Cause.BAD_FIELD,
+            "give exactly one of 'node' and 'position'",
+            where=place,
+            remedy="name a node or place",
         )
     if point.position is not None:
         target = _finite(point.position, f"{place}.position")

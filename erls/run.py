@@ -143,7 +143,7 @@ class Run:
 
     def elastic_coordinates(self, link: str, t: ArrayLike) -> Array:
         """(..., n) elastic modal coordinates of a link [m √kg]."""
-        return self.modal_coordinates(link, t)[..., 6:]
+        return np.asarray(self.modal_coordinates(link, t)[..., 6:])
 
     def modal_coordinates(self, link: str, t: ArrayLike) -> Array:
         """(..., 6 + n) modal coordinates of a link, rigid-body ones first [m √kg]."""
@@ -165,7 +165,9 @@ class Run:
         """
         found = self._reactions(joint, t)
         shape = (*np.shape(t), 3)
-        return np.array([r.force for r in found]).reshape(shape), np.array([r.moment for r in found]).reshape(shape)
+        return np.array([r.force for r in found]).reshape(shape), np.array([r.moment for r in found]).reshape(
+            shape
+        )
 
     def joint_effort(self, joint: str, t: ArrayLike) -> Array:
         """(...) torque [N m] or force [N] of drive, spring, damper and friction; for a prescribed motion, what its
@@ -184,7 +186,8 @@ class Run:
         """Whether total energy should stay constant: no drives, damping or friction."""
         mechanism = self.formulation.mechanism
         passive = all(
-            j.drive.kind == "free" and not j.forces.damping and not j.forces.friction for j in mechanism.joints
+            j.drive.kind == "free" and not j.forces.damping and not j.forces.friction
+            for j in mechanism.joints
         )
         return passive and not any(link.damping.any() for link in mechanism.links)
 
@@ -224,7 +227,9 @@ class Run:
         }
 
 
-def node_positions(run: Run, state: State, link: int, nodes: Any = slice(None), magnification: float = 1.0) -> Array:
+def node_positions(
+    run: Run, state: State, link: int, nodes: Any = slice(None), magnification: float = 1.0
+) -> Array:
     """(n, 3) world positions of nodes of a link.
 
     Parameters

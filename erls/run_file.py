@@ -79,7 +79,9 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
             stored.append(link.model)
             write_modal_group(models.create_group(f"{len(stored):04d}"), link.model)
         numbers.append(known[0] + 1)
-    write_array(group, "model_of_link", np.array(numbers, dtype=np.int64), "1", "group of models/ of each link")
+    write_array(
+        group, "model_of_link", np.array(numbers, dtype=np.int64), "1", "group of models/ of each link"
+    )
     _fill_output(group, run)
 
 
@@ -94,7 +96,9 @@ def _fill_output(group: h5py.Group, run: Run) -> None:
     for k, name in enumerate(run.joint_names):
         for what in ("coordinates", "angles", "rates"):
             values = np.array([getattr(s, what)[k] for s in states])
-            write_array(group, f"output/joints/{_key(name)}/{what}", values, "rad or m, per s", "joint motion")
+            write_array(
+                group, f"output/joints/{_key(name)}/{what}", values, "rad or m, per s", "joint motion"
+            )
     energy = run.energy(times)
     for kind in ("kinetic", "elastic", "gravity", "springs", "total"):
         write_array(group, f"output/energy/{kind}", getattr(energy, kind), "J", f"{kind} energy")
@@ -140,7 +144,9 @@ def load_run(path: Path | str) -> Run:
     path = Path(path)
     with open_for_reading(path, SceneError, Cause.RUN_FILE) as file:
         if file.attribute("schema", str) != SCHEMA or file.attribute("schema_version", int) != SCHEMA_VERSION:
-            raise file.fail("@schema", "not a run file of this version", file.attribute("schema", str), SCHEMA)
+            raise file.fail(
+                "@schema", "not a run file of this version", file.attribute("schema", str), SCHEMA
+            )
         text = file.text("scene")
         try:
             data = msgspec.json.decode(text)
@@ -152,7 +158,8 @@ def load_run(path: Path | str) -> Run:
         numbers = file.integers("model_of_link", (count,), 1, count + 1)
         models = file.subgroup("models")
         read = {
-            int(n): read_modal_group(models.subgroup(f"{n:04d}").group, str(path)) for n in sorted(set(numbers.tolist()))
+            int(n): read_modal_group(models.subgroup(f"{n:04d}").group, str(path))
+            for n in sorted(set(numbers.tolist()))
         }
         built = build_mechanism(scene, models=[read[int(n)] for n in numbers])
         settings = record.simulation

@@ -26,7 +26,7 @@ class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     pass
 
 
-class Simulation(_Record):
+class Simulation(_Record, frozen=True):
     """How the motion is computed.
 
     Attributes
@@ -57,14 +57,14 @@ class Simulation(_Record):
     spectral_radius: float = 0.8
 
 
-class Base(_Record):
+class Base(_Record, frozen=True):
     """Pose of the first Denavit-Hartenberg frame in the world; rotation about fixed x, then y, then z."""
 
     position: Vector = (0.0, 0.0, 0.0)
     rotation_deg: Vector = (0.0, 0.0, 0.0)
 
 
-class DH(_Record):
+class DH(_Record, frozen=True):
     """Denavit-Hartenberg row; ``convention`` is ``standard`` or ``modified``, with no default."""
 
     convention: Literal["standard", "modified"]
@@ -76,7 +76,7 @@ class DH(_Record):
     theta_deg: float | None = None
 
 
-class JointInitial(_Record):
+class JointInitial(_Record, frozen=True):
     """Joint coordinate and rate at time 0; ``_deg`` for revolute joints."""
 
     position: float | None = None
@@ -85,14 +85,14 @@ class JointInitial(_Record):
     rate_deg: float | None = None
 
 
-class Friction(_Record):
+class Friction(_Record, frozen=True):
     """Coulomb friction ``force`` [N m or N], smooth around zero over ``transition_rate`` [rad/s or m/s]."""
 
     force: float
     transition_rate: float = 0.01
 
 
-class Motor(_Record):
+class Motor(_Record, frozen=True):
     """Rotor inertia [kg m²] behind a gear (reflected inertia: rotor_inertia · gear_ratio²), and the motor's own
     ``mass`` and ``inertia`` (about its centre, mesh axes), which sit on the outboard interface of the link before.
     """
@@ -103,7 +103,7 @@ class Motor(_Record):
     inertia: Inertia = (0.0, 0.0, 0.0)
 
 
-class Joint(_Record):
+class Joint(_Record, frozen=True):
     """A joint between the link before it (or the ground) and its own link."""
 
     name: str
@@ -119,7 +119,7 @@ class Joint(_Record):
     motor: Motor = Motor()
 
 
-class RigidBody(_Record):
+class RigidBody(_Record, frozen=True):
     """A rigid link: mass [kg], centre of mass, inertia about it, and named positions, all in the link's frame."""
 
     mass: float
@@ -128,7 +128,7 @@ class RigidBody(_Record):
     inertia: Inertia = (0.0, 0.0, 0.0)
 
 
-class MeshPose(_Record):
+class MeshPose(_Record, frozen=True):
     """Pose of the link's mesh frame.
 
     ``frame``: in the link's Denavit-Hartenberg frame (``dh``), or in the frame of its inboard joint (``joint``).
@@ -139,7 +139,7 @@ class MeshPose(_Record):
     frame: Literal["dh", "joint"] = "dh"
 
 
-class Link(_Record):
+class Link(_Record, frozen=True):
     """A link: exactly one of ``model`` (link description, reduced on the fly), ``modal_file`` and ``rigid``.
 
     ``elastic_modes`` keeps only the lowest ones; ``flexible = false`` none. ``inboard`` and ``outboard`` name the
@@ -159,7 +159,7 @@ class Link(_Record):
     damping: Damping | None = None
 
 
-class Point(_Record):
+class Point(_Record, frozen=True):
     """A named point whose position is reported: a named node or interface of a link, or the mesh node nearest to a
     ``position`` in the mesh frame.
     """
@@ -170,7 +170,7 @@ class Point(_Record):
     position: Vector | None = None
 
 
-class Payload(_Record):
+class Payload(_Record, frozen=True):
     """A rigid body on a named point: mass [kg], inertia about its centre, centre from the point (mesh axes) [m]."""
 
     point: str
@@ -179,13 +179,13 @@ class Payload(_Record):
     offset: Vector = (0.0, 0.0, 0.0)
 
 
-class Initial(_Record):
+class Initial(_Record, frozen=True):
     """``deformation``: links start undeformed (``zero``) or in static equilibrium, joints held (``static``)."""
 
     deformation: Literal["zero", "static"] = "zero"
 
 
-class SceneRecord(_Record):
+class SceneRecord(_Record, frozen=True):
     """A scene: a serial chain of joints and links, what drives it, and how it is simulated."""
 
     simulation: Simulation
@@ -253,7 +253,9 @@ def _override(data: dict[str, Any], text: str) -> None:
     key, equals, value = text.partition("=")
     where = f"--set {text}"
     if not equals or not key.strip():
-        raise SceneError(Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4")
+        raise SceneError(
+            Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4"
+        )
     try:
         parsed = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
@@ -267,14 +269,20 @@ def _override(data: dict[str, Any], text: str) -> None:
             if place is None:
                 known = ", ".join(str(i.get("name")) for i in at if isinstance(i, dict))
                 raise SceneError(
-                    Cause.BAD_REFERENCE, f"no member {step!r}", where=where, value=step, remedy=f"known: {known}"
+                    Cause.BAD_REFERENCE,
+                    f"no member {step!r}",
+                    where=where,
+                    value=step,
+                    remedy=f"known: {known}",
                 )
         elif isinstance(at, dict):
             place = step
             if following is not None:
                 at.setdefault(step, {})
         else:
-            raise SceneError(Cause.BAD_FIELD, f"{step!r} is not inside a table", where=where, remedy="check the key")
+            raise SceneError(
+                Cause.BAD_FIELD, f"{step!r} is not inside a table", where=where, remedy="check the key"
+            )
         if following is None:
             at[place] = parsed
         else:
@@ -288,7 +296,9 @@ def _check(scene: SceneRecord, file: str) -> None:
     for name in ("duration", "step", "rtol", "atol"):
         value = getattr(s, name)
         if value is not None and not (math.isfinite(value) and value > 0):
-            raise _bad(f"{file}: simulation.{name}", f"{name} must be positive", value, "give a number above 0")
+            raise _bad(
+                f"{file}: simulation.{name}", f"{name} must be positive", value, "give a number above 0"
+            )
     if not 0 <= s.spectral_radius <= 1:
         raise _bad(f"{file}: simulation.spectral_radius", "out of range", s.spectral_radius, "give 0 to 1")
     if not scene.joints:

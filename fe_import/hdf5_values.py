@@ -173,6 +173,10 @@ def _shown(value: Any) -> Any:
     return value if not isinstance(value, str) or len(value) < 120 else value[:117] + "..."
 
 
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "backslashreplace")  # a file name may hold bytes that are not UTF-8
+
+
 def write_array(group: h5py.Group, name: str, values: Any, unit: str, description: str) -> None:
     """Store float64 or int64 values with their unit and meaning; groups in ``name`` are made."""
     values = np.asarray(values)
@@ -184,7 +188,7 @@ def write_array(group: h5py.Group, name: str, values: Any, unit: str, descriptio
 
 def write_strings(group: h5py.Group, name: str, values: str | tuple[str, ...], description: str) -> None:
     """Store one string or a list of strings as UTF-8 of fixed length."""
-    encoded = values.encode() if isinstance(values, str) else [v.encode() for v in values]
+    encoded = _bytes(values) if isinstance(values, str) else [_bytes(v) for v in values]
     longest = max((len(v) for v in ([encoded] if isinstance(encoded, bytes) else encoded)), default=0)
     dtype = h5py.string_dtype("utf-8", max(1, longest))
     dataset = group.create_dataset(name, data=np.array(encoded, dtype=dtype), dtype=dtype, track_times=False)
@@ -195,7 +199,7 @@ def write_strings(group: h5py.Group, name: str, values: str | tuple[str, ...], d
 def write_attribute(item: h5py.HLObject, name: str, value: str | int | float) -> None:
     """Store a text (UTF-8 of fixed length) or a number as an attribute."""
     if isinstance(value, str):
-        data = value.encode()
+        data = _bytes(value)
         dtype = h5py.string_dtype("utf-8", max(1, len(data)))
         item.attrs.create(name, np.array(data, dtype=dtype), dtype=dtype)
     else:

@@ -48,7 +48,10 @@ class InertiaInvariants:
     def truncated(self, modes: NDArray[np.int64]) -> InertiaInvariants:
         """The invariants of some of the modes, in the given order."""
         ix = np.ix_(modes, modes)
-        return InertiaInvariants(self.m[ix], self.X[:, *ix], self.Z[:, :, *ix], self.rigid[modes])
+        rows, columns = ix
+        return InertiaInvariants(
+            self.m[ix], self.X[:, rows, columns], self.Z[:, :, rows, columns], self.rigid[modes]
+        )
 
     @property
     def rigid_mass_matrix(self) -> Array:
@@ -74,7 +77,9 @@ def mass_properties(rigid_mass_matrix: Array) -> MassProperties:
     if mass <= 0:
         return MassProperties(0.0, np.zeros(3), rigid_mass_matrix[3:, 3:].copy())
     moment = rigid_mass_matrix[3:, :3]  # μ c×
-    c = np.array([moment[2, 1] - moment[1, 2], moment[0, 2] - moment[2, 0], moment[1, 0] - moment[0, 1]]) / (2 * mass)
+    c = np.array([moment[2, 1] - moment[1, 2], moment[0, 2] - moment[2, 0], moment[1, 0] - moment[0, 1]]) / (
+        2 * mass
+    )
     inertia = rigid_mass_matrix[3:, 3:] - mass * (c @ c * np.eye(3) - np.outer(c, c))
     return MassProperties(mass, c, (inertia + inertia.T) / 2)
 
@@ -98,7 +103,9 @@ def turned(fields: Array, dof_map: IntArray, axis: int) -> Array:
     return result
 
 
-def inertia_invariants(mass: sp.csc_array, shapes: Array, dof_map: IntArray, rigid: Array) -> InertiaInvariants:
+def inertia_invariants(
+    mass: sp.csc_array, shapes: Array, dof_map: IntArray, rigid: Array
+) -> InertiaInvariants:
     """Invariants of a mass matrix and mode shapes.
 
     Parameters

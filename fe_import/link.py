@@ -26,7 +26,7 @@ class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     pass
 
 
-class Units(_Record):
+class Units(_Record, frozen=True):
     """Units of the description and its mesh; converted to SI at the border."""
 
     length: str = "m"
@@ -34,7 +34,7 @@ class Units(_Record):
     time: str = "s"
 
 
-class Material(_Record):
+class Material(_Record, frozen=True):
     """Isotropic linear elastic material: E [Pa], ν, ρ [kg/m³] (in the stated units)."""
 
     youngs_modulus: float
@@ -42,7 +42,7 @@ class Material(_Record):
     density: float
 
 
-class Member(_Record):
+class Member(_Record, frozen=True):
     """A straight member between two named nodes, divided into ``elements`` equal elements.
 
     ``local_z`` is the direction of the section's height; the default is z, or y for members along z. Inner nodes
@@ -57,7 +57,7 @@ class Member(_Record):
     local_z: Vector | None = None
 
 
-class Frame(_Record):
+class Frame(_Record, frozen=True):
     """A link made of beams.
 
     ``theory``: ``timoshenko`` or ``euler-bernoulli``; ``mass``: ``consistent`` or ``lumped``; ``rotary_inertia``:
@@ -72,14 +72,14 @@ class Frame(_Record):
     torsion: str = "saint-venant"
 
 
-class Region(_Record):
+class Region(_Record, frozen=True):
     """The elements of a named set of the mesh, and their material."""
 
     set: str
     material: str
 
 
-class Solid(_Record):
+class Solid(_Record, frozen=True):
     """A link meshed with solid elements; ``mesh`` is any file that meshio reads.
 
     ``material`` holds for the whole mesh, or ``regions`` give one per element set. ``nodes`` names positions
@@ -92,7 +92,7 @@ class Solid(_Record):
     nodes: dict[str, Vector] = {}
 
 
-class PointMass(_Record):
+class PointMass(_Record, frozen=True):
     """Mass and inertia ([Ixx, Iyy, Izz] or a 3x3 matrix about the node) added to a node or interface."""
 
     node: str
@@ -100,7 +100,7 @@ class PointMass(_Record):
     inertia: Inertia = (0.0, 0.0, 0.0)
 
 
-class Interface(_Record):
+class Interface(_Record, frozen=True):
     """A node where a joint sits: on a frame ``node``, or on a ``face`` (node or face set) of a solid.
 
     ``coupling``: how the face follows the interface node (``rigid``). ``position`` defaults to the centre of the
@@ -114,7 +114,7 @@ class Interface(_Record):
     position: Vector | None = None
 
 
-class Reduction(_Record):
+class Reduction(_Record, frozen=True):
     """How the model is reduced.
 
     Attributes
@@ -142,14 +142,14 @@ class Reduction(_Record):
     form: str = "orthonormal"
 
 
-class Rayleigh(_Record):
+class Rayleigh(_Record, frozen=True):
     """Damping matrix ``alpha`` M + ``beta`` K, in 1/s and s."""
 
     alpha: float = 0.0
     beta: float = 0.0
 
 
-class Damping(_Record):
+class Damping(_Record, frozen=True):
     """Modal damping: one ``ratio`` for all elastic modes, ``ratios`` from the lowest on, or ``rayleigh``."""
 
     ratio: float | None = None
@@ -157,7 +157,7 @@ class Damping(_Record):
     rayleigh: Rayleigh | None = None
 
 
-class LinkDescription(_Record):
+class LinkDescription(_Record, frozen=True):
     """A link: exactly one of ``frame`` and ``solid``, its interfaces and its reduction."""
 
     interfaces: list[Interface]

@@ -9,7 +9,7 @@ import scipy.linalg as la
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.link import Damping, Reduction
-from fe_import.model import Array, FEModel
+from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction import Basis
 from fe_import.sparse import dense_modes
 
@@ -31,7 +31,7 @@ def reduced_matrices(model: FEModel, basis: Basis) -> tuple[Array, Array]:
 
 
 def orthonormal_modes(
-    mass: Array, stiffness: Array, basis: Basis, options: Reduction, inboard_columns: Array | None, where: str
+    mass: Array, stiffness: Array, basis: Basis, options: Reduction, inboard_columns: IntArray | None, where: str
 ) -> OrthonormalModes:
     """Rigid-body modes from geometry, elastic ones from the eigenproblem on their mass-orthogonal complement.
 
@@ -88,7 +88,7 @@ def orthonormal_modes(
     return OrthonormalModes(coordinates * signs, np.concatenate([np.zeros(6), omega[:wanted]]), rigid_coordinates)
 
 
-def _clamped_span(mass: Array, stiffness: Array, rigid: Array, clamped: Array, count: int) -> Array:
+def _clamped_span(mass: Array, stiffness: Array, rigid: Array, clamped: IntArray, count: int) -> Array:
     """Mass-orthogonal complement of the rigid motions in the span of them and of the lowest clamped modes."""
     free = np.setdiff1d(np.arange(len(mass)), clamped)
     ix = np.ix_(free, free)

@@ -106,7 +106,7 @@ def _nodal(shapes: Array, rows: IntArray) -> Array:
     return np.ascontiguousarray(shapes[rows.ravel()].reshape(len(rows), 3, shapes.shape[1]))
 
 
-def _inboard_columns(model: FEModel, basis: Basis, link: LinkFile) -> Array | None:
+def _inboard_columns(model: FEModel, basis: Basis, link: LinkFile) -> IntArray | None:
     options = link.description.reduction
     if options.truncation != "clamped":
         return None

@@ -30,18 +30,27 @@ def read_toml(path: Path, error: type[ReportedError] = FEImportError) -> dict[st
     """
     try:
         if path.stat().st_size > _MAX_BYTES:
-            raise error(Cause.NOT_READABLE, "file is too large for a description", where=str(path), limit="50 MB")
+            raise error(
+                Cause.NOT_READABLE, "file is too large for a description", where=str(path), limit="50 MB"
+            )
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise error(
-            Cause.FILE_NOT_FOUND, "no such file", where=str(path), remedy="check the path, relative paths start at the file that names them"
+            Cause.FILE_NOT_FOUND,
+            "no such file",
+            where=str(path),
+            remedy="check the path, relative paths start at the file that names them",
         ) from None
     except (OSError, UnicodeDecodeError) as problem:
-        raise error(Cause.NOT_READABLE, f"cannot be read: {problem}", where=str(path), remedy="give a UTF-8 TOML file") from None
+        raise error(
+            Cause.NOT_READABLE, f"cannot be read: {problem}", where=str(path), remedy="give a UTF-8 TOML file"
+        ) from None
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as problem:
-        raise error(Cause.SYNTAX, f"not valid TOML: {problem}", where=str(path), remedy="mend the syntax at that line") from None
+        raise error(
+            Cause.SYNTAX, f"not valid TOML: {problem}", where=str(path), remedy="mend the syntax at that line"
+        ) from None
 
 
 def convert(data: Any, kind: type[T], where: str, error: type[ReportedError] = FEImportError) -> T:
@@ -107,8 +116,12 @@ def _suggest(kind: Any, path: str, name: str) -> str:
                 following.append(c.item_type)
             elif isinstance(c, msgspec.inspect.DictType):
                 following.append(c.value_type)
-        candidates = [u for c in following for u in (c.types if isinstance(c, msgspec.inspect.UnionType) else [c])]
-    fields = [f.encode_name for c in candidates if isinstance(c, msgspec.inspect.StructType) for f in c.fields]
+        candidates = [
+            u for c in following for u in (c.types if isinstance(c, msgspec.inspect.UnionType) else [c])
+        ]
+    fields = [
+        f.encode_name for c in candidates if isinstance(c, msgspec.inspect.StructType) for f in c.fields
+    ]
     close = difflib.get_close_matches(name, fields, n=1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]!r}?"

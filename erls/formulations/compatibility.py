@@ -20,6 +20,7 @@ import numpy as np
 from erls.lie.se3 import inverse, joint_pose, twist_cross, twist_transform
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism
+from fe_import.model import IntArray
 
 GAUGES = ("joint-angle", "minimum-norm")
 
@@ -45,7 +46,7 @@ class JointRows:
     bracket: Array
     own: Array
     previous: Array | None
-    kept: Array
+    kept: IntArray
     free_row: int
 
     def transform(self, coordinate: float) -> Array:
@@ -68,8 +69,8 @@ class Layout:
     """
 
     modes: tuple[slice, ...]
-    rigid: Array
-    elastic: Array
+    rigid: IntArray
+    elastic: IntArray
     elastic_of: tuple[slice, ...]
 
     @property
@@ -104,7 +105,9 @@ def joint_rows(mechanism: Mechanism, gauge: str) -> tuple[JointRows, ...]:
         all_rows = gauge == "joint-angle" or joint.drive.prescribed
         kept = np.arange(6) if all_rows else np.delete(np.arange(6), joint.type.free_row)
         result.append(
-            JointRows(joint.type.revolute, twist_cross(joint.type.screw), own, previous, kept, joint.type.free_row)
+            JointRows(
+                joint.type.revolute, twist_cross(joint.type.screw), own, previous, kept, joint.type.free_row
+            )
         )
     return tuple(result)
 

@@ -42,7 +42,9 @@ def held_equilibrium(equations: Erls, y: Array) -> Array:
     def out_of_balance(trial: Array) -> Array:
         """Held angles first, then forces on the elastic coordinates."""
         forces = equations.residual(0.0, trial, zero, zero)
-        return np.concatenate([equations.state(0.0, trial, zero).angles[equations.free_joints] - held, forces[f:]])
+        return np.concatenate(
+            [equations.state(0.0, trial, zero).angles[equations.free_joints] - held, forces[f:]]
+        )
 
     y = y.copy()
     change = np.inf

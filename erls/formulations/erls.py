@@ -182,7 +182,9 @@ class Erls:
             wrench, forces = inertia.forces(
                 chain.twists[k], twist_rate + chain.biases[k], q[modes], qd[modes], qdd[modes]
             )
-            weight, modal_weight = inertia.gravity(chain.poses[k][:3, :3].T @ self.mechanism.gravity, q[modes])
+            weight, modal_weight = inertia.gravity(
+                chain.poses[k][:3, :3].T @ self.mechanism.gravity, q[modes]
+            )
             wrenches.append(wrench - weight)
             modal[modes] = forces - modal_weight
         for k in range(self.joints - 1, 0, -1):
@@ -208,7 +210,7 @@ class Erls:
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
         """(n,) forces out of balance on the independent coordinates."""
-        return self.evaluate(t, y, v, a).residual[self.free]
+        return np.asarray(self.evaluate(t, y, v, a).residual[self.free])
 
     def full_mass_matrix(self, t: float, y: Array) -> Array:
         """(joints + elastic)² mass matrix over (θ, q_d), prescribed joints included."""
@@ -243,7 +245,7 @@ class Erls:
 
     def mass_matrix(self, t: float, y: Array) -> Array:
         """(n, n) mass matrix over the independent coordinates."""
-        return self.full_mass_matrix(t, y)[np.ix_(self.free, self.free)]
+        return np.asarray(self.full_mass_matrix(t, y)[np.ix_(self.free, self.free)])
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """(n,) accelerations from the equations of motion.
@@ -256,7 +258,9 @@ class Erls:
         force = self.residual(t, y, v, np.zeros(self.size))
         mass = self.mass_matrix(t, y)
         try:
-            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
+            return np.asarray(
+                la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False)
+            )
         except la.LinAlgError:
             raise self._singular(t, mass) from None
 

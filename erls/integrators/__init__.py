@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from erls.integrators.base import Integrator
-from erls.integrators.generalized_alpha import generalized_alpha
+
+# the underscore keeps the module of that name reachable
+from erls.integrators.generalized_alpha import generalized_alpha as _generalized_alpha
 from erls.integrators.scipy_ivp import scipy_method
 
 INTEGRATORS: dict[str, Integrator] = {
-    "generalized_alpha": generalized_alpha,
+    "generalized_alpha": _generalized_alpha,
     "rk45": scipy_method("rk45"),
     "dop853": scipy_method("dop853"),
     "radau": scipy_method("radau"),

@@ -2,20 +2,21 @@
 
 Rules for adding an integrator:
 
-1. One file with one function ``integrate(system, times, y, v, options, observer) -> Solution`` and one line in the
-   registry of ``erls/integrators/__init__.py``.
-2. An integrator knows the system only through `SecondOrderSystem`; it never asks what the coordinates mean. Norms
-   are taken in metres, through ``system.length_scales``.
-3. It never steps over a member of ``breakpoints(system, times)``: forces jump there. At such a time the solution
-   holds two knots, one with the acceleration on either side. Forces are asked for only at times inside
-   ``[leg.first, leg.last]`` of the current member of ``legs(system, times)``, a hair away from the jump, so that
-   it does not matter to which side a force counts its own jump.
+1. One file with one function ``integrate(system, times, y, v, options, observer) -> Solution`` and one line
+   in the registry of ``erls/integrators/__init__.py``.
+2. An integrator knows the system only through `SecondOrderSystem`; it never asks what the coordinates mean.
+   Norms are taken in metres, through ``system.length_scales``.
+3. It never steps over a member of ``breakpoints(system, times)``: forces jump there. At such a time the
+   solution holds two knots, one with the acceleration on either side. Forces are asked for only at times
+   inside ``[leg.first, leg.last]`` of the current member of ``legs(system, times)``, a hair away from the
+   jump, so that it does not matter to which side a force counts its own jump.
 4. Knots lie densely enough that quintic Hermite interpolation through (y, v, a) is as accurate as the method.
-5. It never raises for a numerical failure: it returns what was computed with ``Solution.failure`` set, whose
-   message says when, why and what to try. ``KeyboardInterrupt`` likewise ends in a failure with cause INTERRUPTED.
+5. It never raises for a numerical failure: it returns what was computed, at least one knot, with
+   ``Solution.failure`` set, whose message says when, why and what to try. ``KeyboardInterrupt`` likewise ends
+   in a failure with cause INTERRUPTED.
 6. It counts its work honestly in `Work`; tests assert budgets on it.
-7. It calls ``observer(t, knots)`` after each accepted step, where ``knots()`` returns the `Solution` so far. A
-   `SimulationError` that the observer or the system raises ends the run and becomes its failure.
+7. It calls ``observer(t, knots)`` after each accepted step, where ``knots()`` returns the `Solution` so far.
+   A `SimulationError` that the observer or the system raises ends the run and becomes its failure.
 
 `erls.integrators.driver.integrate_legs` keeps rules 3, 5 and 7 for a method that can advance over one leg.
 """
@@ -68,7 +69,8 @@ class SecondOrderSystem(Protocol):
     def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
         """(n, n) twice: the stiff parts of -∂f/∂y and -∂f/∂v (modal stiffness, springs, controller gains).
 
-        They enter the iteration matrix of implicit methods only; terms left out cost iterations, not accuracy.
+        They enter the iteration matrix of implicit methods only; terms left out cost iterations, not
+        accuracy.
         """
 
 
@@ -96,8 +98,8 @@ class Options:
     spectral_radius : float
         ρ∞ of generalized-α: numerical damping at infinite frequency, 1 none, 0 full.
     newton_tolerance : float
-        Newton iterations stop when the remaining error is estimated below this [m]; at steps below 1 ms it falls
-        with the cube of the step, so that convergence keeps its order.
+        Newton iterations stop when the remaining error is estimated below this [m]; at steps below 1 ms it
+        falls with the cube of the step, so that convergence keeps its order.
 
     Raises
     ------
@@ -114,7 +116,7 @@ class Options:
     def __post_init__(self) -> None:
         # NaN fails every comparison, so that it is refused too
         checks = (
-            ("step", self.step, self.step is None or 0 < self.step, "a positive number of seconds"),
+            ("step", self.step, self.step is None or self.step > 0, "a positive number of seconds"),
             ("rtol", self.rtol, 3e-14 <= self.rtol < 1, "between 3e-14 (rounding) and 1"),
             ("atol", self.atol, self.atol > 0, "a positive number of metres"),
             ("spectral_radius", self.spectral_radius, 0 <= self.spectral_radius <= 1, "between 0 and 1"),
@@ -142,7 +144,9 @@ class Solution:
 
 
 Observer = Callable[[float, Callable[[], Solution]], None]
-Integrator = Callable[[SecondOrderSystem, tuple[float, float], Array, Array, Options, Observer | None], Solution]
+Integrator = Callable[
+    [SecondOrderSystem, tuple[float, float], Array, Array, Options, Observer | None], Solution
+]
 
 
 class Leg(NamedTuple):
@@ -194,10 +198,11 @@ def legs(system: SecondOrderSystem, times: tuple[float, float]) -> list[Leg]:
 
 
 def metre_scales(system: SecondOrderSystem) -> Array:
-    """(n,) ``system.length_scales``, bounded away from zero: a coordinate that moves no point has no metres."""
-    scales = np.array(system.length_scales, dtype=float)
+    """(n,) ``system.length_scales``, never zero: also a coordinate that moves no point gets some metres."""
+    scales: Array = np.array(system.length_scales, dtype=float)
     largest = float(scales.max(initial=0.0)) or 1.0
-    return np.maximum(scales, 1e-6 * largest)
+    bounded: Array = np.maximum(scales, 1e-6 * largest)
+    return bounded
 
 
 def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, Array]:
@@ -206,7 +211,7 @@ def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, A
     Parameters
     ----------
     t : (k,) array
-        Knots in rising order; a time that stands twice marks a jump of ``a``.
+        Knots in rising order, at least one; a time that stands twice marks a jump of ``a``.
     y, v, a : (k, n) arrays
     at : (m,) array
         Times within [t[0], t[-1]]; outside, the first and last polynomial are continued.

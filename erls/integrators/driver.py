@@ -1,4 +1,4 @@
-"""What every integrator shares: the walk from breakpoint to breakpoint, the record of knots, the end of a run."""
+"""What integrators share: the walk from breakpoint to breakpoint, the record of knots, the end of a run."""
 
 from __future__ import annotations
 
@@ -57,10 +57,8 @@ class Recorder:
     def solution(self, failure: SimulationError | None = None) -> Solution:
         """The run so far; its arrays are views that later knots leave unchanged."""
         k = self._count
-        knots = self._knots[:k]
-        return Solution(
-            self._t[:k], knots[:, 0], knots[:, 1], knots[:, 2], replace(self.work), failure, tuple(self.warnings)
-        )
+        y, v, a = (self._knots[:k, i] for i in range(3))
+        return Solution(self._t[:k], y, v, a, replace(self.work), failure, tuple(self.warnings))
 
 
 Advance = Callable[[Leg, Array, Array, Array, Recorder], tuple[Array, Array]]
@@ -74,7 +72,7 @@ def not_finite(t: float, values: Array) -> SimulationError:
         f"coordinate {bad} (counted from 0) is no longer finite",
         where=f"t = {t:.9g} s",
         value=float(values[bad]),
-        remedy="check forces, drives and initial velocities; a motion that grows without bound needs a shorter run",
+        remedy="check forces, drives and initial velocities; end the run before a motion without bound",
     )
 
 
@@ -91,14 +89,14 @@ def integrate_legs(
     Parameters
     ----------
     advance : callable
-        ``advance(leg, y, v, a, recorder) -> (y, v)`` adds the knots after the first one of a leg and returns the
-        state at its end; raises `SimulationError` when it cannot.
+        ``advance(leg, y, v, a, recorder) -> (y, v)`` adds the knots after the first one of a leg and returns
+        the state at its end; raises `SimulationError` when it cannot.
     """
     failure: SimulationError | None = None
     y, v = np.array(y, dtype=float), np.array(v, dtype=float)
     start, end = times
     walk = legs(system, times) or [Leg(start, end, start, end)]
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are checked for and reported
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
         try:
             for leg in walk:
                 recorder.work.rhs_calls += 1

@@ -1,16 +1,20 @@
-"""Generalized-α, the default: implicit, second order, with numerical damping of what the step does not resolve.
+"""Generalized-α, the default: implicit, second order, with numerical damping of unresolved vibrations.
 
-J. Chung and G. M. Hulbert, J. Appl. Mech. 60 (1993) 371–375, in the form of M. Arnold and O. Brüls, Multibody Syst.
-Dyn. 18 (2007) 185–202: M(y, t) ÿ = f holds at every knot, and an algorithmic acceleration a with
+J. Chung and G. M. Hulbert, J. Appl. Mech. 60 (1993) 371–375, in the form of M. Arnold and O. Brüls, Multibody
+Syst. Dyn. 18 (2007) 185–202: M(y, t) ÿ = f holds at every knot, and an algorithmic acceleration a with
 
     (1 − α_m) a₁ + α_m a₀ = (1 − α_f) ÿ₁ + α_f ÿ₀
 
-enters Newmark's formulas y₁ = y₀ + h v₀ + h² ((½ − β) a₀ + β a₁) and v₁ = v₀ + h ((1 − γ) a₀ + γ a₁). From a
-correction Δy follow Δÿ = β' Δy and Δv = γ' Δy with β' = (1 − α_m)/(h² β (1 − α_f)) and γ' = γ/(h β), hence the
-iteration matrix S = β' M + γ' C + K.
+enters Newmark's formulas y₁ = y₀ + h v₀ + h² ((½ − β) a₀ + β a₁) and v₁ = v₀ + h ((1 − γ) a₀ + γ a₁). With
 
-S is factored once and kept while it serves. A fresh one costs about as much as a few residuals, so it is made when
-the iterations beyond those that a fresh one needed add up to that cost, and whenever the iteration fails.
+    α_m = (2ρ − 1)/(ρ + 1),  α_f = ρ/(ρ + 1),  γ = ½ + α_f − α_m,  β = ¼ (γ + ½)²
+
+the order is two and vibrations that the step does not resolve lose the factor ρ = ρ∞ in each step. From a
+correction Δy follow Δÿ = β' Δy and Δv = γ' Δy with β' = (1 − α_m)/(h² β (1 − α_f)) and γ' = γ/(h β), hence
+the iteration matrix S = β' M + γ' C + K. A run starts with a₀ = ÿ₀: that is wrong by O(h), once, and decays.
+
+S is factored once and kept while it serves. A fresh one costs about as much as a few residuals, so it is
+made when the iterations beyond those that a fresh one needed add up to that cost, and when iteration fails.
 """
 
 from __future__ import annotations
@@ -49,7 +53,8 @@ def generalized_alpha(
 ) -> Solution:
     """Integrate with fixed steps ``options.step`` (default: a thousandth of the run, at most 1 ms).
 
-    Steps are equal inside a leg and end on breakpoints. Where Newton's method fails they are halved for a while.
+    Steps are equal inside a leg and end on breakpoints. Where Newton's method fails they are halved for a
+    while.
     """
     step = options.step or min((times[1] - times[0]) / 1000, 1e-3)
     capacity = int(min((times[1] - times[0]) / step, 1e6)) + 2 if times[1] > times[0] else 2
@@ -74,8 +79,9 @@ class _Stepper:
         self.factors = self.pivots = np.empty(0)  # of S
         self.factored = False
         self.rate = _SLOWEST_KNOWN
-        self.usual, self.excess = MAX_ITERATIONS, 0  # iterations: fewest since the last refresh, sum beyond those
-        self.suspect, self.reason = np.zeros(1), ""  # (n,) vector that made the last iteration fail, and how
+        self.usual = MAX_ITERATIONS  # fewest since the matrix is fresh
+        self.excess = 0  # sum of slow steps' iterations beyond those
+        self.suspect, self.reason = np.zeros(1), ""  # (n,) what made the last iteration fail, and how
 
     def set_step(self, h: float) -> None:
         """Formulas for steps of ``h``; a step that differs only by rounding keeps the matrix."""
@@ -92,7 +98,7 @@ class _Stepper:
         self.v_from_a = (h * (1 - self.gamma), h * self.gamma)
 
     def advance(self, leg: Leg, y: Array, v: Array, a: Array, recorder: Recorder) -> tuple[Array, Array]:
-        """Equal steps over a leg; on a grid of 2^MAX_HALVINGS points per step, so that halved steps meet it."""
+        """Equal steps over a leg, each of 2^MAX_HALVINGS units of time, so that halved steps meet its end."""
         unit = 1 << MAX_HALVINGS
         count = max(1, math.ceil((leg.end - leg.start) / self.step * (1 - 1e-9)))
         total, at, halvings, served = count * unit, 0, 0, 0
@@ -169,8 +175,8 @@ class _Stepper:
     def iterate(self, t: float, y: Array, v: Array, acc: Array) -> bool:
         """Chord iteration on y, v, ÿ in place; True when the remaining error is estimated within tolerance.
 
-        The estimate rate/(1 − rate) |Δ| uses the rate of earlier steps at first (Hairer & Wanner, Solving ODEs II,
-        sec. IV.8), which counts for less the older it gets.
+        The estimate rate/(1 − rate) |Δ| uses the rate of earlier steps at first (Hairer & Wanner, Solving
+        ODEs II, sec. IV.8), which counts for less the older it gets.
         """
         rounding = _ROUNDING * float(np.abs(self.metres * y).max())
         goal = self.tolerance + rounding
@@ -193,7 +199,8 @@ class _Stepper:
             if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
                 self.rate = min(rate, _SLOWEST_KNOWN)
                 self.usual = min(self.usual, k)
-                self.excess += k - self.usual
+                if k > 1 and rate > _FASTEST_TRUSTED:  # otherwise the last iteration just confirmed
+                    self.excess += k - self.usual
                 return True
             left = MAX_ITERATIONS - k
             # a first correction may be small by luck; later ones must lead to the goal in time
@@ -215,6 +222,6 @@ class _Stepper:
             where=f"t = {t:.9g} s",
             value=f"step {self.h:.3g} s",
             limit=f"{MAX_HALVINGS} halvings of the step",
-            remedy="check forces and stiffness that act on this coordinate, for jumps without breakpoint first; "
-            "then try a smaller step or a larger Newton tolerance",
+            remedy="check forces and stiffness that act on this coordinate, for jumps without breakpoint "
+            "first; then try a smaller step or a larger Newton tolerance",
         )

@@ -3,18 +3,17 @@
 Explicit Runge-Kutta pairs RK45 (Dormand & Prince, 1980) and DOP853 (Hairer, Nørsett & Wanner, 1993); implicit
 Radau IIA of order 5 (Hairer & Wanner, 1996), BDF (Shampine & Reichelt, 1997) and LSODA (Petzold, 1983).
 
-Error weights: ``atol`` is in metres, so coordinate i gets ``atol / length_scales[i]``. Its velocity gets ten times
-that per second: in motions of this field velocities are some ten times the displacements (0.1 s and slower).
+Error weights: ``atol`` is in metres, so coordinate i gets ``atol / length_scales[i]``. Its velocity gets ten
+times that per second: vibrations that matter are of 10 rad/s or faster, with velocities that much larger.
 
-Knots: quintic Hermite interpolation between the ends of steps is more accurate than SciPy's own interpolants, except
-in the long steps of DOP853. There the interpolant yields accelerations at three inner times, and the polynomial of
-degree 8 that meets those and both ends yields y and v, consistent with one another as the interpolant's are not.
+Knots: quintic Hermite interpolation between the ends of steps is more accurate than SciPy's own interpolants,
+except in the long steps of DOP853. There the interpolant yields accelerations at three inner times, and the
+polynomial of degree 8 that meets those and both ends yields y and v, consistent with one another as the
+interpolant's are not. Positions of the multistep methods BDF and LSODA jitter by their local error, which
+velocities between knots magnify: some ten times in smooth motion, more in stiff transients.
 
-Positions
-of the multistep methods BDF and LSODA jitter by their local error, which velocities between knots magnify, up to
-ten times in smooth motion and more in stiff transients; velocities at knots are good.
-
-SciPy does not tell the rejected steps and Newton iterations of its implicit methods; they stay 0 in `Work`.
+The implicit methods get the Jacobian of the stiff terms instead of 2n differences of right-hand sides. SciPy
+does not tell their rejected steps and Newton iterations; these stay 0 in `Work`.
 """
 
 from __future__ import annotations
@@ -53,7 +52,8 @@ def _rows(at: Array, order: int) -> Array:
     """(k, 9) derivative of the monomials up to degree 8."""
     powers = np.arange(9)
     factors = np.prod([np.maximum(powers - i, 0) for i in range(order)], axis=0)
-    return factors * at[:, None] ** np.maximum(powers - order, 0)
+    rows: Array = factors * at[:, None] ** np.maximum(powers - order, 0)
+    return rows
 
 
 _ENDS = np.array([0.0, 1.0])
@@ -83,7 +83,13 @@ METHODS = {
 def explicit_step_limit(
     system: SecondOrderSystem, t: float, y: Array, v: Array, method: str
 ) -> tuple[float, float]:
-    """Highest undamped frequency [Hz] of (K, M) at this state, and the largest stable step [s] of ``method``."""
+    """Highest undamped frequency [Hz] of (K, M) at this state, and the largest stable step [s].
+
+    Parameters
+    ----------
+    method : str
+        A member of ``METHODS``; the step of an implicit one is infinite.
+    """
     stiffness, _ = system.stiffness_and_damping(t, y, v)
     squares = np.linalg.eigvals(np.linalg.solve(system.mass_matrix(t, y), stiffness))
     omega = math.sqrt(float(np.abs(squares).max(initial=0.0)))
@@ -102,9 +108,9 @@ def _warn_of_stiffness(
     if steps <= MANY_STEPS:
         return []
     return [
-        f"{name} is explicit: the highest frequency, {frequency:.4g} Hz, limits its step to {limit:.3g} s, so this "
-        f"run needs at least {steps:.3g} steps; the default integrator, generalized_alpha, is implicit and has no "
-        "such limit"
+        f"{name} is explicit: the highest frequency, {frequency:.4g} Hz, limits its step to {limit:.3g} s, "
+        f"so this run needs at least {steps:.3g} steps; the default integrator, generalized_alpha, is "
+        "implicit and has no such limit"
     ]
 
 
@@ -127,7 +133,9 @@ def scipy_method(name: str) -> Integrator:
         return integrate_legs(system, times, y, v, recorder, run.advance)
 
     integrate.__name__ = name
-    integrate.__doc__ = f"Integrate with SciPy's {method.solver.__name__}; ``options.step`` is its largest step."
+    integrate.__doc__ = (
+        f"Integrate with SciPy's {method.solver.__name__}; ``options.step`` is its largest step."
+    )
     return integrate
 
 
@@ -177,9 +185,11 @@ class _Run:
         solver = self.guarded(self.method.solver, self.derivative, leg.start, x, leg.end, **self.settings)
         old = (leg.start, y, v, a)
         while solver.status == "running":
-            calls = self.work.rhs_calls
+            calls, factored = self.work.rhs_calls, solver.nlu
             message = self.guarded(solver.step)
-            stuck = solver.status == "running" and solver.t - old[0] < 10 * np.spacing(abs(old[0]))  # LSODA goes on
+            self.work.factorizations += solver.nlu - factored
+            # LSODA does not stop by itself when its steps are lost in rounding
+            stuck = solver.status == "running" and solver.t - old[0] < 10 * np.spacing(abs(old[0]))
             if stuck or solver.status == "failed" or not np.isfinite(solver.y).all():
                 raise self.failure(solver, message)
             if self.explicit:
@@ -220,7 +230,7 @@ class _Run:
             recorder.append(time, filled[k], filled[k + 3] / h, rates[k])
 
     def guarded(self, call: Callable[..., Any], *args: Any, **settings: Any) -> Any:
-        """Call SciPy without its warnings, which repeat what it reports, and explain what NaN makes it raise."""
+        """Call SciPy without its warnings, which repeat what it reports; explain what NaN makes it raise."""
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -241,9 +251,10 @@ class _Run:
         worst = int(np.abs(a * metre_scales(self.system)).argmax())
         return SimulationError(
             Cause.STEP_TOO_SMALL,
-            f"no step is small enough for the tolerances; coordinate {worst} (counted from 0) accelerates most",
+            "no step is small enough for the tolerances; "
+            f"coordinate {worst} (counted from 0) accelerates most",
             where=f"t = {t:.9g} s",
             value=(message or "").strip() or "no progress",
-            remedy="check forces that act on this coordinate, for jumps without breakpoint and growth without "
-            "bound first; then try larger tolerances or the default integrator, generalized_alpha",
+            remedy="check forces that act on this coordinate, for jumps without breakpoint and growth "
+            "without bound first; then try larger tolerances or the default integrator, generalized_alpha",
         )

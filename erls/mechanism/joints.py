@@ -69,7 +69,11 @@ class JointForces:
         """-∂force/∂angle and -∂force/∂rate."""
         slope = 0.0
         if self.friction:
-            slope = self.friction / self.transition_rate / math.cosh(min(abs(rate) / self.transition_rate, 300)) ** 2
+            slope = (
+                self.friction
+                / self.transition_rate
+                / math.cosh(min(abs(rate) / self.transition_rate, 300)) ** 2
+            )
         return self.stiffness, self.damping + slope
 
     @property

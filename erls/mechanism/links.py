@@ -82,7 +82,9 @@ def truncated(model: ModalModel, elastic_modes: int) -> ModalModel:
     )
 
 
-def payload_invariants(model: ModalModel, node: int, offset: Array, mass: float, inertia: Array) -> InertiaInvariants:
+def payload_invariants(
+    model: ModalModel, node: int, offset: Array, mass: float, inertia: Array
+) -> InertiaInvariants:
     """Invariants of a rigid body on a node.
 
     Parameters

@@ -39,9 +39,11 @@ class Modes(SecondOrderSystem):
 
 
 class Law(Modes):
-    """One coordinate of unit mass with acceleration ``law(t, y, v)`` and no stiffness known to the integrator."""
+    """One coordinate of unit mass with acceleration ``law(t, y, v)``; no stiffness is told."""
 
-    def __init__(self, law: Callable[[float, float, float], float], breakpoints: tuple[float, ...] = ()) -> None:
+    def __init__(
+        self, law: Callable[[float, float, float], float], breakpoints: tuple[float, ...] = ()
+    ) -> None:
         super().__init__([0.0], breakpoints=breakpoints)
         self.law = law
 
@@ -85,7 +87,7 @@ class DoublePendulum(SecondOrderSystem):
 
 
 class ElasticPendulum(SecondOrderSystem):
-    """A unit mass on a spring of unit length: angle from the vertical and elongation, a stiff nonlinear system."""
+    """A unit mass on a spring of unit length: angle from the vertical and elongation; stiff and nonlinear."""
 
     size = 2
     length_scales = np.array([1.0, 1.0])

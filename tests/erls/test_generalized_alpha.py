@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from small_systems import DoublePendulum, ElasticPendulum, Law, Modes
 
 from erls.errors import Cause
-from erls.integrators import generalized_alpha
 from erls.integrators.base import Array, Options
+from erls.integrators.generalized_alpha import generalized_alpha
 
 RADII = (0.0, 0.5, 0.8, 1.0)
 ONE, ZERO = np.ones(1), np.zeros(1)
@@ -52,22 +52,26 @@ def test_damping_at_infinite_frequency_is_the_spectral_radius(radius: float) -> 
 
 
 def test_energy_of_a_linear_oscillator_without_damping_is_kept() -> None:
-    """ρ∞ = 1 is the trapezoidal rule, which keeps quadratic invariants: drift by rounding of 1e4 steps only."""
+    """ρ∞ = 1 is the trapezoidal rule, which keeps quadratic invariants: 1e4 steps of rounding only."""
     omega = np.array([1.0, 30.0, 4000.0])
     setting = Options(step=1e-3, spectral_radius=1.0)
     found = generalized_alpha(Modes(list(omega)), (0, 10), 1 / omega, np.ones(3), setting)
     energy = ((found.v**2 + (omega * found.y) ** 2) / 2).sum(axis=1)
     assert np.abs(energy / energy[0] - 1).max() < 1e-11
-    damped = generalized_alpha(Modes([4000.0]), (0, 1), ONE / 4000, ONE, Options(step=1e-3, spectral_radius=0.5))
+    damped = generalized_alpha(
+        Modes([4000.0]), (0, 1), ONE / 4000, ONE, Options(step=1e-3, spectral_radius=0.5)
+    )
     assert abs(damped.v[-1, 0]) < 1e-12  # the mode that the step cannot resolve dies
 
 
 @pytest.mark.parametrize("radius", RADII)
 def test_stiff_modes_are_stable(radius: float) -> None:
-    """Modes up to 1e5 Hz with 1 ms: bounded by the static response to the step load, the slow mode is right."""
+    """Modes up to 1e5 Hz with 1 ms: bounded by their static response, and the slow mode is right."""
     omega = 2 * np.pi * np.array([0.5, 1e3, 1e5])
     setting = Options(step=1e-3, spectral_radius=radius)
-    found = generalized_alpha(Modes(list(omega), force=lambda t: 1.0), (0, 2), np.zeros(3), np.zeros(3), setting)
+    found = generalized_alpha(
+        Modes(list(omega), force=lambda t: 1.0), (0, 2), np.zeros(3), np.zeros(3), setting
+    )
     assert found.failure is None
     assert (np.abs(found.y) <= 4 / omega**2).all()  # true motion: twice the static response
     exact = (1 - np.cos(omega[0] * found.t)) / omega[0] ** 2
@@ -75,7 +79,7 @@ def test_stiff_modes_are_stable(radius: float) -> None:
 
 
 def test_work_on_a_linear_stiff_oscillator() -> None:
-    """One factorization, and at most two iterations in a step, of which the first solves and the second confirms."""
+    """One factorization, and at most two iterations in a step: one that solves and one that confirms."""
     counts: list[int] = []
     system = Modes([1.0, 1e3, 1e5], zeta=0.01, force=np.sin)
     found = generalized_alpha(
@@ -92,7 +96,8 @@ def test_work_on_a_linear_stiff_oscillator() -> None:
     assert found.work.rhs_calls == found.work.newton_iterations + 1
 
 
-BUDGETS = [  # system, start, step, Newton iterations per step, factorizations per step; a third above what is measured
+# system, start, step, Newton iterations per step, factorizations per step: a third more than was measured
+BUDGETS = [
     (DoublePendulum(), [1.0, 0.5], 1e-3, 1.8, 0.1),
     (DoublePendulum(), [3.0, 3.0], 4e-3, 4.0, 0.2),
     (ElasticPendulum(1e3), [1.0, 0.0], 1e-3, 2.7, 0.01),
@@ -132,7 +137,9 @@ def test_halved_steps_recover() -> None:
     assert steps.min() < 0.02 < 0.0499 < steps[-1]
     assert found.t[-1] == 4
     # set times of the grid are met whatever happened in between
-    np.testing.assert_allclose(np.min(np.abs(found.t[:, None] - np.linspace(0, 4, 81)), axis=0), 0, atol=1e-12)
+    np.testing.assert_allclose(
+        np.min(np.abs(found.t[:, None] - np.linspace(0, 4, 81)), axis=0), 0, atol=1e-12
+    )
 
 
 def test_a_system_without_solution_is_reported() -> None:

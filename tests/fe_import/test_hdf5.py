@@ -295,6 +295,8 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_attribute(file, "version", 3)
         write_attribute(file, "name", "é")
         write_attribute(file, "ratio", 0.5)
+        write_attribute(file, "large", "é" * 100_000)
+        write_attribute(file, "not UTF-8", "a\udce9")
         write_attribute(file, "nan", float("nan"))
         file.attrs["variable"] = "é"
     return path
@@ -321,6 +323,8 @@ def test_reads_what_was_written(mixed: Path) -> None:
         assert file.text("t") == "some text"
         assert file.attribute("version", int) == 3
         assert file.attribute("ratio", float) == 0.5
+        assert file.attribute("large", str) == "é" * 100_000
+        assert file.attribute("not UTF-8", str) == r"a\udce9"
         assert file.attribute("name", str) == file.attribute("variable", str) == "é"
         assert file.subgroup("g").names_inside() == ()
         assert file.group["x"].attrs["unit"] == b"m"

@@ -21,7 +21,9 @@ from fe_import.toml_file import choose
 
 Progress = Callable[[float, float], None]  # (time, duration)
 
-_LARGE_DEFLECTION = 0.1  # of the link's size; the second-order error of a small-displacement model is then about 1 %
+_LARGE_DEFLECTION = (
+    0.1  # of the link's size; the second-order error of a small-displacement model is then about 1 %
+)
 _LARGE_ROTATION = 0.2  # rad
 CHECKPOINT_S = 20.0  # a killed run loses at most this much work
 
@@ -108,7 +110,11 @@ def impulse_warnings(built: Built) -> list[str]:
             continue
         for t in joint.drive.breakpoints:
             before, after = joint.drive.reference(t, left=True), joint.drive.reference(t)
-            if before is not None and after is not None and abs(before[1] - after[1]) > 1e-9 * max(1, abs(after[1])):
+            if (
+                before is not None
+                and after is not None
+                and abs(before[1] - after[1]) > 1e-9 * max(1, abs(after[1]))
+            ):
                 result.append(
                     f"joint {joint.name!r}: the prescribed rate jumps at t = {t:.6g} s; the links do not feel the "
                     "blow (use a motion with continuous rate)"

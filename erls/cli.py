@@ -1,0 +1,379 @@
+"""The command ``erls``: reduce, simulate, info, view.
+
+Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 2 bad input, 3 numerical failure, 4 did not
+converge where convergence was asked for, 130 interrupted. Heavy packages are imported inside the commands, so that
+help answers at once.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+
+from fe_import.errors import ReportedError
+
+app = App(
+    name="erls",
+    help="Simulate mechanisms and robots with flexible links.\n\n"
+    "Reduce the finite-element model of a link to a modal file, put links on Denavit-Hartenberg joints in a scene, "
+    "simulate it, look at the result:\n\n"
+    "    erls simulate data/l_shape/steel_tall.toml -o l.run.h5\n\n"
+    "    erls view l.run.h5 -o l.png",
+    help_format="plaintext",
+    version_flags=["--version"],
+    default_parameter=Parameter(show_default=False),
+)
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+Output = Annotated[Path | None, Parameter(name=["--output", "-o"])]
+
+
+@app.command
+def reduce(
+    link: Path,
+    /,
+    *,
+    output: Output = None,
+    method: str | None = None,
+    modes: int | None = None,
+    json: Json = False,
+) -> None:
+    """Reduce the finite-element model of a link to a modal file.
+
+    Prints the modes, the mass properties and the health checks.
+
+    Parameters
+    ----------
+    link
+        Link description (TOML).
+    output
+        Modal file to write; LINK.modal.h5 in the current folder unless given.
+    method
+        Reduction instead of the one in the description: craig-bampton or none.
+    modes
+        Number of elastic modes instead of that in the description.
+    json
+        Print one JSON object.
+    """
+    from fe_import.link import load_link
+    from fe_import.modal_file import write_modal_file
+    from fe_import.reduce import reduce_link, reduction_summary
+
+    changes = {k: v for k, v in (("method", method), ("elastic_modes", modes)) if v is not None}
+    description = load_link(link, changes)
+    target = output or Path(f"{description.description.name}.modal.h5")
+    _writable(target)
+    begun = time.perf_counter()
+    _tell(f"reducing {link}")
+    model = reduce_link(description)
+    write_modal_file(target, model)
+    summary = {
+        **reduction_summary(model),
+        "wall_s": time.perf_counter() - begun,
+        "peak_memory_mb": _peak_memory_mb(),
+        "output": str(target),
+    }
+    if json:
+        return _print_json(summary)
+    from erls.report.tables import modal_report
+
+    print(modal_report(model))
+    print(f"\nwritten to {target}")
+
+
+@app.command
+def simulate(
+    scene: Path,
+    /,
+    *,
+    output: Output = None,
+    formulation: str | None = None,
+    set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
+    at: str = "",
+    json: Json = False,
+) -> None:
+    """Simulate a scene; links are reduced on the fly and cached by content.
+
+    Parameters
+    ----------
+    scene
+        Scene (TOML).
+    output
+        Run file to write (HDF5); none unless given.
+    formulation
+        Formulation instead of the one in the scene: erls.
+    set_
+        Change a field of the scene, KEY=VALUE; may be repeated. For example simulation.step=1e-4,
+        links.arm.elastic_modes=8, joints.0.initial.position_deg=30.
+    at
+        Times in seconds, separated by commas, at which to report joints and points.
+    json
+        Print one JSON object.
+    """
+    from erls.errors import SimulationError
+    from erls.report.tables import run_report
+    from erls.run_file import write_run
+    from erls.scene import load_scene
+    from erls.simulation import simulate as run_simulation
+
+    changes = list(set_ or [])
+    if formulation is not None:
+        changes.append(f'simulation.formulation="{formulation}"')
+    loaded = load_scene(scene, changes)
+    times = _times(at, loaded.record.simulation.duration)
+    if output is not None:
+        _writable(output)
+    partial = output.with_name(f"{output.name}.partial") if output is not None else None
+    try:
+        with _progress("simulating") as advance:
+            run = run_simulation(loaded, progress=advance, tell=_tell, checkpoint=partial)
+    except SimulationError as problem:
+        if problem.run is not None and output is not None and len(problem.run.solution.t) > 1:
+            write_run(output, problem.run)
+            _tell(f"what was computed, up to t = {problem.run.end:.6g} s, is in {output}")
+        raise
+    finally:
+        if partial is not None:
+            partial.unlink(missing_ok=True)
+    for warning in run.warnings:
+        _tell(f"warning: {warning}")
+    if output is not None:
+        write_run(output, run)
+    if json:
+        return _print_json({**run.summary(times), "output": None if output is None else str(output)})
+    print(run_report(run, times))
+    if output is not None:
+        print(f"\nwritten to {output}")
+
+
+@app.command
+def info(file: Path, /, *, json: Json = False) -> None:
+    """Show what is in a link, modal, scene or run file.
+
+    Of a modal file: the modes with frequency, kind and effective mass, the mass properties against those of the full
+    model, and the health checks.
+
+    Parameters
+    ----------
+    file
+        The file.
+    json
+        Print one JSON object.
+    """
+    from erls.report.info import file_info
+
+    summary, text = file_info(file)
+    if json:
+        return _print_json(summary)
+    print(text)
+
+
+@app.command
+def view(
+    run: Path,
+    /,
+    *,
+    output: Output = None,
+    at: str = "",
+    magnify: float = 1.0,
+    fps: int = 30,
+    speed: float = 1.0,
+    json: Json = False,
+) -> None:
+    """Make a picture, film or export of a run; without -o, open a window.
+
+    The ending of the output decides: .png or .jpg a picture, .mp4 or .gif a film, .pvd the deformed links for
+    ParaView, .csv a table of joints, points, forces and energies.
+
+    Parameters
+    ----------
+    run
+        Run file.
+    output
+        File to write.
+    at
+        Times in seconds, separated by commas, instead of even ones (picture, .pvd, .csv).
+    magnify
+        Factor on the displacement of the links; 1 shows it true.
+    fps
+        Frames per second of a film.
+    speed
+        Film time over real time; 0.5 is slow motion.
+    json
+        Print one JSON object.
+    """
+    from erls.run_file import load_run
+    from erls.view import show, write_view
+
+    if output is not None:
+        _writable(output)
+    loaded = load_run(run)
+    if output is None:
+        show(loaded)
+        return
+    begun = time.perf_counter()
+    times = _times(at, loaded.end) or None
+    with _progress("drawing") as advance:
+        write_view(
+            loaded,
+            output,
+            times=times,
+            magnification=magnify,
+            fps=fps,
+            speed=speed,
+            progress=lambda done, total: advance(done, total),
+        )
+    if json:
+        return _print_json({"run": str(run), "output": str(output), "wall_s": time.perf_counter() - begun})
+    print(f"written to {output}")
+
+
+def _times(text: str, end: float) -> list[float]:
+    """Times of ``--at``."""
+    from erls.errors import Cause, SceneError
+
+    result = []
+    for part in (p for p in text.split(",") if p.strip()):
+        try:
+            value = float(part)
+        except ValueError:
+            value = float("nan")
+        if not 0 <= value <= end:
+            raise SceneError(
+                Cause.TIME_OUT_OF_RANGE,
+                "not a time within the run",
+                where="--at",
+                value=part.strip(),
+                limit=f"0 to {end:g} s",
+                remedy="give times in seconds, separated by commas",
+            )
+        result.append(value)
+    return result
+
+
+def _writable(path: Path) -> None:
+    """Refuse an output that cannot be written before any work is done."""
+    import os
+
+    from erls.errors import Cause, SceneError
+
+    folder = path.parent
+    remedy = ""
+    if not folder.is_dir():
+        remedy = "make the folder first"
+    elif path.is_dir():
+        remedy = "give the name of a file"
+    elif not os.access(folder, os.W_OK):
+        remedy = "choose another folder"
+    if remedy:
+        raise SceneError(Cause.NOT_WRITABLE, "cannot be written", where=f"-o {path}", remedy=remedy)
+
+
+def _peak_memory_mb() -> float | None:
+    """Largest memory of this process so far; None where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    unit = 2**20 if sys.platform == "darwin" else 2**10
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+def _tell(text: str) -> None:
+    """A message on stderr."""
+    print(text, file=sys.stderr)
+
+
+def _print_json(summary: dict[str, Any]) -> None:
+    print(json.dumps(summary, allow_nan=False))
+
+
+class _progress:
+    """A progress bar on stderr; plain lines where stderr is no terminal."""
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self.bar: Any = None
+        self.task: Any = None
+        self.told = time.monotonic()
+        self.last = 0.0
+
+    def __enter__(self) -> Callable[[float, float], None]:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+            columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %"))
+            self.bar = Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+            self.bar.start()
+            self.task = self.bar.add_task(self.what, total=1.0)
+        return self.advance
+
+    def advance(self, done: float, total: float) -> None:
+        now = time.monotonic()
+        share = done / total if total else 1.0
+        if self.bar is not None:
+            if now - self.last > 0.05:
+                self.last = now
+                self.bar.update(self.task, completed=share)
+        elif now - self.told > 5:
+            self.told = now
+            _tell(f"{self.what}: {100 * share:.0f} %")
+
+    def __exit__(self, *exception: object) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+
+def _report(error: ReportedError, as_json: bool) -> int:
+    """Print an error; returns the exit code."""
+    if as_json:
+        _print_json({"error": error.as_dict()})
+    else:
+        _tell(f"error: {error}")
+    return error.exit_code
+
+
+def _usage_error(problem: CycloptsError) -> ReportedError:
+    from erls.errors import Cause, SceneError
+
+    text = " ".join(str(problem).split())
+    return SceneError(Cause.BAD_FIELD, text, where="command line", remedy="see erls --help")
+
+
+def _interrupt(number: int, frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; returns the exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Instead of those of the process.
+    """
+    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    as_json = "--json" in tokens
+    if arguments is None:
+        signal.signal(signal.SIGTERM, _interrupt)  # like Ctrl-C: finished work is kept
+    try:
+        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as problem:
+        return _report(_usage_error(problem), as_json)
+    except ReportedError as problem:
+        return _report(problem, as_json)
+    except KeyboardInterrupt:
+        _tell("interrupted")
+        return 130
+    except MemoryError:
+        _tell("error: out of memory; reduce the model further or free memory")
+        return 3
+    return 0

@@ -1,0 +1,114 @@
+"""What is in a file: the summary (JSON) and text of ``erls info``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from erls.errors import Cause, SceneError
+from erls.report.tables import modal_report, run_report, table
+from erls.scene import Scene, load_scene
+from fe_import.hdf5 import open_for_reading
+from fe_import.link import LinkFile, load_link
+from fe_import.modal_file import ModalModel, read_modal_file
+from fe_import.toml_file import read_toml
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def file_info(path: Path) -> tuple[dict[str, Any], str]:
+    """Summary and text of a link, modal, scene or run file; the content decides which it is.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Not a file of this program, or a faulty one.
+    """
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(_HDF5))
+    except OSError:
+        start = b""  # reported by the reader below
+    if start == _HDF5:
+        with open_for_reading(path, SceneError, Cause.RUN_FILE) as reader:
+            schema = reader.attribute("schema", str) if "schema" in reader.attribute_names() else ""
+        if schema == "erls run":
+            from erls.run_file import load_run
+
+            run = load_run(path)
+            return {"file": "run", **run.summary()}, run_report(run)
+        return _modal_info(read_modal_file(path))
+    data = read_toml(path, SceneError)
+    if "joints" in data or "simulation" in data or "links" in data:
+        return _scene_info(load_scene(path))
+    return _link_info(load_link(path))
+
+
+def _modal_info(model: ModalModel) -> tuple[dict[str, Any], str]:
+    from fe_import.reduce import reduction_summary
+
+    modes = [
+        {"frequency_hz": float(f), "kind": kind, "damping_ratio": float(d)}
+        for f, kind, d in zip(model.frequencies_hz, model.kinds, model.damping_ratios, strict=True)
+    ]
+    full = model.full_mass_properties
+    summary = {
+        "file": "modal",
+        **reduction_summary(model),
+        "modes": modes,
+        "fixed_interface_modes": [
+            {"frequency_hz": float(f), "effective_mass": share.tolist()}
+            for f, share in zip(model.fixed_interface.frequencies_hz, model.fixed_interface.effective_mass, strict=True)
+        ],
+        "full_model": {
+            "mass": full.mass,
+            "centre_of_mass": full.centre_of_mass.tolist(),
+            "inertia": full.inertia.tolist(),
+        },
+        "provenance": model.provenance,
+    }
+    return summary, modal_report(model)
+
+
+def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
+    record = scene.record
+    rows = [
+        (joint.name, joint.type, msgspec.to_builtins(joint.drive)["type"], link.name, _source(link))
+        for joint, link in zip(record.joints, record.links, strict=True)
+    ]
+    simulation = msgspec.to_builtins(record.simulation)
+    text = f"{scene.name}: scene with {len(rows)} joints\n\n" + table(
+        ("joint", "type", "drive", "link", "source"), rows
+    )
+    text += "\n\npoints: " + (", ".join(p.name for p in record.points) or "none")
+    text += "\nsimulation: " + ", ".join(f"{k} = {v}" for k, v in simulation.items() if v is not None)
+    return {"file": "scene", "scene": scene.name, **msgspec.to_builtins(record)}, text
+
+
+def _source(link: Any) -> str:
+    return str(link.model or link.modal_file or "rigid")
+
+
+def _link_info(link: LinkFile) -> tuple[dict[str, Any], str]:
+    from fe_import.build import build_model
+    from fe_import.inertia import mass_properties
+
+    model = build_model(link)
+    rigid = model.rigid_body_modes()
+    properties = mass_properties(rigid.T @ (model.mass @ rigid))
+    summary = {
+        "file": "link",
+        "link": link.description.name,
+        "kind": model.kind,
+        "nodes": len(model.nodes),
+        "dofs": len(model.independent),
+        "interfaces": [i.name for i in model.interface_nodes],
+        "mass": properties.mass,
+        "centre_of_mass": properties.centre_of_mass.tolist(),
+        "inertia": properties.inertia.tolist(),
+        "reduction": msgspec.to_builtins(link.description.reduction),
+    }
+    text = "\n".join(f"{key}: {value}" for key, value in summary.items() if key != "file")
+    return summary, text

@@ -1,0 +1,103 @@
+"""Plain-text tables of modal models and runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from erls.run import Run
+from fe_import.inertia import MassProperties
+from fe_import.modal_file import ModalModel
+
+_SHOWN_MODES = 40
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns aligned to the right, the first one to the left."""
+    widths = [max(len(r[k]) for r in [header, *rows]) for k in range(len(header))]
+    lines = []
+    for row in [header, *rows]:
+        cells = [row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)
+
+
+def modal_report(model: ModalModel) -> str:
+    """Modes, mass properties and health of a modal model."""
+    p = model.provenance
+    head = (
+        f"{model.name}: {p.get('kind', 'link')} model, {p.get('dofs', '?')} dofs, "
+        f"{len(model.interface_nodes)} interfaces ({', '.join(i.name for i in model.interface_nodes)}), "
+        f"reduced by {p.get('method', '?')} to {model.modes} coordinates"
+    )
+    parts = [head]
+    if model.form == "orthonormal":
+        rows = [
+            (str(k + 1), f"{f:.3f}", kind, f"{100 * d:.3g} %" if d else "-")
+            for k, (f, kind, d) in enumerate(
+                zip(model.frequencies_hz[6:], model.kinds[6:], model.damping_ratios[6:], strict=True)
+            )
+        ][:_SHOWN_MODES]
+        parts.append("Elastic modes of the free link\n" + table(("mode", "frequency [Hz]", "kind", "damping"), rows))
+    if len(model.fixed_interface.frequencies_hz):
+        parts.append(_effective_mass_table(model))
+    parts.append(_mass_table(model.mass_properties, model.full_mass_properties))
+    failed = [c for c in model.health if not c.ok]
+    rows = [(c.name, f"{c.value:.2e}", f"{c.limit:.0e}", "ok" if c.ok else "FAILED") for c in model.health]
+    parts.append("Health: " + ("ok" if not failed else f"{len(failed)} checks FAILED"))
+    if rows:
+        parts[-1] += "\n" + table(("check", "value", "limit", ""), rows)
+    return "\n\n".join(parts)
+
+
+def _effective_mass_table(model: ModalModel) -> str:
+    fixed = model.fixed_interface
+    axes = ("x", "y", "z", "about x", "about y", "about z")
+    rows = [
+        (str(k + 1), f"{f:.3f}", *(f"{100 * share:.2f}" for share in shares))
+        for k, (f, shares) in enumerate(zip(fixed.frequencies_hz, fixed.effective_mass, strict=True))
+    ][:_SHOWN_MODES]
+    rows.append(("all", "", *(f"{100 * share:.2f}" for share in fixed.effective_mass.sum(axis=0))))
+    return "Modes with clamped interfaces, effective mass and inertia [%]\n" + table(
+        ("mode", "frequency [Hz]", *axes), rows
+    )
+
+
+def _mass_table(reduced: MassProperties, full: MassProperties) -> str:
+    def row(name: str, a: np.ndarray | float, b: np.ndarray | float) -> tuple[str, str, str, str]:
+        def show(v: np.ndarray | float) -> str:
+            return " ".join(f"{x:.9g}" for x in np.atleast_1d(v))
+
+        difference = np.abs(np.atleast_1d(a) - np.atleast_1d(b)).max()
+        return name, show(a), show(b), f"{difference:.1e}"
+
+    rows = [
+        row("mass [kg]", reduced.mass, full.mass),
+        row("centre of mass [m]", np.round(reduced.centre_of_mass, 12), np.round(full.centre_of_mass, 12)),
+        row("principal inertia [kg m²]", np.linalg.eigvalsh(reduced.inertia), np.linalg.eigvalsh(full.inertia)),
+    ]
+    return "Mass properties\n" + table(("", "reduced", "full model", "difference"), rows)
+
+
+def run_report(run: Run, times: Sequence[float] = ()) -> str:
+    """Summary of a run, and joints and points at given times (its end unless given)."""
+    s = run.summary(times or [run.end])
+    drift = s["energy"]["max_drift"]
+    lines = [
+        f"{s['scene']}: {s['joints']} joints, {s['elastic_coordinates']} elastic coordinates "
+        f"(highest {s['highest_frequency_hz']:.4g} Hz), {s['formulation']}, gauge {s['gauge']}",
+        f"{s['integrator']}: {s['duration']:.6g} s in {s['steps']} steps, {s['rhs_calls']} evaluations, "
+        f"{s['newton_iterations']} iterations, {s['factorizations']} factorizations, {s['wall_s']:.2f} s",
+        f"energy: {s['energy']['initial']:.6g} J at the start, {s['energy']['final']:.6g} J at the end"
+        + (f", drift at most {drift:.2g} J" if drift is not None else " (driven or damped: not conserved)"),
+    ]
+    rows = []
+    for sample in s["samples"]:
+        for name, joint in sample["joints"].items():
+            revolute = run.formulation.mechanism.joints[run.joint_names.index(name)].type.revolute
+            angle = f"{np.degrees(joint['angle']):.4f} deg" if revolute else f"{joint['angle']:.6f} m"
+            rows.append((f"{sample['t']:g}", name, angle, "", ""))
+        for name, point in sample["points"].items():
+            rows.append((f"{sample['t']:g}", name, *(f"{x:.6f}" for x in point)))
+    return "\n".join(lines) + "\n\n" + table(("t [s]", "", "x [m]", "y [m]", "z [m]"), rows)
