@@ -92,3 +92,57 @@ def mechanism(path: Path) -> Mechanism:
 def equations(path: Path, gauge: str = "joint-angle") -> Erls:
     """ERLS equations of a scene file."""
     return Erls(mechanism(path), gauge)
+
+
+ARM_LINK: dict[str, Any] = {
+    "materials": {"m": {"youngs_modulus": 7e10, "poissons_ratio": 0.33, "density": 2700.0}},
+    "sections": {"s": {"shape": "rectangular", "width": 0.01, "height": 0.02}},
+    "frame": {
+        "nodes": {"root": [0.0, 0.0, 0.0], "tip": [0.5, 0.05, 0.1]},
+        "members": [{"from": "root", "to": "tip", "elements": 3, "material": "m", "section": "s"}],
+    },
+    "interfaces": [{"name": "root", "node": "root"}, {"name": "tip", "node": "tip"}],
+    "reduction": {"fixed_interface_modes": 4, "elastic_modes": 7},
+}
+
+
+def arm_link(folder: Path, **changes: Any) -> Path:
+    """A straight link out of every plane, in ``folder``/arm.toml."""
+    return write_toml(folder / "arm.toml", merged(ARM_LINK, changes))
+
+
+def three_links(folder: Path, kind: str = "revolute", **changes: Any) -> Path:
+    """A spatial chain of three flexible links: ``revolute``, ``mixed`` (a prismatic joint, both conventions) or
+    ``prescribed`` (the second joint driven).
+    """
+    arm_link(folder)
+    joints: list[dict[str, Any]] = [
+        {"name": "j1", "dh": {"convention": "standard", "a": 0.5, "alpha_deg": 70.0, "d": 0.1}},
+        {"name": "j2", "dh": {"convention": "standard", "a": 0.4, "alpha_deg": -30.0, "theta_deg": 10.0}},
+        {"name": "j3", "dh": {"convention": "standard", "a": 0.3, "alpha_deg": 20.0}},
+    ]
+    if kind == "mixed":
+        joints[1] = {"name": "j2", "type": "prismatic", "dh": {"convention": "modified", "a": 0.4, "alpha_deg": 50.0}}
+        joints[2]["dh"]["convention"] = "modified"
+    if kind == "prescribed":
+        motion = {"shape": "sine", "amplitude": 0.5, "frequency_hz": 1.0, "phase_deg": 90.0}
+        joints[1]["drive"] = {"type": "motion", "motion": motion}
+    pose = {"position": [-0.4, 0.02, 0.03], "rotation_deg": [5.0, -10.0, 20.0]}
+    links = [
+        {"name": "a", "model": "arm.toml", "mesh_pose": {"frame": "joint"}},
+        {"name": "b", "model": "arm.toml", "mesh_pose": pose},
+        {"name": "c", "model": "arm.toml", "mesh_pose": {"frame": "joint", "rotation_deg": [0.0, 15.0, 0.0]}},
+    ]
+    data = {
+        "simulation": {"duration": 0.2, "step": 1e-3},
+        "base": {"position": [0.1, 0.2, 0.3], "rotation_deg": [20.0, 30.0, -10.0]},
+        "joints": joints,
+        "links": links,
+        "points": [{"name": "end", "link": "c", "node": "tip"}],
+    }
+    return write_toml(folder / "three.toml", merged(data, changes))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file."""
+    return tomllib.loads(path.read_text(encoding="utf-8"))
