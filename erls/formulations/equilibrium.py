@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from erls.formulations.erls import Erls
 
 _ITERATIONS = 20
-_TOLERANCE = 1e-12  # change of the coordinates in metres; quadratic convergence reaches rounding
+_TOLERANCE = 1e-10  # of the deflection; one more step of quadratic convergence would reach rounding
 
 
 def held_equilibrium(equations: Erls, y: Array) -> Array:
@@ -47,7 +47,8 @@ def held_equilibrium(equations: Erls, y: Array) -> Array:
         )
 
     y = y.copy()
-    change = np.inf
+    size_m = max(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in equations.mechanism.links)
+    deflection = 0.0
     for _ in range(_ITERATIONS):
         value = out_of_balance(y)
         slope = np.empty((size, size))
@@ -56,16 +57,21 @@ def held_equilibrium(equations: Erls, y: Array) -> Array:
             trial = y.copy()
             trial[k] += step
             slope[:, k] = (out_of_balance(trial) - value) / step
-        update = np.linalg.solve(slope, -value)
+        try:
+            update = np.linalg.solve(slope, -value)
+        except np.linalg.LinAlgError:
+            break
         y += update
-        change = float(np.abs(scales * update).max())
-        if change < _TOLERANCE:
+        deflection = float(np.abs(scales * y)[f:].max(initial=0.0))
+        if not deflection < size_m:
+            break
+        if np.abs(scales * update).max(initial=0.0) <= _TOLERANCE * max(deflection, 1e-9):
             return y
     raise SimulationError(
         Cause.NO_EQUILIBRIUM,
         "no static equilibrium within small displacements",
         where="initial.deformation",
-        value=change,
-        limit=_TOLERANCE,
+        value=f"deflection {deflection:.3g} m",
+        limit=f"{size_m:.3g} m, the size of a link",
         remedy="start from deformation = 'zero', or check stiffness and gravity",
     )

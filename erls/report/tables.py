@@ -96,8 +96,13 @@ def run_report(run: Run, times: Sequence[float] = ()) -> str:
     for sample in s["samples"]:
         for name, joint in sample["joints"].items():
             revolute = run.formulation.mechanism.joints[run.joint_names.index(name)].type.revolute
-            angle = f"{np.degrees(joint['angle']):.4f} deg" if revolute else f"{joint['angle']:.6f} m"
-            rows.append((f"{sample['t']:g}", name, angle, "", ""))
+
+            def show(value: float, revolute: bool = revolute) -> str:
+                return f"{np.degrees(value):.4f} deg" if revolute else f"{value:.6f} m"
+
+            same = abs(joint["angle"] - joint["coordinate"]) < 1e-12
+            coordinate = "" if same else f"theta {show(joint['coordinate'])}"
+            rows.append((f"{sample['t']:g}", name, show(joint["angle"]), coordinate, ""))
         for name, point in sample["points"].items():
             rows.append((f"{sample['t']:g}", name, *(f"{x:.6f}" for x in point)))
     return "\n".join(lines) + "\n\n" + table(("t [s]", "", "x [m]", "y [m]", "z [m]"), rows)

@@ -202,9 +202,9 @@ def test_massless_chain_is_refused_with_the_joint(tmp_path: Path) -> None:
 
 
 def test_no_equilibrium_is_reported(tmp_path: Path) -> None:
-    """A deflection of 1e16 m cannot be found to 1e-12 m: NO_EQUILIBRIUM, with a remedy."""
+    """Links that would sag by more than their size have no equilibrium within small displacements."""
     scenes.l_link(tmp_path, 2)
-    scene = scenes.l_scene(tmp_path, initial={"deformation": "static"}, gravity=[0.0, 0.0, -1e20])
+    scene = scenes.l_scene(tmp_path, initial={"deformation": "static"}, gravity=[0.0, 0.0, -1e7])
     with pytest.raises(SimulationError) as caught:
         erls.simulate(scene)
     assert caught.value.cause == Cause.NO_EQUILIBRIUM
