@@ -43,7 +43,7 @@ class Run:
     [0.5, 0.5, 0.0]
     >>> run.position("tip", [0.0, 0.005, 0.01]).shape
     (3, 3)
-    >>> run.joint_angle("shoulder", 0.01) > 0
+    >>> bool(run.joint_angle("shoulder", 0.01) > 0)
     True
     >>> run.elastic_coordinates("l", 0.01).shape
     (18,)

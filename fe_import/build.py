@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from fe_import.errors import Cause, FEImportError, ReportedError
 from fe_import.frame import FrameElement, assemble_frame, local_axes
@@ -12,6 +14,8 @@ from fe_import.link import Frame, Inertia, Interface, LinkDescription, LinkFile,
 from fe_import.model import Array, FEModel, InterfaceNode, IntArray
 from fe_import.sections import section_constants
 from fe_import.toml_file import choose
+
+MOST_ELEMENTS = 100_000  # per member; a larger number is a slip
 
 _LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
 _MASS = {"kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237, "slug": 14.59390294, "lbf*s2/in": 175.12683524}
@@ -55,23 +59,10 @@ def _frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
         place = f"{where}: frame.members[{k}]"
         chain = _subdivide(member, names, positions, place)
         for a, b in zip(chain[:-1], chain[1:], strict=True):
-            elements.append(_element(link, frame, member, (a, b), positions, place))
+            elements.append(_element(link, frame, member, (a, b), positions, where, place))
             lines.append((a, b))
     nodes = np.stack(positions)
-    if not np.isfinite(nodes).all():
-        bad = list(names)[int(np.flatnonzero(~np.isfinite(nodes).all(axis=1))[0])]
-        raise FEImportError(
-            Cause.BAD_FIELD, "a position must be finite", where=f"{where}: frame.nodes.{bad}", remedy="give numbers"
-        )
-    unused = set(range(len(nodes))) - {n for line in lines for n in line}
-    if unused:
-        name = list(names)[min(unused)]
-        raise FEImportError(
-            Cause.DISCONNECTED,
-            "this node belongs to no member",
-            where=f"{where}: frame.nodes.{name}",
-            remedy="remove it or add a member",
-        )
+    _check_connected(np.asarray(lines), names, where)
     mass, stiffness, parts = assemble_frame(
         len(nodes),
         elements,
@@ -96,6 +87,30 @@ def _frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
     )
 
 
+def _check_connected(lines: IntArray, names: dict[str, int], where: str) -> None:
+    count = len(names)
+    unused = np.setdiff1d(np.arange(count), lines)
+    if len(unused):
+        raise FEImportError(
+            Cause.DISCONNECTED,
+            "this node belongs to no member",
+            where=f"{where}: frame.nodes.{list(names)[unused[0]]}",
+            remedy="remove it or add a member",
+        )
+    graph = sp.coo_array((np.ones(len(lines)), lines.T), shape=(count, count))
+    parts, part = connected_components(graph, directed=False)
+    if parts > 1:
+        apart = list(names)[int(np.argmax(part != part[0]))]
+        raise FEImportError(
+            Cause.DISCONNECTED,
+            f"no members join node {apart!r} to node {next(iter(names))!r}",
+            where=f"{where}: frame.members",
+            value=f"{parts} parts",
+            limit=1,
+            remedy="let members share a node (equal positions are not enough), or make each part a link",
+        )
+
+
 def _subdivide(member: Member, names: dict[str, int], positions: list[Array], place: str) -> list[int]:
     """Node indices along a member; inner nodes are added to ``names`` and ``positions``."""
     if member.elements < 1:
@@ -105,6 +120,15 @@ def _subdivide(member: Member, names: dict[str, int], positions: list[Array], pl
             where=f"{place}.elements",
             value=member.elements,
             remedy="give 1 or more",
+        )
+    if member.elements > MOST_ELEMENTS:
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            "too many elements",
+            where=f"{place}.elements",
+            value=member.elements,
+            limit=MOST_ELEMENTS,
+            remedy="beam elements are accurate: a few per member do",
         )
     first, last = (_node(names, n, f"{place}.{f}") for n, f in ((member.start, "from"), (member.end, "to")))
     if np.linalg.norm(positions[last] - positions[first]) == 0:
@@ -118,7 +142,16 @@ def _subdivide(member: Member, names: dict[str, int], positions: list[Array], pl
     chain = [first]
     for k in range(1, member.elements):
         s = k / member.elements
-        names[f"{member.start}-{member.end}/{k}"] = len(positions)
+        name = f"{member.start}-{member.end}/{k}"
+        if name in names:
+            raise FEImportError(
+                Cause.BAD_FIELD,
+                "two nodes of one name: inner nodes of a member are named FROM-TO/1 ... in order",
+                where=place,
+                value=name,
+                remedy="rename the node, or divide members that run side by side by nodes of their own",
+            )
+        names[name] = len(positions)
         chain.append(len(positions))
         positions.append((1 - s) * positions[first] + s * positions[last])
     return [*chain, last]
@@ -130,6 +163,7 @@ def _element(
     member: Member,
     nodes: tuple[int, int],
     positions: list[Array],
+    where: str,
     place: str,
 ) -> FrameElement:
     choose(member.material, link.materials, f"{place}.material")
@@ -138,12 +172,13 @@ def _element(
     start, end = positions[nodes[0]], positions[nodes[1]]
     along = (end - start) / np.linalg.norm(end - start)
     reference = np.asarray(member.local_z or ((0, 1, 0) if abs(along[2]) > 0.999 else (0, 0, 1)), dtype=float)
-    if np.linalg.norm(np.cross(reference, along)) < 1e-6 * np.linalg.norm(reference) or not reference.any():
+    usable = np.isfinite(reference).all() and reference.any()
+    if not usable or np.linalg.norm(np.cross(reference, along)) < 1e-6 * np.linalg.norm(reference):
         raise FEImportError(
             Cause.BAD_FIELD,
-            "local_z must not be parallel to the member",
+            "local_z must be finite and not parallel to the member",
             where=f"{place}.local_z",
-            value=tuple(reference),
+            value=tuple(reference.tolist()),
             remedy="give a direction across the member",
         )
     return FrameElement(
@@ -154,7 +189,7 @@ def _element(
             link.sections[member.section],
             material.poissons_ratio,
             frame.torsion,
-            f"{link.name}: sections.{member.section}",
+            f"{where}: sections.{member.section}",
         ),
         youngs_modulus=material.youngs_modulus,
         shear_modulus=material.youngs_modulus / (2 * (1 + material.poissons_ratio)),
@@ -175,6 +210,14 @@ def _frame_interfaces(
                 where=place,
                 value=interface.face or None,
                 remedy="give node = NAME",
+            )
+        if interface.position is not None:
+            raise FEImportError(
+                Cause.INTERFACE,
+                "an interface of a frame link is where its node is",
+                where=f"{place}.position",
+                value=interface.position,
+                remedy="remove the field, or put the interface on another node",
             )
         node = _node(names, interface.node, f"{place}.node")
         if any(node == other.node for other in result):
@@ -209,6 +252,15 @@ def add_masses(model: FEModel, masses: list[PointMass], where: str) -> FEModel:
     for k, point in enumerate(masses):
         place = f"{where}: masses[{k}]"
         node = _node(names, point.node, f"{place}.node")
+        interface = next((i for i in model.interface_nodes if i.name == point.node), None)
+        if interface is not None and interface.node != node:
+            raise FEImportError(
+                Cause.BAD_REFERENCE,
+                "both a node and an interface elsewhere have this name",
+                where=f"{place}.node",
+                value=point.node,
+                remedy="rename one of the two",
+            )
         inertia = inertia_matrix(point.inertia, f"{place}.inertia")
         dofs = model.dof_map[node]
         if inertia.any() and (dofs < 0).any():

@@ -26,7 +26,16 @@ def solid_model(link: LinkFile) -> FEModel:
     solid = description.solid
     if solid is None:
         raise FEImportError(Cause.BAD_FIELD, "not a solid link", where=where)
-    mesh = read_mesh(link.folder / solid.mesh)
+    path = link.folder / solid.mesh
+    if "\0" in solid.mesh or not path.is_file():
+        raise FEImportError(
+            Cause.FILE_NOT_FOUND,
+            "no such mesh file",
+            where=f"{where}: solid.mesh",
+            value=solid.mesh,
+            remedy="give a path that starts at the folder of the link description",
+        )
+    mesh = read_mesh(path)
     mass, stiffness = assemble_solid(mesh, _materials(description, solid, mesh, where))
     coupled = rigid_coupling(mesh.nodes, _faces(description, mesh, where), where)
     return FEModel(
@@ -79,9 +88,13 @@ def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[Interface
                 value=interface.node or None,
                 remedy="give face = SET",
             )
-        choose(interface.coupling, ("rigid",), f"{place}.coupling")
         position = None if interface.position is None else np.asarray(interface.position, dtype=float)
-        result.append(interface_face(mesh, interface.name, interface.face, position))
+        try:
+            result.append(interface_face(mesh, interface.name, interface.face, position))
+        except FEImportError as problem:  # found in the mesh, to be mended in the description
+            problem.where = f"{place}.face"
+            problem.remedy = problem.remedy or "name a face of the mesh with 3 nodes or more, not on one line"
+            raise
     return result
 
 

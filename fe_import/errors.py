@@ -3,7 +3,23 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from typing import Any
+
+
+_LONGEST = 80
+
+
+def shortened(text: str) -> str:
+    """The text, or its beginning and its length when it would fill the screen."""
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 25]}... ({len(text)} characters)"
+
+
+def _shown(value: Any, form: Callable[[Any], str]) -> str:
+    try:
+        return shortened(form(value))
+    except ValueError:  # Python's limit for integers in text
+        return "a number of thousands of digits"
 
 
 class ReportedError(Exception):
@@ -45,9 +61,10 @@ class ReportedError(Exception):
     def __str__(self) -> str:
         parts = [f"{self.where}: {self.message}" if self.where else self.message]
         if self.value is not None:
-            parts.append(f"got {self.value!r}" + ("" if self.limit is None else f", limit {self.limit}"))
+            limit = "" if self.limit is None else f", limit {_shown(self.limit, str)}"
+            parts.append(f"got {_shown(self.value, repr)}{limit}")
         elif self.limit is not None:
-            parts.append(f"limit {self.limit}")
+            parts.append(f"limit {_shown(self.limit, str)}")
         if self.remedy:
             parts.append(self.remedy)
         return "; ".join(parts)
@@ -58,8 +75,8 @@ class ReportedError(Exception):
             "cause": str(self.cause),
             "message": self.message,
             "where": self.where,
-            "value": None if self.value is None else str(self.value),
-            "limit": None if self.limit is None else str(self.limit),
+            "value": None if self.value is None else _shown(self.value, str),
+            "limit": None if self.limit is None else _shown(self.limit, str),
             "remedy": self.remedy,
         }
 

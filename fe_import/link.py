@@ -15,8 +15,11 @@ from typing import Any
 import msgspec
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.sections import Section
-from fe_import.toml_file import convert, read_toml
+from fe_import.sections import Section, check_section
+from fe_import.toml_file import choose, convert, read_toml
+
+MOST_MODES = 100_000  # no machine keeps more; a larger number is a slip
+COUPLINGS = ("rigid",)
 
 Vector = tuple[float, float, float]
 Inertia = tuple[float | Vector, float | Vector, float | Vector]  # [Ixx, Iyy, Izz] or a 3x3 matrix
@@ -190,7 +193,7 @@ class LinkFile:
         if self.description.solid is not None:
             try:
                 digest.update((self.folder / self.description.solid.mesh).read_bytes())
-            except OSError:
+            except (OSError, ValueError):
                 pass  # reported with its name when the mesh is read
         return digest.hexdigest()
 
@@ -256,6 +259,15 @@ def _check(link: LinkDescription, file: str) -> None:
             raise _fail(
                 f"{place}.poissons_ratio", "Poisson's ratio out of range", m.poissons_ratio, "between -1 and 0.5"
             )
+    for name, section in link.sections.items():
+        check_section(section, f"{file}: sections.{name}")
+    for table, nodes in (("frame", link.frame), ("solid", link.solid)):
+        for name, position in nodes.nodes.items() if nodes is not None else ():
+            place = f"{file}: {table}.nodes.{name}"
+            if not name or "\0" in name:
+                raise _fail(place, "a name must not be empty", name, "name the node")
+            if not all(map(math.isfinite, position)):
+                raise _fail(place, "a position must be finite", position, "give three numbers")
     if not link.interfaces:
         raise _fail(f"{file}: interfaces", "a link needs at least one interface", remedy="add [[interfaces]]")
     seen: set[str] = set()
@@ -263,11 +275,20 @@ def _check(link: LinkDescription, file: str) -> None:
         if i.name in seen or not i.name:
             raise _fail(f"{file}: interfaces[{k}].name", "interface names must differ", i.name, "rename one")
         seen.add(i.name)
+        choose(i.coupling, COUPLINGS, f"{file}: interfaces[{k}].coupling")
+        if i.position is not None and not all(map(math.isfinite, i.position)):
+            raise _fail(
+                f"{file}: interfaces[{k}].position", "a position must be finite", i.position, "give three numbers"
+            )
     r = link.reduction
     for field in ("fixed_interface_modes", "elastic_modes"):
         value = getattr(r, field)
         if value is not None and value < 0:
             raise _fail(f"{file}: reduction.{field}", "a mode count cannot be negative", value, "give 0 or more")
+        if value is not None and value > MOST_MODES:
+            raise _fail(f"{file}: reduction.{field}", "too many modes", value, "ask for fewer", MOST_MODES)
+    if r.form == "physical":
+        _check_physical(link, file)
     if r.inboard and r.inboard not in seen:
         raise FEImportError(
             Cause.BAD_REFERENCE,
@@ -280,6 +301,16 @@ def _check(link: LinkDescription, file: str) -> None:
         if not (math.isfinite(p.mass) and p.mass >= 0):
             raise _fail(f"{file}: masses[{k}].mass", "a mass cannot be negative", p.mass, "give 0 or more")
     _check_damping(link.damping, file)
+
+
+def _check_physical(link: LinkDescription, file: str) -> None:
+    """The physical form has no elastic modes that a count or a damping ratio could mean."""
+    remedy = "remove it, or use form = 'orthonormal'"
+    if link.reduction.elastic_modes is not None:
+        message = "the physical form keeps the interface displacements and all fixed-interface modes"
+        raise _fail(f"{file}: reduction.elastic_modes", message, link.reduction.elastic_modes, remedy)
+    if link.damping != Damping():
+        raise _fail(f"{file}: damping", "the physical form carries no modal damping", remedy=remedy)
 
 
 def _check_damping(d: Damping, file: str) -> None:

@@ -8,10 +8,13 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_import.errors import Cause, FEImportError
+from fe_import.inertia import mass_properties
 from fe_import.link import Damping, Reduction
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction import Basis
-from fe_import.sparse import dense_modes
+from fe_import.sparse import dense_modes, polishing
+
+_MASSLESS = 1e-12  # of the largest; the thinnest wire has 1e-8, rounding 1e-15
 
 
 @dataclass(frozen=True)
@@ -52,17 +55,12 @@ def orthonormal_modes(
     FEImportError
         The rigid-body mass matrix is singular, or more elastic modes are asked for than there are.
     """
-    rigid_mass = basis.rigid.T @ mass @ basis.rigid
-    try:
-        factor = la.cholesky(rigid_mass, lower=True)
-    except la.LinAlgError:
-        raise FEImportError(
-            Cause.NOT_DEFINITE,
-            "the link has no mass or no inertia about some axis",
-            where=where,
-            remedy="give it density, rotary inertia or point masses off one line",
-        ) from None
-    rigid = la.solve_triangular(factor, basis.rigid.T, lower=True).T  # (k, 6), mass-orthonormal
+    # columns of like size: without, rounding in the large ones drowns the lowest modes of a slender link
+    inertia, resistance = np.diag(mass), np.diag(stiffness)
+    massive = inertia > _MASSLESS * inertia.max()
+    scale = 1 / np.sqrt(inertia + resistance / np.median(resistance[massive] / inertia[massive]))
+    mass, stiffness = mass * np.outer(scale, scale), stiffness * np.outer(scale, scale)
+    rigid, rigid_coordinates = _rigid_modes(mass, basis.rigid / scale[:, None], where)
 
     complement = la.qr(mass @ rigid)[0][:, 6:]
     if inboard_columns is not None and options.elastic_modes is not None:
@@ -80,12 +78,51 @@ def orthonormal_modes(
             limit=len(omega),
             remedy="ask for fewer, or raise fixed_interface_modes",
         )
-    coordinates = np.hstack([rigid, complement @ elastic[:, :wanted]])
-    signs = np.sign(coordinates[np.abs(coordinates).argmax(axis=0), np.arange(coordinates.shape[1])])
-    signs[:6] = 1.0
-    rigid_coordinates = np.zeros((6 + wanted, 6))
-    rigid_coordinates[:6] = factor.T
-    return OrthonormalModes(coordinates * signs, np.concatenate([np.zeros(6), omega[:wanted]]), rigid_coordinates)
+    coordinates = scale[:, None] * np.hstack([rigid, complement @ elastic[:, :wanted]])
+    motions = np.zeros((6 + wanted, 6))
+    motions[:6] = rigid_coordinates
+    return OrthonormalModes(coordinates, np.concatenate([np.zeros(6), omega[:wanted]]), motions)
+
+
+def mode_shapes(model: FEModel, basis: Basis, modes: OrthonormalModes) -> tuple[Array, OrthonormalModes]:
+    """Displacement fields (d, m) of the modes, and the modes polished with them.
+
+    The reduced matrices carry the rounding of the large basis vectors that a high mode is the small difference of;
+    the fields do not, so orthonormality is restored there. Signs: the largest component is positive.
+    """
+    shapes = basis.vectors @ modes.coordinates
+    count = shapes.shape[1]
+    change = np.eye(count)
+    change[:6, 6:] = -shapes[:, :6].T @ (model.mass @ shapes[:, 6:])
+    omega, polish = polishing(model.stiffness, model.mass, modes.omega[6:], shapes @ change[:, 6:])
+    change[:, 6:] = change[:, 6:] @ polish
+    shapes = shapes @ change
+    size = np.abs(shapes)
+    first = (size > 0.99 * size.max(axis=0)).argmax(axis=0)  # the first of several equal ones, whatever the rounding
+    change[:, 6:] *= np.sign(shapes[first, np.arange(count)])[6:]
+    polished = OrthonormalModes(modes.coordinates @ change, np.concatenate([np.zeros(6), omega]), modes.rigid)
+    return basis.vectors @ modes.coordinates @ change, polished
+
+
+def _rigid_modes(mass: Array, motions: Array, where: str) -> tuple[Array, Array]:
+    """Mass-orthonormal rigid-body modes (k, 6), and (6, 6) coordinates of the unit ``motions`` in them."""
+    centre = mass_properties(motions.T @ mass @ motions).centre_of_mass
+    shift = np.eye(6)  # to rotations about the centre of mass, so that a distant origin costs no digits
+    shift[:3, 3:] = -np.stack([np.cross(axis, centre) for axis in np.eye(3)], axis=1)
+    central = motions @ shift
+    rigid_mass = central.T @ mass @ central
+    size = np.sqrt(np.diag(rigid_mass))
+    inertia = np.linalg.eigvalsh(rigid_mass[3:, 3:])
+    if not size[:3].all() or inertia[0] <= _MASSLESS * inertia[-1]:
+        raise FEImportError(
+            Cause.NOT_DEFINITE,
+            "the link has no mass or no inertia about some axis",
+            where=where,
+            remedy="give it density, rotary inertia or point masses off one line",
+        )
+    factor = la.cholesky(rigid_mass, lower=True)
+    back = 2 * np.eye(6) - shift  # its inverse
+    return la.solve_triangular(factor, central.T, lower=True).T, factor.T @ back
 
 
 def _clamped_span(mass: Array, stiffness: Array, rigid: Array, clamped: IntArray, count: int) -> Array:

@@ -18,7 +18,7 @@ from fe_import.inertia import inertia_invariants, mass_properties
 from fe_import.link import LinkFile, load_link
 from fe_import.modal_file import SCHEMA_VERSION, ModalModel, read_modal_file, write_modal_file
 from fe_import.model import Array, FEModel, IntArray
-from fe_import.modes import damping_ratios, mode_kinds, orthonormal_modes, reduced_matrices
+from fe_import.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
 from fe_import.reduction import REDUCTIONS, Basis
 from fe_import.toml_file import choose
 
@@ -62,9 +62,9 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     basis = REDUCTIONS[options.method](model, options, where)
     mass, stiffness = reduced_matrices(model, basis)
     modes = orthonormal_modes(mass, stiffness, basis, options, _inboard_columns(model, basis, link), where)
-    shapes = basis.vectors @ modes.coordinates
+    shapes, modes = mode_shapes(model, basis, modes)
     invariants = inertia_invariants(model.mass, shapes, model.dof_map, modes.rigid)
-    reduced_stiffness = modes.coordinates.T @ stiffness @ modes.coordinates
+    reduced_stiffness = shapes.T @ (model.stiffness @ shapes)
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
     if options.form == "physical":
@@ -182,7 +182,7 @@ def reduce_cached(link: LinkFile, folder: Path) -> tuple[ModalModel, bool]:
         try:
             return read_modal_file(path), True
         except FEImportError:
-            path.unlink(missing_ok=True)
+            pass  # written anew below
     model = reduce_link(link)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -138,16 +138,12 @@ def _constants(section: Section, poissons_ratio: float) -> SectionConstants:
             )
 
 
-def section_constants(section: Section, poissons_ratio: float, torsion: str, where: str) -> SectionConstants:
-    """Constants of a section, checked.
+def check_section(section: Section, where: str) -> None:
+    """Refuse dimensions that no section has.
 
     Parameters
     ----------
     section : Section
-    poissons_ratio : float
-        Enters the shear factor of round sections.
-    torsion : str
-        ``"saint-venant"`` or ``"polar"`` (I_y + I_z, as some programs take it).
     where : str
         File and field, for messages.
 
@@ -177,6 +173,27 @@ def section_constants(section: Section, poissons_ratio: float, torsion: str, whe
                 limit=outer / 2,
                 remedy="give a wall below half the outer size",
             )
+
+
+def section_constants(section: Section, poissons_ratio: float, torsion: str, where: str) -> SectionConstants:
+    """Constants of a section, checked.
+
+    Parameters
+    ----------
+    section : Section
+    poissons_ratio : float
+        Enters the shear factor of round sections.
+    torsion : str
+        ``"saint-venant"`` or ``"polar"`` (I_y + I_z, as some programs take it).
+    where : str
+        File and field, for messages.
+
+    Raises
+    ------
+    FEImportError
+        See `check_section`.
+    """
+    check_section(section, where)
     c = _constants(section, poissons_ratio)
     given = section.torsion_constant
     j = given if given is not None else c.inertia_y + c.inertia_z if torsion == "polar" else c.torsion_constant

@@ -12,6 +12,8 @@ import scipy.sparse.linalg as spla
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array
 
+Matrix = Array | sp.csc_array
+
 _DENSE = 600  # below this size LAPACK is faster than Lanczos and finds every mode
 _RESIDUAL = 1e-6  # relative residual of an accepted eigenpair; Lanczos to working precision gives below 1e-9
 
@@ -31,8 +33,7 @@ def factorize(matrix: sp.csc_array, what: str) -> Callable[[Array], Array]:
     except RuntimeError:
         raise _singular(what) from None
     pivots = np.abs(factor.U.diagonal())
-    scale = np.abs(matrix.diagonal())
-    if (pivots / scale[factor.perm_c.argsort()]).min() <= 1e-13:
+    if (pivots <= 1e-13 * np.abs(matrix.diagonal())[factor.perm_c.argsort()]).any():
         raise _singular(what)
 
     def solve(right: Array) -> Array:
@@ -67,7 +68,7 @@ def lowest_modes(stiffness: sp.csc_array, mass: sp.csc_array, count: int, what: 
         K is not positive definite (NOT_DEFINITE), or the solver failed (EIGENSOLVER).
     """
     size = stiffness.shape[0]
-    if count == 0 or size == 0:
+    if count == 0 or size == 0 or not mass.count_nonzero():
         return np.zeros(0), np.zeros((size, 0))
     if size <= _DENSE or count > size // 4:
         return dense_modes(stiffness.toarray(), mass.toarray(), count, what)
@@ -92,7 +93,9 @@ def lowest_modes(stiffness: sp.csc_array, mass: sp.csc_array, count: int, what: 
             limit=_RESIDUAL,
             remedy="ask for fewer modes",
         )
-    return np.sqrt(values), modes
+    omega = np.sqrt(values)
+    omega, change = polishing(stiffness, mass, omega, modes)
+    return omega, modes @ change
 
 
 def dense_modes(stiffness: Array, mass: Array, count: int | None, what: str) -> tuple[Array, Array]:
@@ -100,11 +103,53 @@ def dense_modes(stiffness: Array, mass: Array, count: int | None, what: str) -> 
     try:
         # solved as M φ = μ K φ, μ = 1/ω²: massless directions are the null space of M, and the largest μ, the
         # lowest modes, are the most accurate
-        scale = 1 / np.sqrt(np.diag(stiffness))
-        mu, modes = la.eigh(mass * np.outer(scale, scale), stiffness * np.outer(scale, scale))
+        diagonal = np.diag(stiffness)
+        if not (diagonal > 0).all():
+            raise _singular(what)
+        scale = 1 / np.sqrt(diagonal)
+        mass, stiffness = mass * np.outer(scale, scale), stiffness * np.outer(scale, scale)
+        mu, modes = la.eigh(mass, stiffness)
     except (la.LinAlgError, ValueError):
         raise _singular(what) from None
-    mu, modes = mu[::-1], scale[:, None] * modes[:, ::-1]
-    finite = mu > 1e-13 * mu[0]
+    mu, modes = mu[::-1], modes[:, ::-1]
+    finite = mu > 1e-13 * mu[:1]
     mu, modes = mu[finite][:count], modes[:, finite][:, :count]
-    return 1 / np.sqrt(mu), modes / np.sqrt(mu)
+    omega, change = polishing(stiffness, mass, 1 / np.sqrt(mu), modes / np.sqrt(mu))
+    return omega, scale[:, None] * (modes / np.sqrt(mu)) @ change
+
+
+def polishing(stiffness: Matrix, mass: Matrix, omega: Array, modes: Array) -> tuple[Array, Array]:
+    """What makes the upper modes as accurate as the lower ones.
+
+    Solved for μ = 1/ω², a mode is known to rounding times μ₁/μ, so that the highest of many are neither mass-orthonormal
+    nor modes. All are orthonormalized, the lowest first, and those above the geometric middle of the spectrum are
+    found again within their span as eigenvectors for ω², where they are the accurate ones.
+
+    Parameters
+    ----------
+    stiffness, mass : (d, d) dense or sparse
+    omega : (m,) array
+        In rising order.
+    modes : (d, m) array
+
+    Returns
+    -------
+    omega : (m,) array
+    change : (m, m) array
+        Near the identity; ``modes @ change`` are the better modes.
+    """
+    change = _orthonormalizing(modes, mass)
+    high = omega**2 > omega[:1] * omega[-1:]
+    if len(omega) == 0 or omega[-1] < 100 * omega[0]:
+        return omega, change
+    change[:, high] = change[:, high] @ _orthonormalizing(modes @ change[:, high], mass)
+    stiff = modes @ change[:, high]
+    squared, turn = la.eigh(stiff.T @ (stiffness @ stiff))
+    change[:, high] = change[:, high] @ turn
+    return np.concatenate([omega[~high], np.sqrt(squared)]), change
+
+
+def _orthonormalizing(modes: Array, mass: Matrix) -> Array:
+    """(m, m) upper triangle that makes nearly mass-orthonormal modes orthonormal, the first ones first."""
+    lower = la.cholesky(modes.T @ (mass @ modes), lower=True)
+    return np.asarray(la.solve_triangular(lower, np.eye(len(lower)), lower=True).T)

@@ -11,13 +11,27 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from fe_import.errors import Cause, FEImportError, ReportedError
+from fe_import.errors import Cause, FEImportError, ReportedError, shortened
 
 T = TypeVar("T")
 
 _PATH = re.compile(r" - at `(?:key in )?\$(.*)`$")
-_UNKNOWN = re.compile(r"unknown field `(.*?)`")
+_UNKNOWN = re.compile(r"unknown field `(.*)`$", re.DOTALL)
+_MISSING = re.compile(r"missing required field `(.*?)`")
+_EXPECTED = re.compile(r"Expected `([^`]*)`(?: of length (\d+))?")
+_WORDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "a text in quotes",
+    "bool": "true or false",
+    "object": "a table",
+    "array": "a list in brackets",
+}
 _MAX_BYTES = 50_000_000
+_SHOWN_NAMES = 30
+_EVERY = "[...]"  # how msgspec names a key of a table of the user's names
+
+Steps = list[str | int]
 
 
 def read_toml(path: Path, error: type[ReportedError] = FEImportError) -> dict[str, Any]:
@@ -31,7 +45,11 @@ def read_toml(path: Path, error: type[ReportedError] = FEImportError) -> dict[st
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise error(
-                Cause.NOT_READABLE, "file is too large for a description", where=str(path), limit="50 MB"
+                Cause.NOT_READABLE,
+                "file is too large for a description",
+                where=str(path),
+                limit="50 MB",
+                remedy="give a TOML description; meshes and matrices are files of their own",
             )
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -41,13 +59,13 @@ def read_toml(path: Path, error: type[ReportedError] = FEImportError) -> dict[st
             where=str(path),
             remedy="check the path, relative paths start at the file that names them",
         ) from None
-    except (OSError, UnicodeDecodeError) as problem:
+    except (OSError, ValueError) as problem:  # not UTF-8, or a path with a NUL character
         raise error(
             Cause.NOT_READABLE, f"cannot be read: {problem}", where=str(path), remedy="give a UTF-8 TOML file"
         ) from None
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as problem:
+    except (ValueError, RecursionError) as problem:  # syntax errors, and integers of thousands of digits
         raise error(
             Cause.SYNTAX, f"not valid TOML: {problem}", where=str(path), remedy="mend the syntax at that line"
         ) from None
@@ -68,61 +86,137 @@ def convert(data: Any, kind: type[T], where: str, error: type[ReportedError] = F
     try:
         return msgspec.convert(data, kind, strict=True)
     except msgspec.ValidationError as problem:
-        text = str(problem)
-        match = _PATH.search(text)
-        path = match.group(1).lstrip(".") if match else ""
-        text = _PATH.sub("", text)
-        unknown = _UNKNOWN.search(text)
-        if unknown:
-            name = unknown.group(1)
-            remedy = _suggest(kind, path, name)
-            place = f"{where}: {path}.{name}".replace(": .", ": ")
-            raise error(Cause.UNKNOWN_FIELD, f"unknown field {name!r}", where=place, remedy=remedy) from None
-        value = _value_at(data, path)
-        raise error(
-            Cause.BAD_FIELD, _lower(text), where=f"{where}: {path}" if path else where, value=value, remedy=""
-        ) from None
+        raise _explained(str(problem), data, kind, where, error) from None
     except RecursionError:
-        raise error(Cause.SYNTAX, "nested too deeply", where=where) from None
+        raise error(Cause.SYNTAX, "nested too deeply", where=where, remedy="use fewer levels of tables") from None
+
+
+def _explained(text: str, data: Any, kind: Any, where: str, error: type[ReportedError]) -> ReportedError:
+    """The error that msgspec's message stands for."""
+    steps = _steps(text, data, kind)
+    message = _PATH.sub("", text)
+    unknown, missing = _UNKNOWN.search(message), _MISSING.search(message)
+    records = [c for c in _types_at(kind, data, steps) if isinstance(c, msgspec.inspect.StructType)]
+    if unknown:
+        name = shortened(unknown.group(1))
+        place = _place(where, [*steps, name])
+        remedy = _suggest(name, [f.encode_name for c in records for f in c.fields])
+        return error(Cause.UNKNOWN_FIELD, f"unknown field {name!r}", where=place, remedy=remedy)
+    if missing:
+        name = missing.group(1)
+        tags = _tags(records, name)
+        place, remedy = _place(where, [*steps, name]), f"add {name} = " + (_either(tags) if tags else "...")
+        return error(Cause.BAD_FIELD, "this field is required", where=place, remedy=remedy)
+    value, tags = _value_at(data, steps), []
+    if steps:
+        tags = _tags(_types_at(kind, data, steps[:-1]), steps[-1])
+    remedy = f"give {_either(tags)}" if tags else _expected(message)
+    return error(Cause.BAD_FIELD, _lower(message), where=_place(where, steps), value=value, remedy=remedy)
 
 
 def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _steps(path: str) -> list[str]:
-    return [s for s in re.split(r"\.|(\[[^\]]*\])", path) if s]
+def _either(tags: list[str]) -> str:
+    return " or ".join(f"'{tag}'" for tag in tags)
 
 
-def _value_at(data: Any, path: str) -> Any:
-    for step in _steps(path):
+def _expected(message: str) -> str:
+    """The type that a message of msgspec asks for, in words."""
+    match = _EXPECTED.search(message)
+    if not match:
+        return "give a value within range"
+    words = [_WORDS.get(name, name) for name in match.group(1).split(" | ") if name != "null"]
+    return "give " + " or ".join(words) + (f" of {match.group(2)} values" if match.group(2) else "")
+
+
+def _place(where: str, steps: Steps) -> str:
+    path = "".join(f"[{s}]" if isinstance(s, int) else f".{shortened(s)}" for s in steps).lstrip(".")
+    return f"{where}: {path}" if path else where
+
+
+def _steps(text: str, data: Any, kind: Any) -> Steps:
+    """Keys and indices from the root of ``data`` to the fault.
+
+    msgspec does not say which key of a table of the user's names is meant: the one that alone gives the same message.
+    """
+    match = _PATH.search(text)
+    steps: Steps = []
+    for step in re.findall(r"\[[^\]]*\]|[^.\[]+", match.group(1)) if match else ():
+        if step == _EVERY:
+            table = _node_at(data, steps)
+            steps.append(next((k for k in table if _message(_only(data, steps, k), kind) == text), _EVERY))
+        else:
+            steps.append(int(step[1:-1]) if step.startswith("[") else step)
+    return steps
+
+
+def _message(data: Any, kind: Any) -> str:
+    try:
+        msgspec.convert(data, kind, strict=True)
+    except msgspec.ValidationError as problem:
+        return str(problem)
+    return ""
+
+
+def _only(data: Any, steps: Steps, key: str) -> Any:
+    """A copy of ``data`` in which the table at ``steps`` has one key only."""
+    if not steps:
+        return {key: data[key]}
+    copy = data.copy()
+    copy[steps[0]] = _only(data[steps[0]], steps[1:], key)
+    return copy
+
+
+def _node_at(data: Any, steps: Steps) -> Any:
+    for step in steps:
         try:
-            data = data[int(step[1:-1])] if step.startswith("[") else data[step]
-        except (KeyError, IndexError, TypeError, ValueError):
+            data = data[step]
+        except (KeyError, IndexError, TypeError):
             return None
-    return data if isinstance(data, (str, int, float, bool)) else None
+    return data
 
 
-def _suggest(kind: Any, path: str, name: str) -> str:
-    """Names of the fields at ``path`` of the schema, nearest first."""
-    info = msgspec.inspect.type_info(kind)
-    candidates = [info]
-    for step in _steps(path):
+def _value_at(data: Any, steps: Steps) -> Any:
+    """The faulty value when it is short enough to show: not a table."""
+    value = _node_at(data, steps)
+    return value if steps and isinstance(value, (str, int, float, bool, list)) else None
+
+
+def _types_at(kind: Any, data: Any, steps: Steps) -> list[Any]:
+    """Types that the schema allows at ``steps``; of tagged records the one that the data's tag names."""
+    types = _alternatives(msgspec.inspect.type_info(kind), data)
+    for depth, step in enumerate(steps, start=1):
+        node = _node_at(data, steps[:depth])
         following: list[Any] = []
-        for c in candidates:
-            if isinstance(c, msgspec.inspect.StructType) and not step.startswith("["):
-                following += [f.type for f in c.fields if f.encode_name == step]
-            elif isinstance(c, (msgspec.inspect.ListType, msgspec.inspect.VarTupleType)):
-                following.append(c.item_type)
-            elif isinstance(c, msgspec.inspect.DictType):
-                following.append(c.value_type)
-        candidates = [
-            u for c in following for u in (c.types if isinstance(c, msgspec.inspect.UnionType) else [c])
-        ]
-    fields = [
-        f.encode_name for c in candidates if isinstance(c, msgspec.inspect.StructType) for f in c.fields
-    ]
-    close = difflib.get_close_matches(name, fields, n=1, cutoff=0.6)
+        for t in types:
+            if isinstance(t, msgspec.inspect.StructType):
+                following += [f.type for f in t.fields if f.encode_name == step]
+            elif isinstance(t, (msgspec.inspect.ListType, msgspec.inspect.VarTupleType)):
+                following.append(t.item_type)
+            elif isinstance(t, msgspec.inspect.DictType):
+                following.append(t.value_type)
+        types = [a for t in following for a in _alternatives(t, node)]
+    return types
+
+
+def _alternatives(kind: Any, node: Any) -> list[Any]:
+    types = list(kind.types) if isinstance(kind, msgspec.inspect.UnionType) else [kind]
+    if isinstance(node, dict):
+        tagged = [t for t in types if getattr(t, "tag", None) is not None and node.get(t.tag_field) == t.tag]
+        return tagged or types
+    return types
+
+
+def _tags(types: list[Any], field: str | int) -> list[str]:
+    """Tags of the records that ``field`` tells apart."""
+    return [str(t.tag) for t in types if getattr(t, "tag", None) is not None and t.tag_field == field]
+
+
+def _suggest(name: str, fields: list[str]) -> str:
+    """The field that was probably meant, or all there are."""
+    close = difflib.get_close_matches(name[:200], fields, n=1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]!r}?"
     return "known fields: " + ", ".join(sorted(set(fields))) if fields else "remove it"
@@ -132,11 +226,13 @@ def choose(value: str, options: Any, where: str, error: type[ReportedError] = FE
     """Refuse a name that is not among the options of a registry, with a suggestion."""
     names = [str(o.value) if isinstance(o, enum.Enum) else str(o) for o in options]
     if value not in names:
-        close = difflib.get_close_matches(value, names, n=1)
+        known = ", ".join(names[:_SHOWN_NAMES]) + (f" and {len(names) - _SHOWN_NAMES} more" if names[_SHOWN_NAMES:] else "")
+        close = difflib.get_close_matches(value[:200], names, n=1)
         raise error(
             Cause.BAD_REFERENCE,
-            f"unknown name {value!r}",
+            f"unknown name {shortened(value)!r}" if value else "a name is missing",
             where=where,
-            value=value,
-            remedy=(f"did you mean {close[0]!r}? " if close else "") + "known: " + ", ".join(names),
+            value=value or None,
+            remedy=(f"did you mean {close[0]!r}? " if close else "")
+            + (f"known: {known}" if names else "none is defined"),
         )

@@ -33,7 +33,12 @@ from numpy.typing import NDArray
 from erls.errors import Cause, SceneError, SimulationError
 
 Array = NDArray[np.float64]
-_HAIR = 1e-12  # of the largest time: breakpoints this close are one
+_HAIR = 1e-12  # of the largest time, or of 1 s: breakpoints this close are one
+
+
+def _hair(times: tuple[float, float]) -> float:
+    """Time that no force resolves; above the tolerance within which `erls.mechanism.curves` merges events."""
+    return _HAIR * max(abs(times[0]), abs(times[1]), 1.0)
 
 
 class SecondOrderSystem(Protocol):
@@ -164,7 +169,7 @@ def breakpoints(system: SecondOrderSystem, times: tuple[float, float]) -> list[f
     Breakpoints that only rounding tells apart (0.3 and 0.1 + 0.2) count once.
     """
     start, end = times
-    margin = _HAIR * max(abs(start), abs(end))
+    margin = _hair(times)
     found: list[float] = []
     for b in sorted(system.breakpoints):
         if (found[-1] if found else start) + margin < b < end - margin:
@@ -192,7 +197,7 @@ def legs(system: SecondOrderSystem, times: tuple[float, float]) -> list[Leg]:
     if start == end:
         return []
     ends = breakpoints(system, times)
-    hair = _HAIR * max(abs(start), abs(end))
+    hair = _hair(times)
     pairs = zip([start, *ends[:-1]], ends, strict=True)
     return [Leg(s, e, min(s + hair, (s + e) / 2), max(e - hair, (s + e) / 2)) for s, e in pairs]
 

@@ -1,0 +1,160 @@
+"""Pictures, films and windows of a run; and `write_view`, which picks the kind of output by the name's ending."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from erls.export import export_csv, export_paraview
+from erls.output_file import check_writable, replacing
+from erls.run import Run
+from erls.view_camera import Size
+from erls.view_checks import Progress, bad, check, drawing, no_picture, surveyed
+from erls.view_film import FILMS, film
+from erls.view_scene import Stage
+from erls.view_text import caption, displacement, point_labels, time_labels, written
+from erls.view_window import Window
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+__all__ = ["film", "picture", "show", "write_view"]
+
+_INSTANTS = 6
+PICTURES = (".png", ".jpg", ".jpeg")
+
+
+def picture(
+    run: Run,
+    path: Path | str,
+    times: Sequence[float] | None = None,
+    magnification: float = 1.0,
+    size: Size = (1280, 800),
+) -> None:
+    """Draw a run: the mechanism at several times, the last one solid, with the paths of its points.
+
+    Parameters
+    ----------
+    run : Run
+    path : path
+        .png or .jpg.
+    times : sequence of float, optional
+        [s]; six even ones unless given. The last is drawn solid, the others as ghosts, fainter the earlier.
+    magnification : float
+        Of the displacement against the Equivalent Rigid Link System; 1 is true.
+    size : (width, height)
+        [pixel]
+
+    Raises
+    ------
+    SceneError
+        NOT_WRITABLE, TIME_OUT_OF_RANGE, BAD_FIELD.
+    SimulationError
+        NO_PICTURE: no drawing is possible on this machine.
+    """
+    check(magnification, size, path, PICTURES)
+    with replacing(path) as temporary:
+        image = _picture(run, times, magnification, size)
+        image.save(temporary, **({"quality": 95} if temporary.suffix.lower() != ".png" else {"optimize": True}))
+
+
+def _picture(run: Run, times: Sequence[float] | None, magnification: float, size: Size) -> Image:
+    if times is None or not len(times):
+        times = np.linspace(float(run.solution.t[0]), run.end, _INSTANTS if run.end > run.solution.t[0] else 1).tolist()
+    states = run.states(list(times))
+    motion = surveyed(run, magnification, states)
+    *earlier, last = states
+    with drawing(), Stage(run, motion, magnification, size, finer=2) as stage:
+        stage.pose(last)
+        base = stage.image()
+        blended = base.astype(np.float32)
+        for k, state in enumerate(earlier):
+            stage.pose(state, ghost=True)
+            ghost = stage.image()
+            weight = 0.15 + 0.4 * (k + 1) / len(earlier)
+            covers = (ghost != base).any(axis=2, keepdims=True)
+            blended = np.where(covers, (1 - weight) * blended + weight * ghost, blended)
+        stage.clear_ghost()
+        sheet = written(stage, np.rint(blended).astype(np.uint8), caption(run, states, magnification))
+        labels = point_labels(stage, last)
+        if len(states) > 1:
+            labels += time_labels(stage, states)
+        sheet.place(labels)
+    return sheet.image
+
+
+def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800)) -> None:
+    """Open a window that can be turned, with a slider for time; returns when it is closed.
+
+    Raises
+    ------
+    SimulationError
+        NO_PICTURE: there is no display.
+    """
+    check(magnification, size)
+    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        raise no_picture("there is no display for a window")
+    motion = surveyed(run, magnification, None)
+    with drawing(), Window(run, motion, magnification, size) as window:
+        if window.hidden:
+            raise no_picture("the display cannot be opened")
+        window.interact(f"{run.scene.name}  ·  {displacement(magnification)}")
+
+
+def write_view(
+    run: Run,
+    path: Path | str,
+    *,
+    times: Sequence[float] | None = None,
+    magnification: float = 1.0,
+    fps: int = 30,
+    speed: float = 1.0,
+    progress: Progress | None = None,
+) -> None:
+    """Write a picture (.png, .jpg), film (.mp4, .gif), export for ParaView (.pvd) or table (.csv) of a run.
+
+    Parameters
+    ----------
+    run : Run
+    path : path
+        Its ending decides.
+    times : sequence of float, optional
+        [s]; not for films.
+    magnification : float
+        Of the displacement against the Equivalent Rigid Link System; not for tables.
+    fps, speed : int, float
+        Of films.
+    progress : callable, optional
+        Told how much is done, and the total.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD, NOT_WRITABLE, TIME_OUT_OF_RANGE.
+    SimulationError
+        NO_PICTURE.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (*PICTURES, *FILMS, ".pvd", ".csv"):
+        remedy = "end it in .png or .jpg (picture), .mp4 or .gif (film), .pvd (ParaView) or .csv (table)"
+        raise bad("-o", "the ending of the name does not say what to write", str(path), None, remedy)
+    check_writable(path)
+    if suffix in FILMS:
+        if times is not None and len(times):
+            raise bad("times", "a film shows the whole run", list(times), None, "leave the times out, or make a .png")
+        film(run, path, magnification, fps, speed, progress=progress)
+    elif suffix in PICTURES:
+        picture(run, path, times, magnification)
+    elif suffix == ".pvd":
+        export_paraview(run, path, times, magnification, progress)
+    else:
+        if magnification != 1.0:
+            raise bad("magnification", "a table holds true values", magnification, None, "leave it at 1")
+        export_csv(run, path, times)
+
+

@@ -1,0 +1,276 @@
+"""The stage of pictures and films: a mechanism before measured walls, seen by one camera, drawn off screen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from erls.formulations.base import State
+from erls.lie.so3 import Array
+from erls.run import Run, node_positions
+from erls.view_camera import Box, Camera, Pixels, Size, Walls, text_unit
+from erls.view_shapes import (
+    SHARP,
+    deflection,
+    ground_surface,
+    joint_places,
+    joints_surface,
+    link_surface,
+    polylines,
+    rigid_outline,
+    with_normals,
+)
+
+COLOURS = "turbo"  # of the deflection; its dark ends are cut
+GHOST = (0.42, 0.50, 0.60)
+LINKS = ("#3d6b99", "#c26a2d", "#4f8a5b", "#8a5a96", "#a04848", "#4a8f95")
+POINTS = ("#b3123f", "#1d4e89", "#2f7d32", "#7b3fa0", "#a65a00", "#00707a")
+_PATH_SAMPLES = 1001
+_BOX_SAMPLES = 201
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a view needs to know of the whole run, at one magnification.
+
+    Attributes
+    ----------
+    times : (k,) array
+        Of the paths [s].
+    paths : list of (k, 3) arrays
+        Of the named points [m].
+    box : Box
+    largest : float
+        Largest deflection [m].
+    unit : float
+        Radius of a tube [m].
+    """
+
+    times: Array
+    paths: list[Array]
+    box: Box
+    largest: float
+    unit: float
+
+    @classmethod
+    def of(cls, run: Run, magnification: float, shown: Sequence[State] | None = None) -> Motion | None:
+        """Survey a run; if ``shown`` states are given, the box is theirs and the deflection that of the last.
+
+        None where the mechanism has no finite size.
+        """
+        times = np.linspace(float(run.solution.t[0]), run.end, _PATH_SAMPLES if run.end > run.solution.t[0] else 1)
+        states = run.states(times)
+        mechanism = run.formulation.mechanism
+        paths = [
+            np.array([node_positions(run, s, p.link, [p.node], magnification)[0] for s in states])
+            for p in mechanism.points
+        ]
+        every = max(len(states) // _BOX_SAMPLES, 1)
+        seen = states[::every] if shown is None else shown
+        unit = 0.01 * max(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in mechanism.links)
+        extent, largest = [mechanism.joints[0].before[:3, 3]], 0.0
+        for k in range(len(mechanism.links)):
+            for s in seen:
+                positions = node_positions(run, s, k, magnification=magnification)
+                extent += [positions.min(axis=0), positions.max(axis=0)]
+                if shown is None or s is shown[-1]:
+                    largest = max(largest, float(np.linalg.norm(deflection(run, s, k), axis=1).max()))
+        points = np.concatenate([np.array(extent), *paths])
+        if not (np.abs(points) < 1e15).all():
+            return None
+        unit = max(unit, 0.0065 * float(np.ptp(points, axis=0).max()), 1e-6)
+        points = np.concatenate([points - unit, points + unit])
+        return cls(times, paths, Box.around(points), largest, unit)
+
+    @property
+    def elastic(self) -> bool:
+        """Whether there is a deflection worth a colour."""
+        return self.largest > 1e-9 * self.unit / 0.01
+
+
+class Stage:
+    """An off-screen window with a mechanism; close it after use, or use it in a ``with`` statement.
+
+    Parameters
+    ----------
+    run : Run
+    motion : Motion
+        Its survey.
+    magnification : float
+    size : (width, height)
+        Of the pictures [pixel].
+    finer : int
+        Draw that many times finer, and take the mean.
+    """
+
+    off_screen: bool | None = True
+
+    def __init__(self, run: Run, motion: Motion, magnification: float, size: Size, finer: int = 1) -> None:
+        import pyvista as pv
+
+        self.run, self.motion, self.magnification, self.finer = run, motion, magnification, finer
+        self.camera = Camera.fitting(motion.box, run.formulation.mechanism.gravity, size)
+        self.walls = Walls(motion.box, self.camera)
+        self.line = finer * text_unit(size) / 14.5  # a thin line [pixel]
+        window = [finer * size[0], finer * size[1]]
+        self.plotter = pv.Plotter(off_screen=self.off_screen, window_size=window, lighting="light kit")
+        self.plotter.set_background("white")
+        self.plotter.enable_anti_aliasing("msaa", multi_samples=4)
+        self._actors: dict[str, list[Any]] = {}
+        self.corner = (0.0, 0.0)
+        self.gravity: Array | None = None
+        self._furniture()
+        self._directions()
+        self._aim()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the window."""
+        self.plotter.close()
+
+    def _add(self, mesh: Any, **look: Any) -> Any:
+        shiny = {"ambient": 0.3, "diffuse": 0.8, "specular": 0.2, "specular_power": 20}
+        if not mesh.GetNumberOfPolys():
+            shiny = {"lighting": False}
+        actor = self.plotter.add_mesh(mesh, **{**shiny, **look}, reset_camera=False, render=False)
+        actor.prop.interpolation = "Phong"
+        return actor
+
+    def _lines(self, segments: Array, colour: Any, width: float) -> Any:
+        import pyvista as pv
+
+        flat = np.asarray(segments).reshape(-1, 3)
+        mesh = pv.PolyData(flat, lines=np.insert(np.arange(len(flat)).reshape(-1, 2), 0, 2, axis=1).ravel())
+        return self._add(mesh, color=colour, line_width=width * self.line)
+
+    def _furniture(self) -> None:
+        """What does not move: walls, ground, paths."""
+        mechanism, motion = self.run.formulation.mechanism, self.motion
+        self._lines(self.walls.lines(), "#dfe3e8", 1.0)
+        ground = ground_surface(mechanism.joints[0].before, self.camera.towards, motion.unit)
+        self._add(ground, color="#a3aab3")
+        self.paths(motion.times[-1])
+
+    def _directions(self) -> None:
+        """Axes triad and gravity arrow in the corner of the picture."""
+        gravity, em = self.run.formulation.mechanism.gravity, text_unit(self.camera.size)
+        self.corner = (4.2 * em, self.camera.size[1] - 4.2 * em)
+        origin = self.camera.lift(*self.corner)
+        for axis, colour in enumerate(("#c62828", "#2e7d32", "#1565c0")):
+            self._arrow(origin, np.eye(3)[axis], 3.0 * em, colour)
+        if gravity.any():
+            self.gravity = self.camera.lift(self.corner[0] + 6.0 * em, self.corner[1] - 1.5 * em)
+            self._arrow(self.gravity, gravity / np.linalg.norm(gravity), 3.2 * em, "#222222")
+
+    def _arrow(self, start: Array, direction: Array, pixels: float, colour: str) -> None:
+        import pyvista as pv
+
+        shape = pv.Arrow(
+            start=start, direction=direction, scale=pixels * self.camera.pixel, tip_length=0.3, tip_radius=0.085,
+            shaft_radius=0.03, tip_resolution=24, shaft_resolution=16,
+        )  # fmt: skip
+        self._add(with_normals(shape), color=colour)
+
+    def _aim(self) -> None:
+        camera, view = self.plotter.camera, self.camera
+        reach = 3 * float(np.linalg.norm(self.motion.box.high - self.motion.box.low)) + 100 * self.motion.unit
+        camera.enable_parallel_projection()
+        camera.focal_point, camera.position = view.focal, view.focal + reach * view.towards
+        camera.up = view.up
+        camera.parallel_scale = view.pixel * view.size[1] / 2
+        camera.clipping_range = (reach * 0.02, 2 * reach)
+
+    def paths(self, until: float) -> None:
+        """Draw the paths of the named points: strong up to a time, pale beyond."""
+        self._remove("paths")
+        motion, actors = self.motion, []
+        count = int(np.searchsorted(motion.times, until, side="right"))
+        behind = -3 * motion.unit * self.camera.towards  # unseen in a parallel view; pale never covers strong
+        for k, path in enumerate(motion.paths):
+            for part, strong in ((path[:count], True), (path[max(count - 1, 0) :] + behind, False)):
+                if len(part) > 1:
+                    colour = POINTS[k % len(POINTS)] if strong else "#c9ced6"
+                    # a fine tube: lines of short pieces look ragged
+                    width = (1.6 if strong else 1.2) * self.line / self.finer * self.camera.pixel
+                    curve = polylines(part, [list(range(len(part)))]).tube(radius=width / 2, n_sides=6)
+                    actors.append(self._add(curve, color=colour, lighting=False))
+        self._actors["paths"] = actors
+
+    def pose(self, state: State, ghost: bool = False) -> None:
+        """Put the mechanism in a state; a ghost is drawn in one pale colour, instead of any earlier ghost."""
+        name = "ghost" if ghost else "pose"
+        self._remove(name)
+        run, motion = self.run, self.motion
+        actors = []
+        for k, link in enumerate(run.formulation.mechanism.links):
+            positions = node_positions(run, state, k, magnification=self.magnification)
+            values = 1e3 * np.linalg.norm(deflection(run, state, k), axis=1)
+            surface = link_surface(link, positions, values, motion.unit)
+            if ghost:
+                actors.append(self._add(surface, color=GHOST, scalars=None))
+            elif motion.elastic:
+                limits = [0.0, 1e3 * motion.largest]
+                look = {"scalars": "value", "cmap": colour_map(), "clim": limits, "show_scalar_bar": False}
+                actors.append(self._add(surface, **look))
+            else:
+                actors.append(self._add(surface, color=LINKS[k % len(LINKS)], scalars=None))
+            if len(link.model.triangles) and not ghost:
+                edges = surface.extract_feature_edges(SHARP, boundary_edges=False, non_manifold_edges=False)
+                if edges.n_points:
+                    actors.append(self._add(edges, color="#333333", line_width=0.8 * self.line))
+        places = joint_places(run, state, self.magnification)
+        if ghost and places[0].revolute:
+            places = places[1:]  # the first one does not move
+        if places:
+            actors.append(self._add(joints_surface(places, motion.unit), color=GHOST if ghost else "#596069"))
+        if not ghost:
+            actors += self._dots(state)
+            if self.magnification != 1.0:
+                outline = rigid_outline(run, state)
+                actors += [self._add(m, color="#777777", line_width=1.0 * self.line) for m in outline]
+        self._actors[name] = actors
+
+    def _dots(self, state: State) -> list[Any]:
+        import pyvista as pv
+
+        places = self.point_places(state)
+        balls = [pv.Sphere(radius=1.5 * self.motion.unit, center=p) for p in places]
+        return [self._add(b, color=POINTS[k % len(POINTS)]) for k, b in enumerate(balls)]
+
+    def point_places(self, state: State) -> list[Array]:
+        """(3,) places of the named points."""
+        points = self.run.formulation.mechanism.points
+        return [node_positions(self.run, state, p.link, [p.node], self.magnification)[0] for p in points]
+
+    def _remove(self, name: str) -> None:
+        for actor in self._actors.pop(name, []):
+            self.plotter.remove_actor(actor, reset_camera=False, render=False)
+
+    def image(self) -> Pixels:
+        """(height, width, 3) picture."""
+        taken: Pixels = np.asarray(self.plotter.screenshot(None, return_img=True))
+        n = self.finer
+        if n == 1:
+            return taken
+        total = sum(taken[i::n, j::n].astype(np.uint16) for i in range(n) for j in range(n))
+        return np.asarray(total // n**2, dtype=np.uint8)
+
+    def clear_ghost(self) -> None:
+        """Take the ghost away."""
+        self._remove("ghost")
+
+
+def colour_map() -> Any:
+    """Colours of the deflection."""
+    import matplotlib
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(matplotlib.colormaps[COLOURS](np.linspace(0.1, 0.93, 256)))
