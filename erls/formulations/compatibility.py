@@ -128,9 +128,11 @@ def compatibility_matrix(rows: tuple[JointRows, ...], places: Layout, theta: Arr
     -------
     (v, size) array
     """
-    blocks = []
+    result = np.zeros((sum(len(row.kept) for row in rows), places.size))
+    at = 0
     for k, row in enumerate(rows):
-        block = np.zeros((len(row.kept), places.size))
+        block = result[at : at + len(row.kept)]
+        at += len(row.kept)
         if order == 0:
             block[:, places.modes[k]] = row.own[row.kept]
         if row.previous is not None:
@@ -138,13 +140,12 @@ def compatibility_matrix(rows: tuple[JointRows, ...], places: Layout, theta: Arr
             for _ in range(order):
                 x = -row.bracket @ x
             block[:, places.modes[k - 1]] = -(x @ row.previous)[row.kept]
-        blocks.append(block)
-    return np.vstack(blocks)
+    return result
 
 
 @dataclass(frozen=True)
 class RightInverse:
-    """C_r⁺ and the projector on the null space of C_r, through the QR factors of C_rᵀ."""
+    """C_r⁺ and the projector on the null space of C_r (through the QR factors of C_rᵀ, where C_r is not square)."""
 
     pseudo_inverse: Array
     null_projector: Array | None  # None when C_r is square: the null space is empty
@@ -152,11 +153,10 @@ class RightInverse:
 
 def right_inverse(c_r: Array) -> RightInverse:
     """Right pseudo-inverse of a matrix of full row rank (paper, before eq. 11)."""
-    q, r = np.linalg.qr(c_r.T)
-    pseudo = q @ np.linalg.inv(r).T
     if c_r.shape[0] == c_r.shape[1]:
-        return RightInverse(pseudo, None)
-    return RightInverse(pseudo, np.eye(len(q)) - q @ q.T)
+        return RightInverse(np.asarray(np.linalg.inv(c_r), dtype=float), None)
+    q, r = np.linalg.qr(c_r.T)
+    return RightInverse(q @ np.linalg.inv(r).T, np.eye(len(q)) - q @ q.T)
 
 
 class Compatibility:

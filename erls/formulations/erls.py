@@ -20,20 +20,11 @@ import scipy.linalg as la
 from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State
 from erls.formulations.compatibility import Compatibility
+from erls.formulations.joint_turn import JointTurn, Motion, joint_turn
 from erls.formulations.link_inertia import LinkInertia, moment_about
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism, jacobians, kinematics, poses
 from erls.mechanism.rigid_dynamics import inverse_dynamics
-
-
-@dataclass(frozen=True)
-class JointTurn:
-    """Physical angle and rate of a joint, its gradient over (θ, q_d), and its acceleration at zero (θ̈, q̈_d)."""
-
-    angle: float
-    rate: float
-    gradient: Array | None  # None: the coordinate itself
-    bias: float
 
 
 @dataclass(frozen=True)
@@ -127,24 +118,11 @@ class Erls:
         qdd = np.zeros(self.elastic) if a is None else a[f:]
         return theta, rates, accelerations, y[f:], v[f:], qdd
 
-    def _joint_turn(self, k: int, theta: Array, rates: Array, motion: tuple[Array, ...]) -> JointTurn:
-        """Physical motion of joint k; ``motion`` is (q, q̇, D, G, n)."""
-        if self.compatibility.keeps_angle(k):
-            return JointTurn(float(theta[k]), float(rates[k]), None, 0.0)
-        q, qd, d, g, n = motion
-        places = self.compatibility.layout
-        row, slope, bend = np.zeros((3, places.size))
-        for target, order in ((row, 0), (slope, 1), (bend, 2)):
-            own, previous = self.compatibility.joint_displacement(k, theta[k], order)
-            target[places.modes[k]] = own
-            if previous is not None:
-                target[places.modes[k - 1]] = previous
-        rigid, elastic = row[places.rigid], row[places.elastic]
-        gradient = np.concatenate([rigid @ g, rigid @ d + elastic])
-        gradient[k] += 1 + slope @ q
-        rate = rates[k] + row @ qd + (slope @ q) * rates[k]
-        bias = (bend @ q) * rates[k] ** 2 + 2 * (slope @ qd) * rates[k] + rigid @ n
-        return JointTurn(float(theta[k] + row @ q), float(rate), gradient, float(bias))
+    def _motion(self, theta: Array, rates: Array, q_d: Array, qd_d: Array) -> Motion:
+        return Motion(*self.compatibility.acceleration(theta, rates, q_d, qd_d))
+
+    def _turn(self, k: int, theta: Array, rates: Array, motion: Motion) -> JointTurn:
+        return joint_turn(self.compatibility, k, theta, rates, motion)
 
     def feed_forward(self, t: float) -> Array:
         """(joints,) rigid inverse dynamics of the reference motion of all joints."""
@@ -168,7 +146,8 @@ class Erls:
     def evaluate(self, t: float, y: Array, v: Array, a: Array) -> Evaluation:
         """Forces over (θ, q_d) that are out of balance, link wrenches from the tip inward, joint efforts."""
         theta, rates, accelerations, q_d, qd_d, qdd_d = self._expand(t, y, v, a)
-        q, qd, d, g, n = self.compatibility.acceleration(theta, rates, q_d, qd_d)
+        motion = self._motion(theta, rates, q_d, qd_d)
+        q, qd, d, g, n = motion.q, motion.qd, motion.d, motion.g, motion.n
         qdd = self.compatibility.stack(d @ qdd_d + g @ accelerations + n, qdd_d)
         chain = kinematics(self.mechanism, self.screws, theta, rates)
         places = self.compatibility.layout
@@ -198,7 +177,7 @@ class Erls:
         )
         efforts = np.zeros(self.joints)
         for k in self.active_joints:
-            turn = self._joint_turn(k, theta, rates, (q, qd, d, g, n))
+            turn = self._turn(k, theta, rates, motion)
             efforts[k] = self._effort(k, t, turn.angle, turn.rate)
             rotor = self.mechanism.joints[k].rotor_inertia
             if turn.gradient is None:
@@ -214,7 +193,7 @@ class Erls:
 
     def full_mass_matrix(self, t: float, y: Array) -> Array:
         """(joints + elastic)² mass matrix over (θ, q_d), prescribed joints included."""
-        theta, rates, _, q_d, qd_d, _ = self._expand(t, y, np.zeros(self.size), None)
+        theta, _, _, q_d, _, _ = self._expand(t, y, np.zeros(self.size), None)
         q, d, g = self.compatibility.velocity(theta, q_d)
         chain = kinematics(self.mechanism, self.screws, theta, np.zeros(self.joints))
         places = self.compatibility.layout
@@ -234,9 +213,8 @@ class Erls:
         for k in self.active_joints:
             rotor = self.mechanism.joints[k].rotor_inertia
             if rotor:
-                gradient = self._joint_turn(
-                    k, theta, np.zeros(self.joints), (q, np.zeros_like(q), d, g, np.zeros(len(d)))
-                ).gradient
+                at_rest = Motion(q, np.zeros_like(q), d, g, np.zeros(len(d)))
+                gradient = self._turn(k, theta, np.zeros(self.joints), at_rest).gradient
                 if gradient is None:
                     result[k, k] += rotor
                 else:
@@ -287,10 +265,10 @@ class Erls:
         damping = np.diag(np.concatenate([np.zeros(self.joints), self.damping]))
         if self.active_joints:
             theta, rates, _, q_d, qd_d, _ = self._expand(t, y, v, None)
-            motion = self.compatibility.acceleration(theta, rates, q_d, qd_d)
+            motion = self._motion(theta, rates, q_d, qd_d)
             for k in self.active_joints:
                 joint = self.mechanism.joints[k]
-                turn = self._joint_turn(k, theta, rates, motion)
+                turn = self._turn(k, theta, rates, motion)
                 passive, active = joint.forces.gains(turn.rate), joint.drive.gains
                 along = np.eye(len(stiffness))[k] if turn.gradient is None else turn.gradient
                 stiffness += (passive[0] + active[0]) * np.outer(along, along)
@@ -314,12 +292,12 @@ class Erls:
     def state(self, t: float, y: Array, v: Array) -> State:
         """Poses, modal coordinates and joint angles at a state."""
         theta, rates, _, q_d, qd_d, _ = self._expand(t, y, v, None)
-        motion = self.compatibility.acceleration(theta, rates, q_d, qd_d)
-        turns = [self._joint_turn(k, theta, rates, motion) for k in range(self.joints)]
+        motion = self._motion(theta, rates, q_d, qd_d)
+        turns = [self._turn(k, theta, rates, motion) for k in range(self.joints)]
         return State(
             time=t,
             poses=poses(self.mechanism, theta),
-            modal=[motion[0][m] for m in self.compatibility.layout.modes],
+            modal=[motion.q[m] for m in self.compatibility.layout.modes],
             coordinates=theta,
             angles=np.array([turn.angle for turn in turns]),
             rates=np.array([turn.rate for turn in turns]),
@@ -328,8 +306,8 @@ class Erls:
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""
         theta, rates, _, q_d, qd_d, _ = self._expand(t, y, v, None)
-        motion = self.compatibility.acceleration(theta, rates, q_d, qd_d)
-        q, qd = motion[:2]
+        motion = self._motion(theta, rates, q_d, qd_d)
+        q, qd = motion.q, motion.qd
         chain = kinematics(self.mechanism, self.screws, theta, rates)
         kinetic = gravity = springs = 0.0
         for k, inertia in enumerate(self.inertia):
@@ -337,7 +315,7 @@ class Erls:
             kinetic += inertia.kinetic_energy(chain.twists[k], q[modes], qd[modes])
             gravity += inertia.gravity_energy(self.mechanism.gravity, chain.poses[k], q[modes])
         for k, joint in enumerate(self.mechanism.joints):
-            turn = self._joint_turn(k, theta, rates, motion)
+            turn = self._turn(k, theta, rates, motion)
             kinetic += 0.5 * joint.rotor_inertia * turn.rate**2
             springs += 0.5 * joint.forces.stiffness * (turn.angle - joint.forces.rest) ** 2
         return Energy(kinetic, float(0.5 * self.stiffness @ q_d**2), gravity, springs)
