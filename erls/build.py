@@ -71,30 +71,14 @@ def build_mechanism(
         Naming file, field, value and remedy.
     """
     record, file = scene.record, str(scene.path)
-    warnings: list[str] = []
+    joints = _joints(scene)  # first: a faulty one is found before time goes into reductions
     if models is None:
         models = link_models(scene, tell)
-    rotation = fixed_axes(*_finite(np.radians(record.base.rotation_deg), f"{file}: base.rotation_deg"))
-    ground = pose(rotation, _finite(record.base.position, f"{file}: base.position"))
-    joints: list[Joint] = []
-    links: list[Link] = []
-    before = ground
-    for k, (joint_record, link_record, model) in enumerate(
-        zip(record.joints, record.links, models, strict=True)
-    ):
-        place = f"{file}: joints[{k}]"
-        choose(joint_record.type, JOINT_TYPES, f"{place}.type", SceneError)
-        first, second = split(_dh_row(joint_record, place))
-        mesh = link_record.mesh_pose
-        mesh_pose = pose(
-            fixed_axes(*_finite(np.radians(mesh.rotation_deg), f"{file}: links[{k}].mesh_pose.rotation_deg")),
-            _finite(mesh.position, f"{file}: links[{k}].mesh_pose.position"),
-        )
-        after = second @ mesh_pose if mesh.frame == "dh" else mesh_pose
-        joints.append(_joint(joint_record, before @ first, after, Place(scene.folder, place)))
-        links.append(_link(link_record, model, k, len(models), file))
-        before = inverse(mesh_pose) if mesh.frame == "dh" else inverse(mesh_pose) @ second
-        warnings += _arm_warnings(joints[-1], links[-1])
+    links = [
+        _link(link, model, k, len(models), file)
+        for k, (link, model) in enumerate(zip(record.links, models, strict=True))
+    ]
+    warnings = [w for joint, link in zip(joints, links, strict=True) for w in _arm_warnings(joint, link)]
     points = [_point(scene, k, links) for k in range(len(record.points))]
     links = _with_payloads(scene, links, points)
     return Built(
@@ -103,20 +87,27 @@ def build_mechanism(
             joints=tuple(joints),
             links=tuple(links),
             points=tuple(points),
-            gravity=_finite(record.gravity, f"{file}: gravity"),
+            gravity=np.array(record.gravity),
             static_start=record.initial.deformation == "static",
         ),
         tuple(warnings),
     )
 
 
-def _finite(value: object, where: str) -> Array:
-    array = np.asarray(value, dtype=float)
-    if not (np.isfinite(array).all() and np.abs(array).max(initial=0.0) < 1e30):
-        raise SceneError(
-            Cause.BAD_FIELD, "numbers must be finite", where=where, value=value, remedy="give numbers"
-        )
-    return array
+def _joints(scene: Scene) -> list[Joint]:
+    """The joints, on their Denavit-Hartenberg rows and mesh poses."""
+    record = scene.record
+    before = pose(fixed_axes(*np.radians(record.base.rotation_deg)), np.array(record.base.position))
+    result: list[Joint] = []
+    for k, (joint, link) in enumerate(zip(record.joints, record.links, strict=True)):
+        place = f"{scene.path}: joints[{k}]"
+        first, second = split(_dh_row(joint, place))
+        mesh = link.mesh_pose
+        mesh_pose = pose(fixed_axes(*np.radians(mesh.rotation_deg)), np.array(mesh.position))
+        after = second @ mesh_pose if mesh.frame == "dh" else mesh_pose
+        result.append(_joint(joint, before @ first, after, Place(scene.folder, place)))
+        before = inverse(mesh_pose) if mesh.frame == "dh" else inverse(mesh_pose) @ second
+    return result
 
 
 def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
@@ -142,25 +133,12 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
     place = f"{scene.path}: links[{k}]"
     if link.rigid is not None:
         rigid = link.rigid
-        for name in ("mass",):
-            if not (math.isfinite(rigid.mass) and rigid.mass >= 0):
-                raise SceneError(
-                    Cause.BAD_FIELD, "a mass cannot be negative", where=f"{place}.rigid.{name}", value=rigid.mass,
-                    remedy="give 0 or more",
-                )  # fmt: skip
-        if not rigid.points:
-            raise SceneError(
-                Cause.BAD_FIELD,
-                "a rigid link needs named points",
-                where=f"{place}.rigid.points",
-                remedy="give the inboard one at least, points = { root = [0, 0, 0] }",
-            )
         return rigid_model(
             link.name,
             rigid.mass,
-            _finite(rigid.centre_of_mass, f"{place}.rigid.centre_of_mass"),
+            np.array(rigid.centre_of_mass),
             inertia_matrix(rigid.inertia, f"{place}.rigid.inertia", SceneError),
-            {n: _finite(p, f"{place}.rigid.points.{n}") for n, p in rigid.points.items()},
+            {n: np.array(p) for n, p in rigid.points.items()},
         )
     if link.modal_file:
         path = scene.folder / link.modal_file
@@ -181,7 +159,7 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
     wanted = 0 if not link.flexible else link.elastic_modes
     if wanted is None:
         return model
-    if not 0 <= wanted <= model.elastic_modes:
+    if wanted > model.elastic_modes:
         raise SceneError(
             Cause.BAD_FIELD,
             "the modal model has fewer elastic modes",
@@ -194,11 +172,11 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
 
 
 def _within(place: str, read: Callable[[], T]) -> T:
-    """Say which field of the scene named a file that does not exist."""
+    """Say which field of the scene named a file that cannot be read."""
     try:
         return read()
     except FEImportError as problem:
-        if problem.cause == Cause.FILE_NOT_FOUND:
+        if problem.cause in (Cause.FILE_NOT_FOUND, Cause.NOT_READABLE):
             problem.remedy = f"named by {place}; " + problem.remedy
         raise
 
@@ -315,20 +293,10 @@ def _arm_warnings(joint: Joint, link: Link) -> list[str]:
 def _point(scene: Scene, k: int, links: list[Link]) -> Point:
     """Resolve a named point to a node of a link."""
     point, place = scene.record.points[k], f"{scene.path}: points[{k}]"
-    names = [link.name for link in links]
-    choose(point.link, names, f"{place}.link", SceneError)
-    number = names.index(point.link)
+    number = [link.name for link in links].index(point.link)
     model = links[number].model
-    if bool(point.node) == (point.position is not None):
-        raise SceneError(
-            Cause.BAD_FIELD,
-            "give exactly one of 'node' and 'position'",
-            where=place,
-            remedy="name a node or place",
-        )
     if point.position is not None:
-        target = _finite(point.position, f"{place}.position")
-        distance = np.linalg.norm(model.nodes - target, axis=1)
+        distance = np.linalg.norm(model.nodes - np.array(point.position), axis=1)
         node = int(distance.argmin())
         limit = 0.05 * float(np.linalg.norm(np.ptp(model.nodes, axis=0)))
         if distance[node] > limit:
@@ -367,11 +335,10 @@ def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list
 
     for k, payload in enumerate(scene.record.payloads):
         place = f"{scene.path}: payloads[{k}]"
-        choose(payload.point, names, f"{place}.point", SceneError)
         point = names[payload.point]
         mass = Place(scene.folder, place).not_negative("mass", payload.mass)
         inertia = inertia_matrix(payload.inertia, f"{place}.inertia", SceneError)
-        add(point.link, point.node, _finite(payload.offset, f"{place}.offset"), mass, inertia, place)
+        add(point.link, point.node, np.array(payload.offset), mass, inertia, place)
     for k, joint in enumerate(scene.record.joints):
         place = f"{scene.path}: joints[{k}].motor"
         mass = Place(scene.folder, place).not_negative("mass", joint.motor.mass)

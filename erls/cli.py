@@ -7,7 +7,10 @@ help answers at once.
 
 from __future__ import annotations
 
+import contextlib
 import json
+import math
+import os
 import signal
 import sys
 import time
@@ -69,7 +72,7 @@ def reduce(
     changes = {k: v for k, v in (("method", method), ("elastic_modes", modes)) if v is not None}
     description = load_link(link, changes)
     target = output or Path(f"{description.description.name}.modal.h5")
-    _writable(target)
+    _writable(target, link)
     begun = time.perf_counter()
     _tell(f"reducing {link}")
     model = reduce_link(description)
@@ -129,23 +132,22 @@ def simulate(
     loaded = load_scene(scene, changes)
     times = _times(at, loaded.record.simulation.duration)
     if output is not None:
-        _writable(output)
+        _writable(output, scene)
     partial = output.with_name(f"{output.name}.partial") if output is not None else None
     try:
         with _progress("simulating") as advance:
             run = run_simulation(loaded, progress=advance, tell=_tell, checkpoint=partial)
     except SimulationError as problem:
-        if problem.run is not None and output is not None and len(problem.run.solution.t) > 1:
+        if output is None:
+            problem.remedy += "; give -o RUN.h5 to keep what was computed" if problem.run is not None else ""
+        elif problem.run is not None and len(problem.run.solution.t) > 1:
             write_run(output, problem.run)
             _tell(f"what was computed, up to t = {problem.run.end:.6g} s, is in {output}")
+            _remove(partial)
         raise
-    finally:
-        if partial is not None:
-            partial.unlink(missing_ok=True)
-    for warning in run.warnings:
-        _tell(f"warning: {warning}")
     if output is not None:
         write_run(output, run)
+        _remove(partial)
     if json:
         return _print_json({**run.summary(times), "output": None if output is None else str(output)})
     print(run_report(run, times))
@@ -212,12 +214,11 @@ def view(
     from erls.run_file import load_run
     from erls.view import show, write_view
 
-    if output is not None:
-        _writable(output)
     loaded = load_run(run)
     if output is None:
         show(loaded)
         return
+    _writable(output, run)
     begun = time.perf_counter()
     times = _times(at, loaded.end) or None
     with _progress("drawing") as advance:
@@ -258,22 +259,17 @@ def _times(text: str, end: float) -> list[float]:
     return result
 
 
-def _writable(path: Path) -> None:
-    """Refuse an output that cannot be written before any work is done."""
-    import os
+def _writable(path: Path, source: Path) -> None:
+    """Refuse an output that cannot be written, or that is what was read, before any work is done."""
+    from erls.output_file import check_writable, not_writable
 
-    from erls.errors import Cause, SceneError
+    if check_writable(path) == source.resolve():
+        raise not_writable(path, "it is the file that is read", "give the output another name")
 
-    folder = path.parent
-    remedy = ""
-    if not folder.is_dir():
-        remedy = "make the folder first"
-    elif path.is_dir():
-        remedy = "give the name of a file"
-    elif not os.access(folder, os.W_OK):
-        remedy = "choose another folder"
-    if remedy:
-        raise SceneError(Cause.NOT_WRITABLE, "cannot be written", where=f"-o {path}", remedy=remedy)
+
+def _remove(path: Path | None) -> None:
+    if path is not None:
+        path.unlink(missing_ok=True)
 
 
 def _peak_memory_mb() -> float | None:
@@ -287,12 +283,22 @@ def _peak_memory_mb() -> float | None:
 
 
 def _tell(text: str) -> None:
-    """A message on stderr."""
-    print(text, file=sys.stderr)
+    """A message on stderr; nobody may be listening any more."""
+    with contextlib.suppress(OSError):
+        print(text, file=sys.stderr)
 
 
 def _print_json(summary: dict[str, Any]) -> None:
-    print(json.dumps(summary, allow_nan=False))
+    print(json.dumps(_finite(summary), allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no infinities and no NaN, which a run that failed may hold."""
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 class _progress:
@@ -337,14 +343,14 @@ def _report(error: ReportedError, as_json: bool) -> int:
     if as_json:
         _print_json({"error": error.as_dict()})
     else:
-        _tell(f"error: {error}")
+        _tell("error: " + str(error).replace("\n", "\\n"))
     return error.exit_code
 
 
 def _usage_error(problem: CycloptsError) -> ReportedError:
     from erls.errors import Cause, SceneError
 
-    text = " ".join(str(problem).split())
+    text = " ".join(str(problem).split()).rstrip(".")
     return SceneError(Cause.BAD_FIELD, text, where="command line", remedy="see erls --help")
 
 
@@ -361,19 +367,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Instead of those of the process.
     """
     tokens = list(sys.argv[1:] if arguments is None else arguments)
-    as_json = "--json" in tokens
+    as_json = not {"--json", "--json=true", "--json=yes", "--json=1"}.isdisjoint(tokens)
     if arguments is None:
         signal.signal(signal.SIGTERM, _interrupt)  # like Ctrl-C: finished work is kept
     try:
         app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
     except CycloptsError as problem:
         return _report(_usage_error(problem), as_json)
     except ReportedError as problem:
         return _report(problem, as_json)
     except KeyboardInterrupt:
-        _tell("interrupted")
-        return 130
+        return _report(_stopped("INTERRUPTED", "interrupted", "start again"), as_json)
     except MemoryError:
-        _tell("error: out of memory; reduce the model further or free memory")
-        return 3
+        remedy = "reduce the model further, shorten the run, or free memory"
+        return _report(_stopped("OUT_OF_MEMORY", "out of memory", remedy), as_json)
+    except BrokenPipeError:  # whoever reads stdout has enough, as in: erls info FILE | head
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
+
+
+def _stopped(cause: str, message: str, remedy: str) -> ReportedError:
+    from erls.errors import Cause, SimulationError
+
+    return SimulationError(Cause[cause], message, remedy=remedy)

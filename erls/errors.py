@@ -29,8 +29,8 @@ class Cause(enum.StrEnum):
     NEWTON_FAILED = "Newton iteration did not converge"
     NOT_FINITE = "solution is no longer finite"
     STEP_TOO_SMALL = "step size became too small"
-    LINEAR_RANGE = "deformation left the range of small displacements"
     NO_PICTURE = "picture could not be made"
+    OUT_OF_MEMORY = "out of memory"
     INTERRUPTED = "interrupted"
 
 
@@ -40,7 +40,7 @@ _NUMERICAL = {
     Cause.NEWTON_FAILED,
     Cause.NOT_FINITE,
     Cause.STEP_TOO_SMALL,
-    Cause.LINEAR_RANGE,
+    Cause.OUT_OF_MEMORY,
     Cause.NO_PICTURE,
 }
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from erls.errors import Cause, SceneError
+from fe_import.output_file import refusal
 
 
 def check_writable(path: Path | str) -> Path:
@@ -21,7 +22,7 @@ def check_writable(path: Path | str) -> Path:
     """
     try:
         target = Path(os.path.realpath(path))
-        problem, remedy = _refusal(target)
+        problem, remedy = refusal(target) or ("", "")
     except (OSError, ValueError) as failure:
         problem, remedy = str(failure), "choose another path"
     if problem:
@@ -32,20 +33,6 @@ def check_writable(path: Path | str) -> Path:
 def not_writable(path: Path | str, problem: object, remedy: str) -> SceneError:
     """The error for an output that cannot be written."""
     return SceneError(Cause.NOT_WRITABLE, f"cannot be written: {problem}", where=str(path), remedy=remedy)
-
-
-def _refusal(target: Path) -> tuple[str, str]:
-    """Why a path cannot be written, and what to do; empty if it can."""
-    folder = target.parent
-    if not folder.is_dir():
-        return f"no folder {str(folder)!r}", "make the folder first"
-    if target.is_dir():
-        return "it is a folder", "give the name of a file"
-    if target.exists() and not target.is_file():
-        return "it is not a regular file", "choose another path"
-    if not os.access(folder, os.W_OK | os.X_OK) or (target.exists() and not os.access(target, os.W_OK)):
-        return "no permission", "choose another folder, or change its permissions"
-    return "", ""
 
 
 def temporary_name(target: Path) -> Path:

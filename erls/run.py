@@ -122,7 +122,7 @@ class Run:
     def point_position(self, state: State, number: int) -> Array:
         """(3,) world position of point ``number`` in a state."""
         point = self.formulation.mechanism.points[number]
-        return node_positions(self, state, point.link, np.array([point.node]))[0]
+        return np.asarray(node_positions(self, state, point.link, np.array([point.node]))[0])
 
     def joint_angle(self, joint: str, t: ArrayLike) -> Array:
         """(...) physical joint angle, what an encoder reads [rad or m]."""
@@ -149,8 +149,8 @@ class Run:
         """(..., 6 + n) modal coordinates of a link, rigid-body ones first [m √kg]."""
         choose(link, self.link_names, "link", SceneError)
         number = self.link_names.index(link)
-        found = np.array([s.modal[number] for s in self.states(t)])
-        return found.reshape(*np.shape(t), found.shape[-1])
+        modes = self.formulation.mechanism.links[number].model.modes
+        return np.array([s.modal[number] for s in self.states(t)]).reshape(*np.shape(t), modes)
 
     def energy(self, t: ArrayLike) -> Energy:
         """Kinetic, elastic, gravity and spring energy [J], each of the shape of ``t``."""

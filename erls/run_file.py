@@ -20,6 +20,7 @@ from erls.integrators.base import Solution, Work
 from erls.mechanism.tables import read_csv
 from erls.run import Run
 from erls.scene import Scene, SceneRecord
+from erls.scene_check import check_scene
 from fe_import.hdf5 import open_for_reading, write_array, write_atomically, write_attribute, write_strings
 from fe_import.modal_file import ModalModel, read_modal_group, write_modal_group
 from fe_import.toml_file import choose, convert
@@ -58,7 +59,8 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
     write_attribute(group, "message", "" if run.failure is None else str(run.failure))
     write_attribute(group, "scene_file", run.scene.path.name)
     write_attribute(group, "wall_s", run.wall_s)
-    write_strings(group, "scene", _self_contained(run.scene), "the scene as JSON")
+    scene = msgspec.json.encode(self_contained(run.scene).record).decode()
+    write_strings(group, "scene", scene, "the scene as JSON")
     write_strings(group, "warnings", run.warnings, "what the user was told")
     write_array(group, "knots/time", solution.t, "s", "times of the steps; twice where forces jump")
     for name, values, unit in (
@@ -92,26 +94,20 @@ def _fill_output(group: h5py.Group, run: Run) -> None:
     write_array(group, "output/time", times, "s", "even times")
     for k, name in enumerate(run.point_names):
         positions = np.array([run.point_position(s, k) for s in states])
-        write_array(group, f"output/points/{_key(name)}", positions, "m", "world position; time, axis")
+        write_array(group, f"output/points/{name}", positions, "m", "world position; time, axis")
     for k, name in enumerate(run.joint_names):
         for what in ("coordinates", "angles", "rates"):
             values = np.array([getattr(s, what)[k] for s in states])
             write_array(
-                group, f"output/joints/{_key(name)}/{what}", values, "rad or m, per s", "joint motion"
+                group, f"output/joints/{name}/{what}", values, "rad or m, per s", "joint motion"
             )
     energy = run.energy(times)
     for kind in ("kinetic", "elastic", "gravity", "springs", "total"):
         write_array(group, f"output/energy/{kind}", getattr(energy, kind), "J", f"{kind} energy")
 
 
-def _key(name: str) -> str:
-    """A name that cannot be taken for a path inside the file."""
-    return name.replace("/", "_") if name not in (".", "") else "_"
-
-
-def _self_contained(scene: Scene) -> str:
-    """The scene as JSON, tables from CSV files written into it."""
-    data = msgspec.to_builtins(scene.record)
+def self_contained(scene: Scene) -> Scene:
+    """The scene with the tables of its CSV files written into it."""
 
     def inline(value: Any) -> Any:
         if isinstance(value, list):
@@ -128,7 +124,8 @@ def _self_contained(scene: Scene) -> str:
             return {**value, "times": times, "values_deg" if degrees else "values": values.tolist()}
         return {k: inline(v) for k, v in value.items()}
 
-    return msgspec.json.encode(inline(data)).decode()
+    data = inline(msgspec.to_builtins(scene.record))
+    return Scene(scene.path, convert(data, SceneRecord, str(scene.path), SceneError))
 
 
 def load_run(path: Path | str) -> Run:
@@ -153,6 +150,7 @@ def load_run(path: Path | str) -> Run:
         except msgspec.DecodeError as problem:
             raise file.fail("scene", f"not JSON: {problem}") from None
         record = convert(data, SceneRecord, f"{path}: /scene", SceneError)
+        check_scene(record, f"{path}: /scene")
         scene = Scene(Path(file.attribute("scene_file", str) or path.name), record)
         count = len(record.links)
         numbers = file.integers("model_of_link", (count,), 1, count + 1)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from erls.build import Built, Message, build_mechanism
+from erls.build import Message, build_mechanism
 from erls.errors import SceneError, SimulationError
 from erls.formulations import FORMULATIONS
 from erls.integrators import INTEGRATORS
 from erls.integrators.base import Options, Solution
 from erls.mechanism.chain import Mechanism
 from erls.run import Run, node_positions
-from erls.run_file import write_run
+from erls.run_file import self_contained, write_run
 from erls.scene import Scene, load_scene
 from fe_import.toml_file import choose
 
@@ -43,7 +44,7 @@ def simulate(
     progress : callable, optional
         Called with (time, duration) after each step.
     tell : callable, optional
-        Told about each preparation that takes time.
+        Told about each preparation that takes time, and every warning as soon as it is known.
     checkpoint : Path, optional
         Run file to which a long run saves what it has, every 20 s of work.
 
@@ -72,43 +73,58 @@ def simulate(
     settings = scene.record.simulation
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
     built = build_mechanism(scene, tell)
+    scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
+    warned: list[str] = []
+
+    def warn(texts: Iterable[str]) -> None:
+        for text in texts:
+            if text not in warned:
+                warned.append(text)
+                tell(f"warning: {text}")
+
+    warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
     formulation = FORMULATIONS[settings.formulation](built.mechanism, settings.gauge)
     y, v = formulation.initial_state()
     options = Options(settings.step, settings.rtol, settings.atol, settings.spectral_radius)
-    begun = time.perf_counter()
+    begun = saved = time.perf_counter()
 
-    def make_run(solution: Solution, warnings: tuple[str, ...]) -> Run:
-        return Run(scene, formulation, solution, time.perf_counter() - begun, warnings)
+    def make_run(solution: Solution) -> Run:
+        return Run(scene, formulation, solution, time.perf_counter() - begun, tuple(warned))
 
-    saved = begun
+    first = True
 
     def observe(t: float, knots: Callable[[], Solution]) -> None:
-        nonlocal saved
+        nonlocal first, saved
+        if first:
+            first = False
+            warn(knots().warnings)
         if progress is not None:
             progress(t, settings.duration)
         if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
-            write_run(checkpoint, make_run(knots(), built.warnings), "unfinished")
+            try:
+                write_run(checkpoint, make_run(knots()), "unfinished")
+            except SceneError as problem:  # a full disk may have room again at the end
+                tell(f"warning: no checkpoint: {problem}")
             saved = time.perf_counter()
 
-    observer = observe if progress is not None or checkpoint is not None else None
     times = (0.0, settings.duration)
-    solution = INTEGRATORS[settings.integrator](formulation, times, y, v, options, observer)
-    run = make_run(solution, ())
-    warnings = (*built.warnings, *solution.warnings, *impulse_warnings(built), *range_warnings(run))
-    run = Run(scene, formulation, solution, run.wall_s, warnings)
+    solution = INTEGRATORS[settings.integrator](formulation, times, y, v, options, observe)
+    run = make_run(solution)
+    warn((*solution.warnings, *range_warnings(run)))
+    run = replace(run, warnings=tuple(warned))
     if solution.failure is not None:
         solution.failure.run = run
         raise solution.failure
     return run
 
 
-def impulse_warnings(built: Built) -> list[str]:
+def impulse_warnings(mechanism: Mechanism, duration: float) -> list[str]:
     """Prescribed motions whose rate jumps would need an infinite force."""
     result = []
-    for joint in built.mechanism.joints:
+    for joint in mechanism.joints:
         if not joint.drive.prescribed:
             continue
-        for t in joint.drive.breakpoints:
+        for t in (b for b in joint.drive.breakpoints if 0 <= b < duration):
             before, after = joint.drive.reference(t, left=True), joint.drive.reference(t)
             if (
                 before is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from fe_import.errors import Cause, FEImportError, ReportedError
 from fe_import.frame import FrameElement, assemble_frame, local_axes
 from fe_import.link import Frame, Inertia, Interface, LinkDescription, LinkFile, Material, Member, PointMass
-from fe_import.model import Array, FEModel, InterfaceNode, IntArray
+from fe_import.model import Array, FEModel, IntArray, InterfaceNode
 from fe_import.sections import section_constants
 from fe_import.toml_file import choose
 
@@ -58,7 +59,7 @@ def _frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
     for k, member in enumerate(frame.members):
         place = f"{where}: frame.members[{k}]"
         chain = _subdivide(member, names, positions, place)
-        for a, b in zip(chain[:-1], chain[1:], strict=True):
+        for a, b in pairwise(chain):
             elements.append(_element(link, frame, member, (a, b), positions, where, place))
             lines.append((a, b))
     nodes = np.stack(positions)

@@ -6,7 +6,6 @@ import enum
 from collections.abc import Callable
 from typing import Any
 
-
 _LONGEST = 80
 
 

@@ -21,6 +21,7 @@ from fe_import.errors import ReportedError
 from fe_import.hdf5_audit import Limits, audit
 from fe_import.hdf5_sink import Sink
 from fe_import.hdf5_values import REMEDY, Reader, translated, write_array, write_attribute, write_strings
+from fe_import.output_file import refusal
 
 __all__ = [
     "Reader",
@@ -99,11 +100,11 @@ def write_atomically(
     where = str(path)
     try:
         target = Path(os.path.realpath(path))  # through a link to a file, not over it
-        refusal = _refusal(target)
-    except (OSError, ValueError) as problem:
-        refusal = (str(problem), "choose another path")
-    if refusal:
-        raise error(cause, f"cannot be written: {refusal[0]}", where=where, remedy=refusal[1])
+        problem = refusal(target)
+    except (OSError, ValueError) as failure:
+        problem = (str(failure), "choose another path")
+    if problem:
+        raise error(cause, f"cannot be written: {problem[0]}", where=where, remedy=problem[1])
     temporary = target.with_name(f".{os.getpid()}-{secrets.token_hex(8)}.h5.tmp")
     try:
         try:
@@ -122,20 +123,6 @@ def write_atomically(
             where=where,
             remedy="free disk space, or choose another path",
         ) from problem
-
-
-def _refusal(target: Path) -> tuple[str, str] | None:
-    """Why a path cannot be written, and what to do; None if it can."""
-    folder = target.parent
-    if not folder.is_dir():
-        return f"no folder {str(folder)!r}", "make the folder first"
-    if target.is_dir():
-        return "it is a folder", "give the name of a file"
-    if target.exists() and not target.is_file():
-        return "it is not a regular file", "choose another path"
-    if not os.access(folder, os.W_OK | os.X_OK) or (target.exists() and not os.access(target, os.W_OK)):
-        return "no permission", "choose another folder, or change its permissions"
-    return None
 
 
 def _fill(sink: Sink, write: Callable[[h5py.Group], None]) -> None:

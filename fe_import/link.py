@@ -5,6 +5,7 @@ Every record below is one table of the file; unknown keys are errors with a sugg
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 from collections.abc import Iterator
@@ -191,10 +192,8 @@ class LinkFile:
         """SHA-256 of everything that the reduction depends on: the description and the files it names."""
         digest = hashlib.sha256(msgspec.json.encode(self.description, order="deterministic"))
         if self.description.solid is not None:
-            try:
+            with contextlib.suppress(OSError, ValueError):  # reported with its name when the mesh is read
                 digest.update((self.folder / self.description.solid.mesh).read_bytes())
-            except (OSError, ValueError):
-                pass  # reported with its name when the mesh is read
         return digest.hexdigest()
 
 

@@ -99,9 +99,10 @@ def mode_shapes(model: FEModel, basis: Basis, modes: OrthonormalModes) -> tuple[
     shapes = shapes @ change
     size = np.abs(shapes)
     first = (size > 0.99 * size.max(axis=0)).argmax(axis=0)  # the first of several equal ones, whatever the rounding
-    change[:, 6:] *= np.sign(shapes[first, np.arange(count)])[6:]
-    polished = OrthonormalModes(modes.coordinates @ change, np.concatenate([np.zeros(6), omega]), modes.rigid)
-    return basis.vectors @ modes.coordinates @ change, polished
+    signs = np.sign(shapes[first, np.arange(count)])
+    signs[:6] = 1.0
+    omega = np.concatenate([np.zeros(6), omega])
+    return shapes * signs, OrthonormalModes(modes.coordinates @ change * signs, omega, modes.rigid)
 
 
 def _rigid_modes(mass: Array, motions: Array, where: str) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 import scipy.linalg as la
@@ -12,7 +13,7 @@ import scipy.sparse.linalg as spla
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array
 
-Matrix = Array | sp.csc_array
+Matrix: TypeAlias = Array | sp.csc_array
 
 _DENSE = 600  # below this size LAPACK is faster than Lanczos and finds every mode
 _RESIDUAL = 1e-6  # relative residual of an accepted eigenpair; Lanczos to working precision gives below 1e-9
@@ -94,8 +95,42 @@ def lowest_modes(stiffness: sp.csc_array, mass: sp.csc_array, count: int, what: 
             remedy="ask for fewer modes",
         )
     omega = np.sqrt(values)
+    _check_complete(stiffness, mass, values, what)
     omega, change = polishing(stiffness, mass, omega, modes)
     return omega, modes @ change
+
+
+def _check_complete(stiffness: sp.csc_array, mass: sp.csc_array, values: Array, what: str) -> None:
+    """Refuse a spectrum with a gap: Lanczos may miss one of several modes of equal frequency.
+
+    Sylvester: K - λM has as many negative pivots as there are modes below λ. The count is trusted when the pivots
+    came from the diagonal and none is small; λ lies where the found spectrum leaves most room, above its middle.
+    """
+    first = len(values) // 2
+    room = np.diff(np.log(values[first:]))
+    if not len(room):
+        return
+    last = first + int(room.argmax())
+    shift = float(np.sqrt(values[last] * values[last + 1]))
+    shifted = (stiffness - shift * mass).tocsc()
+    try:
+        factor = spla.splu(
+            shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError:
+        return
+    pivots = factor.U.diagonal()
+    if not np.array_equal(factor.perm_r, factor.perm_c) or np.abs(pivots).min() < 1e-10 * np.abs(pivots).max():
+        return
+    below = int((pivots < 0).sum())
+    if below != last + 1:
+        raise FEImportError(
+            Cause.EIGENSOLVER,
+            f"modes of the {what} were missed",
+            value=f"{last + 1} found below {np.sqrt(shift) / (2 * np.pi):.6g} Hz",
+            limit=f"there are {below}",
+            remedy="ask for more or for fewer modes",
+        )
 
 
 def dense_modes(stiffness: Array, mass: Array, count: int | None, what: str) -> tuple[Array, Array]:
@@ -121,9 +156,9 @@ def dense_modes(stiffness: Array, mass: Array, count: int | None, what: str) -> 
 def polishing(stiffness: Matrix, mass: Matrix, omega: Array, modes: Array) -> tuple[Array, Array]:
     """What makes the upper modes as accurate as the lower ones.
 
-    Solved for μ = 1/ω², a mode is known to rounding times μ₁/μ, so that the highest of many are neither mass-orthonormal
-    nor modes. All are orthonormalized, the lowest first, and those above the geometric middle of the spectrum are
-    found again within their span as eigenvectors for ω², where they are the accurate ones.
+    Solved for μ = 1/ω², a mode is known to rounding times μ₁/μ, so that the highest of many are neither
+    mass-orthonormal nor modes. All are orthonormalized, the lowest first, and those above the geometric middle of
+    the spectrum are found again within their span as eigenvectors for ω², where they are the accurate ones.
 
     Parameters
     ----------
@@ -146,7 +181,9 @@ def polishing(stiffness: Matrix, mass: Matrix, omega: Array, modes: Array) -> tu
     stiff = modes @ change[:, high]
     squared, turn = la.eigh(stiff.T @ (stiffness @ stiff))
     change[:, high] = change[:, high] @ turn
-    return np.concatenate([omega[~high], np.sqrt(squared)]), change
+    omega = np.concatenate([omega[~high], np.sqrt(squared)])
+    order = np.argsort(omega, kind="stable")  # a pair of equal frequencies may stand on both sides of the middle
+    return omega[order], change[:, order]
 
 
 def _orthonormalizing(modes: Array, mass: Matrix) -> Array:

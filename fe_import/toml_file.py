@@ -105,8 +105,8 @@ def _explained(text: str, data: Any, kind: Any, where: str, error: type[Reported
     if missing:
         name = missing.group(1)
         tags = _tags(records, name)
-        place, remedy = _place(where, [*steps, name]), f"add {name} = " + (_either(tags) if tags else "...")
-        return error(Cause.BAD_FIELD, "this field is required", where=place, remedy=remedy)
+        remedy = f"add {name} = " + (_either(tags) if tags else "...")
+        return error(Cause.BAD_FIELD, f"required field {name!r} is missing", where=_place(where, steps), remedy=remedy)
     value, tags = _value_at(data, steps), []
     if steps:
         tags = _tags(_types_at(kind, data, steps[:-1]), steps[-1])
@@ -202,7 +202,7 @@ def _types_at(kind: Any, data: Any, steps: Steps) -> list[Any]:
 
 
 def _alternatives(kind: Any, node: Any) -> list[Any]:
-    types = list(kind.types) if isinstance(kind, msgspec.inspect.UnionType) else [kind]
+    types: list[Any] = list(kind.types) if isinstance(kind, msgspec.inspect.UnionType) else [kind]
     if isinstance(node, dict):
         tagged = [t for t in types if getattr(t, "tag", None) is not None and node.get(t.tag_field) == t.tag]
         return tagged or types
@@ -226,7 +226,8 @@ def choose(value: str, options: Any, where: str, error: type[ReportedError] = FE
     """Refuse a name that is not among the options of a registry, with a suggestion."""
     names = [str(o.value) if isinstance(o, enum.Enum) else str(o) for o in options]
     if value not in names:
-        known = ", ".join(names[:_SHOWN_NAMES]) + (f" and {len(names) - _SHOWN_NAMES} more" if names[_SHOWN_NAMES:] else "")
+        more = len(names) - _SHOWN_NAMES
+        known = ", ".join(names[:_SHOWN_NAMES]) + (f" and {more} more" if more > 0 else "")
         close = difflib.get_close_matches(value[:200], names, n=1)
         raise error(
             Cause.BAD_REFERENCE,

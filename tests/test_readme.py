@@ -110,7 +110,7 @@ def test_defaults_are_as_printed() -> None:
     assert (simulation.formulation, simulation.gauge, simulation.integrator) == (
         *("erls", "joint-angle", "generalized_alpha"),
     )
-    assert (simulation.rtol, simulation.atol, simulation.spectral_radius) == (1e-8, 1e-10, 0.8)
+    assert (simulation.rtol, simulation.atol, simulation.spectral_radius) == (1e-8, 1e-12, 0.8)
     frame = Frame(nodes={}, members=[])
     assert (frame.theory, frame.mass, frame.rotary_inertia, frame.torsion) == (
         *("timoshenko", "consistent", True, "saint-venant"),

@@ -29,7 +29,7 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
     try:
         with path.open("rb") as file:
             start = file.read(len(_HDF5))
-    except OSError:
+    except (OSError, ValueError):
         start = b""  # reported by the reader below
     if start == _HDF5:
         with open_for_reading(path, SceneError, Cause.RUN_FILE) as reader:
@@ -38,7 +38,9 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
             from erls.run_file import load_run
 
             run = load_run(path)
-            return {"file": "run", **run.summary()}, run_report(run)
+            failure = None if run.failure is None else run.failure.as_dict()
+            text = "\n".join([run_report(run), *(f"warning: {w}" for w in run.warnings)])
+            return {"file": "run", **run.summary(), "failure": failure}, text
         return _modal_info(read_modal_file(path))
     data = read_toml(path, SceneError)
     if "joints" in data or "simulation" in data or "links" in data:

@@ -92,6 +92,8 @@ def run_report(run: Run, times: Sequence[float] = ()) -> str:
         f"energy: {s['energy']['initial']:.6g} J at the start, {s['energy']['final']:.6g} J at the end"
         + (f", drift at most {drift:.2g} J" if drift is not None else " (driven or damped: not conserved)"),
     ]
+    if run.failure is not None:
+        lines.append(f"stopped early: {run.failure}")
     rows = []
     for sample in s["samples"]:
         for name, joint in sample["joints"].items():

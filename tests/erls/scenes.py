@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from pathlib import Path
 from typing import Any
-
-import tomllib
 
 from erls.build import build_mechanism
 from erls.formulations.erls import Erls
@@ -52,7 +52,7 @@ def toml(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        return json.dumps(value, ensure_ascii=False)  # the same escapes
     return repr(value)
 
 

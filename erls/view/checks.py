@@ -11,8 +11,8 @@ import numpy as np
 from erls.errors import Cause, SceneError, SimulationError
 from erls.formulations.base import State
 from erls.run import Run
-from erls.view_camera import Size
-from erls.view_scene import Motion
+from erls.view.camera import Size
+from erls.view.stage import Motion
 
 Progress = Callable[[int, int], None]  # (done, total)
 

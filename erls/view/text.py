@@ -9,9 +9,9 @@ import numpy as np
 
 from erls.formulations.base import State
 from erls.run import Run
-from erls.view_camera import Pixels, text_unit
-from erls.view_labels import Label, Sheet
-from erls.view_scene import POINTS, Stage, colour_map
+from erls.view.camera import Pixels, text_unit
+from erls.view.labels import Label, Sheet
+from erls.view.stage import POINTS, Stage, colour_map
 
 
 def written(stage: Stage, pixels: Pixels, caption: str) -> Sheet:
@@ -71,7 +71,12 @@ def time_labels(stage: Stage, states: Sequence[State]) -> list[Label]:
             groups.append([k])
     result = []
     for group in groups:
-        text = ", ".join(f"{t:.4g}" for t in sorted({states[k].time for k in group})) + " s"
+        members = sorted(group)
+        text = ", ".join(f"{t:.4g}" for t in sorted({states[k].time for k in members})[:3])
+        if len(members) > 3:
+            in_a_row = members[-1] - members[0] == len(members) - 1
+            text = f"{states[members[0]].time:.4g} to {states[members[-1]].time:.4g}" if in_a_row else text + ", …"
+        text += " s"
         x, y = places[group[0]]
         last = len(states) - 1 in group
         result.append(Label(text, text, (float(x), float(y)), "#20242a" if last else "#5a626d", scale=0.9))

@@ -11,8 +11,8 @@ import numpy as np
 from erls.formulations.base import State
 from erls.lie.so3 import Array
 from erls.run import Run, node_positions
-from erls.view_camera import Box, Camera, Pixels, Size, Walls, text_unit
-from erls.view_shapes import (
+from erls.view.camera import Box, Camera, Pixels, Size, Walls, text_unit
+from erls.view.shapes import (
     SHARP,
     deflection,
     ground_surface,
@@ -205,9 +205,8 @@ class Stage:
         self._actors["paths"] = actors
 
     def pose(self, state: State, ghost: bool = False) -> None:
-        """Put the mechanism in a state; a ghost is drawn in one pale colour, instead of any earlier ghost."""
-        name = "ghost" if ghost else "pose"
-        self._remove(name)
+        """Put the mechanism in a state, instead of any earlier one; a ghost is drawn in one pale colour."""
+        self._remove("pose")
         run, motion = self.run, self.motion
         actors = []
         for k, link in enumerate(run.formulation.mechanism.links):
@@ -236,7 +235,7 @@ class Stage:
             if self.magnification != 1.0:
                 outline = rigid_outline(run, state)
                 actors += [self._add(m, color="#777777", line_width=1.0 * self.line) for m in outline]
-        self._actors[name] = actors
+        self._actors["pose"] = actors
 
     def _dots(self, state: State) -> list[Any]:
         import pyvista as pv
@@ -256,16 +255,13 @@ class Stage:
 
     def image(self) -> Pixels:
         """(height, width, 3) picture."""
+        self.plotter.render()
         taken: Pixels = np.asarray(self.plotter.screenshot(None, return_img=True))
         n = self.finer
         if n == 1:
             return taken
         total = sum(taken[i::n, j::n].astype(np.uint16) for i in range(n) for j in range(n))
         return np.asarray(total // n**2, dtype=np.uint8)
-
-    def clear_ghost(self) -> None:
-        """Take the ghost away."""
-        self._remove("ghost")
 
 
 def colour_map() -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from erls.lie.so3 import Array
-from erls.view_scene import POINTS, Stage
+from erls.view.stage import POINTS, Stage
 
 
 class Window(Stage):

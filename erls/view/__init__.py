@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.export import export_csv, export_paraview
+from erls.view.export import export_csv, export_paraview
 from erls.output_file import check_writable, replacing
 from erls.run import Run
-from erls.view_camera import Size
-from erls.view_checks import Progress, bad, check, drawing, no_picture, surveyed
-from erls.view_film import FILMS, film
-from erls.view_scene import Stage
-from erls.view_text import caption, displacement, point_labels, time_labels, written
-from erls.view_window import Window
+from erls.view.camera import Size
+from erls.view.checks import Progress, bad, check, drawing, no_picture, surveyed
+from erls.view.film import FILMS, film
+from erls.view.stage import Stage
+from erls.view.text import caption, displacement, point_labels, time_labels, written
+from erls.view.window import Window
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -70,16 +70,17 @@ def _picture(run: Run, times: Sequence[float] | None, magnification: float, size
     motion = surveyed(run, magnification, states)
     *earlier, last = states
     with drawing(), Stage(run, motion, magnification, size, finer=2) as stage:
-        stage.pose(last)
-        base = stage.image()
-        blended = base.astype(np.float32)
+        empty = stage.image()
+        blended = empty.astype(np.float32)
         for k, state in enumerate(earlier):
             stage.pose(state, ghost=True)
             ghost = stage.image()
             weight = 0.15 + 0.4 * (k + 1) / len(earlier)
-            covers = (ghost != base).any(axis=2, keepdims=True)
+            covers = (ghost != empty).any(axis=2, keepdims=True)
             blended = np.where(covers, (1 - weight) * blended + weight * ghost, blended)
-        stage.clear_ghost()
+        stage.pose(last)
+        solid = stage.image()
+        blended = np.where((solid != empty).any(axis=2, keepdims=True), solid, blended)  # over every ghost
         sheet = written(stage, np.rint(blended).astype(np.uint8), caption(run, states, magnification))
         labels = point_labels(stage, last)
         if len(states) > 1:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from erls.lie.so3 import Array
-from erls.view_camera import Camera, Pixels, Size, Walls, round_number, text_unit
+from erls.view.camera import Camera, Pixels, Size, Walls, round_number, text_unit
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -107,6 +107,7 @@ class Sheet:
         strip = (255 * colours(np.linspace(1, 0, height))[:, None, :3]).astype(np.uint8)
         self.image.paste(PIL.Image.fromarray(np.repeat(strip, width, axis=1)), (left, top))
         self._draw.rectangle((left, top, left + width, top + height), outline="#555555")
+        self._taken.append((left - self.em, top, left + width, top + height))
         self.write(left + width / 2, top - 2.9 * self.em, "deflection", "mm", 1.0)
         self.write(left + width / 2, top - 1.5 * self.em, "[mm]", "mm", 1.0)
         step = round_number(max(largest, 1e-300) / 6)

@@ -89,8 +89,10 @@ class Camera:
         if gravity[vertical] > 0:
             turned = np.array([turned[1], turned[0], -turned[2]])
         flat, rise = math.cos(_ELEVATION), math.sin(_ELEVATION)
-        towards = np.array([flat * math.cos(_AZIMUTH), flat * math.sin(_AZIMUTH), rise]) @ turned
-        right = np.array([-math.sin(_AZIMUTH), math.cos(_AZIMUTH), 0.0]) @ turned
+        first, second, _ = np.abs(turned) @ (box.high - box.low)
+        azimuth = _AZIMUTH if first > 0.8 * second else -math.pi / 2 - _AZIMUTH  # along the longer side
+        towards = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), rise]) @ turned
+        right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0]) @ turned
         up = np.cross(towards, right)
         width, height = size
         em = text_unit(size)

@@ -14,10 +14,10 @@ from erls.errors import Cause, SimulationError
 from erls.lie.so3 import Array
 from erls.output_file import replacing
 from erls.run import Run
-from erls.view_camera import Size
-from erls.view_checks import Progress, bad, check, drawing, surveyed
-from erls.view_scene import Stage
-from erls.view_text import caption, point_labels, written
+from erls.view.camera import Size
+from erls.view.checks import Progress, bad, check, drawing, surveyed
+from erls.view.stage import Stage
+from erls.view.text import caption, point_labels, written
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -55,7 +55,7 @@ def film(
     speed : float
         Speed of the film; 0.5 is slow motion.
     size : (width, height)
-        [pixel], made even for .mp4.
+        [pixel], rounded down to even numbers.
     progress : callable, optional
         Told the frames done and their total.
 
@@ -114,7 +114,7 @@ class FilmWriter:
         self._path, self._size, self._fps = path, size, fps
 
     def __enter__(self) -> FilmWriter:
-        import imageio_ffmpeg  # type: ignore[import-untyped]
+        import imageio_ffmpeg
 
         width, height = self._size
         self._said: Any = tempfile.TemporaryFile()

@@ -1,0 +1,150 @@
+"""The conditions on a scene that the types of its records cannot state, checked before any link is reduced."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from erls.errors import Cause, SceneError
+from erls.integrators import INTEGRATORS
+from erls.mechanism.dh import CONVENTIONS
+from erls.mechanism.joints import JOINT_TYPES
+from erls.mechanism.place import LARGEST, LATEST
+from fe_import.link import Damping
+from fe_import.toml_file import choose
+
+if TYPE_CHECKING:
+    from erls.scene import Link, SceneRecord, Simulation
+
+GAUGES = ("joint-angle", "minimum-norm")
+FRAMES = ("dh", "joint")
+DEFORMATIONS = ("zero", "static")
+MOST_STEPS = 100_000_000  # fill any memory; more are a slip
+SMALLEST_RTOL = 3e-14  # rounding
+
+
+def check_scene(scene: SceneRecord, file: str) -> None:
+    """Refuse a scene that cannot be meant.
+
+    Parameters
+    ----------
+    scene : SceneRecord
+    file : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD, BAD_REFERENCE: naming file, field, value and remedy.
+    """
+    for path, value in _numbers(msgspec.to_builtins(scene)):
+        if not abs(value) <= LARGEST:
+            remedy = f"give a number between {-LARGEST:g} and {LARGEST:g}"
+            raise _bad(f"{file}: {path}", "not a finite number of plausible size", value, remedy)
+    _check_simulation(scene.simulation, f"{file}: simulation")
+    choose(scene.initial.deformation, DEFORMATIONS, f"{file}: initial.deformation", SceneError)
+    if not scene.name.isprintable():
+        raise _bad(f"{file}: name", "a name is one line of printable characters", scene.name, "rename it")
+    if not scene.joints:
+        raise _bad(f"{file}: joints", "a scene needs at least one joint", None, "add [[joints]]")
+    if len(scene.joints) != len(scene.links):
+        counts = f"{len(scene.links)} links, {len(scene.joints)} joints"
+        message = "joint k carries link k, so there must be as many links as joints"
+        raise _bad(f"{file}: links", message, counts, "add or remove one")
+    for kind in ("joints", "links", "points"):
+        named = [(f"{file}: {kind}[{k}].name", item.name) for k, item in enumerate(getattr(scene, kind))]
+        _check_names(named)
+    for k, joint in enumerate(scene.joints):
+        choose(joint.type, JOINT_TYPES, f"{file}: joints[{k}].type", SceneError)
+        choose(joint.dh.convention, CONVENTIONS, f"{file}: joints[{k}].dh.convention", SceneError)
+    for k, link in enumerate(scene.links):
+        _check_link(link, f"{file}: links[{k}]")
+    for k, point in enumerate(scene.points):
+        choose(point.link, [link.name for link in scene.links], f"{file}: points[{k}].link", SceneError)
+        if bool(point.node) == (point.position is not None):
+            remedy = "name a node of the link, or give a position in its mesh frame"
+            raise _bad(f"{file}: points[{k}]", "give exactly one of 'node' and 'position'", point.name, remedy)
+    for k, payload in enumerate(scene.payloads):
+        choose(payload.point, [p.name for p in scene.points], f"{file}: payloads[{k}].point", SceneError)
+
+
+def _numbers(value: Any, path: str = "") -> Iterable[tuple[str, float]]:
+    """All numbers of nested tables and lists with their places."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _numbers(item, f"{path}.{key}" if path else key)
+    elif isinstance(value, (list, tuple)):
+        for k, item in enumerate(value):
+            yield from _numbers(item, f"{path}[{k}]")
+    elif isinstance(value, (int, float)):
+        yield path, value
+
+
+def _check_simulation(s: Simulation, place: str) -> None:
+    choose(s.integrator, INTEGRATORS, f"{place}.integrator", SceneError)
+    choose(s.gauge, GAUGES, f"{place}.gauge", SceneError)
+    for name in ("duration", "step", "atol"):
+        value = getattr(s, name)
+        if value is not None and not value > 0:
+            raise _bad(f"{place}.{name}", f"{name} must be positive", value, "give a number above 0")
+    if s.duration > LATEST:
+        raise _bad(f"{place}.duration", "longer than any run", s.duration, f"give at most {LATEST:g} s")
+    if s.duration / MOST_STEPS > (s.step or 1e-3):
+        name = "duration" if s.step is None else "step"
+        remedy = f"a run has at most {MOST_STEPS:.0e} steps: shorten it, or give a larger step"
+        raise _bad(f"{place}.{name}", "too many steps", getattr(s, name), remedy)
+    if not SMALLEST_RTOL <= s.rtol < 1:
+        remedy = f"give {SMALLEST_RTOL:g} (rounding) to 1"
+        raise _bad(f"{place}.rtol", "not a relative tolerance", s.rtol, remedy)
+    if not 0 <= s.spectral_radius <= 1:
+        raise _bad(f"{place}.spectral_radius", "out of range", s.spectral_radius, "give 0 to 1")
+
+
+def _check_names(places: Iterable[tuple[str, str]]) -> None:
+    """Names, each behind its place, differ and can stand in tables and, as keys, in files."""
+    seen: set[str] = set()
+    for place, name in places:
+        if not name or name == "." or "/" in name or not name.isprintable():
+            message = "a name is one line of printable characters without '/'"
+            raise _bad(place, message, name, "rename it")
+        if name in seen:
+            raise _bad(place, "names must differ", name, "rename one")
+        seen.add(name)
+
+
+def _check_link(link: Link, place: str) -> None:
+    if bool(link.model) + bool(link.modal_file) + (link.rigid is not None) != 1:
+        message = "give exactly one of 'model', 'modal_file' and 'rigid'"
+        raise _bad(place, message, link.name, "a link has one source")
+    choose(link.mesh_pose.frame, FRAMES, f"{place}.mesh_pose.frame", SceneError)
+    if link.elastic_modes is not None and link.elastic_modes < 0:
+        message = "a mode count cannot be negative"
+        raise _bad(f"{place}.elastic_modes", message, link.elastic_modes, "give 0 or more")
+    if link.damping is not None:
+        _check_damping(link.damping, f"{place}.damping")
+    if link.rigid is None:
+        return
+    for name in ("elastic_modes", "damping"):
+        if getattr(link, name):
+            raise _bad(f"{place}.{name}", "a rigid link does not vibrate", link.name, f"remove {name!r}")
+    if link.rigid.mass < 0:
+        raise _bad(f"{place}.rigid.mass", "a mass cannot be negative", link.rigid.mass, "give 0 or more")
+    if not link.rigid.points:
+        remedy = "give the inboard one at least, points = { root = [0, 0, 0] }"
+        raise _bad(f"{place}.rigid.points", "a rigid link needs named points", None, remedy)
+    _check_names((f"{place}.rigid.points", name) for name in link.rigid.points)
+
+
+def _check_damping(damping: Damping, place: str) -> None:
+    given = {name: value for name, value in msgspec.to_builtins(damping).items() if value is not None}
+    if len(given) > 1:
+        raise _bad(place, "more than one kind of damping", " and ".join(given), "keep one")
+    for path, value in _numbers(given):
+        if value < 0:
+            raise _bad(f"{place}.{path}", "damping cannot be negative", value, "give 0 or more")
+
+
+def _bad(where: str, message: str, value: Any, remedy: str) -> SceneError:
+    return SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)

@@ -1,0 +1,242 @@
+"""Pictures and films: written whole, in the right place, without a display."""
+
+import itertools
+import os
+import subprocess
+import sys
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+from scenes import ROOT
+
+import erls
+from erls.errors import Cause, SceneError, SimulationError
+from erls.view import film, picture, show, write_view
+from erls.view.camera import Box, Camera, Walls
+from erls.view.checks import surveyed
+from erls.view.stage import Motion
+from erls.view.shapes import chains, joint_places
+from erls.view.window import Window
+
+SIZE = (400, 250)
+
+
+def simulated(scene, *changes):
+    return erls.simulate(erls.load_scene(ROOT / "data" / scene, ["simulation.duration=0.05", *changes]))
+
+
+@pytest.fixture(scope="module")
+def pendulum():
+    return simulated("l_shape/steel_tall.toml")
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return simulated("robot/two_link.toml")
+
+
+def pixels(path):
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB")).astype(int)
+
+
+def coloured(image):
+    """Where the picture is neither white nor grey."""
+    return np.ptp(image, axis=2) > 60
+
+
+def test_picture_shows_the_link_at_its_tip(pendulum, tmp_path):
+    path = tmp_path / "l.png"
+    size = (800, 500)
+    picture(pendulum, path, size=size)
+    image = pixels(path)
+    assert image.shape == (500, 800, 3)
+    assert 0.5 < (image.min(axis=2) > 250).mean() < 0.98
+    states = pendulum.states(np.linspace(0, 0.05, 6))
+    camera = Camera.fitting(Motion.of(pendulum, 1.0, states).box, np.array([0, 0, -9.81]), size)
+    for name in ("tip", "elbow"):
+        x, y = camera.project(pendulum.position(name, 0.05)).round().astype(int)
+        assert coloured(image)[y - 2 : y + 3, x - 2 : x + 3].mean() > 0.5
+    halfway = (pendulum.position("tip", 0.05) + pendulum.position("elbow", 0.05)) / 2
+    x, y = camera.project(halfway).round().astype(int)
+    assert coloured(image)[y - 2 : y + 3, x - 2 : x + 3].mean() > 0.5
+    assert not coloured(image)[y + 15 : y + 20, x - 2 : x + 3].any()  # beside the link there is nothing
+
+
+def test_same_run_same_picture(pendulum, tmp_path):
+    for name in ("a.png", "b.png"):
+        picture(pendulum, tmp_path / name, [0.02], size=SIZE)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize("scene", ["robot/two_link.toml", "l_shape/solid.toml"])
+@pytest.mark.parametrize("changes", [[], ["points=[]"], ["links.0.flexible=false", "gravity=[0, 3, 0]"]])
+def test_any_mechanism_makes_a_picture(scene, changes, tmp_path):
+    run = simulated(scene, "simulation.duration=0.002", *changes)
+    picture(run, tmp_path / "a.JPG", [0.0, 0.002], magnification=20, size=SIZE)
+    assert coloured(pixels(tmp_path / "a.JPG")).sum() > 200
+
+
+def test_magnification_changes_the_picture(robot, tmp_path):
+    for factor in (1, 50):
+        picture(robot, tmp_path / f"{factor}.png", [0.05], magnification=factor, size=SIZE)
+    assert (pixels(tmp_path / "1.png") != pixels(tmp_path / "50.png")).any(axis=2).mean() > 0.02
+
+
+@pytest.mark.parametrize("display", [None, ":77"])
+def test_no_display_needed(display, tmp_path):
+    code = (
+        f"import erls, erls.view\n"
+        f"s = erls.load_scene({str(ROOT / 'data/l_shape/steel_tall.toml')!r}, ['simulation.duration=0.002'])\n"
+        f"erls.view.picture(erls.simulate(s), {str(tmp_path / 'a.png')!r}, [0.0], size=(200, 150))\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environment |= {"PYTHONPATH": str(ROOT)} | ({"DISPLAY": display} if display else {})
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert coloured(pixels(tmp_path / "a.png")).any()
+
+
+def test_import_is_light():
+    code = "import sys, erls.view; print(sorted({'pyvista', 'vtk', 'PIL', 'matplotlib', 'meshio'} & set(sys.modules)))"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_film_has_every_frame(robot, tmp_path):
+    told = []
+    film(robot, tmp_path / "a.mp4", fps=20, speed=0.25, size=(401, 251), progress=lambda *a: told.append(a))
+    decode = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(tmp_path / "a.mp4")]
+    done = subprocess.run([*decode, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"], capture_output=True, check=True)
+    frames = np.frombuffer(done.stdout, np.uint8).reshape(-1, 250, 400, 3).astype(int)
+    assert b"400x250" in done.stderr
+    assert b"20 fps" in done.stderr
+    assert told == [(k, 5) for k in range(1, 6)]
+    assert len(frames) == 5
+    assert all(np.abs(a - b).max() > 60 for a, b in itertools.pairwise(frames))
+
+
+def test_gif(pendulum, tmp_path):
+    film(pendulum, tmp_path / "a.gif", fps=10, speed=0.25, size=SIZE)
+    with Image.open(tmp_path / "a.gif") as image:
+        durations = [f.info["duration"] for f in ImageSequence.Iterator(image)]
+        assert image.size == SIZE
+    assert durations == [100, 100, 100]
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
+def test_interrupted_film_leaves_the_old_one(pendulum, name, tmp_path):
+    (tmp_path / name).write_text("old")
+
+    def interrupt(done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        film(pendulum, tmp_path / name, fps=20, speed=0.25, size=SIZE, progress=interrupt)
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "old"
+
+
+def test_encoder_that_fails(pendulum, tmp_path, monkeypatch):
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/bin/false")
+    with pytest.raises(SimulationError) as caught:
+        film(pendulum, tmp_path / "a.mp4", size=SIZE)
+    assert caught.value.cause == Cause.NO_PICTURE
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "cause", "where"),
+    [
+        ("a.vtu", {}, Cause.BAD_FIELD, "-o"),
+        ("a", {}, Cause.BAD_FIELD, "-o"),
+        ("nowhere/a.png", {}, Cause.NOT_WRITABLE, "nowhere"),
+        ("nowhere/a.mp4", {}, Cause.NOT_WRITABLE, "nowhere"),
+        ("nowhere/a.pvd", {}, Cause.NOT_WRITABLE, "nowhere"),
+        ("nowhere/a.csv", {}, Cause.NOT_WRITABLE, "nowhere"),
+        ("a.png", {"times": [9.0]}, Cause.TIME_OUT_OF_RANGE, "t"),
+        ("a.png", {"magnification": float("nan")}, Cause.BAD_FIELD, "magnification"),
+        ("a.png", {"magnification": 1e200}, Cause.BAD_FIELD, "magnification"),
+        ("a.csv", {"magnification": 2.0}, Cause.BAD_FIELD, "magnification"),
+        ("a.pvd", {"magnification": float("inf")}, Cause.BAD_FIELD, "magnification"),
+        ("a.mp4", {"times": [0.01]}, Cause.BAD_FIELD, "times"),
+        ("a.mp4", {"fps": 0}, Cause.BAD_FIELD, "fps"),
+        ("a.gif", {"fps": 60}, Cause.BAD_FIELD, "fps"),
+        ("a.mp4", {"speed": 0.0}, Cause.BAD_FIELD, "speed"),
+        ("a.mp4", {"speed": 1e-9}, Cause.BAD_FIELD, "speed"),
+    ],
+)
+def test_refused(pendulum, name, options, cause, where, tmp_path):
+    with pytest.raises(SceneError) as caught:
+        write_view(pendulum, tmp_path / name, **options)
+    assert caught.value.cause == cause
+    assert where in caught.value.where
+    assert caught.value.remedy
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("draw", [picture, film])
+def test_refused_name_and_size(draw, pendulum, tmp_path):
+    for name, size in (("a.txt", SIZE), ("a.png" if draw is picture else "a.gif", (10, 10))):
+        with pytest.raises(SceneError) as caught:
+            draw(pendulum, tmp_path / name, size=size)
+        assert caught.value.cause == Cause.BAD_FIELD
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere there is always a display")
+@pytest.mark.parametrize("display", ["", ":77"])
+def test_window_needs_a_display(display, pendulum, monkeypatch):
+    monkeypatch.setenv("DISPLAY", display)
+    with pytest.raises(SimulationError) as caught:
+        show(pendulum)
+    assert caught.value.cause == Cause.NO_PICTURE
+    assert "-o PICTURE.png" in caught.value.remedy
+
+
+def test_window_follows_its_slider(robot, monkeypatch):
+    monkeypatch.setattr("pyvista.OFF_SCREEN", True)
+    with Window(robot, surveyed(robot, 1.0, None), 1.0, SIZE) as window:
+        shown = []
+        monkeypatch.setattr(window.plotter, "show", lambda **_: shown.append(window.image().astype(int)))
+        window.interact("two links")
+        window.show_time(0.05)
+        shown.append(window.image().astype(int))
+    assert np.abs(shown[1] - shown[0]).max() > 60
+
+
+def test_camera_fits_the_box():
+    points = np.random.default_rng(1).normal(size=(20, 3)) * [3, 0.1, 1]
+    for gravity in ([0, 0, -9.81], [0, 9.81, 0], [-9.81, 0, 0], [0, 0, 0]):
+        box = Box.around(points)
+        camera = Camera.fitting(box, np.array(gravity, dtype=float), (800, 500))
+        seen = camera.project(box.corners)
+        assert (seen > 0).all()
+        assert (seen < [800, 500]).all()
+        np.testing.assert_allclose(camera.lift(*camera.project(camera.focal)), camera.focal)
+        assert camera.up @ gravity <= 0
+        np.testing.assert_allclose(np.cross(camera.right, camera.up), camera.towards, atol=1e-15)
+        titles = [t.text for t in Walls(box, camera).ticks() if t.title]
+        assert titles == ["x [m]", "y [m]", "z [m]"]
+
+
+def test_chains_end_at_corners_and_branches():
+    nodes = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0], [1, 0, 1.0]])
+    lines = np.array([[1, 0], [1, 2], [3, 2], [3, 4], [1, 5]])
+    found = {tuple(min(c, c[::-1])) for c in chains(nodes, lines)}
+    assert found == {(0, 1), (1, 2), (1, 5), (2, 3, 4)}
+    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    (loop,) = chains(ring, np.stack([np.arange(40), (np.arange(40) + 1) % 40], axis=1))
+    assert (loop[0], len(loop)) == (loop[-1], 41)
+
+
+def test_both_sides_of_a_joint_meet(robot):
+    (state,) = robot.states([0.05])
+    for place in joint_places(robot, state, 1.0):
+        np.testing.assert_allclose(place.inner[:3, 3], place.outer[:3, 3], atol=1e-6)
+        np.testing.assert_allclose(place.inner[:3, 2], place.outer[:3, 2], atol=1e-4)
+        np.testing.assert_allclose(place.outer_node, place.outer[:3, 3], atol=1e-9)
