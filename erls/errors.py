@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import enum
-from typing import TYPE_CHECKING
+from typing import Any
 
 from fe_import.errors import ReportedError
-
-if TYPE_CHECKING:
-    from erls.run import Run
 
 
 class Cause(enum.StrEnum):
@@ -52,7 +49,7 @@ class SceneError(ReportedError):
 class SimulationError(ReportedError):
     """A failed simulation: says when, why and what to try; ``run`` holds what was computed, if anything."""
 
-    run: Run | None = None
+    run: Any = None  # a Run; its module stands above this one
 
     @property
     def exit_code(self) -> int:

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from erls.errors import Cause, SimulationError
+from erls.formulations.base import Formulation
 from erls.lie.so3 import Array
-
-if TYPE_CHECKING:
-    from erls.formulations.erls import Erls
+from fe_import.model import IntArray
 
 _ITERATIONS = 20
 _TOLERANCE = 1e-10  # of the deflection; one more step of quadratic convergence would reach rounding
 
 
-def held_equilibrium(equations: Erls, y: Array) -> Array:
+def held_equilibrium(equations: Formulation, y: Array, held_joints: IntArray) -> Array:
     """Elastic coordinates in equilibrium under gravity while every physical joint angle keeps its initial value.
 
     Parameters
     ----------
-    equations : Erls
+    equations : Formulation
     y : (n,) array
-        Independent coordinates with the joints in place and the links undeformed.
+        Independent coordinates with the joints in place and the links undeformed; joint coordinates first.
+    held_joints : int array
+        Joints whose coordinates stand in ``y``.
 
     Returns
     -------
@@ -34,7 +33,7 @@ def held_equilibrium(equations: Erls, y: Array) -> Array:
     SimulationError
         NO_EQUILIBRIUM: the links are too soft for small displacements to carry the load.
     """
-    f, size = len(equations.free_joints), equations.size
+    f, size = len(held_joints), equations.size
     held = y[:f].copy()
     zero = np.zeros(size)
     scales = equations.length_scales
@@ -43,7 +42,7 @@ def held_equilibrium(equations: Erls, y: Array) -> Array:
         """Held angles first, then forces on the elastic coordinates."""
         forces = equations.residual(0.0, trial, zero, zero)
         return np.concatenate(
-            [equations.state(0.0, trial, zero).angles[equations.free_joints] - held, forces[f:]]
+            [equations.state(0.0, trial, zero).angles[held_joints] - held, forces[f:]]
         )
 
     y = y.copy()

@@ -20,6 +20,7 @@ import scipy.linalg as la
 from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State
 from erls.formulations.compatibility import Compatibility
+from erls.formulations.equilibrium import held_equilibrium
 from erls.formulations.joint_turn import JointTurn, Motion, joint_turn
 from erls.formulations.link_inertia import LinkInertia, moment_about
 from erls.lie.so3 import Array
@@ -278,15 +279,13 @@ class Erls:
 
     def initial_state(self) -> tuple[Array, Array]:
         """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
-        from erls.formulations.equilibrium import held_equilibrium
-
         joints = self.mechanism.joints
         y, v = np.zeros(self.size), np.zeros(self.size)
         f = len(self.free_joints)
         y[:f] = [joints[k].position for k in self.free_joints]
         v[:f] = [joints[k].rate for k in self.free_joints]
         if self.mechanism.static_start:
-            y = held_equilibrium(self, y)
+            y = held_equilibrium(self, y, self.free_joints)
         return y, v
 
     def state(self, t: float, y: Array, v: Array) -> State:
