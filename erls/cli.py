@@ -32,6 +32,7 @@ app = App(
     help_format="plaintext",
     version_flags=["--version"],
     default_parameter=Parameter(show_default=False),
+    suppress_keyboard_interrupt=False,
 )
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
@@ -120,7 +121,7 @@ def simulate(
     json
         Print one JSON object.
     """
-    from erls.errors import SimulationError
+    from erls.errors import Cause, SimulationError
     from erls.report.tables import run_report
     from erls.run_file import write_run
     from erls.scene import load_scene
@@ -138,9 +139,10 @@ def simulate(
         with _progress("simulating") as advance:
             run = run_simulation(loaded, progress=advance, tell=_tell, checkpoint=partial)
     except SimulationError as problem:
-        if output is None:
-            problem.remedy += "; give -o RUN.h5 to keep what was computed" if problem.run is not None else ""
-        elif problem.run is not None and len(problem.run.solution.t) > 1:
+        if output is None and problem.run is not None:
+            hint = "give -o RUN.h5 to keep what was computed"
+            problem.remedy = hint if problem.cause == Cause.INTERRUPTED else f"{problem.remedy}; {hint}"
+        elif output is not None and problem.run is not None and len(problem.run.solution.t) > 1:
             write_run(output, problem.run)
             _tell(f"what was computed, up to t = {problem.run.end:.6g} s, is in {output}")
             _remove(partial)

@@ -21,6 +21,7 @@ from erls.mechanism.tables import read_csv
 from erls.run import Run
 from erls.scene import Scene, SceneRecord
 from erls.scene_check import check_scene
+from fe_import.errors import ReportedError
 from fe_import.hdf5 import open_for_reading, write_array, write_atomically, write_attribute, write_strings
 from fe_import.modal_file import ModalModel, read_modal_group, write_modal_group
 from fe_import.toml_file import choose, convert
@@ -110,7 +111,7 @@ def self_contained(scene: Scene) -> Scene:
     """The scene with the tables of its CSV files written into it."""
 
     def inline(value: Any) -> Any:
-        if isinstance(value, list):
+        if isinstance(value, (list, tuple)):
             return [inline(v) for v in value]
         if not isinstance(value, dict):
             return value
@@ -147,7 +148,7 @@ def load_run(path: Path | str) -> Run:
         text = file.text("scene")
         try:
             data = msgspec.json.decode(text)
-        except msgspec.DecodeError as problem:
+        except (msgspec.DecodeError, RecursionError) as problem:
             raise file.fail("scene", f"not JSON: {problem}") from None
         record = convert(data, SceneRecord, f"{path}: /scene", SceneError)
         check_scene(record, f"{path}: /scene")
@@ -159,7 +160,11 @@ def load_run(path: Path | str) -> Run:
             int(n): read_modal_group(models.subgroup(f"{n:04d}").group, str(path))
             for n in sorted(set(numbers.tolist()))
         }
-        built = build_mechanism(scene, models=[read[int(n)] for n in numbers])
+        try:
+            built = build_mechanism(scene, models=[read[int(n)] for n in numbers])
+        except ReportedError as problem:
+            problem.where = f"{path}: /scene: {problem.where}"
+            raise
         settings = record.simulation
         choose(settings.formulation, FORMULATIONS, f"{path}: /scene simulation.formulation", SceneError)
         formulation = FORMULATIONS[settings.formulation](built.mechanism, settings.gauge)

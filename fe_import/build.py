@@ -19,7 +19,16 @@ from fe_import.toml_file import choose
 MOST_ELEMENTS = 100_000  # per member; a larger number is a slip
 
 _LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
-_MASS = {"kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237, "slug": 14.59390294, "lbf*s2/in": 175.12683524}
+_POUND = 0.45359237
+_POUND_FORCE = _POUND * 9.80665
+_MASS = {
+    "kg": 1.0,
+    "g": 1e-3,
+    "t": 1e3,
+    "lb": _POUND,
+    "slug": _POUND_FORCE / 0.3048,
+    "lbf*s2/in": _POUND_FORCE / 0.0254,
+}
 _TIME = {"s": 1.0, "ms": 1e-3}
 
 

@@ -56,9 +56,11 @@ def orthonormal_modes(
         The rigid-body mass matrix is singular, or more elastic modes are asked for than there are.
     """
     # columns of like size: without, rounding in the large ones drowns the lowest modes of a slender link
-    inertia, resistance = np.diag(mass), np.diag(stiffness)
+    inertia, resistance = np.diag(mass), np.diag(stiffness).clip(min=0)
     massive = inertia > _MASSLESS * inertia.max()
-    scale = 1 / np.sqrt(inertia + resistance / np.median(resistance[massive] / inertia[massive]))
+    squared = resistance[massive] / inertia[massive]  # of the frequencies of the columns alone; 0 for rigid motions
+    typical = np.median(squared[squared > 0]) if squared.any() else 1.0
+    scale = 1 / np.sqrt(inertia + resistance / typical)
     mass, stiffness = mass * np.outer(scale, scale), stiffness * np.outer(scale, scale)
     rigid, rigid_coordinates = _rigid_modes(mass, basis.rigid / scale[:, None], where)
 

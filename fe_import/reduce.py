@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.metadata
 import json
@@ -178,17 +179,12 @@ def reduce_cached(link: LinkFile, folder: Path) -> tuple[ModalModel, bool]:
         Whether it came from the cache. An unreadable cache entry is made anew.
     """
     path = folder / f"{cache_key(link)}.modal.h5"
-    if path.exists():
-        try:
-            return read_modal_file(path), True
-        except FEImportError:
-            pass  # written anew below
+    with contextlib.suppress(OSError, FEImportError):  # none there, or not readable: made anew
+        return read_modal_file(path), True
     model = reduce_link(link)
-    try:
+    with contextlib.suppress(OSError, FEImportError):  # a cache that cannot be written costs time, not the result
         folder.mkdir(parents=True, exist_ok=True)
         write_modal_file(path, model)
-    except (OSError, FEImportError):
-        pass  # a cache that cannot be written costs time, not the result
     return model, False
 
 

@@ -33,7 +33,7 @@ def factorize(matrix: sp.csc_array, what: str) -> Callable[[Array], Array]:
         )
     except RuntimeError:
         raise _singular(what) from None
-    pivots = np.abs(factor.U.diagonal())
+    pivots = factor.U.diagonal()
     if (pivots <= 1e-13 * np.abs(matrix.diagonal())[factor.perm_c.argsort()]).any():
         raise _singular(what)
 
@@ -46,7 +46,7 @@ def factorize(matrix: sp.csc_array, what: str) -> Callable[[Array], Array]:
 def _singular(what: str) -> FEImportError:
     return FEImportError(
         Cause.NOT_DEFINITE,
-        f"the {what} is singular: some part can move without strain while the interfaces are held",
+        f"the {what} is singular or unstable: some part can move without strain",
         remedy="connect all parts, remove hinges inside the link, or give the free part stiffness",
     )
 
@@ -180,7 +180,7 @@ def polishing(stiffness: Matrix, mass: Matrix, omega: Array, modes: Array) -> tu
     change[:, high] = change[:, high] @ _orthonormalizing(modes @ change[:, high], mass)
     stiff = modes @ change[:, high]
     squared, turn = la.eigh(stiff.T @ (stiffness @ stiff))
-    change[:, high] = change[:, high] @ turn
+    change[:, high] = change[:, high] @ (turn * np.where(np.diag(turn) < 0, -1.0, 1.0))
     omega = np.concatenate([omega[~high], np.sqrt(squared)])
     order = np.argsort(omega, kind="stable")  # a pair of equal frequencies may stand on both sides of the middle
     return omega[order], change[:, order]

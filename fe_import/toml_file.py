@@ -111,7 +111,8 @@ def _explained(text: str, data: Any, kind: Any, where: str, error: type[Reported
     if steps:
         tags = _tags(_types_at(kind, data, steps[:-1]), steps[-1])
     remedy = f"give {_either(tags)}" if tags else _expected(message)
-    return error(Cause.BAD_FIELD, _lower(message), where=_place(where, steps), value=value, remedy=remedy)
+    message = f"unknown {steps[-1]}" if tags else _lower(message)  # msgspec repeats the value, however long
+    return error(Cause.BAD_FIELD, message, where=_place(where, steps), value=value, remedy=remedy)
 
 
 def _lower(text: str) -> str:

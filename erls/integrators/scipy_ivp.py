@@ -187,7 +187,7 @@ class _Run:
         while solver.status == "running":
             calls, factored = self.work.rhs_calls, solver.nlu
             message = self.guarded(solver.step)
-            self.work.factorizations += solver.nlu - factored
+            self.work.factorizations += int(solver.nlu - factored)  # LSODA counts in its own type
             # LSODA does not stop by itself when its steps are lost in rounding
             stuck = solver.status == "running" and solver.t - old[0] < 10 * np.spacing(abs(old[0]))
             if stuck or solver.status == "failed" or not np.isfinite(solver.y).all():

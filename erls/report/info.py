@@ -9,9 +9,12 @@ import msgspec
 
 from erls.errors import Cause, SceneError
 from erls.report.tables import modal_report, run_report, table
+from erls.run_file import SCHEMA as RUN_SCHEMA
+from erls.run_file import load_run
 from erls.scene import Scene, load_scene
 from fe_import.hdf5 import open_for_reading
 from fe_import.link import LinkFile, load_link
+from fe_import.modal_file import SCHEMA as MODAL_SCHEMA
 from fe_import.modal_file import ModalModel, read_modal_file
 from fe_import.toml_file import read_toml
 
@@ -34,13 +37,19 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
     if start == _HDF5:
         with open_for_reading(path, SceneError, Cause.RUN_FILE) as reader:
             schema = reader.attribute("schema", str) if "schema" in reader.attribute_names() else ""
-        if schema == "erls run":
-            from erls.run_file import load_run
-
+        if schema == RUN_SCHEMA:
             run = load_run(path)
             failure = None if run.failure is None else run.failure.as_dict()
             text = "\n".join([run_report(run), *(f"warning: {w}" for w in run.warnings)])
             return {"file": "run", **run.summary(), "failure": failure}, text
+        if schema != MODAL_SCHEMA:
+            raise SceneError(
+                Cause.NOT_READABLE,
+                "an HDF5 file, but neither a modal file nor a run file",
+                where=str(path),
+                value=schema or None,
+                remedy="give a file that erls wrote",
+            )
         return _modal_info(read_modal_file(path))
     data = read_toml(path, SceneError)
     if "joints" in data or "simulation" in data or "links" in data:

@@ -1,0 +1,496 @@
+"""Craig-Bampton and no reduction against the full model, and the constant inertia invariants."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+from link_files import (
+    SOLID,
+    Array,
+    boundary,
+    clamped_flexibility,
+    clamped_frequencies,
+    dense,
+    frame_link,
+    free_frequencies,
+    frequencies,
+    held,
+    interface_shapes,
+    solid_link,
+    straight_link,
+)
+
+from fe_import.build import build_model
+from fe_import.errors import Cause, FEImportError
+from fe_import.link import LinkFile
+from fe_import.modal_file import ModalModel, read_modal_file, write_modal_file
+from fe_import.model import FEModel
+from fe_import.modes import reduced_matrices
+from fe_import.reduce import reduce_link, reduce_model
+from fe_import.reduction import REDUCTIONS
+
+MASSES = pytest.mark.parametrize("mass", ["consistent", "lumped"])
+THIRD = {"name": "middle", "node": "elbow"}
+FOURTH = {"name": "4", "node": "elbow-tip/1"}
+HUB, HAND = {"name": "hub", "node": "root"}, {"name": "hand", "node": "tip"}
+
+
+def both(link: LinkFile) -> tuple[FEModel, ModalModel]:
+    model = build_model(link)
+    return model, reduce_model(model, link)
+
+
+def all_modes(folder: Path, method: str, mass: str = "consistent", **changes: Any) -> tuple[FEModel, ModalModel]:
+    """The frame with every mode that it has, and its full model."""
+    inner = len(build_model(frame_link(folder, frame={"mass": mass}, **changes)).independent) - 12
+    options = {"method": method, **({"fixed_interface_modes": inner} if method == "craig-bampton" else {})}
+    return both(frame_link(folder, frame={"mass": mass}, reduction=options, **changes))
+
+
+def receptance(model: FEModel, frequency: float) -> Array:
+    """Harmonic displacement of the interfaces per load there, (K - ω²M)⁻¹, scaled to unit stiffness before solving."""
+    mass, stiffness, _ = dense(model)
+    scale = 1 / np.sqrt(np.diag(stiffness))
+    matrix = (stiffness - (2 * np.pi * frequency) ** 2 * mass) * np.outer(scale, scale)
+    b = boundary(model)
+    unit = np.zeros((len(mass), len(b)))
+    unit[b, np.arange(len(b))] = scale[b]
+    return np.asarray((scale[:, None] * la.solve(matrix, unit))[b])
+
+
+def modal_receptance(modal: ModalModel, frequency: float) -> Array:
+    shapes = interface_shapes(modal)
+    dynamic = np.diag(modal.stiffness) - (2 * np.pi * frequency) ** 2
+    return np.asarray(shapes / dynamic @ shapes.T)
+
+
+# ----- nothing cut: the full model
+
+
+@MASSES
+@pytest.mark.parametrize("method", sorted(REDUCTIONS))
+def test_all_modes_are_the_full_model(tmp_path: Path, method: str, mass: str) -> None:
+    """Every dof kept: lowest 10 frequencies, receptance below and among them, static tip flexibility to 1e-8.
+
+    Seen: 1e-11; the reference is computed in extended precision. All modes obey the same in sum: the receptance at
+    20 kHz, among the highest modes.
+    """
+    model, modal = all_modes(tmp_path, method, mass)
+    assert modal.modes == len(model.independent)
+    assert all(c.ok for c in modal.health), modal.health
+    np.testing.assert_allclose(modal.frequencies_hz[6:16], free_frequencies(model, 10), rtol=1e-8)
+    for frequency in (5.0, 400.0, 3000.0, 20000.0):
+        full, reduced = receptance(model, frequency), modal_receptance(modal, frequency)
+        scale = np.sqrt(np.abs(np.outer(np.diag(full), np.diag(full))))
+        np.testing.assert_allclose(reduced / scale, full / scale, atol=1e-8)
+    np.testing.assert_allclose(clamped_flexibility(modal) / _tip(model), 1, atol=1e-8)
+
+
+def _tip(model: FEModel) -> Array:
+    """(6, 6) flexibility of the second interface, the first clamped, of the full model."""
+    _, stiffness, _ = dense(model)
+    b = boundary(model)
+    free = np.setdiff1d(np.arange(len(stiffness)), b[:6])
+    at = np.searchsorted(free, b[6:12])
+    unit = np.zeros((len(free), 6))
+    unit[at, np.arange(6)] = 1.0
+    scale = 1 / np.sqrt(np.diag(stiffness)[free])
+    inner = stiffness[np.ix_(free, free)] * np.outer(scale, scale)
+    return np.asarray((scale[:, None] * la.solve(inner, scale[:, None] * unit, assume_a="pos"))[at])
+
+
+@pytest.mark.parametrize("method", sorted(REDUCTIONS))
+def test_all_modes_of_a_solid(tmp_path: Path, method: str) -> None:
+    """Every dof of a small solid kept: lowest 6 frequencies and receptances to 1e-8."""
+    inner = len(build_model(solid_link(tmp_path)).independent) - 12
+    options = {"method": method, **({"fixed_interface_modes": inner} if method == "craig-bampton" else {})}
+    model, modal = both(solid_link(tmp_path, reduction=options))
+    assert modal.modes == len(model.independent)
+    assert all(c.ok for c in modal.health), modal.health
+    np.testing.assert_allclose(modal.frequencies_hz[6:12], free_frequencies(model, 6), rtol=1e-8)
+    for frequency in (200.0, 3000.0):
+        full, reduced = receptance(model, frequency), modal_receptance(modal, frequency)
+        scale = np.sqrt(np.abs(np.outer(np.diag(full), np.diag(full))))
+        np.testing.assert_allclose(reduced / scale, full / scale, atol=1e-8)
+
+
+def test_both_methods_agree_on_a_slender_frame(tmp_path: Path) -> None:
+    """1 mm wide legs in 8 elements each: the spectrum spans 8 decades of ω², yet the modes stay orthonormal.
+
+    Lowest 6 frequencies 1e-7: the rounding of the assembled stiffness itself moves them by 1e-8. The file is legal.
+    """
+    slender = {"sections": {"s": {"width": 0.001}}}
+    members = [{"from": a, "to": b, "elements": 8, "material": "m", "section": "s"}
+               for a, b in (("root", "elbow"), ("elbow", "tip"))]  # fmt: skip
+    found = []
+    for method, options in (("craig-bampton", {"fixed_interface_modes": 90}), ("none", {})):
+        link = frame_link(tmp_path, **slender, frame={"members": members}, reduction={"method": method, **options})
+        modal = reduce_link(link)
+        assert modal.modes == 102
+        check = next(c for c in modal.health if c.name == "orthonormality of the modes")
+        assert check.value < 1e-11
+        assert all(c.ok for c in modal.health)
+        path = tmp_path / f"{method}.modal.h5"
+        write_modal_file(path, modal)
+        assert read_modal_file(path).modes == 102
+        found.append(modal.frequencies_hz[6:])
+    reference = free_frequencies(build_model(link), 6)
+    np.testing.assert_allclose(found[0][:6], reference, rtol=1e-7)
+    np.testing.assert_allclose(found[1][:6], reference, rtol=1e-7)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["frame", "solid"])
+def test_constraint_modes_alone_are_statically_exact(tmp_path: Path, kind: str) -> None:
+    """No fixed-interface mode: tip flexibility to 1e-9 of the full model."""
+    make = frame_link if kind == "frame" else solid_link
+    model, modal = both(make(tmp_path, reduction={"fixed_interface_modes": 0}))
+    assert modal.elastic_modes == 6
+    full = _tip(model)
+    scale = np.sqrt(np.outer(np.diag(full), np.diag(full)))
+    np.testing.assert_allclose(clamped_flexibility(modal) / scale, full / scale, atol=1e-9)
+
+
+CUTS: list[dict[str, Any]] = [
+    {},
+    {"fixed_interface_modes": 0},
+    {"fixed_interface_modes": 5, "elastic_modes": 0},
+    {"fixed_interface_modes": 5, "elastic_modes": 1},
+    {"fixed_interface_modes": 5, "elastic_modes": 4, "truncation": "clamped"},
+    {"fixed_interface_modes": 5, "form": "physical"},
+    {"method": "none", "elastic_modes": 3},
+]
+
+
+@pytest.mark.parametrize("kind", ["frame", "lumped", "solid", "loaded solid"])
+@pytest.mark.parametrize("options", CUTS, ids=str)
+def test_mass_properties_survive_every_cut(tmp_path: Path, kind: str, options: dict[str, Any]) -> None:
+    """Mass, centre of mass, inertia and the rigid motions are those of the full model, to 1e-9."""
+    if kind in ("frame", "lumped"):
+        link = frame_link(tmp_path, reduction=options, frame={"mass": "lumped" if kind == "lumped" else "consistent"})
+    else:
+        masses = [{"node": "hand", "mass": 0.2, "inertia": [1e-4, 1e-4, 1e-4]}] if "loaded" in kind else []
+        link = solid_link(tmp_path, reduction=options, masses=masses)
+    model, modal = both(link)
+    full, reduced = modal.full_mass_properties, modal.mass_properties
+    assert reduced.mass == pytest.approx(full.mass, rel=1e-9)
+    size = np.linalg.norm(np.ptp(model.nodes, axis=0))
+    np.testing.assert_allclose(reduced.centre_of_mass, full.centre_of_mass, atol=1e-9 * size)
+    np.testing.assert_allclose(reduced.inertia, full.inertia, atol=1e-9 * np.abs(full.inertia).max())
+    rigid = modal.invariants.rigid
+    fields = model.rigid_body_modes()
+    np.testing.assert_allclose(modal.translation_shapes @ rigid, fields[model.dof_map[:, :3]], atol=1e-9)
+    assert all(c.ok for c in modal.health), modal.health
+
+
+# ----- what is cut
+
+
+def test_more_modes_are_never_worse(tmp_path: Path) -> None:
+    """Ritz: free-free frequencies fall towards those of the full model as fixed-interface modes are added."""
+    model = build_model(frame_link(tmp_path))
+    exact = free_frequencies(model, 6)
+    last = np.full(6, np.inf)
+    for count in (0, 2, 4, 8, 16):
+        modal = reduce_model(model, frame_link(tmp_path, reduction={"fixed_interface_modes": count}))
+        found = modal.frequencies_hz[6:12]
+        assert (found < last * (1 + 1e-10)).all()
+        assert (found > exact * (1 - 1e-9)).all()
+        last = found
+    np.testing.assert_allclose(last, exact, rtol=1e-3)
+
+
+def test_clamped_truncation_converges_faster(tmp_path: Path) -> None:
+    """Frequencies with the inboard interface clamped, 4 elastic modes kept of 18.
+
+    The span of the lowest clamped modes gives all four to rounding of the basis (1e-9); free-free modes miss the
+    first by more than 1 % and the fourth by more than 20 %.
+    """
+    model = build_model(frame_link(tmp_path))
+    mass, stiffness, _ = dense(model)
+    free = np.setdiff1d(np.arange(len(mass)), boundary(model)[:6])
+    exact = frequencies(mass[np.ix_(free, free)], stiffness[np.ix_(free, free)], 4)
+    whole = clamped_frequencies(reduce_model(model, frame_link(tmp_path)))[:4]
+    np.testing.assert_allclose(whole, exact, rtol=1e-3)
+    errors = {}
+    for truncation in ("free-free", "clamped"):
+        for kept in (4, 8):
+            link = frame_link(tmp_path, reduction={"elastic_modes": kept, "truncation": truncation})
+            errors[truncation, kept] = clamped_frequencies(reduce_model(model, link))[:4] / whole - 1
+    assert np.abs(errors["clamped", 4]).max() < 1e-9
+    assert np.abs(errors["clamped", 8]).max() < 1e-9
+    assert errors["free-free", 4][0] > 1e-2
+    assert errors["free-free", 4][3] > 0.2
+    assert 1e-5 < errors["free-free", 8][0] < errors["free-free", 4][0]
+
+
+def test_inboard_interface_may_be_named(tmp_path: Path) -> None:
+    """Clamping the hand instead of the hub serves the hand."""
+    model = build_model(frame_link(tmp_path))
+    whole = reduce_model(model, frame_link(tmp_path))
+
+    def held_frequencies(modal: ModalModel) -> Array:
+        basis = held(interface_shapes(modal)[6:])
+        return frequencies(basis.T @ modal.invariants.m @ basis, basis.T @ modal.stiffness @ basis, 4)
+
+    for inboard, exact in (("hand", True), ("hub", False)):
+        options = {"elastic_modes": 4, "truncation": "clamped", "inboard": inboard}
+        modal = reduce_model(model, frame_link(tmp_path, reduction=options))
+        error = np.abs(held_frequencies(modal) / held_frequencies(whole) - 1).max()
+        assert (error < 1e-9) == exact
+
+
+@pytest.mark.parametrize("interfaces", [[HUB], [HUB, HAND, THIRD], [HUB, HAND, THIRD, FOURTH]], ids=len)
+def test_one_interface_or_many(tmp_path: Path, interfaces: list[dict[str, str]]) -> None:
+    """One interface: its constraint modes are rigid motions, the elastic modes are the clamped ones. Many: six each."""
+    options = {"fixed_interface_modes": 6}
+    model, modal = both(frame_link(tmp_path, interfaces=interfaces, reduction=options))
+    assert modal.modes == 6 * len(interfaces) + 6
+    assert all(c.ok for c in modal.health), modal.health
+    assert [i.name for i in modal.interface_nodes] == [i["name"] for i in interfaces]
+    np.testing.assert_allclose(modal.frequencies_hz[6:9], free_frequencies(model, 3), rtol=2e-2)
+    if len(interfaces) == 1:
+        np.testing.assert_allclose(clamped_frequencies(modal), modal.fixed_interface.frequencies_hz, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["frame", "solid"])
+def test_one_interface_without_elastic_modes(tmp_path: Path, kind: str) -> None:
+    """The constraint modes of one interface are the rigid-body motions and no more."""
+    options = {"fixed_interface_modes": 0}
+    modal = (
+        reduce_link(frame_link(tmp_path, interfaces=[HUB], reduction=options))
+        if kind == "frame"
+        else reduce_link(solid_link(tmp_path, interfaces=SOLID["interfaces"][:1], reduction=options))
+    )
+    assert modal.modes == 6
+    assert all(c.ok for c in modal.health), modal.health
+
+
+def test_frame_without_inner_nodes(tmp_path: Path) -> None:
+    """Every node an interface: nothing to reduce, nothing cut, no fixed-interface modes."""
+    model, modal = both(straight_link(tmp_path, 0.5, 1, interfaces=[HUB, HAND]))
+    assert modal.modes == 12 == len(model.independent)
+    assert len(modal.fixed_interface.frequencies_hz) == 0
+    np.testing.assert_allclose(modal.frequencies_hz[6:], free_frequencies(model, 6), rtol=1e-8)
+
+
+# ----- physical form
+
+
+@pytest.mark.parametrize("kind", ["frame", "solid"])
+def test_physical_form(tmp_path: Path, kind: str) -> None:
+    """Coordinates are interface displacements and clamped modes: K is condensed, M_qq = 1, K_qq = ω².
+
+    The condensed stiffness to 1e-9 of its diagonal: K_bb - K_bi K_ii⁻¹ K_ib, solved densely.
+    """
+    make = frame_link if kind == "frame" else solid_link
+    model, modal = both(make(tmp_path, reduction={"form": "physical", "fixed_interface_modes": 4}))
+    mass, stiffness, _ = dense(model)
+    b = boundary(model)
+    inner = np.setdiff1d(np.arange(len(mass)), b)
+    scale = 1 / np.sqrt(np.diag(stiffness)[inner])
+    inverse = np.outer(scale, scale) * la.inv(stiffness[np.ix_(inner, inner)] * np.outer(scale, scale))
+    psi = -inverse @ stiffness[np.ix_(inner, b)]
+    condensed = stiffness[np.ix_(b, b)] + stiffness[np.ix_(b, inner)] @ psi
+    size = np.sqrt(np.outer(np.diag(condensed), np.diag(condensed)))
+    np.testing.assert_allclose(modal.stiffness[:12, :12] / size, condensed / size, atol=1e-8)
+    guyan = mass[np.ix_(b, b)] + mass[np.ix_(b, inner)] @ psi
+    guyan = guyan + psi.T @ (mass[np.ix_(inner, b)] + mass[np.ix_(inner, inner)] @ psi)
+    np.testing.assert_allclose(modal.invariants.m[:12, :12], guyan, atol=1e-9 * np.abs(guyan).max())
+    np.testing.assert_allclose(modal.invariants.m[12:, 12:], np.eye(4), atol=1e-10)
+    omega = 2 * np.pi * modal.fixed_interface.frequencies_hz
+    np.testing.assert_allclose(modal.stiffness[12:, 12:], np.diag(omega**2), atol=1e-9 * omega[-1] ** 2)
+    coupling = np.abs(modal.stiffness[:12, 12:]) / np.sqrt(np.outer(np.diag(condensed), omega**2))
+    assert coupling.max() < 1e-9
+    np.testing.assert_allclose(interface_shapes(modal), np.eye(12, 16), atol=1e-12)
+    assert modal.kinds == ("interface displacement",) * 12 + ("fixed-interface",) * 4
+    np.testing.assert_array_equal(modal.frequencies_hz, [0.0] * 12 + modal.fixed_interface.frequencies_hz.tolist())
+
+
+def test_physical_form_has_the_same_modes(tmp_path: Path) -> None:
+    """Eigenvalues of the physical matrices are the frequencies of the orthonormal form, to 1e-8."""
+    one, two = (reduce_link(frame_link(tmp_path, reduction={"form": f})) for f in ("physical", "orthonormal"))
+    clamped = [clamped_frequencies(m) for m in (one, two)]
+    np.testing.assert_allclose(clamped[0], clamped[1], rtol=1e-8)
+    assert one.modes == two.modes
+
+
+# ----- fixed-interface modes
+
+
+def test_effective_mass_of_a_clamped_beam(tmp_path: Path) -> None:
+    """First bending mode of a clamped-clamped beam carries (4α/βL)² = 0.6903 of the mass, the second none.
+
+    φ = cosh βx - cos βx - α(sinh βx - sin βx), ∫φ² = L, and φ'''' = β⁴φ gives ∫φ = [φ''']/β⁴ = 4α/β, with
+    βL = 4.7300407, α = 0.9825022 (Blevins 1979); third mode likewise, βL = 10.9956078, α = 0.9999664. The axial
+    one carries 8/π². 1e-4 with 40 elements: order 2 of the axial displacement.
+    """
+    changes = {"frame": {"theory": "euler-bernoulli", "rotary_inertia": False}}
+    link = straight_link(tmp_path, 1.0, 40, **changes, reduction={"fixed_interface_modes": 60})
+    table = reduce_link(link).fixed_interface
+    area, inertia = 2e-4, 0.01 * 0.02**3 / 12
+    roots = np.array([4.73004074, 7.85320462, 10.9956078])
+    bending = roots**2 * math.sqrt(7e10 * inertia / (2700 * area)) / (2 * np.pi)
+    first, second, third = (int(np.abs(table.frequencies_hz / f - 1).argmin()) for f in bending)
+    np.testing.assert_allclose(table.frequencies_hz[[first, second, third]], bending, rtol=1e-5)
+    assert table.effective_mass[first, 2] == pytest.approx((4 * 0.9825022 / roots[0]) ** 2, rel=1e-4)
+    assert round(table.effective_mass[first, 2], 3) == 0.690
+    assert table.effective_mass[second, 2] < 1e-12
+    assert table.effective_mass[third, 2] == pytest.approx((4 * 0.9999664 / roots[2]) ** 2, rel=1e-4)
+    axial = int(table.effective_mass[:, 0].argmax())
+    assert table.frequencies_hz[axial] == pytest.approx(math.sqrt(7e10 / 2700) / 2, rel=1e-3)
+    assert table.effective_mass[axial, 0] == pytest.approx(8 / np.pi**2, rel=1e-3)
+    assert table.effective_mass[first, [0, 1]].max() < 1e-12
+
+
+@pytest.mark.parametrize("kind", ["frame", "solid"])
+def test_effective_masses_add_up(tmp_path: Path, kind: str) -> None:
+    """Never above 1 in sum, rising with the number of modes; a fine clamped beam's tend to all of it.
+
+    What is left of 20 elements is near the clamped ends, about 1/20 of the mass.
+    """
+    if kind == "solid":
+        totals = [
+            reduce_link(solid_link(tmp_path, reduction={"fixed_interface_modes": n})).fixed_interface.effective_mass
+            for n in (3, 20)
+        ]
+    else:
+        link = straight_link(tmp_path, 1.0, 20, reduction={"fixed_interface_modes": 114})
+        whole = reduce_link(link).fixed_interface.effective_mass
+        totals = [whole[:10], whole]
+        assert (whole.sum(axis=0)[:3] > 0.95).all()
+        assert (whole.sum(axis=0)[3:] > 0.85).all()  # rotation: the ends weigh three times as much
+    few, many = (t.sum(axis=0) for t in totals)
+    assert (few <= many + 1e-12).all()
+    assert (many < 1 + 1e-9).all()
+
+
+def test_massless_rotations_have_no_modes(tmp_path: Path) -> None:
+    """Lumped mass without rotary inertia: 3 modes per inner node; asking for more is a clear error."""
+    massless = {"mass": "lumped", "rotary_inertia": False}
+    modal = reduce_link(frame_link(tmp_path, frame=massless, reduction={"fixed_interface_modes": 15}))
+    assert len(modal.fixed_interface.frequencies_hz) == 15
+    assert all(c.ok for c in modal.health), modal.health
+    whole = reduce_link(frame_link(tmp_path, frame=massless, reduction={"method": "none"}))
+    assert whole.modes == 3 * 7
+    for options, field in (
+        ({"fixed_interface_modes": 16}, "fixed_interface_modes"),
+        ({"fixed_interface_modes": 15, "elastic_modes": 16}, "elastic_modes"),
+        ({"method": "none", "elastic_modes": 16}, "elastic_modes"),
+    ):
+        with pytest.raises(FEImportError) as caught:
+            reduce_link(frame_link(tmp_path, frame=massless, reduction=options))
+        assert caught.value.cause is Cause.MODE_COUNT
+        assert caught.value.where.endswith(f"link.toml: reduction.{field}")
+        assert (caught.value.value, caught.value.limit) == (16, 15)
+        assert caught.value.remedy
+
+
+def test_default_number_of_fixed_interface_modes(tmp_path: Path) -> None:
+    """12, or all there are."""
+    assert len(reduce_link(frame_link(tmp_path)).fixed_interface.frequencies_hz) == 12
+    assert len(reduce_link(straight_link(tmp_path, 0.5, 2)).fixed_interface.frequencies_hz) == 6
+
+
+# ----- contract of every method
+
+
+@pytest.mark.parametrize("method", sorted(REDUCTIONS))
+@pytest.mark.parametrize("kind", ["frame", "solid"])
+def test_basis_spans_rigid_motions(tmp_path: Path, method: str, kind: str) -> None:
+    """Rule 2 of the contract, to 1e-12 of the size; interface columns are unit displacements."""
+    make = frame_link if kind == "frame" else solid_link
+    link = make(tmp_path, reduction={"method": method})
+    model = build_model(link)
+    basis = REDUCTIONS[method](model, link.description.reduction, "link.toml")
+    np.testing.assert_allclose(basis.vectors @ basis.rigid, model.rigid_body_modes(), atol=1e-12)
+    n = basis.interface_columns
+    np.testing.assert_allclose(basis.vectors[model.interface_dofs, :n], np.eye(len(model.interface_dofs), n), atol=0)
+    mass, stiffness = reduced_matrices(model, basis)
+    for matrix in (mass, stiffness):
+        np.testing.assert_array_equal(matrix, matrix.T)
+    assert la.eigvalsh(mass)[0] > -1e-12 * np.abs(mass).max()
+
+
+# ----- inertia invariants
+
+
+INVARIANTS: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
+    ("frame", {"mass": "consistent"}, {}),
+    ("frame", {"mass": "consistent"}, {"method": "none"}),
+    ("frame", {"mass": "consistent"}, {"elastic_modes": 5, "truncation": "clamped"}),
+    ("frame", {"mass": "consistent"}, {"form": "physical"}),
+    ("frame", {"mass": "lumped"}, {}),
+    ("solid", {}, {"elastic_modes": 9}),
+    ("solid", {}, {"form": "physical", "fixed_interface_modes": 3}),
+]
+
+
+@pytest.mark.parametrize(("kind", "frame", "options"), INVARIANTS)
+def test_kinetic_energy_of_the_invariants(
+    tmp_path: Path, kind: str, frame: dict[str, Any], options: dict[str, Any]
+) -> None:
+    """T from m, X, Z equals ½ wᵀ M w with the velocity of every node written out, to 1e-12.
+
+    A node at x with displacement u and rotation φ moves with v + ω × (x + u) + u̇ and turns with ω + ω × φ + φ̇.
+    """
+    body = {"node": "hand", "mass": 0.2, "inertia": [[2e-3, 1e-4, 0.0], [1e-4, 1e-3, 0.0], [0.0, 0.0, 3e-3]]}
+    link = (
+        frame_link(tmp_path, frame=frame, reduction=options, masses=[body])
+        if kind == "frame"
+        else solid_link(tmp_path, reduction=options, masses=[body])
+    )
+    model, modal = both(link)
+    inertia = modal.invariants
+    rng = np.random.default_rng(11)
+    v, omega = rng.standard_normal((2, 3))
+    size = np.abs(modal.translation_shapes).max(axis=(0, 1))
+    q, rate = rng.standard_normal((2, modal.modes)) / np.where(size > 0, size, 1)
+    w = np.zeros(model.mass.shape[0])
+    turning = {int(node): k for k, node in enumerate(modal.rotation_nodes)}
+    for node, x in enumerate(modal.nodes):
+        shape = modal.translation_shapes[node]
+        w[model.dof_map[node, :3]] = v + np.cross(omega, x + shape @ q) + shape @ rate
+        if node in turning:
+            turn = modal.rotation_shapes[turning[node]]
+            w[model.dof_map[node, 3:]] = omega + np.cross(omega, turn @ q) + turn @ rate
+    expected = 0.5 * w @ (model.mass @ w)
+    s = rate + inertia.rigid @ np.concatenate([v, omega])
+    found = 0.5 * s @ inertia.m @ s
+    found += np.einsum("a,i,aij,j->", omega, s, inertia.X, q)
+    found += 0.5 * np.einsum("a,b,i,abij,j->", omega, omega, q, inertia.Z, q)
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_invariants_of_some_modes(tmp_path: Path) -> None:
+    """Truncating the invariants is reducing with fewer modes."""
+    link = frame_link(tmp_path, reduction={"fixed_interface_modes": 5})
+    model, whole = both(link)
+    fewer = reduce_model(model, frame_link(tmp_path, reduction={"fixed_interface_modes": 5, "elastic_modes": 4}))
+    cut = whole.invariants.truncated(np.arange(10))
+    for name in ("m", "X", "Z", "rigid"):
+        expected = getattr(fewer.invariants, name)
+        np.testing.assert_allclose(getattr(cut, name), expected, atol=1e-9 * np.abs(expected).max())
+    double = cut + cut
+    np.testing.assert_allclose(double.Z, 2 * cut.Z)
+    np.testing.assert_array_equal(double.rigid, cut.rigid)
+
+
+def test_solid_names_are_those_of_the_description(tmp_path: Path) -> None:
+    """The interface nodes follow their faces rigidly, with equal weights."""
+    modal = reduce_link(solid_link(tmp_path, reduction={"fixed_interface_modes": 2}))
+    assert [i.name for i in modal.interface_nodes] == [i["name"] for i in SOLID["interfaces"]]
+    for interface in modal.interface_nodes:
+        assert interface.coupling == "rigid"
+        assert interface.weights.sum() == pytest.approx(1.0)
+        shift, turn = modal.node_shape(interface.node)
+        assert turn is not None
+        for node in interface.coupled_nodes:
+            arm = modal.nodes[node] - interface.position
+            moved = shift + np.cross(turn.T, arm).T
+            np.testing.assert_allclose(modal.translation_shapes[node], moved, atol=1e-10 * np.abs(moved).max())
