@@ -18,7 +18,7 @@ from erls.run_file import load_run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX systems")
 
-# tells when a reduction starts and when the first step is done, so that tests need not guess; otherwise the program as it is
+# tells when a reduction starts and when the first step is done, so that tests need not guess
 START = """
 import sys
 import erls.build

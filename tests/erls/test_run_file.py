@@ -114,6 +114,16 @@ def test_reading_and_writing_is_the_identity(file: Path, tmp_path: Path) -> None
     assert (tmp_path / "again.h5").read_bytes() == file.read_bytes()
 
 
+def test_a_run_file_may_be_moved_and_renamed(file: Path, tmp_path: Path) -> None:
+    """The scene keeps its name; no answer depends on where the file lies."""
+    moved = tmp_path / "other folder" / "überholt.dat"
+    moved.parent.mkdir()
+    moved.write_bytes(file.read_bytes())
+    loaded = load_run(moved)
+    assert loaded.scene.name == "chain"
+    np.testing.assert_array_equal(loaded.position("end", TIMES), load_run(file).position("end", TIMES))
+
+
 def test_tables_are_those_of_the_start(tmp_path: Path) -> None:
     """A table that changes or disappears while the run computes does not matter."""
     path = chain(tmp_path)

@@ -27,7 +27,7 @@ def test_defaults(tmp_path: Path) -> None:
         scene.record.links[0],
     )
     assert (scene.name, scene.folder, record.name) == ("small", tmp_path, "")
-    assert (simulation.duration, simulation.step, simulation.rtol, simulation.atol) == (1.0, None, 1e-8, 1e-10)
+    assert (simulation.duration, simulation.step, simulation.rtol, simulation.atol) == (1.0, None, 1e-8, 1e-12)
     assert (simulation.formulation, simulation.gauge) == ("erls", "joint-angle")
     assert (simulation.integrator, simulation.spectral_radius) == ("generalized_alpha", 0.8)
     assert record.gravity == (0.0, 0.0, -9.81)

@@ -325,6 +325,15 @@ def test_polishing_of_disturbed_modes() -> None:
     np.testing.assert_allclose(np.diag(strain), 1, atol=1e-9)
 
 
+def test_polishing_keeps_a_pair_in_order() -> None:
+    """Two close frequencies on both sides of the spectrum's middle (10), the upper one found to be the lower one."""
+    true = np.array([1.0, 9.99999995, 9.9999999, 100.0])
+    found = np.array([1.0, 9.99999995, 10.0000001, 100.0])
+    frequencies, change = polishing(np.diag(true**2), np.eye(4), found, np.eye(4))
+    np.testing.assert_allclose(frequencies, np.sort(true), rtol=1e-14)
+    np.testing.assert_allclose(change, np.eye(4)[:, [0, 2, 1, 3]], atol=1e-14)
+
+
 # ----- damping
 
 
