@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import enum
 import re
+import stat
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -43,7 +44,12 @@ def read_toml(path: Path, error: type[ReportedError] = FEImportError) -> dict[st
         Of class ``error``: file missing, not readable, too large, not UTF-8 or not TOML.
     """
     try:
-        if path.stat().st_size > _MAX_BYTES:
+        status = path.stat()
+        if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):  # a pipe would never end
+            raise error(
+                Cause.NOT_READABLE, "not a file", where=str(path), remedy="give the path of a TOML description"
+            )
+        if status.st_size > _MAX_BYTES:
             raise error(
                 Cause.NOT_READABLE,
                 "file is too large for a description",

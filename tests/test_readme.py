@@ -145,5 +145,7 @@ def test_shipped_files_have_a_header_and_are_valid(path: Path) -> None:
 
 def test_picture_and_paths_exist() -> None:
     """Files that the README names are there."""
-    for path in re.findall(r"\]\((data/[^)]*)\)", README) + re.findall(r"`((?:data|tests|erls|fe_import)/[^`*]*)`", README):
+    pictures = re.findall(r"\]\((data/[^)]*)\)", README)
+    places = re.findall(r"`((?:data|tests|erls|fe_import|benchmarks)/[^`*]*)`", README)
+    for path in pictures + places:
         assert (ROOT / path).exists(), path

@@ -114,7 +114,7 @@ class Options:
 
     step: float | None = None
     rtol: float = 1e-8
-    atol: float = 1e-10
+    atol: float = 1e-12
     spectral_radius: float = 0.8
     newton_tolerance: float = 1e-11
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.view.export import export_csv, export_paraview
 from erls.output_file import check_writable, replacing
 from erls.run import Run
 from erls.view.camera import Size
 from erls.view.checks import Progress, bad, check, drawing, no_picture, surveyed
+from erls.view.export import export_csv, export_paraview
 from erls.view.film import FILMS, film
 from erls.view.stage import Stage
 from erls.view.text import caption, displacement, point_labels, time_labels, written

@@ -10,8 +10,8 @@ from scenes import ROOT
 
 import erls
 from erls.errors import Cause, SceneError
-from erls.view.export import export_csv, export_paraview
 from erls.run import node_positions
+from erls.view.export import export_csv, export_paraview
 
 
 @pytest.fixture(scope="module", params=["robot/two_link.toml", "l_shape/solid.toml"])

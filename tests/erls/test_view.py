@@ -16,8 +16,8 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.view import film, picture, show, write_view
 from erls.view.camera import Box, Camera, Walls
 from erls.view.checks import surveyed
-from erls.view.stage import Motion
 from erls.view.shapes import chains, joint_places
+from erls.view.stage import Motion
 from erls.view.window import Window
 
 SIZE = (400, 250)

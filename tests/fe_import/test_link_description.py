@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from link_files import (
 )
 
 from fe_import.build import build_model
+from fe_import.errors import FEImportError
 from fe_import.inertia import MassProperties, mass_properties
 from fe_import.link import Reduction, load_link
 from fe_import.model import FEModel
@@ -323,3 +325,11 @@ def test_interface_position_of_a_solid(tmp_path: Path) -> None:
     carry[:3, 3:] = np.stack([np.cross(axis, arm) for axis in np.eye(3)], axis=1)
     expected = carry @ clamped_flexibility(one) @ carry.T
     np.testing.assert_allclose(clamped_flexibility(two), expected, atol=1e-8 * la.norm(expected))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_is_refused(tmp_path: Path) -> None:
+    """Reading it would never end."""
+    os.mkfifo(tmp_path / "link.toml")
+    with pytest.raises(FEImportError, match="not a file"):
+        load_link(tmp_path / "link.toml")
