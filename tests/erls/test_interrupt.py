@@ -93,7 +93,8 @@ def test_a_stopped_simulation_keeps_what_it_computed(folder: Path, number: int) 
     assert run.failure is not None
     assert run.failure.cause == Cause.INTERRUPTED
     assert 0 < run.end < 1.0
-    assert run.end == pytest.approx(1e-6 * run.solution.work.steps)
+    # a signal may come after a step's knot was added and before the step was counted
+    assert run.end == pytest.approx(1e-6 * run.solution.work.steps, abs=1.1e-6)
     assert run.position("tip", run.end)[2] < 0
 
 
