@@ -3,7 +3,7 @@
     python benchmarks/energy_drift.py [--modes 18] [--seconds 2]
 
 Explicit reference integrator (DOP853, rtol 1e-8, atol 1e-12 m) on one and two flexible links, lumped and consistent
-mass, both gauges. Acceptance: drift at most 1e-7 J. High modes force small steps: with 18 modes this takes an hour.
+mass, both gauges. Acceptance: drift at most 1e-7 J. High modes force small steps: with 18 modes this takes two hours.
 """
 
 from __future__ import annotations

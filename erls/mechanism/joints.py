@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from erls.lie.se3 import twist_transform
 from erls.lie.so3 import Array
 from erls.mechanism.drives import Drive
 
@@ -116,6 +117,4 @@ class Joint:
     @property
     def screw(self) -> Array:
         """(6,) twist of unit joint velocity in link k's mesh frame."""
-        from erls.lie.se3 import twist_transform
-
         return np.asarray(twist_transform(self.after) @ self.type.screw)
