@@ -96,6 +96,20 @@ class Solid(_Record, frozen=True):
     nodes: dict[str, Vector] = {}
 
 
+class Matrices(_Record, frozen=True):
+    """A link whose mass and stiffness matrices a finite-element program exported.
+
+    ``format`` names a reader (`fe_import.exports`), ``files`` the files by their role (``stiffness``, ``mass``,
+    ``dofs``, ``mesh`` ...), ``options`` what the reader wants to know. ``nodes`` names nodes that interfaces, masses
+    and scenes may refer to, by their number in that program or by position (nearest node).
+    """
+
+    format: str
+    files: dict[str, str]
+    options: dict[str, Any] = {}
+    nodes: dict[str, int | Vector] = {}
+
+
 class PointMass(_Record, frozen=True):
     """Mass and inertia ([Ixx, Iyy, Izz] or a 3x3 matrix about the node) added to a node or interface."""
 
@@ -162,7 +176,7 @@ class Damping(_Record, frozen=True):
 
 
 class LinkDescription(_Record, frozen=True):
-    """A link: exactly one of ``frame`` and ``solid``, its interfaces and its reduction."""
+    """A link: exactly one of ``frame``, ``solid`` and ``matrices``, its interfaces and its reduction."""
 
     interfaces: list[Interface]
     name: str = ""
@@ -171,9 +185,16 @@ class LinkDescription(_Record, frozen=True):
     sections: dict[str, Section] = {}
     frame: Frame | None = None
     solid: Solid | None = None
+    matrices: Matrices | None = None
     masses: list[PointMass] = []
     reduction: Reduction = Reduction()
     damping: Damping = Damping()
+
+    def files(self) -> list[str]:
+        """The files that it names, as they stand there."""
+        if self.solid is not None:
+            return [self.solid.mesh]
+        return [] if self.matrices is None else [name for _, name in sorted(self.matrices.files.items())]
 
 
 @dataclass(frozen=True)
@@ -191,9 +212,9 @@ class LinkFile:
     def content_hash(self) -> str:
         """SHA-256 of everything that the reduction depends on: the description and the files it names."""
         digest = hashlib.sha256(msgspec.json.encode(self.description, order="deterministic"))
-        if self.description.solid is not None:
-            with contextlib.suppress(OSError, ValueError):  # reported with its name when the mesh is read
-                digest.update((self.folder / self.description.solid.mesh).read_bytes())
+        for name in self.description.files():
+            with contextlib.suppress(OSError, ValueError):  # reported with its name when it is read
+                digest.update((self.folder / name).read_bytes())
         return digest.hexdigest()
 
 
@@ -239,8 +260,9 @@ _CHOICES = {
 
 def _check(link: LinkDescription, file: str) -> None:
     """The conditions that the types cannot state."""
-    if (link.frame is None) == (link.solid is None):
-        raise _fail(file, "give exactly one of the tables 'frame' and 'solid'", remedy="a link has one model")
+    if [link.frame, link.solid, link.matrices].count(None) != 2:
+        message = "give exactly one of the tables 'frame', 'solid' and 'matrices'"
+        raise _fail(file, message, remedy="a link has one model")
     for field, options in _CHOICES.items():
         table, name = field.split(".")
         record = getattr(link, table)
