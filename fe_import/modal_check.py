@@ -68,6 +68,7 @@ def _check_shapes(model: ModalModel, check: Check) -> None:
         ("inertia/rigid", inertia.rigid, (m, 6), "f"),
         ("frequencies_hz", model.frequencies_hz, (m,), "f"),
         ("damping_ratios", model.damping_ratios, (m,), "f"),
+        ("residuals", model.residuals, (m,), "f"),
         ("full_model/mass", np.asarray(full.mass, dtype=float), (), "f"),
         ("full_model/centre_of_mass", full.centre_of_mass, (3,), "f"),
         ("full_model/inertia", full.inertia, (3, 3), "f"),
@@ -135,6 +136,7 @@ def _check_tables(model: ModalModel, check: Check) -> None:
     for item, values in (
         ("frequencies_hz", model.frequencies_hz),
         ("damping_ratios", model.damping_ratios),
+        ("residuals", model.residuals),
         ("fixed_interface/frequencies_hz", model.fixed_interface.frequencies_hz),
         ("fixed_interface/effective_mass", model.fixed_interface.effective_mass),
     ):

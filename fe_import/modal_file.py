@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 SCHEMA = "erls modal model"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 UNITS = "SI"
 
 
@@ -78,6 +78,7 @@ def write_modal_group(group: h5py.Group, model: ModalModel) -> None:
     for name, values, unit, description in (
         ("frequencies_hz", model.frequencies_hz, "Hz", "frequency of each mode, 0 for rigid-body modes"),
         ("damping_ratios", model.damping_ratios, "1", "modal damping ratios"),
+        ("residuals", model.residuals, "1", "|K u - w^2 M u| / |K u| of each mode in the full model"),
         ("nodes", model.nodes, "m", "undeformed positions in the mesh frame; node, axis"),
         ("mode_shapes/translation", model.translation_shapes, "m", "displacements; node, axis, mode"),
         ("mode_shapes/rotation", model.rotation_shapes, "rad", "rotations; rotation node, axis, mode"),
@@ -98,7 +99,7 @@ def write_modal_group(group: h5py.Group, model: ModalModel) -> None:
             "share of mass and of inertia; mode, axis",
         ),
         ("health/values", [c.value for c in model.health], "1", "value of each check"),
-        ("health/limits", [c.limit for c in model.health], "1", "limit: passed when value <= limit"),
+        ("health/limits", [c.limit for c in model.health], "1", "passed when value <= limit; 1.8e308: reported only"),
         ("node_names/nodes", _integers(model.node_names.values()), "1", "nodes that have a name, from 0"),
         ("pictures/lines", model.lines, "1", "line segments for pictures; nodes from 0"),
         ("pictures/triangles", model.triangles, "1", "surface triangles for pictures; nodes from 0"),
@@ -169,6 +170,7 @@ def read_modal_group(group: h5py.Group, where: str) -> ModalModel:
         frequencies_hz=frequencies,
         kinds=file.names("kinds", m),
         damping_ratios=file.array("damping_ratios", (m,)),
+        residuals=file.array("residuals", (m,)),
         full_mass_properties=MassProperties(
             mass=file.scalar("full_model/mass"),
             centre_of_mass=file.array("full_model/centre_of_mass", (3,)),

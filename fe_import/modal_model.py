@@ -9,14 +9,21 @@ import numpy as np
 from fe_import.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.model import Array, IntArray, InterfaceNode
 
+NO_LIMIT = float(np.finfo(np.float64).max)  # a figure that is reported, not judged; finite, as all in a file
+
 
 @dataclass(frozen=True)
 class HealthCheck:
-    """One check of a reduction: passed when ``value`` does not exceed ``limit``."""
+    """One check of a reduction: passed when ``value`` does not exceed ``limit``; `NO_LIMIT` only reports."""
 
     name: str
     value: float
     limit: float
+
+    @property
+    def judged(self) -> bool:
+        """Whether it has a limit."""
+        return self.limit < NO_LIMIT
 
     @property
     def ok(self) -> bool:
@@ -67,6 +74,8 @@ class ModalModel:
         ``"rigid-body"`` or what moves in the mode ("bending", "torsion", "axial", "interface", "interior").
     damping_ratios : (m,) array
         Modal damping; 0 unless the link description gives it.
+    residuals : (m,) array
+        ‖Kφ - ω²Mφ‖ / ‖Kφ‖ of each elastic mode in the full model: 0 for a mode of it, 1 for a shape that is none.
     full_mass_properties : MassProperties
         Of the full finite-element model, for comparison.
     fixed_interface : FixedInterfaceModes
@@ -90,6 +99,7 @@ class ModalModel:
     frequencies_hz: Array
     kinds: tuple[str, ...]
     damping_ratios: Array
+    residuals: Array
     full_mass_properties: MassProperties
     fixed_interface: FixedInterfaceModes
     health: tuple[HealthCheck, ...]

@@ -14,7 +14,7 @@ import numpy as np
 
 from fe_import.build import build_model
 from fe_import.errors import Cause, FEImportError
-from fe_import.health import check_model, check_reduction
+from fe_import.health import check_basis, check_model, check_reduction, mode_residuals
 from fe_import.inertia import inertia_invariants, mass_properties
 from fe_import.link import LinkFile, load_link
 from fe_import.modal_file import SCHEMA_VERSION, ModalModel, read_modal_file, write_modal_file
@@ -63,16 +63,18 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     basis = REDUCTIONS[options.method](model, options, where)
     mass, stiffness = reduced_matrices(model, basis)
     modes = orthonormal_modes(mass, stiffness, basis, options, _inboard_columns(model, basis, link), where)
+    checks += check_basis(model, basis, mass, stiffness, modes.omega, where)
     shapes, modes = mode_shapes(model, basis, modes)
     invariants = inertia_invariants(model.mass, shapes, model.dof_map, modes.rigid)
     reduced_stiffness = shapes.T @ (model.stiffness @ shapes)
-    checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants)
+    checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, where)
+    residuals = mode_residuals(model, shapes, modes.omega)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
     if options.form == "physical":
         shapes, reduced_stiffness = basis.vectors, stiffness
         invariants = inertia_invariants(model.mass, shapes, model.dof_map, basis.rigid)
         omega, kinds = _physical_table(basis)
-        damping = np.zeros(len(omega))
+        damping, residuals = np.zeros(len(omega)), np.zeros(len(omega))
     else:
         omega = modes.omega
         reduced_stiffness = np.diag(omega**2)
@@ -93,6 +95,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
         frequencies_hz=omega / (2 * np.pi),
         kinds=kinds,
         damping_ratios=damping,
+        residuals=residuals,
         full_mass_properties=mass_properties(rigid.T @ (model.mass @ rigid)),
         fixed_interface=basis.fixed_interface,
         health=checks,
@@ -204,6 +207,9 @@ def reduction_summary(model: ModalModel) -> dict[str, Any]:
         "inertia": properties.inertia.tolist(),
         "health": {
             "ok": all(c.ok for c in model.health),
-            "checks": [{"name": c.name, "value": c.value, "limit": c.limit, "ok": c.ok} for c in model.health],
+            "checks": [
+                {"name": c.name, "value": c.value, "limit": c.limit if c.judged else None, "ok": c.ok}
+                for c in model.health
+            ],
         },
     }

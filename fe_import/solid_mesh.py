@@ -59,6 +59,12 @@ def element_faces(mesh: SolidMesh) -> tuple[IntArray, IntArray]:
     return faces, np.asarray(label.ravel(), dtype=np.int64)
 
 
+def boundary_faces(mesh: SolidMesh) -> IntArray:
+    """(f, nodes of a face) faces of one element only, anticlockwise seen from outside."""
+    faces, label = element_faces(mesh)
+    return np.asarray(faces[np.bincount(label)[label] == 1])
+
+
 # a face of n nodes -> triangles over its nodes (corners, then mid-edge nodes, then centre), same sense
 _TRIANGLES = {
     3: ((0, 1, 2),),
@@ -77,7 +83,6 @@ def surface_triangles(mesh: SolidMesh) -> IntArray:
     (t, 3) int array
         Anticlockwise seen from outside.
     """
-    faces, label = element_faces(mesh)
-    boundary = faces[np.bincount(label)[label] == 1]
-    corners = np.array(_TRIANGLES[faces.shape[1]])
+    boundary = boundary_faces(mesh)
+    corners = np.array(_TRIANGLES[boundary.shape[1]])
     return np.asarray(boundary[:, corners].reshape(-1, 3), dtype=np.int64)

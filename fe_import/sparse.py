@@ -112,18 +112,8 @@ def _check_complete(stiffness: sp.csc_array, mass: sp.csc_array, values: Array, 
         return
     last = first + int(room.argmax())
     shift = float(np.sqrt(values[last] * values[last + 1]))
-    shifted = (stiffness - shift * mass).tocsc()
-    try:
-        factor = spla.splu(
-            shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-    except RuntimeError:
-        return
-    pivots = factor.U.diagonal()
-    if not np.array_equal(factor.perm_r, factor.perm_c) or np.abs(pivots).min() < 1e-10 * np.abs(pivots).max():
-        return
-    below = int((pivots < 0).sum())
-    if below != last + 1:
+    below = modes_below(stiffness, mass, shift)
+    if below is not None and below != last + 1:
         raise FEImportError(
             Cause.EIGENSOLVER,
             f"modes of the {what} were missed",
@@ -131,6 +121,24 @@ def _check_complete(stiffness: sp.csc_array, mass: sp.csc_array, values: Array, 
             limit=f"there are {below}",
             remedy="ask for more or for fewer modes",
         )
+
+
+def modes_below(stiffness: sp.csc_array, mass: sp.csc_array, shift: float) -> int | None:
+    """Number of eigenvalues of K φ = λ M φ below ``shift`` (Sylvester: negative pivots of K - λM).
+
+    None when the pivots do not tell: one is small, or they did not come from the diagonal.
+    """
+    shifted = (stiffness - shift * mass).tocsc()
+    try:
+        factor = spla.splu(
+            shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError:
+        return None
+    pivots = factor.U.diagonal()
+    if not np.array_equal(factor.perm_r, factor.perm_c) or np.abs(pivots).min() < 1e-10 * np.abs(pivots).max():
+        return None
+    return int((pivots < 0).sum())
 
 
 def dense_modes(stiffness: Array, mass: Array, count: int | None, what: str) -> tuple[Array, Array]:

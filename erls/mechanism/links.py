@@ -79,6 +79,7 @@ def truncated(model: ModalModel, elastic_modes: int) -> ModalModel:
         frequencies_hz=model.frequencies_hz[keep],
         kinds=model.kinds[: 6 + elastic_modes],
         damping_ratios=model.damping_ratios[keep],
+        residuals=model.residuals[keep],
     )
 
 
@@ -167,6 +168,7 @@ def rigid_model(
         frequencies_hz=np.zeros(6),
         kinds=("rigid-body",) * 6,
         damping_ratios=np.zeros(6),
+        residuals=np.zeros(6),
         full_mass_properties=MassProperties(mass, centre_of_mass, inertia),
         fixed_interface=FixedInterfaceModes(np.zeros(0), np.zeros((0, 6))),
         health=(),

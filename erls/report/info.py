@@ -61,8 +61,8 @@ def _modal_info(model: ModalModel) -> tuple[dict[str, Any], str]:
     from fe_import.reduce import reduction_summary
 
     modes = [
-        {"frequency_hz": float(f), "kind": kind, "damping_ratio": float(d)}
-        for f, kind, d in zip(model.frequencies_hz, model.kinds, model.damping_ratios, strict=True)
+        {"frequency_hz": float(f), "kind": kind, "damping_ratio": float(d), "residual": float(r)}
+        for f, kind, d, r in zip(model.frequencies_hz, model.kinds, model.damping_ratios, model.residuals, strict=True)
     ]
     full = model.full_mass_properties
     summary = {

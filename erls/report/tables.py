@@ -8,7 +8,7 @@ import numpy as np
 
 from erls.run import Run
 from fe_import.inertia import MassProperties
-from fe_import.modal_file import ModalModel
+from fe_import.modal_file import HealthCheck, ModalModel
 
 _SHOWN_MODES = 40
 
@@ -33,22 +33,32 @@ def modal_report(model: ModalModel) -> str:
     )
     parts = [head]
     if model.form == "orthonormal":
-        rows = [
-            (str(k + 1), f"{f:.3f}", kind, f"{100 * d:.3g} %" if d else "-")
-            for k, (f, kind, d) in enumerate(
-                zip(model.frequencies_hz[6:], model.kinds[6:], model.damping_ratios[6:], strict=True)
-            )
+        modes = [
+            (str(k - 5), f"{f:.3f}", model.kinds[k], _percent(model, k), f"{model.residuals[k]:.1e}")
+            for k, f in enumerate(model.frequencies_hz[6:], start=6)
         ][:_SHOWN_MODES]
-        parts.append("Elastic modes of the free link\n" + table(("mode", "frequency [Hz]", "kind", "damping"), rows))
+        header = ("mode", "frequency [Hz]", "kind", "damping", "residual")
+        parts.append("Elastic modes of the free link\n" + table(header, modes))
     if len(model.fixed_interface.frequencies_hz):
         parts.append(_effective_mass_table(model))
     parts.append(_mass_table(model.mass_properties, model.full_mass_properties))
     failed = [c for c in model.health if not c.ok]
-    rows = [(c.name, f"{c.value:.2e}", f"{c.limit:.0e}", "ok" if c.ok else "FAILED") for c in model.health]
+    rows = [(c.name, f"{c.value:.2e}", *_verdict(c)) for c in model.health]
     parts.append("Health: " + ("ok" if not failed else f"{len(failed)} checks FAILED"))
     if rows:
         parts[-1] += "\n" + table(("check", "value", "limit", ""), rows)
     return "\n\n".join(parts)
+
+
+def _percent(model: ModalModel, mode: int) -> str:
+    ratio = model.damping_ratios[mode]
+    return f"{100 * ratio:.3g} %" if ratio else "-"
+
+
+def _verdict(check: HealthCheck) -> tuple[str, str]:
+    if not check.judged:
+        return "-", ""
+    return f"{check.limit:.0e}", "ok" if check.ok else "FAILED"
 
 
 def _effective_mass_table(model: ModalModel) -> str:

@@ -46,6 +46,7 @@ def synthetic_model(elastic_modes: int = 3, seed: int = 0) -> ModalModel:
         frequencies_hz=frequencies,
         kinds=("rigid-body",) * 6 + ("bending",) * elastic_modes,
         damping_ratios=np.concatenate([np.zeros(6), np.full(elastic_modes, 0.01)]),
+        residuals=np.concatenate([np.zeros(6), np.linspace(1e-9, 0.5, elastic_modes)]),
         full_mass_properties=mass_properties(motions.T @ (mass @ motions)),
         fixed_interface=FixedInterfaceModes(np.array([12.0, 50.0]), rng.uniform(0, 0.5, (2, 6))),
         health=(HealthCheck("orthonormality", 1e-15, 1e-9), HealthCheck("grounding", 2e-7, 1e-7)),

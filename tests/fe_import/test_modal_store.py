@@ -201,7 +201,7 @@ KINDS = np.array([k.encode() for k in MODEL.kinds])
 
 FAULTS: list[tuple[str, Callable[[h5py.File], None], str, str]] = [
     ("schema", attribute("schema", "other"), "@schema", "not what a modal file has"),
-    ("version", attribute("schema_version", np.int64(2)), "@schema_version", "unknown version"),
+    ("version", attribute("schema_version", np.int64(1)), "@schema_version", "unknown version"),
     ("version text", attribute("schema_version", "1"), "@schema_version", "type int"),
     ("no version", lambda f: f.attrs.__delitem__("schema_version"), "@schema_version", "missing"),
     ("units", attribute("units", "mm"), "@units", "not what"),

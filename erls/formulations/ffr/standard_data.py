@@ -1,0 +1,147 @@
+"""Standard input data of a flexible body: its inertia as a polynomial of second order in the elastic coordinates.
+
+With η the elastic coordinates, B the modes they stand for and ν = [v; ω] the twist of the floating frame, in its axes,
+the nodal velocities give, for any mass matrix,
+
+    T = ½ νᵀ M(η) ν + νᵀ C(η) η̇ + ½ η̇ᵀ M_e η̇,
+    M(η) = M₀ + M₁ η + ηᵀ M₂ η,   C(η) = C₀ + C₁ η
+
+(O. Wallrapp, Mech. Struct. & Mach. 22 (1994) 283-304: mdCM, J, Ct, Cr, Me; A. A. Shabana, Dynamics of Multibody
+Systems, ch. 5). M₁ fills the rows and columns of ω, M₂ its block, C₁ its rows. The forces are the Boltzmann-Hamel
+equations of T.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from erls.lie.so3 import Array, cross
+from fe_import.inertia import InertiaInvariants
+
+
+class StandardData:
+    """Inertia and weight of one body in its floating frame.
+
+    Parameters
+    ----------
+    invariants : InertiaInvariants
+        Of the link, in the modes of its modal file, payloads included.
+    basis : (m, n) array
+        B: modal coordinates of the field of each elastic coordinate.
+
+    Attributes
+    ----------
+    rigid : (6, 6) array
+        M₀.
+    coupling : (6, n) array
+        C₀; its first rows are the first moment ∫ρ u per elastic coordinate.
+    elastic : (n, n) array
+        M_e.
+    """
+
+    def __init__(self, invariants: InertiaInvariants, basis: Array) -> None:
+        n = basis.shape[1]
+        self.size = n
+        fields = invariants.rigid
+        self.rigid = fields.T @ invariants.m @ fields
+        self.coupling = fields.T @ invariants.m @ basis
+        self.elastic = basis.T @ invariants.m @ basis
+        half = np.stack([fields.T @ x @ basis for x in invariants.X])  # (3, 6, n): half of M₁
+        turned = np.stack([basis.T @ x @ basis for x in invariants.X])  # (3, n, n): C₁
+        z = invariants.Z
+        square = np.einsum("mi,abmk,kj->abij", basis, (z + z.transpose(0, 1, 3, 2)) / 2, basis, optimize=True)
+        self._half = half.reshape(18, n)
+        self._turned = turned.reshape(3, n * n)
+        self._linear = np.vstack([self._half, turned.reshape(3 * n, n)])
+        self._square = square.reshape(9 * n, n)  # M₂
+        self.mass = float(np.trace(self.rigid[:3, :3]) / 3)
+        moment = self.rigid[3:, :3]
+        self.first_moment = np.array([moment[2, 1], moment[0, 2], moment[1, 0]])
+
+    def frame_mass(self, eta: Array) -> Array:
+        """(6, 6) M(η)."""
+        half = (self._half @ eta).reshape(3, 6)
+        return self._frame_mass(half, (self._square @ eta).reshape(3, 3, self.size) @ eta)
+
+    def _frame_mass(self, half: Array, square: Array) -> Array:
+        result = self.rigid.copy()
+        result[3:] += half
+        result[:, 3:] += half.T
+        result[3:, 3:] += square
+        return result
+
+    def frame_coupling(self, eta: Array) -> Array:
+        """(6, n) C(η)."""
+        result = self.coupling.copy()
+        result[3:] += (self._linear[18:] @ eta).reshape(3, self.size)
+        return result
+
+    def forces(self, twist: Array, twist_rate: Array, eta: Array, rate: Array, acceleration: Array) -> tuple[Array, Array]:
+        """Inertia forces.
+
+        Parameters
+        ----------
+        twist, twist_rate : (6,) arrays
+            ν and its derivative.
+        eta, rate, acceleration : (n,) arrays
+            Elastic coordinates and their derivatives.
+
+        Returns
+        -------
+        wrench : (6,) array
+            Force and moment about the frame's origin, in its axes: ṗ + ad*(ν) p with the momentum p = ∂T/∂ν.
+        elastic : (n,) array
+            d/dt ∂T/∂η̇ - ∂T/∂η.
+        """
+        n, omega = self.size, twist[3:]
+        linear = self._linear @ np.stack((eta, rate), axis=1)
+        half, half_rate = linear[:18, 0].reshape(3, 6), linear[:18, 1].reshape(3, 6)
+        turned, turned_rate = linear[18:, 0].reshape(3, n), linear[18:, 1].reshape(3, n)
+        square = (self._square @ eta).reshape(3, 3, n)
+        mass = self._frame_mass(half, square @ eta)
+        coupling = self.coupling.copy()
+        coupling[3:] += turned
+
+        momentum = mass @ twist + coupling @ rate
+        wrench = mass @ twist_rate + coupling @ acceleration
+        wrench += half_rate.T @ omega  # Ṁ ν and Ċ η̇
+        wrench[3:] += half_rate @ twist + 2 * ((square @ rate) @ omega) + turned_rate @ rate
+        wrench[:3] += cross(omega, momentum[:3])
+        wrench[3:] += cross(omega, momentum[3:]) + cross(twist[:3], momentum[:3])
+
+        slope = np.multiply.outer(omega, twist).ravel() @ self._half  # ∂T/∂η
+        slope += rate @ (omega @ self._turned).reshape(n, n)
+        slope += np.multiply.outer(omega, omega).ravel() @ square.reshape(9, n)
+        return wrench, coupling.T @ twist_rate + self.elastic @ acceleration + omega @ turned_rate - slope
+
+    def mass_matrix(self, eta: Array) -> Array:
+        """(6 + n, 6 + n) mass matrix of (ν, η̇)."""
+        result = np.empty((6 + self.size, 6 + self.size))
+        result[:6, :6] = self.frame_mass(eta)
+        result[:6, 6:] = self.frame_coupling(eta)
+        result[6:, :6] = result[:6, 6:].T
+        result[6:, 6:] = self.elastic
+        return result
+
+    def momentum(self, twist: Array, eta: Array, rate: Array) -> Array:
+        """(6,) linear momentum, and angular momentum about the frame's origin, in its axes."""
+        return np.asarray(self.frame_mass(eta) @ twist + self.frame_coupling(eta) @ rate)
+
+    def kinetic_energy(self, twist: Array, eta: Array, rate: Array) -> float:
+        """T."""
+        velocity = np.concatenate([twist, rate])
+        return float(0.5 * velocity @ self.mass_matrix(eta) @ velocity)
+
+    def weight(self, g: Array, eta: Array) -> tuple[Array, Array]:
+        """Wrench and elastic forces of gravity ``g`` in the frame's axes.
+
+        The moment takes the first moment of the deformed body: without its elastic part the weight would be wrong in
+        first order of the deflection.
+        """
+        moment = self.first_moment + self.coupling[:3] @ eta
+        return np.concatenate([self.mass * g, cross(moment, g)]), self.coupling[:3].T @ g
+
+    def gravity_energy(self, g: Array, world: Array, eta: Array) -> float:
+        """Potential energy in the gravity vector ``g`` (world axes) with the frame at ``world`` (4, 4)."""
+        moment = self.first_moment + self.coupling[:3] @ eta
+        return -float(g @ (self.mass * world[:3, 3] + world[:3, :3] @ moment))

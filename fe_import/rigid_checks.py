@@ -1,0 +1,89 @@
+"""Rigid-body motions of a reduced link found in three ways: by geometry, by stiffness, as eigenmodes.
+
+They agree when the matrices belong to the nodes, nothing is grounded and nothing hangs loose; which of them departs
+tells the fault apart. After the report of pyyeti's ``cbcheck``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_import.model import Array, FEModel
+from fe_import.reduction import Basis
+
+
+def rigid_motion_by_stiffness(model: FEModel, basis: Basis, stiffness: Array) -> float:
+    """Departure of the motions that follow one interface without strain from those of geometry.
+
+    The first interface is moved by each of the six unit motions, and the rest takes the shape of least strain
+    energy: min ½ zᵀKz with U_b z = R_b.
+
+    Parameters
+    ----------
+    model : FEModel
+    basis : Basis
+    stiffness : (k, k) array
+        Over the basis.
+
+    Returns
+    -------
+    float
+        Largest departure of any nodal component, per largest component of the motion; infinite when the interface
+        does not hold the link.
+    """
+    rows = model.dof_map[model.interface_nodes[0].node]
+    geometry = model.rigid_body_modes()
+    held = basis.vectors[rows]
+    count = len(stiffness)
+    diagonal = np.diag(stiffness).clip(min=0)
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, diagonal.max()))
+    moved = held * scale
+    size = np.abs(moved).max(axis=1)
+    if not size.all():
+        return float("inf")
+    matrix = np.zeros((count + 6, count + 6))
+    matrix[:count, :count] = stiffness * np.outer(scale, scale)
+    matrix[count:, :count] = moved / size[:, None]
+    matrix[:count, count:] = matrix[count:, :count].T
+    right = np.zeros((count + 6, 6))
+    right[count:] = geometry[rows] / size[:, None]
+    try:
+        found = la.solve(matrix, right, assume_a="sym")[:count] * scale[:, None]
+    except (la.LinAlgError, la.LinAlgWarning):
+        return float("inf")
+    return float((np.abs(basis.vectors @ found - geometry).max(axis=0) / np.abs(geometry).max(axis=0)).max())
+
+
+def rigid_motion_as_eigenmodes(mass: Array, stiffness: Array, rigid: Array, first: float) -> tuple[float, float]:
+    """Frequencies and shapes of the six lowest eigenmodes of the free link.
+
+    Parameters
+    ----------
+    mass, stiffness : (k, k) arrays
+        Over the basis.
+    rigid : (k, 6) array
+        Coordinates of the rigid-body motions in it.
+    first : float
+        First elastic circular frequency [rad/s].
+
+    Returns
+    -------
+    frequency : float
+        Largest ω² of the six, per that of the first elastic mode.
+    departure : float
+        Sine of the largest angle between their span and the motions of geometry, in the mass norm.
+    """
+    diagonal = np.diag(mass) * first**2 + np.diag(stiffness)
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    inertia = mass * np.outer(scale, scale) * first**2
+    shifted = stiffness * np.outer(scale, scale) + inertia
+    count = len(mass)
+    # M x = μ (K + ω₁² M) x, μ = ω₁² / (ω² + ω₁²): the rigid-body modes are the largest, μ = 1, massless columns 0
+    mu, modes = la.eigh(inertia, shifted, subset_by_index=(count - 6, count - 1))
+    motions = rigid / scale[:, None]
+    motions = motions @ np.linalg.inv(la.cholesky(motions.T @ inertia @ motions))
+    modes /= np.sqrt(mu)
+    rest = motions - modes @ (modes.T @ inertia @ motions)
+    departure = np.sqrt(np.linalg.eigvalsh(rest.T @ inertia @ rest).max().clip(min=0))
+    return float(np.abs(1 / mu - 1).max()), float(departure)
