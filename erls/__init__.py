@@ -11,13 +11,15 @@ The command line in three lines::
 
 from typing import Any
 
-__all__ = ["load_run", "load_scene", "save_run", "simulate"]
+__all__ = ["load_run", "load_scene", "save_run", "section_forces", "simulate", "stress"]
 
 _HOME = {
     "load_scene": ("erls.scene", "load_scene"),
     "simulate": ("erls.simulation", "simulate"),
     "load_run": ("erls.run_file", "load_run"),
     "save_run": ("erls.run_file", "write_run"),
+    "section_forces": ("erls.recover", "section_forces"),
+    "stress": ("erls.recover", "stress"),
 }
 
 

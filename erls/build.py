@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -120,6 +121,7 @@ def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
             link.modal_file,
             link.flexible,
             link.elastic_modes,
+            json.dumps(link.reduction, sort_keys=True, default=str),
             link.name if link.rigid else "",
         )
         if key not in made:
@@ -153,7 +155,7 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
             )
     else:
         path = scene.folder / link.model
-        description = _within(f"{place}.model", lambda: load_link(path, {"form": "orthonormal"}))
+        description = _within(f"{place}.model", lambda: load_link(path, {**link.reduction, "form": "orthonormal"}))
         model, cached = reduce_cached(description, cache_folder())
         tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({path.name})")
     wanted = 0 if not link.flexible else link.elastic_modes

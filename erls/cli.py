@@ -1,4 +1,4 @@
-"""The command ``erls``: reduce, simulate, info, view.
+"""The command ``erls``: reduce, simulate, compare, study, info, view.
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 2 bad input, 3 numerical failure, 4 did not
 converge where convergence was asked for, 130 interrupted. Heavy packages are imported inside the commands, so that
@@ -7,19 +7,28 @@ help answers at once.
 
 from __future__ import annotations
 
-import contextlib
-import json
-import math
 import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
+from erls.cli_studies import compare, study
+from erls.terminal import (
+    Json,
+    Output,
+    Progress,
+    peak_memory_mb,
+    print_json,
+    refuse_unwritable,
+    remove,
+    report_times,
+    tell,
+)
 from fe_import.errors import ReportedError
 
 app = App(
@@ -34,9 +43,6 @@ app = App(
     default_parameter=Parameter(show_default=False),
     suppress_keyboard_interrupt=False,
 )
-
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Output = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 
 
 @app.command
@@ -73,19 +79,19 @@ def reduce(
     changes = {k: v for k, v in (("method", method), ("elastic_modes", modes)) if v is not None}
     description = load_link(link, changes)
     target = output or Path(f"{description.description.name}.modal.h5")
-    _writable(target, link)
+    refuse_unwritable(target, link)
     begun = time.perf_counter()
-    _tell(f"reducing {link}")
+    tell(f"reducing {link}")
     model = reduce_link(description)
     write_modal_file(target, model)
     summary = {
         **reduction_summary(model),
         "wall_s": time.perf_counter() - begun,
-        "peak_memory_mb": _peak_memory_mb(),
+        "peak_memory_mb": peak_memory_mb(),
         "output": str(target),
     }
     if json:
-        return _print_json(summary)
+        return print_json(summary)
     from erls.report.tables import modal_report
 
     print(modal_report(model))
@@ -131,27 +137,27 @@ def simulate(
     if formulation is not None:
         changes.append(f'simulation.formulation="{formulation}"')
     loaded = load_scene(scene, changes)
-    times = _times(at, loaded.record.simulation.duration)
+    times = report_times(at, loaded.record.simulation.duration)
     if output is not None:
-        _writable(output, scene)
+        refuse_unwritable(output, scene)
     partial = output.with_name(f"{output.name}.partial") if output is not None else None
     try:
-        with _progress("simulating") as advance:
-            run = run_simulation(loaded, progress=advance, tell=_tell, checkpoint=partial)
+        with Progress("simulating") as advance:
+            run = run_simulation(loaded, progress=advance, tell=tell, checkpoint=partial)
     except SimulationError as problem:
         if output is None and problem.run is not None:
             hint = "give -o RUN.h5 to keep what was computed"
             problem.remedy = hint if problem.cause == Cause.INTERRUPTED else f"{problem.remedy}; {hint}"
         elif output is not None and problem.run is not None and len(problem.run.solution.t) > 1:
             write_run(output, problem.run)
-            _tell(f"what was computed, up to t = {problem.run.end:.6g} s, is in {output}")
-            _remove(partial)
+            tell(f"what was computed, up to t = {problem.run.end:.6g} s, is in {output}")
+            remove(partial)
         raise
     if output is not None:
         write_run(output, run)
-        _remove(partial)
+        remove(partial)
     if json:
-        return _print_json({**run.summary(times), "output": None if output is None else str(output)})
+        return print_json({**run.summary(times), "output": None if output is None else str(output)})
     print(run_report(run, times))
     if output is not None:
         print(f"\nwritten to {output}")
@@ -175,7 +181,7 @@ def info(file: Path, /, *, json: Json = False) -> None:
 
     summary, text = file_info(file)
     if json:
-        return _print_json(summary)
+        return print_json(summary)
     print(text)
 
 
@@ -220,10 +226,10 @@ def view(
     if output is None:
         show(loaded)
         return
-    _writable(output, run)
+    refuse_unwritable(output, run)
     begun = time.perf_counter()
-    times = _times(at, loaded.end) or None
-    with _progress("drawing") as advance:
+    times = report_times(at, loaded.end) or None
+    with Progress("drawing") as advance:
         write_view(
             loaded,
             output,
@@ -234,118 +240,20 @@ def view(
             progress=lambda done, total: advance(done, total),
         )
     if json:
-        return _print_json({"run": str(run), "output": str(output), "wall_s": time.perf_counter() - begun})
+        return print_json({"run": str(run), "output": str(output), "wall_s": time.perf_counter() - begun})
     print(f"written to {output}")
 
 
-def _times(text: str, end: float) -> list[float]:
-    """Times of ``--at``."""
-    from erls.errors import Cause, SceneError
-
-    result = []
-    for part in (p for p in text.split(",") if p.strip()):
-        try:
-            value = float(part)
-        except ValueError:
-            value = float("nan")
-        if not 0 <= value <= end:
-            raise SceneError(
-                Cause.TIME_OUT_OF_RANGE,
-                "not a time within the run",
-                where="--at",
-                value=part.strip(),
-                limit=f"0 to {end:g} s",
-                remedy="give times in seconds, separated by commas",
-            )
-        result.append(value)
-    return result
-
-
-def _writable(path: Path, source: Path) -> None:
-    """Refuse an output that cannot be written, or that is what was read, before any work is done."""
-    from erls.output_file import check_writable, not_writable
-
-    if check_writable(path) == source.resolve():
-        raise not_writable(path, "it is the file that is read", "give the output another name")
-
-
-def _remove(path: Path | None) -> None:
-    if path is not None:
-        path.unlink(missing_ok=True)
-
-
-def _peak_memory_mb() -> float | None:
-    """Largest memory of this process so far; None where the system does not tell."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    unit = 2**20 if sys.platform == "darwin" else 2**10
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
-
-
-def _tell(text: str) -> None:
-    """A message on stderr; nobody may be listening any more."""
-    with contextlib.suppress(OSError):
-        print(text, file=sys.stderr)
-
-
-def _print_json(summary: dict[str, Any]) -> None:
-    print(json.dumps(_finite(summary), allow_nan=False))
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no infinities and no NaN, which a run that failed may hold."""
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-class _progress:
-    """A progress bar on stderr; plain lines where stderr is no terminal."""
-
-    def __init__(self, what: str) -> None:
-        self.what = what
-        self.bar: Any = None
-        self.task: Any = None
-        self.told = time.monotonic()
-        self.last = 0.0
-
-    def __enter__(self) -> Callable[[float, float], None]:
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-            columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %"))
-            self.bar = Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
-            self.bar.start()
-            self.task = self.bar.add_task(self.what, total=1.0)
-        return self.advance
-
-    def advance(self, done: float, total: float) -> None:
-        now = time.monotonic()
-        share = done / total if total else 1.0
-        if self.bar is not None:
-            if now - self.last > 0.05:
-                self.last = now
-                self.bar.update(self.task, completed=share)
-        elif now - self.told > 5:
-            self.told = now
-            _tell(f"{self.what}: {100 * share:.0f} %")
-
-    def __exit__(self, *exception: object) -> None:
-        if self.bar is not None:
-            self.bar.stop()
+app.command(compare)
+app.command(study)
 
 
 def _report(error: ReportedError, as_json: bool) -> int:
     """Print an error; returns the exit code."""
     if as_json:
-        _print_json({"error": error.as_dict()})
+        print_json({"error": error.as_dict()})
     else:
-        _tell("error: " + str(error).replace("\n", "\\n"))
+        tell("error: " + str(error).replace("\n", "\\n"))
     return error.exit_code
 
 
@@ -373,8 +281,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         signal.signal(signal.SIGTERM, _interrupt)  # like Ctrl-C: finished work is kept
     try:
-        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
+        return code if isinstance(code, int) else 0
     except CycloptsError as problem:
         return _report(_usage_error(problem), as_json)
     except ReportedError as problem:

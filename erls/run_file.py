@@ -167,7 +167,7 @@ def load_run(path: Path | str) -> Run:
             raise
         settings = record.simulation
         choose(settings.formulation, FORMULATIONS, f"{path}: /scene simulation.formulation", SceneError)
-        formulation = FORMULATIONS[settings.formulation](built.mechanism, settings.gauge)
+        formulation = FORMULATIONS[settings.formulation](built.mechanism, settings)
         knots = file.subgroup("knots")
         t = knots.array("time", (None,))
         shape = (len(t), formulation.size)

@@ -33,9 +33,11 @@ class Simulation(_Record, frozen=True):
     duration : float
         [s]
     formulation : str
-        ``erls``.
+        ``erls``, or ``ffr``: floating frames of reference.
     gauge : str
-        ``joint-angle`` (θ is the joint angle) or ``minimum-norm`` (five rows per joint, as in the paper).
+        Of ``erls``: ``joint-angle`` (θ is the joint angle) or ``minimum-norm`` (five rows per joint, as in the paper).
+    body_frame : str
+        Of ``ffr``: ``tangent`` at the inboard interface, or ``mean-axis``.
     integrator : str
         ``generalized_alpha`` or one of SciPy's: ``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``.
     step : float, optional
@@ -49,6 +51,7 @@ class Simulation(_Record, frozen=True):
     duration: float
     formulation: str = "erls"
     gauge: str = "joint-angle"
+    body_frame: str = "tangent"
     integrator: str = DEFAULT_INTEGRATOR
     step: float | None = None
     rtol: float = 1e-8
@@ -141,7 +144,8 @@ class MeshPose(_Record, frozen=True):
 class Link(_Record, frozen=True):
     """A link: exactly one of ``model`` (link description, reduced on the fly), ``modal_file`` and ``rigid``.
 
-    ``elastic_modes`` keeps only the lowest ones; ``flexible = false`` none. ``inboard`` and ``outboard`` name the
+    ``elastic_modes`` keeps only the lowest ones; ``flexible = false`` none. ``reduction`` replaces fields of that table
+    of the link description. ``inboard`` and ``outboard`` name the
     interfaces where the joints sit; the first and the second one unless given. ``damping`` replaces that of the
     modal file.
     """
@@ -152,6 +156,7 @@ class Link(_Record, frozen=True):
     rigid: RigidBody | None = None
     flexible: bool = True
     elastic_modes: int | None = None
+    reduction: dict[str, Any] = {}
     inboard: str = ""
     outboard: str = ""
     mesh_pose: MeshPose = MeshPose()

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from erls.scene import Link, SceneRecord, Simulation
 
 GAUGES = ("joint-angle", "minimum-norm")
+BODY_FRAMES = ("tangent", "mean-axis")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
 MOST_STEPS = 100_000_000  # fill any memory; more are a slip
@@ -85,6 +86,7 @@ def _numbers(value: Any, path: str = "") -> Iterable[tuple[str, float]]:
 def _check_simulation(s: Simulation, place: str) -> None:
     choose(s.integrator, INTEGRATORS, f"{place}.integrator", SceneError)
     choose(s.gauge, GAUGES, f"{place}.gauge", SceneError)
+    choose(s.body_frame, BODY_FRAMES, f"{place}.body_frame", SceneError)
     for name in ("duration", "step", "atol"):
         value = getattr(s, name)
         if value is not None and not value > 0:
@@ -115,6 +117,9 @@ def _check_names(places: Iterable[tuple[str, str]]) -> None:
 
 
 def _check_link(link: Link, place: str) -> None:
+    if link.reduction and not link.model:
+        message = "'reduction' changes how a model is reduced, and this link names none"
+        raise _bad(f"{place}.reduction", message, None, "remove it, or give 'model'")
     if bool(link.model) + bool(link.modal_file) + (link.rigid is not None) != 1:
         message = "give exactly one of 'model', 'modal_file' and 'rigid'"
         raise _bad(place, message, link.name, "a link has one source")

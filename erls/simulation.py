@@ -83,7 +83,7 @@ def simulate(
                 tell(f"warning: {text}")
 
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
-    formulation = FORMULATIONS[settings.formulation](built.mechanism, settings.gauge)
+    formulation = FORMULATIONS[settings.formulation](built.mechanism, settings)
     y, v = formulation.initial_state()
     options = Options(settings.step, settings.rtol, settings.atol, settings.spectral_radius)
     begun = saved = time.perf_counter()

@@ -38,6 +38,10 @@ def build_model(link: LinkFile) -> FEModel:
     description, where = link.description, str(link.path)
     if description.frame is not None:
         model = frame_model(description, description.frame, where)
+    elif description.matrices is not None:
+        from fe_import.build_matrices import matrices_model
+
+        model = matrices_model(link)
     else:
         from fe_import.build_solid import solid_model  # scikit-fem and meshio are heavy
 
@@ -120,15 +124,27 @@ def inertia_matrix(given: Inertia, where: str, error: type[ReportedError] = FEIm
     return inertia
 
 
-def to_si(model: FEModel, link: LinkDescription, where: str) -> FEModel:
-    """Convert a model from the units of its description.
+def unit_factors(link: LinkDescription, where: str) -> tuple[float, float, float]:
+    """The description's units of length, mass and time in m, kg and s.
 
-    Displacements scale with the length unit, rotations do not; forces with mass · length / time².
+    Raises
+    ------
+    FEImportError
+        An unknown unit.
     """
     u = link.units
     for name, value, table in (("length", u.length, _LENGTH), ("mass", u.mass, _MASS), ("time", u.time, _TIME)):
         choose(value, table, f"{where}: units.{name}")
-    length, mass, time = _LENGTH[u.length], _MASS[u.mass], _TIME[u.time]
+    return _LENGTH[u.length], _MASS[u.mass], _TIME[u.time]
+
+
+def to_si(model: FEModel, link: LinkDescription, where: str) -> FEModel:
+    """Convert a model from the units of its description.
+
+    Displacements scale with the length unit, rotations do not; forces with mass · length / time². Modal coordinates of
+    a superelement count as displacements: their scale is free, and energies come out in joules.
+    """
+    length, mass, time = unit_factors(link, where)
     if length == mass == time == 1:
         return model
     scale = np.ones(model.mass.shape[0])
@@ -152,4 +168,5 @@ def to_si(model: FEModel, link: LinkDescription, where: str) -> FEModel:
         stiffness_parts={k: convert(p, mass / time**2) for k, p in model.stiffness_parts.items()},
         interface_nodes=tuple(replace(i, position=i.position * length) for i in model.interface_nodes),
         coupling=coupling,
+        stress=None if model.stress is None else model.stress.converted(length, mass / (length * time**2)),
     )

@@ -12,6 +12,7 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.frame import FrameElement, assemble_frame, local_axes
 from fe_import.link import Frame, Interface, LinkDescription, Material, Member
 from fe_import.model import Array, FEModel, IntArray, InterfaceNode
+from fe_import.section_forces import frame_sections
 from fe_import.sections import section_constants
 from fe_import.toml_file import choose
 
@@ -38,6 +39,7 @@ def frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
     positions = [np.asarray(p, dtype=float) for p in frame.nodes.values()]
     elements: list[FrameElement] = []
     lines: list[tuple[int, int]] = []
+    members: list[tuple[str, range]] = []
     if not frame.members:
         raise FEImportError(
             Cause.BAD_FIELD, "a frame needs at least one member", where=f"{where}: frame.members", remedy="add one"
@@ -45,15 +47,17 @@ def frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
     for k, member in enumerate(frame.members):
         place = f"{where}: frame.members[{k}]"
         chain = _subdivide(member, names, positions, place)
+        members.append((f"{member.start}-{member.end}", range(len(elements), len(elements) + len(chain) - 1)))
         for a, b in pairwise(chain):
             elements.append(_element(link, frame, member, (a, b), positions, where, place))
             lines.append((a, b))
     nodes = np.stack(positions)
     _check_connected(np.asarray(lines), names, where)
+    shear = frame.theory == "timoshenko"
     mass, stiffness, parts = assemble_frame(
         len(nodes),
         elements,
-        shear=frame.theory == "timoshenko",
+        shear=shear,
         mass=frame.mass,
         rotary_inertia=frame.rotary_inertia,
     )
@@ -71,6 +75,7 @@ def frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
         stiffness_parts=parts,
         kind="frame",
         source=where,
+        stress=frame_sections(elements, members, shear),
     )
 
 

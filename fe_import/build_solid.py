@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from fe_import.coupling import couple_interfaces
 from fe_import.errors import Cause, FEImportError
-from fe_import.interface import InterfaceFace, interface_face, rigid_coupling
+from fe_import.interface import InterfaceFace, interface_face
 from fe_import.link import LinkDescription, LinkFile, Solid
 from fe_import.mesh import read_mesh
 from fe_import.model import FEModel
 from fe_import.solid import SolidMaterial, assemble_solid
 from fe_import.solid_mesh import SolidMesh, surface_triangles
+from fe_import.solid_stress import solid_stress
 from fe_import.toml_file import choose
 
 
@@ -36,8 +38,12 @@ def solid_model(link: LinkFile) -> FEModel:
             remedy="give a path that starts at the folder of the link description",
         )
     mesh = read_mesh(path)
-    mass, stiffness = assemble_solid(mesh, _materials(description, solid, mesh, where))
-    coupled = rigid_coupling(mesh.nodes, _faces(description, mesh, where), where)
+    materials = _materials(description, solid, mesh, where)
+    mass, stiffness = assemble_solid(mesh, materials)
+    lame = np.empty((len(mesh.elements), 2))
+    for material in materials:
+        lame[slice(None) if material.elements is None else material.elements] = material.lame
+    coupled = couple_interfaces(mesh.nodes, _faces(description, mesh, where), where)
     return FEModel(
         name=description.name,
         nodes=coupled.nodes,
@@ -51,6 +57,7 @@ def solid_model(link: LinkFile) -> FEModel:
         triangles=surface_triangles(mesh),
         kind="solid",
         source=where,
+        stress=solid_stress(mesh, lame),
     )
 
 
@@ -69,6 +76,13 @@ def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str)
     result = []
     for k, region in enumerate(solid.regions):
         choose(region.material, link.materials, f"{where}: solid.regions[{k}].material")
+        if region.set in mesh.lost_sets:
+            raise FEImportError(
+                Cause.MESH,
+                f"set {region.set!r} of the mesh is not usable: {mesh.lost_sets[region.set]}",
+                where=f"{where}: solid.regions[{k}].set",
+                remedy="mend the set in the mesh file",
+            )
         choose(region.set, mesh.element_sets, f"{where}: solid.regions[{k}].set")
         m = link.materials[region.material]
         elements = mesh.element_sets[region.set]
@@ -90,7 +104,9 @@ def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[Interface
             )
         position = None if interface.position is None else np.asarray(interface.position, dtype=float)
         try:
-            result.append(interface_face(mesh, interface.name, interface.face, position))
+            weights = interface.weights or ("area" if interface.coupling == "averaged" else "uniform")
+            face = interface_face(mesh, interface.name, interface.face, position, interface.coupling, weights)
+            result.append(face)
         except FEImportError as problem:  # found in the mesh, to be mended in the description
             problem.where = f"{place}.face"
             problem.remedy = problem.remedy or "name a face of the mesh with 3 nodes or more, not on one line"

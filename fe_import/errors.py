@@ -52,6 +52,10 @@ class ReportedError(Exception):
         self.value, self.limit, self.remedy = value, limit, remedy
         super().__init__(message)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How another process gets it."""
+        return _rebuilt, (type(self), self.cause, self.message, self.where, self.value, self.limit, self.remedy)
+
     @property
     def exit_code(self) -> int:
         """Exit code of the command line: 2 bad input, 3 numerical failure, 4 no convergence where asked for."""
@@ -80,6 +84,12 @@ class ReportedError(Exception):
         }
 
 
+def _rebuilt(
+    kind: type[ReportedError], cause: enum.StrEnum, message: str, where: str, value: Any, limit: Any, remedy: str
+) -> ReportedError:
+    return kind(cause, message, where=where, value=value, limit=limit, remedy=remedy)
+
+
 class Cause(enum.StrEnum):
     """Why a finite-element model could not be read or reduced. A test provokes each."""
 
@@ -91,6 +101,7 @@ class Cause(enum.StrEnum):
     BAD_REFERENCE = "reference to something that does not exist"
     MESH = "faulty mesh"
     UNSUPPORTED_ELEMENT = "unsupported element type"
+    EXPORT = "faulty exported matrices"
     INTERFACE = "faulty interface"
     NOT_DEFINITE = "matrix not definite"
     GROUNDED = "stiffness resists rigid-body motion"

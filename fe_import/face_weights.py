@@ -67,7 +67,7 @@ def nodal_areas(nodes: Array, faces: IntArray) -> Array:
     density = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2) * weights
     diagonal = np.einsum("kq,fq->fk", values**2, density)
     shares = diagonal * (density.sum(axis=1) / diagonal.sum(axis=1))[:, None]
-    return np.bincount(faces.ravel(), shares.ravel(), minlength=len(nodes))
+    return np.asarray(np.bincount(faces.ravel(), shares.ravel(), minlength=len(nodes)), dtype=float)
 
 
 def area_weights(mesh: SolidMesh, chosen: IntArray, name: str) -> Array:

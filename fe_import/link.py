@@ -16,11 +16,13 @@ from typing import Any
 import msgspec
 
 from fe_import.errors import Cause, FEImportError
+from fe_import.link_reduction import Reduction, check_reduction_options
 from fe_import.sections import Section, check_section
 from fe_import.toml_file import choose, convert, read_toml
 
-MOST_MODES = 100_000  # no machine keeps more; a larger number is a slip
-COUPLINGS = ("rigid",)
+COUPLINGS = ("rigid", "averaged")
+WEIGHTS = ("area", "uniform")
+_METHOD = Reduction().method
 
 Vector = tuple[float, float, float]
 Inertia = tuple[float | Vector, float | Vector, float | Vector]  # [Ixx, Iyy, Izz] or a 3x3 matrix
@@ -121,43 +123,29 @@ class PointMass(_Record, frozen=True):
 class Interface(_Record, frozen=True):
     """A node where a joint sits: on a frame ``node``, or on a ``face`` (node or face set) of a solid.
 
-    ``coupling``: how the face follows the interface node (``rigid``). ``position`` defaults to the centre of the
-    face's nodes.
+    ``coupling``: the face follows the interface node (``rigid``), or the node moves as the face does on average
+    (``averaged``), with each node's share of the ``area`` as its weight (the default on a mesh) or ``uniform`` ones.
+    ``position`` defaults to the centre of the face.
     """
 
     name: str
     node: str = ""
     face: str = ""
     coupling: str = "rigid"
+    weights: str = ""
     position: Vector | None = None
 
 
-class Reduction(_Record, frozen=True):
-    """How the model is reduced.
+class Recovery(_Record, frozen=True):
+    """Where stress (solids) or section forces (frames) can be found from the modal coordinates later.
 
-    Attributes
-    ----------
-    method : str
-        ``craig-bampton``, or ``none`` (all nodal dofs kept: ERLS-FEM).
-    fixed_interface_modes : int, optional
-        Modes with clamped interfaces in the Craig-Bampton basis; 12, or all there are if fewer, unless given.
-    elastic_modes : int, optional
-        Elastic modes kept after orthonormalization; all unless given.
-    truncation : str
-        Which modes are kept when there are more: the lowest ``free-free`` ones, or the span of the lowest with the
-        inboard interface ``clamped`` (converges faster once a joint holds that interface).
-    inboard : str
-        The interface that ``truncation = "clamped"`` clamps; the first unless given.
-    form : str
-        ``orthonormal``, or ``physical`` (interface displacements kept as coordinates; for other programs).
+    ``nodes``: named nodes; ``sets``: node or element sets of the mesh, or members of a frame (``FROM-TO``); or
+    ``all``.
     """
 
-    method: str = "craig-bampton"
-    fixed_interface_modes: int | None = None
-    elastic_modes: int | None = None
-    truncation: str = "free-free"
-    inboard: str = ""
-    form: str = "orthonormal"
+    nodes: list[str] = []
+    sets: list[str] = []
+    all: bool = False
 
 
 class Rayleigh(_Record, frozen=True):
@@ -176,7 +164,10 @@ class Damping(_Record, frozen=True):
 
 
 class LinkDescription(_Record, frozen=True):
-    """A link: exactly one of ``frame``, ``solid`` and ``matrices``, its interfaces and its reduction."""
+    """A link: exactly one of ``frame``, ``solid`` and ``matrices``, its interfaces and its reduction.
+
+    Without a table ``recovery`` the modal file holds nothing for stresses.
+    """
 
     interfaces: list[Interface]
     name: str = ""
@@ -189,6 +180,7 @@ class LinkDescription(_Record, frozen=True):
     masses: list[PointMass] = []
     reduction: Reduction = Reduction()
     damping: Damping = Damping()
+    recovery: Recovery | None = None
 
     def files(self) -> list[str]:
         """The files that it names, as they stand there."""
@@ -237,6 +229,9 @@ def load_link(path: Path | str, overrides: dict[str, Any] | None = None) -> Link
     if overrides:
         table = data.setdefault("reduction", {})
         if isinstance(table, dict):
+            if overrides.get("method", table.get("method", _METHOD)) != table.get("method", _METHOD):
+                for field in set(table) - {"elastic_modes", "form"}:  # they belong to the file's method
+                    del table[field]
             table.update(overrides)
     description = convert(data, LinkDescription, str(path))
     if not description.name:
@@ -253,8 +248,6 @@ _CHOICES = {
     "frame.theory": ("timoshenko", "euler-bernoulli"),
     "frame.mass": ("consistent", "lumped"),
     "frame.torsion": ("saint-venant", "polar"),
-    "reduction.truncation": ("free-free", "clamped"),
-    "reduction.form": ("orthonormal", "physical"),
 }
 
 
@@ -297,41 +290,26 @@ def _check(link: LinkDescription, file: str) -> None:
             raise _fail(f"{file}: interfaces[{k}].name", "interface names must differ", i.name, "rename one")
         seen.add(i.name)
         choose(i.coupling, COUPLINGS, f"{file}: interfaces[{k}].coupling")
+        if i.weights:
+            choose(i.weights, WEIGHTS, f"{file}: interfaces[{k}].weights")
+            if i.coupling != "averaged":
+                message, remedy = "only averages have weights", 'remove it, or use coupling = "averaged"'
+                raise _fail(f"{file}: interfaces[{k}].weights", message, i.weights, remedy)
         if i.position is not None and not all(map(math.isfinite, i.position)):
             raise _fail(
                 f"{file}: interfaces[{k}].position", "a position must be finite", i.position, "give three numbers"
             )
-    r = link.reduction
-    for field in ("fixed_interface_modes", "elastic_modes"):
-        value = getattr(r, field)
-        if value is not None and value < 0:
-            raise _fail(f"{file}: reduction.{field}", "a mode count cannot be negative", value, "give 0 or more")
-        if value is not None and value > MOST_MODES:
-            raise _fail(f"{file}: reduction.{field}", "too many modes", value, "ask for fewer", MOST_MODES)
-    if r.form == "physical":
-        _check_physical(link, file)
-    if r.inboard and r.inboard not in seen:
-        raise FEImportError(
-            Cause.BAD_REFERENCE,
-            "no such interface",
-            where=f"{file}: reduction.inboard",
-            value=r.inboard,
-            remedy="interfaces: " + ", ".join(sorted(seen)),
-        )
+    check_reduction_options(link.reduction, seen, f"{file}: reduction")
+    if link.reduction.form == "physical" and link.damping != Damping():
+        message = "the physical form carries no modal damping"
+        raise _fail(f"{file}: damping", message, remedy="remove it, or use form = 'orthonormal'")
+    if link.reduction.form == "physical" and link.recovery is not None:
+        message = "the physical form carries no recovery data"
+        raise _fail(f"{file}: recovery", message, remedy="remove it, or use form = 'orthonormal'")
     for k, p in enumerate(link.masses):
         if not (math.isfinite(p.mass) and p.mass >= 0):
             raise _fail(f"{file}: masses[{k}].mass", "a mass cannot be negative", p.mass, "give 0 or more")
     _check_damping(link.damping, file)
-
-
-def _check_physical(link: LinkDescription, file: str) -> None:
-    """The physical form has no elastic modes that a count or a damping ratio could mean."""
-    remedy = "remove it, or use form = 'orthonormal'"
-    if link.reduction.elastic_modes is not None:
-        message = "the physical form keeps the interface displacements and all fixed-interface modes"
-        raise _fail(f"{file}: reduction.elastic_modes", message, link.reduction.elastic_modes, remedy)
-    if link.damping != Damping():
-        raise _fail(f"{file}: damping", "the physical form carries no modal damping", remedy=remedy)
 
 
 def _check_damping(d: Damping, file: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from fe_import.modal_identities import Check, check_matrices, check_orthonormal, check_rigid_motion
 from fe_import.modal_model import ModalModel
+from fe_import.recovery_file import check_recovery
 
 FORMS = ("orthonormal", "physical")
 COUPLINGS = ("node", "rigid", "averaged")
@@ -41,6 +42,8 @@ def validate(model: ModalModel, where: str, root: str = "") -> None:
         if model.form == "orthonormal":
             check_orthonormal(model, check)
         check_rigid_motion(model, check)
+        if model.recovery is not None:
+            check_recovery(model, model.recovery, check)
 
 
 def _check_shapes(model: ModalModel, check: Check) -> None:

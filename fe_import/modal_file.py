@@ -24,6 +24,7 @@ from fe_import.inertia import InertiaInvariants, MassProperties
 from fe_import.modal_check import validate
 from fe_import.modal_model import FixedInterfaceModes, HealthCheck, ModalModel
 from fe_import.model import IntArray, InterfaceNode
+from fe_import.recovery_file import read_recovery, write_recovery
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -111,6 +112,8 @@ def write_modal_group(group: h5py.Group, model: ModalModel) -> None:
     interfaces = group.create_group("interfaces")
     for number, interface in enumerate(model.interface_nodes, start=1):
         _write_interface(interfaces.create_group(f"{number:04d}"), interface)
+    if model.recovery is not None:
+        write_recovery(group.create_group("recovery"), model.recovery)
     provenance = group.create_group("provenance")
     for key, text in sorted(model.provenance.items()):
         write_attribute(provenance, key, text)
@@ -183,6 +186,7 @@ def read_modal_group(group: h5py.Group, where: str) -> ModalModel:
         lines=file.integers("pictures/lines", (None, 2), 0, n),
         triangles=file.integers("pictures/triangles", (None, 3), 0, n),
         provenance={key: provenance.attribute(key, str) for key in provenance.attribute_names()},
+        recovery=read_recovery(file.subgroup("recovery"), n, m) if "recovery" in file.names_inside() else None,
     )
     validate(model, where, (group.name or "").rstrip("/"))
     return model

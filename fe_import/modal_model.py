@@ -8,6 +8,7 @@ import numpy as np
 
 from fe_import.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.model import Array, IntArray, InterfaceNode
+from fe_import.recovery_maps import RecoveryMaps
 
 NO_LIMIT = float(np.finfo(np.float64).max)  # a figure that is reported, not judged; finite, as all in a file
 
@@ -84,6 +85,8 @@ class ModalModel:
         For pictures.
     provenance : dict of str
         Source file, SHA-256, tool versions, method, options.
+    recovery : RecoveryMaps or None
+        Stress or section forces, when the link description asks for them.
     """
 
     name: str
@@ -106,6 +109,7 @@ class ModalModel:
     lines: IntArray
     triangles: IntArray
     provenance: dict[str, str] = field(default_factory=dict)
+    recovery: RecoveryMaps | None = None
 
     @property
     def modes(self) -> int:

@@ -6,7 +6,9 @@ Degrees of freedom ("dofs") are numbered over *all* nodal components first (``ma
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,6 +45,35 @@ class InterfaceNode:
     coupling: str
 
 
+class StressSource(Protocol):
+    """What knows the elements of a model: stresses or section forces at its sites, linear in the displacements.
+
+    ``quantity`` is ``"stress"`` or ``"section forces"``; ``site_nodes`` (s,) the node of each site; ``sets`` the
+    sites of each named set.
+    """
+
+    @property
+    def quantity(self) -> str: ...
+
+    @property
+    def site_nodes(self) -> IntArray: ...
+
+    @property
+    def sets(self) -> Mapping[str, IntArray]: ...
+
+    def site_elements(self, sites: IntArray) -> IntArray:
+        """(p,) element of each site, -1 where it belongs to none."""
+
+    def site_axes(self, sites: IntArray) -> Array:
+        """(p, 3, 3) axes (rows) in which the six components are counted, in the mesh frame."""
+
+    def evaluate(self, fields: Array, dof_map: IntArray, sites: IntArray) -> Array:
+        """(p, 6, m) components at the sites of displacement fields (d, m)."""
+
+    def converted(self, length: float, stress: float) -> StressSource:
+        """The same in SI, from units of ``length`` metres and ``stress`` pascals."""
+
+
 @dataclass(frozen=True)
 class FEModel:
     """Mass and stiffness matrices of a free link with what is needed to interpret their rows.
@@ -74,6 +105,8 @@ class FEModel:
         ``"frame"``, ``"solid"`` or ``"matrices"``.
     source : str
         File that the model came from.
+    stress : StressSource or None
+        None for bare matrices, which have no elements.
     """
 
     name: str
@@ -90,6 +123,7 @@ class FEModel:
     stiffness_parts: dict[str, sp.csc_array] = field(default_factory=dict)
     kind: str = "frame"
     source: str = ""
+    stress: StressSource | None = None
 
     @property
     def interface_dofs(self) -> IntArray:

@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.inertia import mass_properties
-from fe_import.link import Damping, Reduction
-from fe_import.model import Array, FEModel, IntArray
+from fe_import.link import Damping
+from fe_import.link_reduction import Reduction
+from fe_import.model import Array, FEModel
 from fe_import.reduction import Basis
+from fe_import.reduction.rigid_modes import MASSLESS, rigid_modes
 from fe_import.sparse import dense_modes, polishing
-
-_MASSLESS = 1e-12  # of the largest; the thinnest wire has 1e-8, rounding 1e-15
+from fe_import.static_span import completed, static_span
 
 
 @dataclass(frozen=True)
 class OrthonormalModes:
-    """Coordinates of the modes in the basis (k, m), circular frequencies (m,) [rad/s], rigid motions (m, 6)."""
+    """Coordinates of the modes in the basis (k, m), circular frequencies (m,) [rad/s], rigid motions (m, 6).
+
+    ``flexibility`` (b, b), with static correction: of the whole basis between the interfaces, inertia-relieved.
+    """
 
     coordinates: Array
     omega: Array
     rigid: Array
+    flexibility: Array | None = None
 
 
 def reduced_matrices(model: FEModel, basis: Basis) -> tuple[Array, Array]:
@@ -34,7 +38,7 @@ def reduced_matrices(model: FEModel, basis: Basis) -> tuple[Array, Array]:
 
 
 def orthonormal_modes(
-    mass: Array, stiffness: Array, basis: Basis, options: Reduction, inboard_columns: IntArray | None, where: str
+    mass: Array, stiffness: Array, basis: Basis, options: Reduction, interfaces: Array, inboard: int, where: str
 ) -> OrthonormalModes:
     """Rigid-body modes from geometry, elastic ones from the eigenproblem on their mass-orthogonal complement.
 
@@ -46,8 +50,10 @@ def orthonormal_modes(
     mass, stiffness : (k, k) arrays
     basis : Basis
     options : Reduction
-    inboard_columns : (6,) int array or None
-        Columns of the inboard interface, clamped to choose the elastic modes; None keeps the lowest free-free ones.
+    interfaces : (6 n_interfaces, k) array
+        Interface displacements and rotations per unit coordinate.
+    inboard : int
+        Number of the interface that ``options.truncation = "clamped"`` clamps.
     where : str
 
     Raises
@@ -57,16 +63,17 @@ def orthonormal_modes(
     """
     # columns of like size: without, rounding in the large ones drowns the lowest modes of a slender link
     inertia, resistance = np.diag(mass), np.diag(stiffness).clip(min=0)
-    massive = inertia > _MASSLESS * inertia.max()
+    massive = inertia > MASSLESS * inertia.max()
     squared = resistance[massive] / inertia[massive]  # of the frequencies of the columns alone; 0 for rigid motions
     typical = np.median(squared[squared > 0]) if squared.any() else 1.0
     scale = 1 / np.sqrt(inertia + resistance / typical)
     mass, stiffness = mass * np.outer(scale, scale), stiffness * np.outer(scale, scale)
-    rigid, rigid_coordinates = _rigid_modes(mass, basis.rigid / scale[:, None], where)
+    interfaces = interfaces * scale
+    rigid, rigid_coordinates = rigid_modes(mass, basis.rigid / scale[:, None], where)
 
-    complement = la.qr(mass @ rigid)[0][:, 6:]
-    if inboard_columns is not None and options.elastic_modes is not None:
-        complement = _clamped_span(mass, stiffness, rigid, inboard_columns, options.elastic_modes)
+    complement = whole = la.qr(mass @ rigid)[0][:, 6:]
+    if options.elastic_modes is not None and (options.static_correction or options.truncation == "clamped"):
+        complement = _kept_span(mass, stiffness, complement, rigid, interfaces, inboard, options, where)
     omega, elastic = dense_modes(
         complement.T @ stiffness @ complement, complement.T @ mass @ complement, None, "free link"
     )
@@ -78,12 +85,13 @@ def orthonormal_modes(
             where=f"{where}: reduction.elastic_modes",
             value=wanted,
             limit=len(omega),
-            remedy="ask for fewer, or raise fixed_interface_modes",
+            remedy="ask for fewer, or keep more modes in the basis (fixed_interface_modes, free_modes)",
         )
+    flexibility = _flexibility(stiffness, interfaces, whole) if options.static_correction else None
     coordinates = scale[:, None] * np.hstack([rigid, complement @ elastic[:, :wanted]])
     motions = np.zeros((6 + wanted, 6))
     motions[:6] = rigid_coordinates
-    return OrthonormalModes(coordinates, np.concatenate([np.zeros(6), omega[:wanted]]), motions)
+    return OrthonormalModes(coordinates, np.concatenate([np.zeros(6), omega[:wanted]]), motions, flexibility)
 
 
 def mode_shapes(model: FEModel, basis: Basis, modes: OrthonormalModes) -> tuple[Array, OrthonormalModes]:
@@ -104,39 +112,54 @@ def mode_shapes(model: FEModel, basis: Basis, modes: OrthonormalModes) -> tuple[
     signs = np.sign(shapes[first, np.arange(count)])
     signs[:6] = 1.0
     omega = np.concatenate([np.zeros(6), omega])
-    return shapes * signs, OrthonormalModes(modes.coordinates @ change * signs, omega, modes.rigid)
+    return shapes * signs, replace(modes, coordinates=modes.coordinates @ change * signs, omega=omega)
 
 
-def _rigid_modes(mass: Array, motions: Array, where: str) -> tuple[Array, Array]:
-    """Mass-orthonormal rigid-body modes (k, 6), and (6, 6) coordinates of the unit ``motions`` in them."""
-    centre = mass_properties(motions.T @ mass @ motions).centre_of_mass
-    shift = np.eye(6)  # to rotations about the centre of mass, so that a distant origin costs no digits
-    shift[:3, 3:] = -np.stack([np.cross(axis, centre) for axis in np.eye(3)], axis=1)
-    central = motions @ shift
-    rigid_mass = central.T @ mass @ central
-    size = np.sqrt(np.diag(rigid_mass))
-    inertia = np.linalg.eigvalsh(rigid_mass[3:, 3:])
-    if not size[:3].all() or inertia[0] <= _MASSLESS * inertia[-1]:
+def _flexibility(stiffness: Array, interfaces: Array, complement: Array) -> Array:
+    """(b, b) displacements of the interfaces under unit loads there, balanced by inertia."""
+    moved = interfaces @ complement
+    return np.asarray(moved @ la.solve(complement.T @ stiffness @ complement, moved.T, assume_a="pos"))
+
+
+def _kept_span(
+    mass: Array, stiffness: Array, complement: Array, rigid: Array, interfaces: Array, inboard: int, options: Reduction,
+    where: str,
+) -> Array:
+    """What the elastic modes to keep are made of: columns within the complement of the rigid-body motions."""
+    count = options.elastic_modes or 0
+    k, m = complement.T @ stiffness @ complement, complement.T @ mass @ complement
+    if options.truncation == "clamped":
+        held = interfaces[6 * inboard : 6 * inboard + 6]
+        lowest = complement.T @ _clamped_modes(mass, stiffness, rigid, held, count)
+    else:
+        lowest = dense_modes(k, m, count, "free link")[1]
+    if not options.static_correction:
+        return np.asarray(complement @ la.qr(lowest, mode="economic")[0])
+    static = static_span(k, interfaces @ complement, interfaces @ rigid)
+    if static.shape[1] > count:
         raise FEImportError(
-            Cause.NOT_DEFINITE,
-            "the link has no mass or no inertia about some axis",
-            where=where,
-            remedy="give it density, rotary inertia or point masses off one line",
+            Cause.MODE_COUNT,
+            "static correction takes more elastic modes",
+            where=f"{where}: reduction.elastic_modes",
+            value=count,
+            limit=static.shape[1],
+            remedy="ask for at least as many, six per interface, or remove static_correction",
         )
-    factor = la.cholesky(rigid_mass, lower=True)
-    back = 2 * np.eye(6) - shift  # its inverse
-    return la.solve_triangular(factor, central.T, lower=True).T, factor.T @ back
+    return np.asarray(complement @ completed(static, lowest, k, count))
 
 
-def _clamped_span(mass: Array, stiffness: Array, rigid: Array, clamped: IntArray, count: int) -> Array:
-    """Mass-orthogonal complement of the rigid motions in the span of them and of the lowest clamped modes."""
-    free = np.setdiff1d(np.arange(len(mass)), clamped)
-    ix = np.ix_(free, free)
-    _, modes = dense_modes(stiffness[ix], mass[ix], count, "link with its inboard interface clamped")
-    span = np.zeros((len(mass), modes.shape[1]))
-    span[free] = modes
-    span -= rigid @ (rigid.T @ mass @ span)
-    return np.asarray(la.qr(span, mode="economic")[0])
+def _clamped_modes(mass: Array, stiffness: Array, rigid: Array, held: Array, count: int) -> Array:
+    """Lowest modes with some displacements (c, k) held, less their rigid-body motion."""
+    moving = held.any(axis=0)
+    if moving.sum() == len(held):  # columns of the basis: leave them out
+        free = np.eye(len(mass))[:, ~moving]
+    else:
+        free = la.qr((held / np.abs(held).max(axis=1, keepdims=True)).T)[0][:, len(held) :]
+    _, modes = dense_modes(
+        free.T @ stiffness @ free, free.T @ mass @ free, count, "link with its inboard interface clamped"
+    )
+    span = free @ modes
+    return np.asarray(span - rigid @ (rigid.T @ mass @ span))
 
 
 def mode_kinds(model: FEModel, shapes: Array, basis: Basis, coordinates: Array, stiffness: Array) -> tuple[str, ...]:

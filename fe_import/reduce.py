@@ -12,15 +12,19 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from fe_import.build import build_model
-from fe_import.errors import Cause, FEImportError
+from fe_import.build import build_model, unit_factors
+from fe_import.errors import FEImportError
 from fe_import.health import check_basis, check_model, check_reduction, mode_residuals
 from fe_import.inertia import inertia_invariants, mass_properties
 from fe_import.link import LinkFile, load_link
 from fe_import.modal_file import SCHEMA_VERSION, ModalModel, read_modal_file, write_modal_file
+from fe_import.modal_model import HealthCheck
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
+from fe_import.plausibility import plausible_link, plausible_materials
+from fe_import.recovery import recovery_maps
 from fe_import.reduction import REDUCTIONS, Basis
+from fe_import.static_check import check_static
 from fe_import.toml_file import choose
 
 
@@ -57,17 +61,22 @@ def reduce_link(link: LinkFile | Path | str) -> ModalModel:
 
 def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     """Reduce a model as the description of its link says. See `reduce_link`."""
-    where, options = str(link.path), link.description.reduction
+    where, options, wanted = str(link.path), link.description.reduction, link.description.recovery
     choose(options.method, REDUCTIONS, f"{where}: reduction.method")
-    checks = check_model(model, where)
+    units = unit_factors(link.description, where)
+    checks = plausible_materials(link.description.materials, *units, where) + check_model(model, where)
     basis = REDUCTIONS[options.method](model, options, where)
     mass, stiffness = reduced_matrices(model, basis)
-    modes = orthonormal_modes(mass, stiffness, basis, options, _inboard_columns(model, basis, link), where)
+    interfaces, inboard = basis.vectors[model.interface_dofs], _inboard(model, options.inboard)
+    modes = orthonormal_modes(mass, stiffness, basis, options, interfaces, inboard, where)
     checks += check_basis(model, basis, mass, stiffness, modes.omega, where)
     shapes, modes = mode_shapes(model, basis, modes)
     invariants = inertia_invariants(model.mass, shapes, model.dof_map, modes.rigid)
     reduced_stiffness = shapes.T @ (model.stiffness @ shapes)
+    reference = modes.flexibility if basis.flexibility is None else basis.flexibility
+    checks += check_static(reference, shapes[model.interface_dofs], modes.omega)
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, where)
+    checks += _unit_checks(model, modes.omega, where)
     residuals = mode_residuals(model, shapes, modes.omega)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
     if options.form == "physical":
@@ -101,8 +110,16 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
         health=checks,
         lines=model.lines,
         triangles=model.triangles,
-        provenance=provenance(link, model),
+        provenance=provenance(link, model, basis.selection),
+        recovery=None if wanted is None else recovery_maps(model, shapes, wanted, where),
     )
+
+
+def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck, ...]:
+    rigid = model.rigid_body_modes()
+    mass = mass_properties(rigid.T @ (model.mass @ rigid)).mass
+    first = float(omega[6] / (2 * np.pi)) if len(omega) > 6 else None
+    return plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
 
 
 def _nodal(shapes: Array, rows: IntArray) -> Array:
@@ -110,21 +127,9 @@ def _nodal(shapes: Array, rows: IntArray) -> Array:
     return np.ascontiguousarray(shapes[rows.ravel()].reshape(len(rows), 3, shapes.shape[1]))
 
 
-def _inboard_columns(model: FEModel, basis: Basis, link: LinkFile) -> IntArray | None:
-    options = link.description.reduction
-    if options.truncation != "clamped":
-        return None
-    if basis.interface_columns == 0:
-        raise FEImportError(
-            Cause.BAD_FIELD,
-            "truncation = 'clamped' needs a method that keeps the interface displacements",
-            where=f"{link.path}: reduction.truncation",
-            value=options.method,
-            remedy="use method = 'craig-bampton'",
-        )
-    names = [i.name for i in model.interface_nodes]
-    first = names.index(options.inboard) if options.inboard else 0
-    return 6 * first + np.arange(6)
+def _inboard(model: FEModel, name: str) -> int:
+    """Number of the inboard interface; the first unless named."""
+    return [i.name for i in model.interface_nodes].index(name) if name else 0
 
 
 def _physical_table(basis: Basis) -> tuple[Array, tuple[str, ...]]:
@@ -135,8 +140,8 @@ def _physical_table(basis: Basis) -> tuple[Array, tuple[str, ...]]:
     return np.concatenate([np.zeros(count), fixed]), (kind,) * count + ("fixed-interface",) * len(fixed)
 
 
-def provenance(link: LinkFile, model: FEModel) -> dict[str, str]:
-    """Where a modal file came from: source, content hash, versions, method, options."""
+def provenance(link: LinkFile, model: FEModel, selection: dict[str, Any] | None = None) -> dict[str, str]:
+    """Where a modal file came from: source, content hash, versions, method, options, how modes were selected."""
     packages = ("erls", "numpy", "scipy", "scikit-fem", "meshio")
     options = msgspec.to_builtins(link.description.reduction)
     return {
@@ -147,6 +152,7 @@ def provenance(link: LinkFile, model: FEModel) -> dict[str, str]:
         "kind": model.kind,
         "method": options["method"],
         "options": json.dumps(options, sort_keys=True),
+        **({"selection": json.dumps(selection, sort_keys=True)} if selection else {}),
         "versions": ", ".join(f"{p} {_version(p)}" for p in packages),
     }
 
@@ -205,6 +211,13 @@ def reduction_summary(model: ModalModel) -> dict[str, Any]:
         "mass": properties.mass,
         "centre_of_mass": properties.centre_of_mass.tolist(),
         "inertia": properties.inertia.tolist(),
+        "recovery": None
+        if model.recovery is None
+        else {
+            "quantity": model.recovery.quantity,
+            "places": len(model.recovery.nodes),
+            "megabytes": model.recovery.megabytes,
+        },
         "health": {
             "ok": all(c.ok for c in model.health),
             "checks": [

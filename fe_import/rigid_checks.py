@@ -12,6 +12,8 @@ import scipy.linalg as la
 from fe_import.model import Array, FEModel
 from fe_import.reduction import Basis
 
+_STRAINED = 1e-13  # strain energy per that of its terms; rounding leaves 1e-16
+
 
 def rigid_motion_by_stiffness(model: FEModel, basis: Basis, stiffness: Array) -> float:
     """Departure of the motions that follow one interface without strain from those of geometry.
@@ -36,8 +38,7 @@ def rigid_motion_by_stiffness(model: FEModel, basis: Basis, stiffness: Array) ->
     geometry = model.rigid_body_modes()
     held = basis.vectors[rows]
     count = len(stiffness)
-    diagonal = np.diag(stiffness).clip(min=0)
-    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, diagonal.max()))
+    scale = _stiffness_scale(model, basis, stiffness, held)
     moved = held * scale
     size = np.abs(moved).max(axis=1)
     if not size.all():
@@ -53,6 +54,18 @@ def rigid_motion_by_stiffness(model: FEModel, basis: Basis, stiffness: Array) ->
     except (la.LinAlgError, la.LinAlgWarning):
         return float("inf")
     return float((np.abs(basis.vectors @ found - geometry).max(axis=0) / np.abs(geometry).max(axis=0)).max())
+
+
+def _stiffness_scale(model: FEModel, basis: Basis, stiffness: Array, held: Array) -> Array:
+    """(k,) scale to unit stiffness; to like displacements of the interface for columns that are rigid-body motions."""
+    diagonal, size = np.diag(stiffness), np.abs(basis.vectors)
+    strained = diagonal > _STRAINED * np.einsum("dk,dk->k", size, abs(model.stiffness) @ size)
+    scale = np.ones(len(stiffness))
+    scale[strained] = 1 / np.sqrt(diagonal[strained])
+    reach = np.abs(held).max(axis=0)
+    scale[~strained] = (reach * scale)[strained].max(initial=0.0) or 1.0
+    scale[~strained] /= np.where(reach[~strained] > 0, reach[~strained], 1.0)
+    return scale
 
 
 def rigid_motion_as_eigenmodes(mass: Array, stiffness: Array, rigid: Array, first: float) -> tuple[float, float]:

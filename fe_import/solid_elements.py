@@ -93,6 +93,14 @@ class SolidElement:
             rows.append([*face, *(at[part] for part in (*edges, frozenset(face)) if part in at)])
         return np.array(rows, dtype=np.int64)
 
+    @cached_property
+    def mirrored_order(self) -> IntArray:
+        """(k,) nodes of an element that another program numbers inside out (MED), in our order."""
+        corners = [0, 2, 1, 3] if self.corners == 4 else [0, 3, 2, 1, 4, 7, 6, 5]
+        at = {frozenset(between): self.corners + i for i, between in enumerate(self.midpoints)}
+        middle = [at[frozenset(corners[c] for c in between)] for between in self.midpoints]
+        return np.array([*corners, *middle], dtype=np.int64)
+
     def shape_gradients(self, points: Array) -> Array:
         """Derivatives of the shape functions with respect to the reference coordinates.
 

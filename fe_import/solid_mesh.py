@@ -28,6 +28,8 @@ class SolidMesh:
         Name -> nodes, rising.
     source : str
         File that the mesh came from.
+    lost_sets : dict
+        Name -> why a set of the file is not among these.
     """
 
     nodes: Array
@@ -36,6 +38,7 @@ class SolidMesh:
     element_sets: dict[str, IntArray] = field(default_factory=dict)
     node_sets: dict[str, IntArray] = field(default_factory=dict)
     source: str = ""
+    lost_sets: dict[str, str] = field(default_factory=dict)
 
     @property
     def element(self) -> SolidElement:
@@ -66,7 +69,7 @@ def boundary_faces(mesh: SolidMesh) -> IntArray:
 
 
 # a face of n nodes -> triangles over its nodes (corners, then mid-edge nodes, then centre), same sense
-_TRIANGLES = {
+FACE_TRIANGLES = {
     3: ((0, 1, 2),),
     4: ((0, 1, 2), (0, 2, 3)),
     6: ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)),
@@ -84,5 +87,5 @@ def surface_triangles(mesh: SolidMesh) -> IntArray:
         Anticlockwise seen from outside.
     """
     boundary = boundary_faces(mesh)
-    corners = np.array(_TRIANGLES[boundary.shape[1]])
+    corners = np.array(FACE_TRIANGLES[boundary.shape[1]])
     return np.asarray(boundary[:, corners].reshape(-1, 3), dtype=np.int64)

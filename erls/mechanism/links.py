@@ -80,6 +80,7 @@ def truncated(model: ModalModel, elastic_modes: int) -> ModalModel:
         kinds=model.kinds[: 6 + elastic_modes],
         damping_ratios=model.damping_ratios[keep],
         residuals=model.residuals[keep],
+        recovery=None if model.recovery is None else model.recovery.truncated(keep),
     )
 
 

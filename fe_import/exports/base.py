@@ -40,7 +40,7 @@ class Export:
     dof_map : (n, 6) int array
         Row of each nodal component (ux, uy, uz, rx, ry, rz), -1 where the node lacks it.
     modal_rows : (k,) int array
-        Rows that are no nodal component but a modal coordinate of a superelement.
+        Rows that are no nodal component but a modal coordinate of a superelement, of any scale.
     orientations : (n, 3, 3) array or None
         Axes (columns) of the frame in which a node's displacements and rotations are counted; None when all are the
         mesh frame.

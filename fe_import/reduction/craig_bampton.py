@@ -1,18 +1,26 @@
-"""Craig-Bampton reduction: constraint modes and fixed-interface modes (Craig & Bampton, AIAA J. 6, 1968)."""
+"""Craig-Bampton reduction: constraint modes and fixed-interface modes (Craig & Bampton, AIAA J. 6, 1968).
+
+Keeps interface displacements as they are and is statically exact for loads at the interfaces, whatever the number of
+modes. With static correction the response to the inertia of rigid-body accelerations is added.
+"""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-import scipy.sparse as sp
 
-from fe_import.errors import Cause, FEImportError
-from fe_import.link import Reduction
-from fe_import.modal_file import FixedInterfaceModes
+from fe_import.link_reduction import Reduction
 from fe_import.model import Array, FEModel
-from fe_import.reduction.base import Basis
-from fe_import.sparse import factorize, lowest_modes
+from fe_import.reduction.base import Basis, expanded, refuse_fields
+from fe_import.reduction.effective_mass import carried_shares, fixed_interface_table
+from fe_import.reduction.fixed_interface import Partition, constraint_modes, partition
+from fe_import.reduction.ranking import best_ranked
+from fe_import.reduction.residual import residual_vectors
+from fe_import.reduction.selection import below_frequency, carrying_mass, lowest_by_count
+from fe_import.sparse import lowest_modes
 
-DEFAULT_MODES = 12
+_REFUSED = {"free_modes": "the modes of this method have clamped interfaces; use fixed_interface_modes"}
 
 
 def craig_bampton(model: FEModel, options: Reduction, where: str) -> Basis:
@@ -24,70 +32,39 @@ def craig_bampton(model: FEModel, options: Reduction, where: str) -> Basis:
     FEImportError
         The inner stiffness is singular, or more fixed-interface modes are asked for than there are.
     """
-    mass, stiffness = model.reduced_matrices()
-    place = np.full(model.mass.shape[0], -1)
-    place[model.independent] = np.arange(len(model.independent))
-    boundary = place[model.interface_dofs]
-    inner = np.setdiff1d(np.arange(len(model.independent)), boundary)
-    count = len(boundary)
-    k_ii, m_ii = stiffness[inner][:, inner].tocsc(), mass[inner][:, inner].tocsc()
-
-    constraint = np.zeros((len(model.independent), count))
-    constraint[boundary, np.arange(count)] = 1.0
-    rigid_fields = model.rigid_body_modes()
-    rigid = rigid_fields[model.interface_dofs]
-    if len(inner):
-        constraint[inner] = _constraint_modes(
-            k_ii, stiffness[inner][:, boundary].toarray(), rigid, rigid_fields[model.independent[inner]]
-        )
-
-    asked = options.fixed_interface_modes
-    wanted = min(DEFAULT_MODES, len(inner)) if asked is None else asked
-    omega, modes = (
-        lowest_modes(k_ii, m_ii, min(wanted, len(inner)), "link with clamped interfaces")
-        if len(inner)
-        else (np.zeros(0), np.zeros((0, 0)))
-    )
-    if asked is not None and len(omega) < asked:
-        raise FEImportError(
-            Cause.MODE_COUNT,
-            "the model has fewer fixed-interface modes",
-            where=f"{where}: reduction.fixed_interface_modes",
-            value=asked,
-            limit=len(omega),
-            remedy="ask for fewer, refine the mesh, or give the mass matrix rotary inertia",
-        )
-    fixed = np.zeros((len(model.independent), len(omega)))
-    fixed[inner] = modes
-    vectors = np.hstack([constraint, fixed])
-    full = vectors if model.coupling is None else np.asarray(model.coupling @ vectors)
-    coordinates = np.zeros((vectors.shape[1], 6))
-    coordinates[:count] = rigid
-    return Basis(full, count, coordinates, _effective_mass(model, full[:, count:], omega, rigid_fields))
+    refuse_fields(options, where, _REFUSED)
+    parts = partition(model)
+    constraint = constraint_modes(parts)
+    omega, modes, selection = _fixed_interface_modes(model, parts, constraint, options, where)
+    columns = [constraint, parts.clamped_field(modes)]
+    if options.static_correction and len(parts.inner):
+        loads = parts.inertia
+        columns += [
+            parts.clamped_field(residual_vectors(parts.static(loads), loads, omega, modes, parts.inner_stiffness))
+        ]
+    vectors = np.hstack(columns)
+    count = len(parts.boundary)
+    rigid = np.zeros((vectors.shape[1], 6))
+    rigid[:count] = model.rigid_body_modes()[model.interface_dofs]
+    return Basis(expanded(model, vectors), count, rigid, fixed_interface_table(parts, omega, modes), selection)
 
 
-def _constraint_modes(k_ii: sp.csc_array, k_ib: Array, rigid: Array, rigid_inner: Array) -> Array:
-    """Ψ = -K_ii⁻¹ K_ib, with one step of iterative refinement.
+def _fixed_interface_modes(
+    model: FEModel, parts: Partition, constraint: Array, options: Reduction, where: str
+) -> tuple[Array, Array, dict[str, Any]]:
+    """Circular frequencies, inner shapes (i, m) and how they were chosen."""
+    available = len(parts.inner)
 
-    Exact constraint modes reproduce rigid-body motions, Ψ R_b = R_i. Rounding breaks that by its product with the
-    condition of K_ii (1e-9 on a slender solid); the smallest change of Ψ that restores it is added.
-    """
-    solve = factorize(k_ii, "stiffness of the inner nodes")
-    psi = -solve(k_ib)
-    psi -= solve(k_ii @ psi + k_ib)
-    return np.asarray(psi + (rigid_inner - psi @ rigid) @ np.linalg.pinv(rigid))
+    def lowest(count: int) -> tuple[Array, Array]:
+        if available == 0:
+            return np.zeros(0), np.zeros((0, 0))
+        return lowest_modes(parts.inner_stiffness, parts.inner_mass, count, "link with clamped interfaces")
 
-
-def _effective_mass(model: FEModel, modes: Array, omega: Array, rigid_fields: Array) -> FixedInterfaceModes:
-    """Share of mass, and of inertia about the centre of mass, that each fixed-interface mode carries."""
-    weighted = model.mass @ rigid_fields
-    rigid_mass = rigid_fields.T @ weighted
-    mass = rigid_mass[0, 0]
-    centre = np.array([rigid_mass[5, 1], rigid_mass[3, 2], rigid_mass[4, 0]]) / mass
-    shift = np.eye(6)  # rotations about the centre of mass: ω × (x - c)
-    for axis in range(3):
-        shift[:3, 3 + axis] = -np.cross(np.eye(3)[axis], centre)
-    participation = modes.T @ (weighted @ shift)
-    total = np.diag(shift.T @ rigid_mass @ shift)
-    share = np.divide(participation**2, total, out=np.zeros_like(participation), where=total > 1e-12 * total.max())
-    return FixedInterfaceModes(omega / (2 * np.pi), share)
+    if options.selection == "frequency":
+        return below_frequency(lowest, options, available, where)
+    if options.selection == "effective-mass":
+        return carrying_mass(lowest, carried_shares(parts), options, available, where)
+    if options.selection == "ranking" and options.ranking is not None:
+        return best_ranked(model, parts, constraint, lowest, options.ranking, where)
+    field = f"{where}: reduction.fixed_interface_modes"
+    return *lowest_by_count(lowest, options.fixed_interface_modes, available, field), {}

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-import scipy.sparse as sp
+import numpy as np
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import Reduction
+from fe_import.link_reduction import Reduction
 from fe_import.model import FEModel
-from fe_import.reduction.base import Basis, no_fixed_interface_modes
+from fe_import.reduction.base import Basis, expanded, no_fixed_interface_modes, refuse_fields
 
 LARGEST = 2000  # independent dofs; a dense eigenproblem of this size takes seconds, its invariants 0.4 GB
+
+_ALL = "a model that is not reduced has all its modes; remove the field, or use method = 'craig-bampton'"
+_REFUSED = {
+    "fixed_interface_modes": "a model that is not reduced has no fixed-interface modes; remove the field, or use "
+    "method = 'craig-bampton'",
+    "free_modes": "a model that is not reduced has all free modes; remove the field, or use method = 'craig-chang'",
+}
 
 
 def no_reduction(model: FEModel, options: Reduction, where: str) -> Basis:
@@ -20,15 +27,8 @@ def no_reduction(model: FEModel, options: Reduction, where: str) -> Basis:
     FEImportError
         The model has more than `LARGEST` dofs, or fixed-interface modes are asked for.
     """
+    refuse_fields(options, where, _REFUSED, dict.fromkeys(("frequency", "effective-mass", "ranking"), _ALL))
     count = len(model.independent)
-    if options.fixed_interface_modes:
-        raise FEImportError(
-            Cause.BAD_FIELD,
-            "a model that is not reduced has no fixed-interface modes",
-            where=f"{where}: reduction.fixed_interface_modes",
-            value=options.fixed_interface_modes,
-            remedy="remove the field, or use method = 'craig-bampton'",
-        )
     if count > LARGEST:
         raise FEImportError(
             Cause.MODE_COUNT,
@@ -38,8 +38,5 @@ def no_reduction(model: FEModel, options: Reduction, where: str) -> Basis:
             limit=LARGEST,
             remedy="use method = 'craig-bampton'",
         )
-    size = model.mass.shape[0]
-    vectors = sp.eye_array(size).toarray() if model.coupling is None else model.coupling.toarray()
-    return Basis(vectors, 0, model.rigid_body_modes()[model.independent], no_fixed_interface_modes())
-
-
+    rigid = model.rigid_body_modes()[model.independent]
+    return Basis(expanded(model, np.eye(count)), 0, rigid, no_fixed_interface_modes())

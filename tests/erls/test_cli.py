@@ -223,7 +223,7 @@ def test_info(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert modal["file"] == "modal"
     assert set(modal) >= REDUCE - {"wall_s", "peak_memory_mb", "output"}
     assert len(modal["modes"]) == 24
-    assert set(modal["modes"][0]) == {"frequency_hz", "kind", "damping_ratio"}
+    assert set(modal["modes"][0]) == {"frequency_hz", "kind", "damping_ratio", "residual"}
     assert modal["full_model"]["mass"] == pytest.approx(modal["mass"])
     assert modal["provenance"]["source"] == "link.toml"
     assert "Health: ok" in run(capsys, "info", "b.dat")[0]
@@ -300,7 +300,7 @@ def test_progress_goes_to_stderr(
 ) -> None:
     """Plain lines every few seconds where stderr is no terminal."""
     clock = iter(range(0, 100000, 6))
-    monkeypatch.setattr("erls.cli.time.monotonic", lambda: next(clock))
+    monkeypatch.setattr("erls.terminal.time.monotonic", lambda: next(clock))
     _, err = run_json(capsys, "simulate", "scene.toml")
     shares = [float(s) for s in re.findall(r"^simulating: (\d+) %$", err, re.MULTILINE)]
     assert shares == sorted(shares)

@@ -23,13 +23,13 @@ START = """
 import sys
 import erls.build
 import erls.simulation
-from erls.cli import _progress, main
+from erls.cli import Progress, main
 
 erls.simulation.CHECKPOINT_S = {checkpoint}
-advance = _progress.advance
+advance = Progress.advance
 
 def tell(self, done, total):
-    _progress.advance = advance
+    Progress.advance = advance
     print("stepping", file=sys.stderr, flush=True)
     advance(self, done, total)
 
@@ -39,7 +39,7 @@ def tell_reduction(*arguments):
     print("reducing", file=sys.stderr, flush=True)
     return reduce_cached(*arguments)
 
-_progress.advance, erls.build.reduce_cached = tell, tell_reduction
+Progress.advance, erls.build.reduce_cached = tell, tell_reduction
 sys.exit(main())
 """
 

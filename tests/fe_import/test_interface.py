@@ -11,7 +11,8 @@ import scipy.linalg
 from solid_meshes import box, quarter_ring
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.interface import InterfaceFace, RigidCoupling, interface_face, rigid_coupling
+from fe_import.coupling import Coupling, couple_interfaces
+from fe_import.interface import InterfaceFace, interface_face
 from fe_import.mesh import SolidMesh, read_mesh
 from fe_import.model import FEModel
 from fe_import.solid import SolidMaterial, assemble_solid
@@ -24,8 +25,8 @@ def beam(element_type: str = "hex20") -> SolidMesh:
     return box(element_type, (6, 1, 1), (1.0, 0.1, 0.2))
 
 
-def both_ends(mesh: SolidMesh) -> RigidCoupling:
-    return rigid_coupling(mesh.nodes, [interface_face(mesh, "A", "x0"), interface_face(mesh, "B", "x1")])
+def both_ends(mesh: SolidMesh) -> Coupling:
+    return couple_interfaces(mesh.nodes, [interface_face(mesh, "A", "x0"), interface_face(mesh, "B", "x1")])
 
 
 def model_of(mesh: SolidMesh) -> FEModel:
@@ -100,7 +101,7 @@ def test_clamped_interface_is_a_cantilever():
     held = np.isin(model.independent, model.dof_map[model.interface_nodes[0].node])
     ours = scipy.linalg.eigh(stiffness[~held][:, ~held], mass[~held][:, ~held], eigvals_only=True)[0]
 
-    c = rigid_coupling(mesh.nodes, [interface_face(mesh, "B", "x1")])
+    c = couple_interfaces(mesh.nodes, [interface_face(mesh, "B", "x1")])
     m, k = (c.coupling.T @ c.extended(a) @ c.coupling for a in assemble_solid(mesh, [STEEL]))
     held = np.isin(c.independent, c.dof_map[mesh.node_sets["x0"], :3])
     k, m = k.toarray()[~held][:, ~held], m.toarray()[~held][:, ~held]
@@ -130,7 +131,7 @@ def test_position_off_the_face():
     """A stated position is kept: the axis of a bore lies off the bore's surface."""
     ring = quarter_ring("hex20", 4, 0.4, 0.5, 0.1)
     face = interface_face(ring, "BORE", "x0", np.array([0.0, 0.0, 0.05]))
-    c = rigid_coupling(ring.nodes, [face])
+    c = couple_interfaces(ring.nodes, [face])
     np.testing.assert_array_equal(c.nodes[-1], [0, 0, 0.05])
     turn = np.zeros(len(c.independent))
     turn[-1] = 1.0
@@ -141,7 +142,7 @@ def test_position_off_the_face():
 
 def test_no_interface_couples_nothing():
     mesh = box("tet4", (1, 1, 1))
-    c = rigid_coupling(mesh.nodes, [])
+    c = couple_interfaces(mesh.nodes, [])
     np.testing.assert_array_equal(c.coupling.toarray(), np.eye(24))
     assert c.interface_nodes == ()
 
@@ -184,8 +185,8 @@ FAULTS = {
 }
 
 
-def couple(*faces: InterfaceFace) -> RigidCoupling:
-    return rigid_coupling(MESH.nodes, faces, MESH.source)
+def couple(*faces: InterfaceFace) -> Coupling:
+    return couple_interfaces(MESH.nodes, faces, MESH.source)
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -26,7 +26,7 @@ def _horner(coefficients: list[float], s: float) -> tuple[float, float]:
 def turn_factors(s: float) -> tuple[float, float, float, float]:
     """a = (1 - cos φ)/φ², b = (φ - sin φ)/φ³ and their derivatives by s = φ²."""
     if s < _SERIES:
-        return *_horner(_A, s), *_horner(_B, s)  # type: ignore[return-value]
+        return *_horner(_A, s), *_horner(_B, s)
     angle = math.sqrt(s)
     sine, cosine = math.sin(angle) / angle, math.cos(angle)
     a, b = (1 - cosine) / s, (1 - sine) / s

@@ -76,7 +76,9 @@ class StandardData:
         result[3:] += (self._linear[18:] @ eta).reshape(3, self.size)
         return result
 
-    def forces(self, twist: Array, twist_rate: Array, eta: Array, rate: Array, acceleration: Array) -> tuple[Array, Array]:
+    def forces(
+        self, twist: Array, twist_rate: Array, eta: Array, rate: Array, acceleration: Array
+    ) -> tuple[Array, Array]:
         """Inertia forces.
 
         Parameters

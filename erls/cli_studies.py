@@ -1,0 +1,185 @@
+"""The commands that run a scene more than once: ``erls compare`` and ``erls study``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from erls.terminal import Json, Output, Progress, print_json, refuse_unwritable, tell
+
+if TYPE_CHECKING:
+    from erls.errors import SceneError
+
+Set = Annotated[list[str] | None, Parameter(name="--set", negative="")]
+Workers = Annotated[int | None, Parameter(name="--workers")]
+
+study = App(name="study", help="Run a scene many times and report what changes.", help_format="plaintext")
+
+
+def compare(
+    scene: Path,
+    /,
+    *,
+    formulations: str = "",
+    output: Output = None,
+    set_: Set = None,
+    workers: Workers = None,
+    json: Json = False,
+) -> int:
+    """Simulate a scene in several formulations and report distances, cost and whether they are as expected.
+
+    Parameters
+    ----------
+    scene
+        Scene (TOML).
+    formulations
+        Separated by commas; all unless given. Besides the formulations: erls-minimum-norm (five rows per joint),
+        erls-fem (links not reduced).
+    output
+        Report to write: .html a self-contained page with plots, .csv the histories, .json the JSON object.
+    set_
+        Change a field of the scene, KEY=VALUE; may be repeated.
+    workers
+        Runs at a time; as many as cores unless given.
+    json
+        Print one JSON object.
+    """
+    from erls.report.compare_page import comparison_csv, comparison_page, comparison_text
+    from erls.studies.compare import compare as run_comparison
+    from erls.studies.compare import comparison_summary
+
+    _check_output(output, scene, (".html", ".csv", ".json"))
+    names = [name.strip() for name in formulations.split(",") if name.strip()]
+    with Progress("comparing") as advance:
+        result = run_comparison(scene, names, overrides=set_ or (), progress=advance, workers=workers)
+    summary = comparison_summary(result)
+    if output is not None:
+        makers = {".html": comparison_page, ".csv": comparison_csv}
+        _write(output, makers[output.suffix](result) if output.suffix in makers else _dumped(summary))
+    if json:
+        print_json({**summary, "output": None if output is None else str(output)})
+    else:
+        print(comparison_text(result))
+        _tell_written(output)
+    return _exit_code(result.complete, [error.exit_code for error in result.errors.values()])
+
+
+@study.command
+def modes(
+    scene: Path,
+    /,
+    *,
+    output: Output = None,
+    counts: str = "",
+    link: str = "",
+    tolerance: float = 1e-4,
+    load_tolerance: float = 0.02,
+    frequency_tolerance: float = 0.01,
+    beside: Path | None = None,
+    set_: Set = None,
+    workers: Workers = None,
+    json: Json = False,
+) -> int:
+    """How many elastic modes are enough: raise their number until points, angles, loads and spectra stop changing.
+
+    Ends with exit code 4 when there are no three successive changes below the tolerances.
+
+    Parameters
+    ----------
+    scene
+        Scene (TOML).
+    output
+        Report to write: .html a self-contained page with plots, .json the JSON object.
+    counts
+        Numbers of elastic modes, separated by commas; from 0 to all there are, in growing steps, unless given.
+    link
+        Vary the modes of this link only; of all links alike unless given.
+    tolerance
+        Distance of named points that does not matter [m]; angles are held to it over the size of the largest link.
+    load_tolerance
+        Change of joint forces, moments and efforts that does not matter, relative to their peak.
+    frequency_tolerance
+        Relative change of spectrum peaks that does not matter.
+    beside
+        Published table (CSV) to show beside the figures of this study.
+    set_
+        Change a field of the scene, KEY=VALUE; may be repeated.
+    workers
+        Runs at a time; as many as cores unless given.
+    json
+        Print one JSON object.
+    """
+    from erls.report.mode_page import beside_summary, mode_study_page, mode_study_text, read_printed
+    from erls.studies.mode_count import Tolerances, study_modes, study_summary
+
+    _check_output(output, scene, (".html", ".json"))
+    printed = None if beside is None else read_printed(beside)
+    with Progress("mode study") as advance:
+        result = study_modes(
+            scene,
+            _counts(counts),
+            link=link,
+            overrides=set_ or (),
+            tolerances=Tolerances(tolerance, load_tolerance, frequency_tolerance),
+            progress=advance,
+            workers=workers,
+        )
+    summary = study_summary(result)
+    if printed is not None:
+        summary["beside"] = beside_summary(result, printed)
+    if output is not None:
+        _write(output, mode_study_page(result, printed) if output.suffix == ".html" else _dumped(summary))
+    if json:
+        print_json({**summary, "output": None if output is None else str(output)})
+    else:
+        print(mode_study_text(result, printed))
+        _tell_written(output)
+    failed = [point.error.exit_code for point in result.points if point.error is not None]
+    return _exit_code(result.complete, failed) or (0 if result.converged is not None else 4)
+
+
+def _exit_code(complete: bool, failed: list[int]) -> int:
+    """130 after an interrupt, else the worst of the runs that failed."""
+    return 130 if not complete else max(failed, default=0)
+
+
+def _check_output(output: Path | None, scene: Path, suffixes: tuple[str, ...]) -> None:
+    if output is None:
+        return
+    if output.suffix not in suffixes:
+        remedy = "end in " + ", ".join(suffixes)
+        raise _bad("the ending of the report decides its form", "--output", output.name, remedy)
+    refuse_unwritable(output, scene)
+
+
+def _counts(text: str) -> list[int] | None:
+    try:
+        return [int(part) for part in text.split(",") if part.strip()] or None
+    except ValueError:
+        raise _bad("not whole numbers", "--counts", text, "separate them by commas, e.g. 1,2,6,12") from None
+
+
+def _bad(message: str, where: str, value: object, remedy: str) -> SceneError:
+    from erls.errors import Cause, SceneError
+
+    return SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)
+
+
+def _write(path: Path, text: str) -> None:
+    from erls.output_file import replacing
+
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _dumped(summary: dict[str, object]) -> str:
+    from erls.terminal import json_text
+
+    return json_text(summary) + "\n"
+
+
+def _tell_written(output: Path | None) -> None:
+    if output is not None:
+        tell(f"written to {output}")

@@ -1,0 +1,211 @@
+"""The report of ``erls study modes``: text for the terminal, HTML; figures of a publication beside ours."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from erls.errors import Cause, SceneError
+from erls.report.html import Curve, Plot, figure, heading, page, paragraph
+from erls.report.html import table as html_table
+from erls.report.tables import table
+from erls.studies.mode_count import SUCCESSIVE, ModeStudy, Point
+
+_LARGEST_FILE = 1_000_000
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A published table: figures by number of elastic modes, and what its file says about them.
+
+    Attributes
+    ----------
+    time : float
+        At which they hold [s].
+    columns : tuple of str
+        ``joint NAME`` (coordinate, deg) or ``point NAME x``.
+    rows : dict of int to tuple of float
+    note : str
+    """
+
+    time: float
+    columns: tuple[str, ...]
+    rows: dict[int, tuple[float, ...]]
+    note: str
+
+
+def read_printed(path: Path) -> Printed:
+    """Read a published table: CSV with the header ``elastic_modes, t, joint NAME, point NAME x ...``, notes after #.
+
+    Raises
+    ------
+    SceneError
+        Not readable, or not such a table.
+    """
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise _bad(path, "too large for a table of published figures", path.stat().st_size)
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as problem:
+        raise SceneError(Cause.NOT_READABLE, str(problem), where=str(path), remedy="give a CSV file") from None
+    note = " ".join(line[1:].strip() for line in lines if line.startswith("#"))
+    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+    if not rows or [c.strip() for c in rows[0][:2]] != ["elastic_modes", "t"] or len(rows[0]) < 3:
+        raise _bad(path, "not a table of published figures", ", ".join(rows[0]) if rows else None)
+    columns = tuple(c.strip() for c in rows[0][2:])
+    found: dict[int, tuple[float, ...]] = {}
+    times: set[float] = set()
+    for number, row in enumerate(rows[1:], start=2):
+        try:
+            values = [float(c) for c in row]
+            if len(values) != len(rows[0]) or not np.isfinite(values).all() or values[0] != int(values[0]):
+                raise ValueError
+        except ValueError:
+            raise _bad(path, f"row {number} does not fit the header", ", ".join(row)) from None
+        found[int(values[0])] = tuple(values[2:])
+        times.add(values[1])
+    if len(times) != 1:
+        raise _bad(path, "the figures must hold at one time", sorted(times))
+    return Printed(times.pop(), columns, found, note)
+
+
+def _bad(path: Path, message: str, value: object) -> SceneError:
+    remedy = "header: elastic_modes, t, then columns like 'joint shoulder' (deg) and 'point tip x' (m)"
+    return SceneError(Cause.BAD_FIELD, message, where=str(path), value=value, remedy=remedy)
+
+
+def beside(study: ModeStudy, printed: Printed) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows: printed and computed figures for every mode count of either.
+
+    Raises
+    ------
+    SceneError
+        A column that names no joint or point of the scene.
+    """
+    header = ("elastic modes", *(f"{c} {kind}" for c in printed.columns for kind in ("printed", "here")))
+    ours = {p.modes: p for p in study.points if p.outputs is not None}
+    rows = []
+    for modes in sorted({*printed.rows, *ours}):
+        cells = [str(modes)]
+        for k, column in enumerate(printed.columns):
+            cells.append(f"{printed.rows[modes][k]:g}" if modes in printed.rows else "")
+            cells.append(_figure(ours[modes], column, printed.time) if modes in ours else "")
+        rows.append(tuple(cells))
+    return header, rows
+
+
+def beside_summary(study: ModeStudy, printed: Printed) -> dict[str, Any]:
+    """The same for JSON."""
+    header, rows = beside(study, printed)
+    return {"t": printed.time, "note": printed.note, "header": list(header), "rows": [list(row) for row in rows]}
+
+
+def _figure(point: Point, column: str, time: float) -> str:
+    outputs = point.outputs
+    assert outputs is not None
+    kind, _, rest = column.partition(" ")
+    name, _, axis = rest.rpartition(" ")
+    if kind == "joint" and rest in outputs.coordinates:
+        history, digits, factor = outputs.coordinates[rest], 4, 180 / np.pi
+    elif kind == "point" and name in outputs.points and axis in ("x", "y", "z"):
+        history, digits, factor = outputs.points[name][:, "xyz".index(axis)], 6, 1.0
+    else:
+        raise SceneError(
+            Cause.BAD_REFERENCE,
+            "names no joint or point of the scene",
+            where="published table",
+            value=column,
+            remedy="joints: " + ", ".join(outputs.coordinates) + "; points: " + ", ".join(outputs.points),
+        )
+    if not outputs.times[0] <= time <= outputs.times[-1] + 1e-12:
+        return "beyond the run"
+    return f"{factor * np.interp(time, outputs.times, history):.{digits}f}"
+
+
+def mode_study_text(study: ModeStudy, printed: Printed | None = None) -> str:
+    """Changes from count to count, and the verdict, for the terminal."""
+    what = f"modes of link {study.link!r}" if study.link else "elastic modes, all links alike"
+    parts = [f"{study.scene}: {what}", table(*_change_rows(study)), verdict(study)]
+    if printed is not None:
+        parts.append(f"Published figures at t = {printed.time:g} s: {printed.note}\n" + table(*beside(study, printed)))
+    return "\n\n".join(parts)
+
+
+def verdict(study: ModeStudy) -> str:
+    """What the study says about convergence."""
+    t = study.tolerances
+    limits = f"{t.position:g} m at points, {100 * t.load:g} % of peak loads, {100 * t.frequency:g} % of frequencies"
+    if study.converged is not None:
+        return f"converged at {study.converged} elastic modes: {SUCCESSIVE} successive changes below {limits}"
+    text = f"NOT converged: there are no {SUCCESSIVE} successive changes below {limits}"
+    last = next((p for p in reversed(study.points) if p.changes), None)
+    if last is not None and not last.unchanged:
+        c = last.changes[0]
+        text += f"; the last step still moved {c.output} by {c.value:.2g} {c.unit}"
+    if study.remaining:
+        kind, share = study.remaining[0]
+        text += f"; of the modes it added, '{kind}' ones hold the largest share, {share:.1e} of the elastic energy"
+    if not study.complete:
+        text += "; the study was interrupted"
+    return text
+
+
+def mode_study_page(study: ModeStudy, printed: Printed | None = None) -> str:
+    """One self-contained HTML page."""
+    parts = [paragraph(verdict(study), "good" if study.converged is not None else "bad")]
+    parts += [heading("Changes from one count to the next"), html_table(*_change_rows(study))]
+    if printed is not None:
+        parts += [heading(f"Published figures at t = {printed.time:g} s"), html_table(*beside(study, printed))]
+        parts.append(paragraph(printed.note, "note"))
+    parts += [figure(plot) for plot in _plots(study)]
+    failed = [p for p in study.points if p.error is not None]
+    parts += [paragraph(f"{p.modes} modes failed: {p.error}", "bad") for p in failed]
+    return page(f"{study.scene}: how many modes", parts)
+
+
+def _change_rows(study: ModeStudy) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    names = sorted({c.output for p in study.points for c in p.changes})
+    rows = []
+    for p in study.points:
+        if p.outputs is None:
+            rows.append((str(p.modes), "failed", *("" for _ in names), ""))
+            continue
+        values = {c.output: f"{c.value:.2g}" for c in p.changes}
+        state = "" if not p.changes else "below" if p.unchanged else "above"
+        wall = f"{p.outputs.summary['wall_s']:.2f}"
+        rows.append((str(p.modes), wall, *(values.get(n, "") for n in names), state))
+    return ("elastic modes", "time [s]", *names, "tolerance"), rows
+
+
+def _plots(study: ModeStudy) -> list[Plot]:
+    done = [p for p in study.points if p.changes]
+    plots = []
+    for kind, unit in (
+        ("point", "m"), ("angle", "rad or m"), ("force", "of peak"), ("moment", "of peak"), ("effort", "of peak"),
+    ):  # fmt: skip
+        names = sorted({c.output for p in done for c in p.changes if c.output.split()[0] == kind})
+        curves = []
+        for name in names:
+            pairs = [(p.modes, c.value) for p in done for c in p.changes if c.output == name and c.value > 0]
+            if pairs:
+                counts, values = np.array(pairs, dtype=float).T
+                curves.append(Curve(name, counts, values, marked=True))
+        if curves:
+            limit = study.tolerances.position if kind == "point" else None
+            limit = study.tolerances.load if kind in ("force", "moment", "effort") else limit
+            plots.append(
+                Plot(f"change of {kind} from the count before", "elastic modes", f"change [{unit}]", curves, "y", limit)
+            )
+    runs = [p for p in study.points if p.outputs is not None]
+    for name in runs[0].outputs.points if runs and runs[0].outputs is not None else ():
+        curves = [
+            Curve(f"{p.modes} modes", p.outputs.times, p.outputs.points[name][:, 2], dashed=k % 2 == 1)
+            for k, p in enumerate(runs)
+            if p.outputs is not None
+        ]
+        plots.append(Plot(f"z coordinate of {name} against mode count", "t [s]", "z [m]", curves))
+    return plots

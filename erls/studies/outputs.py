@@ -1,0 +1,145 @@
+"""What a study keeps of a run: histories of everything that a user can compare, at common times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from erls.formulations.base import State
+from erls.integrators.base import hermite
+from erls.lie.so3 import Array
+from erls.run import Run, node_positions
+
+_NUDGE = 1e-4  # s; the second difference along a parabola of time has errors of its square and of rounding, both 1e-8
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Histories at ``times`` (k,); names are those of the scene.
+
+    Attributes
+    ----------
+    points, accelerations : dict of (k, 3) arrays
+        World positions [m] and accelerations [m/s²] of named points.
+    angles, coordinates : dict of (k,) arrays
+        Physical joint angles and joint coordinates θ [rad or m].
+    forces, moments : dict of (k, 3) arrays
+        Joint reactions on the outer link, world axes [N, N m].
+    efforts : dict of (k,) arrays
+        Generalized force on each joint [N m or N].
+    energy : (k,) array
+        Total [J].
+    conservative : bool
+        Whether it should stay constant.
+    deflection : float
+        Largest displacement of a node against its link's rigid shape, held at the inboard interface [m].
+    size : float
+        Of the largest link [m].
+    mode_energy : dict of (m,) arrays
+        Share of each elastic mode in the link's elastic energy, mean over time.
+    mode_kinds : dict of tuple of str
+    mode_frequencies : dict of (m,) arrays
+        [Hz]
+    summary : dict
+        The JSON of ``erls simulate``.
+    """
+
+    times: Array
+    points: dict[str, Array]
+    accelerations: dict[str, Array]
+    angles: dict[str, Array]
+    coordinates: dict[str, Array]
+    forces: dict[str, Array]
+    moments: dict[str, Array]
+    efforts: dict[str, Array]
+    energy: Array
+    conservative: bool
+    deflection: float
+    size: float
+    mode_energy: dict[str, Array]
+    mode_kinds: dict[str, tuple[str, ...]]
+    mode_frequencies: dict[str, Array]
+    summary: dict[str, Any]
+
+
+def run_outputs(run: Run, times: Sequence[float] | Array) -> Outputs:
+    """Sample a run.
+
+    Parameters
+    ----------
+    run : Run
+    times : (k,) array
+        Within the run [s].
+    """
+    formulation, s = run.formulation, run.solution
+    t = np.clip(np.asarray(times, dtype=float), s.t[0], s.t[-1])
+    y, v = hermite(s.t, s.y, s.v, s.a, t)
+    states, accelerated, reactions, energies = [], [], [], []
+    for at, q, rate in zip(t.tolist(), y, v, strict=True):
+        a = formulation.acceleration(at, q, rate)
+        parabola = [formulation.state(at, q + h * rate + h**2 / 2 * a, rate + h * a) for h in (-_NUDGE, 0.0, _NUDGE)]
+        places = np.array([_points(run, state) for state in parabola])
+        states.append(parabola[1])
+        accelerated.append((places[0] - 2 * places[1] + places[2]) / _NUDGE**2)
+        reactions.append(formulation.reactions(at, q, rate))
+        energies.append(formulation.energy(at, q, rate).total)
+    places = np.array([_points(run, state) for state in states])
+    acceleration = np.array(accelerated)
+    joints = run.joint_names
+    models = {name: link.model for name, link in zip(run.link_names, formulation.mechanism.links, strict=True)}
+    return Outputs(
+        times=t,
+        points={name: places[:, k] for k, name in enumerate(run.point_names)},
+        accelerations={name: acceleration[:, k] for k, name in enumerate(run.point_names)},
+        angles={name: np.array([x.angles[k] for x in states]) for k, name in enumerate(joints)},
+        coordinates={name: np.array([x.coordinates[k] for x in states]) for k, name in enumerate(joints)},
+        forces={name: np.array([r[k].force for r in reactions]) for k, name in enumerate(joints)},
+        moments={name: np.array([r[k].moment for r in reactions]) for k, name in enumerate(joints)},
+        efforts={name: np.array([r[k].effort for r in reactions]) for k, name in enumerate(joints)},
+        energy=np.array(energies),
+        conservative=run.conservative,
+        deflection=max((_deflection(run, state) for state in states[:: max(1, len(states) // 100)]), default=0.0),
+        size=max(float(np.linalg.norm(np.ptp(m.nodes, axis=0))) for m in models.values()),
+        mode_energy={
+            name: _mode_energy(np.array([x.modal[k][6:] for x in states]), m.frequencies_hz[6:])
+            for k, (name, m) in enumerate(models.items())
+        },
+        mode_kinds={name: m.kinds[6:] for name, m in models.items()},
+        mode_frequencies={name: m.frequencies_hz[6:] for name, m in models.items()},
+        summary=run.summary(),
+    )
+
+
+def _points(run: Run, state: State) -> Array:
+    """(p, 3) places of all named points."""
+    count = len(run.point_names)
+    return np.array([run.point_position(state, k) for k in range(count)]).reshape(count, 3)
+
+
+def _deflection(run: Run, state: State) -> float:
+    """Largest distance of a node from its link's rigid shape, which follows the inboard interface."""
+    largest = 0.0
+    for k, link in enumerate(run.formulation.mechanism.links):
+        nodes = link.model.nodes
+        moved = node_positions(run, state, k)
+        frame = state.poses[k]
+        inboard = link.inboard.node
+        turn = frame[:3, :3]
+        rotation = link.model.node_shape(inboard)[1]
+        if rotation is not None:
+            angle = rotation @ state.modal[k]
+            arms = nodes - nodes[inboard]
+            rigid = moved[inboard] + (arms + np.cross(angle, arms)) @ turn.T
+        else:
+            rigid = moved[inboard] + (nodes - nodes[inboard]) @ turn.T
+        largest = max(largest, float(np.linalg.norm(moved - rigid, axis=1).max()))
+    return largest
+
+
+def _mode_energy(amplitudes: Array, frequencies: Array) -> Array:
+    energy = np.asarray((amplitudes**2).mean(axis=0) * frequencies**2)
+    total = energy.sum()
+    return energy / total if total > 0 else energy

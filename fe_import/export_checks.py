@@ -1,0 +1,163 @@
+"""What must hold for every export, whatever its format: rows, nodes and matrices belong together; the link is free."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_import.errors import Cause, FEImportError
+from fe_import.exports import Export
+from fe_import.health import GROUNDING, asymmetry, grounding
+from fe_import.model import Array, FEModel, IntArray
+
+_ASYMMETRY = 1e-9
+_LOCAL = 0.3  # share of the nodes at which a link is held, beyond which the matrix is another one
+_NOTICED = 1e-3  # of the largest force
+_DIRECTED = 1e-6  # mass by direction: files carry 6 digits or more
+
+
+def check_export(export: Export, where: str) -> None:
+    """Sizes, finite numbers, each row of the matrices one component or one modal coordinate.
+
+    Raises
+    ------
+    FEImportError
+        ``EXPORT``; ``NOT_DEFINITE``: not symmetric; ``GROUNDED``: a node that lacks some displacements.
+    """
+    size, count = export.stiffness.shape[0], len(export.nodes)
+    for name, matrix in (("stiffness", export.stiffness), ("mass", export.mass)):
+        if matrix.shape != (size, size):
+            shape, square = " x ".join(map(str, matrix.shape)), f"{size} x {size}"
+            raise _fault(f"the {name} matrix has the wrong size", where, shape, square, "take both of one export")
+        if not np.isfinite(matrix.data).all():
+            raise _fault(f"the {name} matrix holds numbers that are not finite", where)
+        _check_symmetry(matrix, name, where)
+    if export.nodes.shape != (count, 3) or not np.isfinite(export.nodes).all() or export.labels.shape != (count,):
+        raise _fault("positions of the nodes are not finite, or some have none", where)
+    if len(np.unique(export.labels)) < count:
+        values, times = np.unique(export.labels, return_counts=True)
+        raise _fault("two nodes of one number", where, int(values[times.argmax()]))
+    _check_rows(export, size, where)
+    _check_nodes(export, where)
+    if export.orientations is not None:
+        product = export.orientations.transpose(0, 2, 1) @ export.orientations
+        if not np.abs(product - np.eye(3)).max(initial=0.0) < 1e-6:
+            raise _fault("the axes of a node's frame are not orthonormal", where)
+
+
+def _check_symmetry(matrix: sp.csc_array, name: str, where: str) -> None:
+    if (found := asymmetry(matrix)) <= _ASYMMETRY:
+        return
+    if min(sp.triu(matrix, 1).nnz, sp.tril(matrix, -1).nnz) == 0:
+        message = f"the {name} matrix holds one triangle, where its file declares all entries"
+        raise _fault(message, where, remedy="declare it symmetric, or export both triangles")
+    raise FEImportError(
+        Cause.NOT_DEFINITE,
+        f"the {name} matrix is not symmetric",
+        where=where,
+        value=found,
+        limit=_ASYMMETRY,
+        remedy="export a linear model without friction, follower loads or gyroscopic terms",
+    )
+
+
+def _check_rows(export: Export, size: int, where: str) -> None:
+    rows = np.concatenate([export.dof_map[export.dof_map >= 0], export.modal_rows])
+    if len(rows) and rows.max() >= size:
+        message = "more dofs than the matrices have rows"
+        raise _fault(message, where, int(rows.max()) + 1, size, "take matrices and dofs of one export")
+    times = np.bincount(rows, minlength=size)
+    if (times != 1).any():
+        first = int((times != 1).argmax())
+        what = "no node or modal coordinate" if times[first] == 0 else "more than one"
+        message = f"{(times != 1).sum()} rows of the matrices belong to {what}, the first is row {first + 1}"
+        raise _fault(message, where, f"{len(rows)} dofs", f"{size} rows", "take matrices and dofs of one export")
+
+
+def _check_nodes(export: Export, where: str) -> None:
+    present = export.dof_map >= 0
+    moving, turning = present[:, :3].sum(axis=1), present[:, 3:].sum(axis=1)
+    if not (moving == 3).any():
+        raise _fault("no node has three displacements", where, remedy="only links in three dimensions can be imported")
+    held = (moving % 3 != 0) | ((moving == 0) & (turning > 0))
+    if held.any():
+        raise FEImportError(
+            Cause.GROUNDED,
+            f"{held.sum()} nodes lack some of their three displacements: held, or dependent in an equation",
+            where=where,
+            value=_listed(export.labels[held]),
+            remedy="export the free link without supports and equations",
+        )
+    if (turning % 3 != 0).any():
+        labels = _listed(export.labels[turning % 3 != 0])
+        raise _fault("a node needs all three rotations or none", where, labels, remedy="export all six components")
+
+
+def refuse_grounded(model: FEModel, labels: IntArray, where: str) -> None:
+    """Refuse a link that is held, or whose matrices are not those of its nodes, and say which it probably is.
+
+    Parameters
+    ----------
+    model : FEModel
+    labels : (n,) int array
+        Numbers of its first nodes in the program that exported it.
+    where : str
+
+    Raises
+    ------
+    FEImportError
+        ``GROUNDED``; ``EXPORT``: the mass differs by direction.
+    """
+    rigid = model.rigid_body_modes()
+    moved = rigid[:, :3].T @ (model.mass @ rigid[:, :3])
+    mass = float(np.trace(moved)) / 3
+    if np.abs(moved - mass * np.eye(3)).max() > _DIRECTED * abs(mass):
+        raise _fault(
+            "the mass of the link differs by direction",
+            where,
+            np.diag(moved).tolist(),
+            f"equal to {_DIRECTED:g}",
+            "check the order of the dofs, and that the file is whole",
+        )
+    if (resisting := grounding(model)) > GROUNDING:
+        message, remedy = _reason(model, rigid, labels)
+        raise FEImportError(
+            Cause.GROUNDED, message, where=f"{where}: matrices", value=resisting, limit=GROUNDING, remedy=remedy
+        )
+
+
+def _reason(model: FEModel, rigid: Array, labels: IntArray) -> tuple[str, str]:
+    """What a stiffness that resists rigid-body motion probably is, and what to do."""
+    rows = model.dof_map[: len(labels), :3]
+    force = np.abs(model.stiffness @ rigid)
+    terms = (abs(model.stiffness) @ np.abs(rigid)).max(axis=0)
+    if (force[:, :3].max(axis=0) <= GROUNDING * terms[:3]).all():
+        return (
+            "the stiffness resists rotations of the link, not its translations: the nodes are not where the matrices "
+            "have them",
+            "check the unit of length, the mesh, the order of the dofs and the frames of the nodes",
+        )
+    size = force[rows, :3].max(axis=(1, 2))
+    held = size > _NOTICED * size.max()
+    if held.mean() <= _LOCAL:
+        return (
+            f"the stiffness resists rigid-body motion at nodes {_listed(labels[held])}",
+            "a link must be free: remove supports, springs to ground and penalty stiffness from the export",
+        )
+    return (
+        "the stiffness resists rigid-body motion at most nodes: it is probably the block of the kept dofs of a larger "
+        "matrix, not the condensed one (CalculiX 2.20 writes this for *SUBSTRUCTURE GENERATE)",
+        "export the full matrices, in CalculiX by *FREQUENCY, SOLVER=MATRIXSTORAGE, or check the order of the dofs",
+    )
+
+
+def _listed(labels: IntArray) -> str:
+    more = f" and {len(labels) - 8} more" if len(labels) > 8 else ""
+    return ", ".join(map(str, labels[:8])) + more
+
+
+def _fault(message: str, where: str, value: Any = None, limit: Any = None, remedy: str = "") -> FEImportError:
+    remedy = remedy or "export again"
+    return FEImportError(Cause.EXPORT, message, where=where, value=value, limit=limit, remedy=remedy)

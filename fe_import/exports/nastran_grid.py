@@ -1,0 +1,137 @@
+"""Nastran grid points: positions and displacement frames from GRID and CORD2R cards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_import.errors import Cause, FEImportError
+from fe_import.exports.nastran_cards import Card
+from fe_import.model import Array
+
+_OTHER_FRAMES = ("CORD1R", "CORD1C", "CORD1S", "CORD2C", "CORD2S")
+CARDS = frozenset({"GRID", "GRDSET", "SPOINT", "PLOTEL", "CORD2R", *_OTHER_FRAMES})
+
+
+@dataclass(frozen=True)
+class GridPoints:
+    """Grid points of a bulk data file.
+
+    Attributes
+    ----------
+    positions : dict of (3,) arrays
+        By number, in the basic frame.
+    axes : dict of (3, 3) arrays
+        Axes (columns) of the displacement frame, of those points that have one of their own.
+    scalar_points : set of int
+    lines : list of pairs
+        Points that PLOTEL cards join.
+    """
+
+    positions: dict[int, Array]
+    axes: dict[int, Array]
+    scalar_points: set[int]
+    lines: list[tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class _Frame:
+    origin: Array
+    axes: Array
+
+
+_BASIC = _Frame(np.zeros(3), np.eye(3))
+
+
+def grid_points(cards: Iterable[Card]) -> GridPoints:
+    """Positions and frames that the cards state.
+
+    Raises
+    ------
+    FEImportError
+        ``EXPORT``: a faulty field, a number that stands twice, GRDSET; ``BAD_REFERENCE``: a coordinate system that is
+        not there, or not a CORD2R.
+    """
+    found = list(cards)
+    frames = _Frames(found)
+    result = GridPoints({}, {}, set(), [])
+    for card in found:
+        if card.name == "GRID":
+            _add_grid(card, frames, result)
+        elif card.name == "GRDSET":
+            raise card.fault("defaults for GRID are not followed", remedy="write CP and CD on each GRID")
+        elif card.name == "SPOINT":
+            result.scalar_points.update(_numbers(card))
+        elif card.name == "PLOTEL":
+            result.lines.append((card.integer(2), card.integer(3)))
+    return result
+
+
+def _add_grid(card: Card, frames: _Frames, points: GridPoints) -> None:
+    number = card.integer(1)
+    if number in points.positions:
+        raise card.fault("this grid point stands twice", number)
+    placed = frames.get(card.integer(2, 0), card)
+    local = np.array([card.real(k, 0.0) for k in (3, 4, 5)])
+    points.positions[number] = placed.origin + placed.axes @ local
+    frame = card.integer(6, 0)
+    if frame:
+        points.axes[number] = frames.get(frame, card).axes
+
+
+def _numbers(card: Card) -> Iterable[int]:
+    if card.field(2).upper() == "THRU":
+        first, last = card.integer(1), card.integer(3)
+        if not 0 < first <= last < first + 1_000_000:
+            raise card.fault("a range must rise, by less than a million", f"{first} THRU {last}")
+        return range(first, last + 1)
+    return [card.integer(k) for k in range(1, len(card.fields) + 1) if card.field(k)]
+
+
+class _Frames:
+    """Coordinate systems by number, each worked out when it is asked for."""
+
+    def __init__(self, cards: list[Card]) -> None:
+        self._known: dict[int, _Frame] = {0: _BASIC}
+        self._cards: dict[int, Card] = {}
+        self._open: set[int] = set()
+        for card in cards:
+            if card.name.startswith("CORD"):
+                number = card.integer(1)
+                if number in self._cards:
+                    raise card.fault("this coordinate system stands twice", number)
+                self._cards[number] = card
+
+    def get(self, number: int, user: Card) -> _Frame:
+        """The coordinate system that a card refers to."""
+        if number in self._known:
+            return self._known[number]
+        card = self._cards.get(number)
+        if card is None or card.name != "CORD2R":
+            raise FEImportError(
+                Cause.BAD_REFERENCE,
+                f"{user.name}: coordinate system {number} is " + ("not there" if card is None else f"a {card.name}"),
+                where=user.where,
+                value=number,
+                limit="0 or a CORD2R",
+                remedy="export grid points with rectangular coordinate systems (CORD2R)",
+            )
+        if number in self._open:
+            raise card.fault("this coordinate system is defined by itself", number)
+        self._open.add(number)
+        frame = self._known[number] = _rectangular(card, self.get(card.integer(2, 0), card))
+        return frame
+
+
+def _rectangular(card: Card, reference: _Frame) -> _Frame:
+    """CORD2R: origin A, z axis towards B, xz plane through C, all in the frame of reference."""
+    a, b, c = (np.array([card.real(k + j, 0.0) for j in range(3)]) for k in (3, 6, 9))
+    z, side = b - a, c - a
+    y = np.cross(z, side)
+    if not np.linalg.norm(y) > 1e-9 * np.linalg.norm(z) * np.linalg.norm(side):
+        raise card.fault("the three points lie on one line")
+    axes = np.stack([np.cross(y, z), y, z], axis=1)
+    axes /= np.linalg.norm(axes, axis=0)
+    return _Frame(reference.origin + reference.axes @ a, reference.axes @ axes)

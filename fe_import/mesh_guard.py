@@ -1,0 +1,143 @@
+"""Before a mesh file is read: gzip unpacked within limits, declared sizes held against the file, memory bounded."""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import mmap
+import re
+import struct
+import sys
+import tempfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from fe_import.errors import Cause, FEImportError
+
+MOST_BYTES = 4_000_000_000  # of an unpacked mesh; one of a million nodes has 2e8
+_MOST_RATIO = 200  # unpacked over packed: meshes have 3 to 20, a bomb 1000
+_FREE_BYTES = 20_000_000  # that any gzip file may hold
+_MEMORY_PER_BYTE = 64  # Python's lists of numbers over their text
+_FREE_MEMORY = 1 << 30
+_BLOCK = 1 << 20
+_HEAD = 1 << 20  # of a .vtu file, where its counts stand
+_VTU_COUNT = re.compile(rb'NumberOf(Points|Cells)\s*=\s*["\']\s*([^"\']*)')
+
+
+@contextlib.contextmanager
+def unpacked(path: Path) -> Iterator[Path]:
+    """The file itself, or a temporary one with the content of a ``.gz`` file.
+
+    Raises
+    ------
+    FEImportError
+        ``NOT_READABLE``: not gzip, cut off, or far larger than meshes are.
+    """
+    if path.suffix.lower() != ".gz":
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / path.stem
+        limit = min(MOST_BYTES, max(_FREE_BYTES, _MOST_RATIO * path.stat().st_size))
+        try:
+            with gzip.open(path, "rb") as packed, copy.open("wb") as plain:
+                total = 0
+                while block := packed.read(_BLOCK):
+                    total += len(block)
+                    if total > limit:
+                        raise _unreadable(path, "unpacks to far more than meshes do", f"{limit} bytes")
+                    plain.write(block)
+        except (EOFError, zlib.error, OSError) as problem:
+            raise _unreadable(path, f"not a whole gzip file: {problem}") from None
+        yield copy
+
+
+def _unreadable(path: Path, message: str, limit: str | None = None) -> FEImportError:
+    return FEImportError(
+        Cause.NOT_READABLE,
+        f"cannot be read as a mesh: {message}",
+        where=str(path),
+        limit=limit,
+        remedy="unpack it and look at it",
+    )
+
+
+def check_declared(path: Path, name: str) -> None:
+    """Hold the counts that a .msh or .vtu file declares against its size, before a reader takes memory for them.
+
+    Parameters
+    ----------
+    path : Path
+        Of the unpacked file.
+    name : str
+        To name in messages.
+
+    Raises
+    ------
+    FEImportError
+        ``MESH``: a count that is no number, or more than the file can hold.
+    """
+    size = path.stat().st_size
+    if size == 0:
+        return
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
+        if path.suffix.lower() == ".vtu":
+            for what, count in _VTU_COUNT.findall(text[:_HEAD]):
+                _check_count(f"NumberOf{what.decode()}", _number(count), 50 * size, name)  # zlib packs 1000 : 1
+        elif path.suffix.lower() == ".msh":
+            for section in (b"$Nodes", b"$Elements"):
+                for count in _msh_counts(text, section):
+                    _check_count(section.decode(), count, size // 4, name)
+
+
+def _number(word: bytes) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return float("nan")
+
+
+def _msh_counts(text: mmap.mmap, section: bytes) -> list[float]:
+    """Blocks and members of a section; of MSH 2 its members."""
+    head = text[: text.find(b"\n", text.find(b"$MeshFormat") + 12) + 1].split()
+    place = text.find(section + b"\n")
+    if place < 0 or len(head) < 4:
+        return []
+    begin = place + len(section) + 1
+    if head[1].startswith(b"4") and head[2] == b"1":
+        return [float(n) for n in struct.unpack("=QQ", text[begin : begin + 16].ljust(16, b"\0"))]
+    end = text.find(b"\n", begin)
+    return [_number(word) for word in text[begin : end if end >= 0 else None].split()[:2]]
+
+
+def _check_count(what: str, count: float, limit: int, name: str) -> None:
+    if not 0 <= count <= limit:
+        raise FEImportError(
+            Cause.MESH,
+            f"{what} declares more than a file of this size can hold, or no number",
+            where=name,
+            value=count,
+            limit=limit,
+            remedy="the header is damaged; write the mesh again",
+        )
+
+
+@contextlib.contextmanager
+def bounded_memory(path: Path) -> Iterator[None]:
+    """Let a reader take memory in proportion to its file only (Linux; elsewhere no bound)."""
+    if sys.platform != "linux":
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    bound = pages * resource.getpagesize() + _FREE_MEMORY + _MEMORY_PER_BYTE * path.stat().st_size
+    for limit in (soft, hard):
+        bound = bound if limit == resource.RLIM_INFINITY else min(bound, limit)
+    resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))

@@ -1,0 +1,43 @@
+"""What a mesh file holds, before it is checked: points, blocks of cells, sets. Every reader of meshes gives this."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from fe_import.model import Array, IntArray
+
+
+@dataclass(frozen=True)
+class Block:
+    """Cells of one type: meshio's name, dimension and (m, k) points."""
+
+    type: str
+    dimension: int
+    cells: IntArray
+
+
+@dataclass
+class RawMesh:
+    """A mesh as it stands in a file; nothing is checked.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+    blocks : list of Block
+    cell_sets : dict
+        Name -> cells of each block (an array, or None).
+    point_sets : dict
+        Name -> points.
+    lost : dict
+        Name -> why a set of the file is not among these.
+    mirrored : bool
+        Whether the format turns elements inside out, so that all of them may be.
+    """
+
+    points: Array
+    blocks: list[Block]
+    cell_sets: dict[str, list[Any]] = field(default_factory=dict)
+    point_sets: dict[str, Any] = field(default_factory=dict)
+    lost: dict[str, str] = field(default_factory=dict)
+    mirrored: bool = False

@@ -1,0 +1,98 @@
+"""The two halves of a link, interfaces and inner dofs, and the fields that belong to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_import.inertia import mass_properties
+from fe_import.model import Array, FEModel, IntArray
+from fe_import.reduction.base import interface_places
+from fe_import.sparse import factorize
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Matrices over the independent dofs, and which of them are interface dofs.
+
+    Attributes
+    ----------
+    mass, stiffness : (f, f) sparse CSC
+    boundary, inner : int arrays
+        Positions of the interface dofs, in the order of the interfaces, and of all others.
+    rigid : (f, 6) array
+        Unit translations, and unit rotations about the centre of mass.
+    """
+
+    mass: sp.csc_array
+    stiffness: sp.csc_array
+    boundary: IntArray
+    inner: IntArray
+    rigid: Array
+
+    @cached_property
+    def inner_mass(self) -> sp.csc_array:
+        """M_ii."""
+        return self.mass[self.inner][:, self.inner].tocsc()
+
+    @cached_property
+    def inner_stiffness(self) -> sp.csc_array:
+        """K_ii."""
+        return self.stiffness[self.inner][:, self.inner].tocsc()
+
+    @cached_property
+    def inertia(self) -> Array:
+        """(i, 6) inertia forces on the inner dofs per unit rigid-body acceleration."""
+        return np.asarray((self.mass @ self.rigid)[self.inner])
+
+    def static(self, loads: Array) -> Array:
+        """Response of the inner dofs to loads on them, interfaces clamped, with one step of iterative refinement."""
+        found = self._solve(loads)
+        return np.asarray(found + self._solve(loads - self.inner_stiffness @ found))
+
+    @cached_property
+    def _solve(self) -> Callable[[Array], Array]:
+        return factorize(self.inner_stiffness, "stiffness of the inner nodes")
+
+    def clamped_field(self, inner: Array) -> Array:
+        """(f, k) fields with the interfaces at rest."""
+        fields = np.zeros((self.mass.shape[0], inner.shape[1]))
+        fields[self.inner] = inner
+        return fields
+
+
+def partition(model: FEModel) -> Partition:
+    """Matrices of a model, coupling eliminated, by interface and inner dofs."""
+    mass, stiffness = model.reduced_matrices()
+    boundary = interface_places(model)
+    inner = np.setdiff1d(np.arange(len(model.independent)), boundary)
+    rigid = model.rigid_body_modes()[model.independent]
+    centre = mass_properties(rigid.T @ (mass @ rigid)).centre_of_mass
+    for axis in range(3):
+        rigid[:, 3 + axis] -= rigid[:, :3] @ np.cross(np.eye(3)[axis], centre)
+    return Partition(mass, stiffness, boundary, inner, rigid)
+
+
+def constraint_modes(parts: Partition) -> Array:
+    """(f, b) unit displacements of each interface dof, the inner dofs free of force: Ψ = -K_ii⁻¹ K_ib.
+
+    Exact constraint modes reproduce rigid-body motions, Ψ R_b = R_i. Rounding breaks that by its product with the
+    condition of K_ii (1e-9 on a slender solid); the smallest change of Ψ that restores it is added.
+
+    Raises
+    ------
+    FEImportError
+        The inner stiffness is singular.
+    """
+    count = len(parts.boundary)
+    fields = np.zeros((parts.mass.shape[0], count))
+    fields[parts.boundary, np.arange(count)] = 1.0
+    if len(parts.inner):
+        psi = -parts.static(parts.stiffness[parts.inner][:, parts.boundary].toarray())
+        rigid = parts.rigid[parts.boundary]
+        fields[parts.inner] = psi + (parts.rigid[parts.inner] - psi @ rigid) @ np.linalg.pinv(rigid)
+    return fields

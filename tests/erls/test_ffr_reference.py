@@ -1,0 +1,178 @@
+"""FFR against nonlinear beams, an independent prototype and ERLS; a free body's momentum; every shipped scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scenes
+from scipy.integrate import solve_ivp
+
+import erls
+from erls.errors import SceneError
+from erls.formulations.ffr.body_frame import BODY_FRAMES, elastic_basis
+from erls.formulations.ffr.standard_data import StandardData
+from erls.lie.so3 import Array, skew
+from erls.run import Run
+
+DATA = scenes.ROOT / "data"
+SHIPPED = sorted(str(p.relative_to(DATA)) for p in DATA.glob("*/*.toml"))
+EULER = {"theory": "euler-bernoulli", "torsion": "polar"}
+
+
+def _table(name: str) -> dict[str, Array]:
+    path = Path(__file__).parents[1] / "data" / f"{name}.csv"
+    comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    columns = comments[-1].lstrip("# ").split(",")
+    return dict(zip(columns, np.loadtxt(path, delimiter=",").T, strict=True))
+
+
+def _distance(run: Run, point: str, table: dict[str, Array], prefix: str) -> float:
+    rows = table["t"] <= run.end
+    expected = np.stack([table[f"{prefix}_{axis}"][rows] for axis in "xyz"], axis=1)
+    return float(np.linalg.norm(run.position(point, table["t"][rows]) - expected, axis=1).max())
+
+
+@pytest.mark.parametrize(
+    ("scene", "table", "point", "prefix", "limit"),
+    [
+        ("l_shape/steel_flat", "l_shape", "tip", "steel_flat", 5e-5),
+        ("l_shape/steel_tall", "l_shape", "tip", "steel_tall", 2e-4),
+        ("l_shape/aluminium", "l_shape", "tip", "aluminium", 5e-4),
+        ("robot/two_link", "two_link", "end2", "end2", 5e-4),
+    ],
+)
+def test_against_nonlinear_beam(scene: str, table: str, point: str, prefix: str, limit: float) -> None:
+    """A converged modal model without geometric stiffening stays within 3.2e-5, 1.5e-4, 3.9e-4 and 3.0e-4 m."""
+    run = erls.simulate(erls.load_scene(DATA / f"{scene}.toml", ["simulation.formulation=ffr"]))
+    assert run.end >= 1.5
+    assert _distance(run, point, _table(f"{table}_nonlinear_beam"), prefix) <= limit
+
+
+def test_against_an_independent_prototype(tmp_path: Path) -> None:
+    """Joint angle and tip of the L with 12 elastic modes; 2e-6: 1e-6 of the prototype and 1e-6 of the step."""
+    scenes.l_link(tmp_path, 2, frame=EULER, reduction={"fixed_interface_modes": 18, "elastic_modes": 12})
+    simulation = {"duration": 0.5, "step": 1e-4, "spectral_radius": 1.0, "formulation": "ffr"}
+    run = erls.simulate(scenes.l_scene(tmp_path, simulation=simulation))
+    table = _table("l_shape_modal_ffr")
+    assert _distance(run, "tip", table, "tip") <= 2e-6
+    rows = table["t"] <= run.end
+    np.testing.assert_allclose(run.joint_angle("shoulder", table["t"][rows]), table["theta"][rows], atol=2e-6)
+
+
+def _two_links(folder: Path, stiffer: float, **simulation: Any) -> Path:
+    """Two aluminium links on crossed axes, released from rest."""
+    scenes.arm_link(
+        folder,
+        frame={"nodes": {"tip": [0.5, 0.0, 0.0]}},
+        materials={"m": {"youngs_modulus": 7e10 * stiffer}},
+        sections={"s": {"width": 0.01, "height": 0.01}},
+        reduction={"fixed_interface_modes": 6, "elastic_modes": 6},
+    )
+    dh = {"convention": "standard", "a": 0.5, "alpha_deg": 90.0}
+    data: dict[str, Any] = {
+        "simulation": {"duration": 0.3, "step": 1e-4, "spectral_radius": 1.0, **simulation},
+        "base": {"rotation_deg": [-90.0, 0.0, 0.0]},
+        "joints": [{"name": n, "dh": dh} for n in ("shoulder", "elbow")],
+        "links": [{"name": n, "model": "arm.toml", "mesh_pose": {"frame": "joint"}} for n in ("upper", "lower")],
+        "points": [{"name": "end", "link": "lower", "node": "tip"}],
+    }
+    return scenes.write_toml(folder / "two.toml", data)
+
+
+def test_two_links_agree_with_erls_to_second_order(tmp_path: Path) -> None:
+    """Ends within 3e-5 m over 0.3 s; twice the modulus, half the deflection, a quarter of the distance (3.2 to 5)."""
+    distances = []
+    times = np.linspace(0, 0.3, 151)
+    for stiffer in (1.0, 2.0):
+        ends = [
+            erls.simulate(_two_links(tmp_path, stiffer, formulation=name)).position("end", times)
+            for name in ("erls", "ffr")
+        ]
+        distances.append(np.linalg.norm(ends[0] - ends[1], axis=1).max())
+    assert distances[0] <= 3e-5
+    assert 3.2 <= distances[0] / distances[1] <= 5.0
+
+
+def test_floating_frames_agree_to_second_order(tmp_path: Path) -> None:
+    """Tangent frame against mean axes on the L: fields linear in one are linear in the other to first order only.
+
+    Their tips differ by φ × (u - φ × p / 2), φ the turn between the frames: 5e-6 m here, a quarter with twice the
+    modulus, and below 1e-6 m with four times the modulus.
+    """
+    distances = []
+    times = np.linspace(0, 0.2, 101)
+    for stiffer in (1.0, 2.0, 4.0):
+        scenes.l_link(
+            tmp_path, 2, frame=EULER, reduction={"elastic_modes": 12}, materials={"m": {"youngs_modulus": 2e11 * stiffer}}
+        )
+        tips = []
+        for body_frame in BODY_FRAMES:
+            simulation = {"duration": 0.2, "step": 2e-4, "formulation": "ffr", "body_frame": body_frame}
+            tips.append(erls.simulate(scenes.l_scene(tmp_path, simulation=simulation)).position("tip", times))
+        distances.append(np.linalg.norm(tips[0] - tips[1], axis=1).max())
+    assert distances[0] <= 1e-5
+    assert distances[2] <= 1e-6
+    assert 8 <= distances[0] / distances[2] <= 24
+
+
+@pytest.mark.parametrize("body_frame", BODY_FRAMES)
+def test_free_link_keeps_momentum_and_energy(tmp_path: Path, body_frame: str) -> None:
+    """A link that nothing holds, tumbling and vibrating: linear and angular momentum to 1e-10, energy to 1e-9.
+
+    Relative to their size; explicit integrator at rtol 1e-12.
+    """
+    scenes.l_link(tmp_path, 2, reduction={"elastic_modes": 3})
+    link = scenes.mechanism(scenes.l_scene(tmp_path)).links[0]
+    data, n = StandardData(link.invariants, elastic_basis(link, body_frame)), 3
+    rng = np.random.default_rng(3)
+
+    def parts(z: Array) -> tuple[Array, Array, Array, Array, Array]:
+        return z[:9].reshape(3, 3), z[9:12], z[12 : 12 + n], z[12 + n : 18 + n], z[18 + n :]
+
+    def rate(t: float, z: Array) -> Array:
+        turn, _, eta, twist, eta_rate = parts(z)
+        wrench, elastic = data.forces(twist, np.zeros(6), eta, eta_rate, np.zeros(n))
+        force = np.concatenate([wrench, elastic + link.stiffness * eta])
+        acceleration = np.linalg.solve(data.mass_matrix(eta), -force)
+        return np.concatenate([(turn @ skew(twist[3:])).ravel(), turn @ twist[:3], eta_rate, acceleration])
+
+    def kept(z: Array) -> tuple[Array, Array, float]:
+        turn, x, eta, twist, eta_rate = parts(z)
+        p = data.momentum(twist, eta, eta_rate)
+        linear = turn @ p[:3]
+        energy = data.kinetic_energy(twist, eta, eta_rate) + 0.5 * link.stiffness @ eta**2
+        return linear, turn @ p[3:] + np.cross(x, linear), float(energy)
+
+    start = np.concatenate(
+        [np.eye(3).ravel(), [0.3, -0.2, 0.1], 1e-2 * rng.uniform(-1, 1, n), rng.uniform(-5, 5, 6), rng.uniform(-1, 1, n)]
+    )
+    end = solve_ivp(rate, (0.0, 0.3), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    (p0, l0, e0), (p1, l1, e1) = kept(start), kept(end)
+    assert np.linalg.norm(end[9:12] - start[9:12]) > 0.5
+    assert np.linalg.norm(p1 - p0) <= 1e-10 * np.linalg.norm(p0)
+    assert np.linalg.norm(l1 - l0) <= 1e-10 * np.linalg.norm(l0)
+    assert e1 == pytest.approx(e0, rel=1e-9)
+
+
+@pytest.mark.parametrize("scene", SHIPPED)
+@pytest.mark.parametrize("body_frame", BODY_FRAMES)
+def test_every_shipped_scene_runs(tmp_path: Path, scene: str, body_frame: str) -> None:
+    """All scenes of data/, reported, written and read again."""
+    changes = ["simulation.formulation=ffr", f"simulation.body_frame={body_frame}", "simulation.duration=2e-3"]
+    run = erls.simulate(erls.load_scene(DATA / scene, changes))
+    assert run.summary()["body_frame"] == body_frame
+    point = run.point_names[-1]
+    erls.save_run(tmp_path / "run.h5", run)
+    again = erls.load_run(tmp_path / "run.h5")
+    np.testing.assert_array_equal(again.position(point, 1e-3), run.position(point, 1e-3))
+
+
+def test_unknown_body_frame_is_refused(tmp_path: Path) -> None:
+    """With the field and the known names."""
+    scenes.l_link(tmp_path, 2)
+    with pytest.raises(SceneError, match="body_frame") as caught:
+        erls.load_scene(scenes.l_scene(tmp_path, simulation={"body_frame": "mean axis"}))
+    assert "tangent" in str(caught.value)

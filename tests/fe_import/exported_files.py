@@ -1,0 +1,128 @@
+"""A small solid link as other programs export it: files by name, which tests spoil one at a time."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse as sp
+from link_files import merged, write_toml
+from solid_meshes import box
+
+from fe_import.errors import Cause, FEImportError
+from fe_import.link import LinkFile, load_link
+from fe_import.reduce import reduce_link
+from fe_import.solid import SolidMaterial, assemble_solid
+from fe_import.solid_mesh import SolidMesh
+
+Files = dict[str, bytes]
+Table = dict[str, Any]
+MATERIAL = SolidMaterial(7e10, 0.33, 2700.0)
+INTERFACES = [{"name": "hub", "face": "X0"}, {"name": "hand", "face": "X1"}]
+CALCULIX = {
+    "matrices": {
+        "format": "calculix",
+        "files": {"stiffness": "k.sti", "mass": "k.mas", "dofs": "k.dof", "mesh": "k.inp"},
+    },
+    "interfaces": INTERFACES,
+}
+MARKET = {
+    "matrices": {
+        "format": "matrix-market",
+        "files": {"stiffness": "k.mtx", "mass": "m.mtx", "dofs": "rows.csv", "mesh": "k.inp"},
+    },
+    "interfaces": INTERFACES,
+}
+NPZ = merged(MARKET, {"matrices": {"format": "npz", "files": {"stiffness": "k.npz", "mass": "m.npz"}}})
+
+
+@cache
+def link_matrices() -> tuple[SolidMesh, sp.csc_array, sp.csc_array]:
+    """Mesh of 3 x 1 x 1 hexahedra with 8 nodes, its mass and stiffness."""
+    mesh = box("hex8", (3, 1, 1), (0.3, 0.02, 0.03))
+    return mesh, *assemble_solid(mesh, [MATERIAL])
+
+
+def deck() -> str:
+    """Nodes (numbers 10, 20, ...), elements and sets."""
+    mesh = link_matrices()[0]
+    lines = ["** a comment", "*NODE, NSET=Nall"]
+    lines += [f"{10 * (k + 1)}, " + ", ".join(map(repr, p.tolist())) for k, p in enumerate(mesh.nodes)]
+    lines += ["*ELEMENT, TYPE=C3D8, ELSET=EALL"]
+    lines += [", ".join(map(str, [k, *(10 * (e + 1)).tolist()])) for k, e in enumerate(mesh.elements, start=1)]
+    for name in ("x0", "x1"):
+        lines += [f"*NSET, NSET={name}", *(f"{10 * (n + 1)}," for n in mesh.node_sets[name])]
+    return "\n".join(lines) + "\n"
+
+
+@cache
+def files() -> Files:
+    """The link as CalculiX, as Matrix Market, and as NPZ."""
+    mesh, mass, stiffness = link_matrices()
+    nodes = 10 * (1 + np.arange(len(mesh.nodes)))
+    pattern = sp.triu(stiffness).tocsc().tocoo()  # CalculiX writes both with one pattern
+    places = list(zip(*(c.tolist() for c in pattern.coords), strict=True))
+    result = {
+        name: "".join(f"{i + 1} {j + 1} {matrix[i, j]: .13e}\n" for i, j in places).encode()
+        for name, matrix in (("k.sti", stiffness.toarray()), ("k.mas", mass.toarray()))
+    }
+    result["k.dof"] = "".join(f"{n}.{c}\n" for n in nodes for c in (1, 2, 3)).encode()
+    result["k.inp"] = deck().encode()
+    result["rows.csv"] = ("node, component\n" + "".join(f"{n}, {c}\n" for n in nodes for c in ("ux", "uy", "uz"))).encode()
+    for name, matrix in (("k", stiffness), ("m", mass)):
+        result[f"{name}.mtx"] = market(matrix)
+        result[f"{name}.npz"] = npz(matrix)
+    return result
+
+
+def market(matrix: sp.csc_array, symmetry: str = "symmetric") -> bytes:
+    """SciPy's Matrix Market file."""
+    buffer = io.BytesIO()
+    scipy.io.mmwrite(buffer, sp.coo_array(matrix), symmetry=symmetry, precision=15)
+    return buffer.getvalue()
+
+
+def npz(matrix: Any) -> bytes:
+    """SciPy's NPZ file."""
+    buffer = io.BytesIO()
+    sp.save_npz(buffer, matrix)
+    return buffer.getvalue()
+
+
+def written(folder: Path, base: Table, spoiled: Files | None = None, changes: Table | None = None) -> LinkFile:
+    """The link description and its files in a folder."""
+    for name, content in {**files(), **(spoiled or {})}.items():
+        (folder / name).write_bytes(content)
+    return load_link(write_toml(folder / "link.toml", merged(base, changes or {})))
+
+
+class Fault(NamedTuple):
+    """What is wrong with the files or the description, and what the message says about it."""
+
+    name: str
+    base: Table
+    spoiled: Callable[[], Files]
+    changes: Table
+    cause: Cause
+    words: str
+
+
+def check_fault(fault: Fault, folder: Path) -> None:
+    """One typed error that names a file and a remedy."""
+    with pytest.raises(FEImportError) as caught:
+        reduce_link(written(folder, fault.base, fault.spoiled(), fault.changes))
+    error = caught.value
+    assert fault.words in str(error)
+    assert error.cause is fault.cause
+    assert error.exit_code == 2
+    assert str(folder) in error.where
+    assert error.remedy
+    assert "\n" not in str(error)
+    assert len(str(error)) < 600
+    assert "np." not in str(error)
