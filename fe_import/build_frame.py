@@ -211,6 +211,14 @@ def _frame_interfaces(
                 value=interface.position,
                 remedy="remove the field, or put the interface on another node",
             )
+        if interface.coupling != "rigid":
+            raise FEImportError(
+                Cause.INTERFACE,
+                "an interface on a node of a frame couples no other nodes",
+                where=f"{place}.coupling",
+                value=interface.coupling,
+                remedy="remove the field",
+            )
         node = node_number(names, interface.node, f"{place}.node")
         if any(node == other.node for other in result):
             raise FEImportError(

@@ -37,7 +37,11 @@ def matrices_model(link: LinkFile) -> FEModel:
     kept, dense = _nodes_with_rows(export)
     faces, seats = matrices_interfaces(description, export, names, dense, where)
     nodes, dof_map = export.nodes[kept], export.dof_map[kept]
-    coupled = couple_interfaces(nodes, faces, where, dof_map, export.mass.shape[0])
+    try:
+        coupled = couple_interfaces(nodes, faces, where, dof_map, export.mass.shape[0])
+    except FEImportError as problem:
+        problem.remedy = problem.remedy or "name a set of 3 nodes or more, not on one line, or mend its position"
+        raise
     added = iter(coupled.interface_nodes)
     model = FEModel(
         name=description.name,
@@ -53,6 +57,7 @@ def matrices_model(link: LinkFile) -> FEModel:
         triangles=_among(export.triangles, dense),
         kind="matrices",
         source=where,
+        notes=export.notes,
     )
     refuse_grounded(model, export.labels[kept], where)
     return model

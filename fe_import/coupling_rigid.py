@@ -33,7 +33,5 @@ def follow_rigidly(state: Dependence, rows: IntArray, offsets: Array, interface:
     values = motion.reshape(-1, 6)[present]
     columns = np.tile(state.columns(interface), (len(values), 1))
     count = np.repeat(np.arange(len(values)), 6)
-    expression = sp.csr_array(
-        (values.ravel(), (count, columns.ravel())), shape=(len(values), len(state.independent))
-    )
+    expression = sp.csr_array((values.ravel(), (count, columns.ravel())), shape=(len(values), len(state.independent)))
     return state.following(state.columns(followers), expression)

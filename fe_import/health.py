@@ -17,6 +17,7 @@ from fe_import.modal_model import NO_LIMIT, HealthCheck
 from fe_import.model import Array, FEModel
 from fe_import.reduction import Basis
 from fe_import.rigid_checks import rigid_motion_as_eigenmodes, rigid_motion_by_stiffness
+from fe_import.rotation_terms import rotation_departure
 from fe_import.sparse import modes_below
 
 _ROUNDING = 1e-9  # symmetry, mass properties: sums of many terms of one sign in double precision
@@ -244,5 +245,8 @@ def check_reduction(
             HealthCheck("strain energy of rigid-body modes, per first elastic mode", float(strain), _EIGEN),
             HealthCheck("Rayleigh quotients against squared frequencies", float(spread), _EIGEN),
         ]
+    if model.kind == "matrices":  # of a superelement only the kept nodes are known
+        name = "centrifugal terms against those of a rigid body"
+        checks.append(HealthCheck(name, rotation_departure(invariants), NO_LIMIT))
     _refuse(((check, "ask for fewer modes, or look for very stiff or very light parts") for check in checks), where)
     return tuple(checks)

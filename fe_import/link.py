@@ -275,12 +275,12 @@ def _check(link: LinkDescription, file: str) -> None:
             )
     for name, section in link.sections.items():
         check_section(section, f"{file}: sections.{name}")
-    for table, nodes in (("frame", link.frame), ("solid", link.solid)):
+    for table, nodes in (("frame", link.frame), ("solid", link.solid), ("matrices", link.matrices)):
         for name, position in nodes.nodes.items() if nodes is not None else ():
             place = f"{file}: {table}.nodes.{name}"
             if not name or "\0" in name:
                 raise _fail(place, "a name must not be empty", name, "name the node")
-            if not all(map(math.isfinite, position)):
+            if not isinstance(position, int) and not all(map(math.isfinite, position)):
                 raise _fail(place, "a position must be finite", position, "give three numbers")
     if not link.interfaces:
         raise _fail(f"{file}: interfaces", "a link needs at least one interface", remedy="add [[interfaces]]")

@@ -123,9 +123,7 @@ def check_reduction_options(options: Reduction, interfaces: Collection[str], whe
             raise _fail(f"{where}.{field}", "too many modes", value, "ask for fewer", MOST_MODES)
     for field, choices in (("truncation", TRUNCATIONS), ("form", FORMS), ("selection", tuple(SELECTIONS))):
         if getattr(options, field) not in choices:
-            raise _fail(
-                f"{where}.{field}", "unknown choice", getattr(options, field), "one of " + ", ".join(choices)
-            )
+            raise _fail(f"{where}.{field}", "unknown choice", getattr(options, field), "one of " + ", ".join(choices))
     if options.inboard:
         choose(options.inboard, sorted(interfaces), f"{where}.inboard")
     if options.form == "physical":
@@ -173,7 +171,9 @@ def _check_ranking(ranking: Ranking | None, interfaces: Collection[str], where: 
         for entry in entries:
             name, _, component = entry.rpartition(".")
             if not name:
-                raise _fail(f"{where}.{field}", "not a component of a node", entry, "give 'NAME.COMPONENT', as 'hub.ry'")
+                raise _fail(
+                    f"{where}.{field}", "not a component of a node", entry, "give 'NAME.COMPONENT', as 'hub.ry'"
+                )
             choose(component, COMPONENTS, f"{where}.{field}")
             if field == "driving":
                 choose(name, sorted(interfaces), f"{where}.{field}")

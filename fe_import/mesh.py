@@ -51,9 +51,7 @@ def read_mesh(path: Path) -> SolidMesh:
         what ``check_mesh`` finds; ``DISCONNECTED``.
     """
     if not path.exists():
-        raise FEImportError(
-            Cause.FILE_NOT_FOUND, "no such mesh file", where=str(path), remedy="check the path"
-        )
+        raise FEImportError(Cause.FILE_NOT_FOUND, "no such mesh file", where=str(path), remedy="check the path")
     raw = _read(path)
     element_type, blocks = _solid_blocks(raw, str(path))
     elements = np.concatenate([raw.blocks[b].cells for b in blocks]).astype(np.int64)
@@ -100,8 +98,7 @@ def _solid_blocks(raw: RawMesh, where: str) -> tuple[str, list[int]]:
     if unsupported:
         raise FEImportError(
             Cause.UNSUPPORTED_ELEMENT,
-            "solid elements that cannot be assembled: "
-            + _listing((name, counts[name]) for name in unsupported),
+            "solid elements that cannot be assembled: " + _listing((name, counts[name]) for name in unsupported),
             where=where,
             limit=", ".join(_BY_MESHIO_NAME),
             remedy="mesh with one of the supported types",

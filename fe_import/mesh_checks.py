@@ -14,6 +14,7 @@ from fe_import.model import Array, IntArray
 from fe_import.solid_mesh import SolidMesh, element_faces
 
 COINCIDENT = 1e-9  # of the mesh's size
+FARTHEST = 1e12  # coordinate in any unit of length; squares of larger ones overflow
 FLAT = 1e-9  # Jacobian determinant over the product of the edge vectors' lengths
 _CHUNK = 20_000  # elements whose Jacobians are held at a time
 
@@ -51,11 +52,11 @@ def _element(mesh: SolidMesh, index: int) -> str:
 
 
 def _check_coordinates(mesh: SolidMesh) -> None:
-    bad = np.flatnonzero(~np.isfinite(mesh.nodes).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(mesh.nodes) <= FARTHEST).all(axis=1))
     if bad.size:
         raise _faulty(
             mesh,
-            f"{bad.size} nodes have coordinates that are not finite, the first is node {bad[0]}",
+            f"{bad.size} nodes have coordinates that are not finite or absurd, the first is node {bad[0]}",
             "write the mesh again; node numbers count from 0 in the file's order",
             value=_place(mesh.nodes[bad[0]]),
         )

@@ -107,6 +107,8 @@ class FEModel:
         File that the model came from.
     stress : StressSource or None
         None for bare matrices, which have no elements.
+    notes : dict of str
+        What the provenance should say about the source.
     """
 
     name: str
@@ -124,6 +126,7 @@ class FEModel:
     kind: str = "frame"
     source: str = ""
     stress: StressSource | None = None
+    notes: dict[str, str] = field(default_factory=dict)
 
     @property
     def interface_dofs(self) -> IntArray:

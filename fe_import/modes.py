@@ -38,7 +38,13 @@ def reduced_matrices(model: FEModel, basis: Basis) -> tuple[Array, Array]:
 
 
 def orthonormal_modes(
-    mass: Array, stiffness: Array, basis: Basis, options: Reduction, interfaces: Array, inboard: int, where: str
+    mass: Array,
+    stiffness: Array,
+    basis: Basis,
+    options: Reduction,
+    interfaces: Array | None,
+    where: str,
+    inboard: int = 0,
 ) -> OrthonormalModes:
     """Rigid-body modes from geometry, elastic ones from the eigenproblem on their mass-orthogonal complement.
 
@@ -50,11 +56,11 @@ def orthonormal_modes(
     mass, stiffness : (k, k) arrays
     basis : Basis
     options : Reduction
-    interfaces : (6 n_interfaces, k) array
-        Interface displacements and rotations per unit coordinate.
+    interfaces : (6 n_interfaces, k) array or None
+        Interface displacements and rotations per unit coordinate; for static correction and clamped truncation.
+    where : str
     inboard : int
         Number of the interface that ``options.truncation = "clamped"`` clamps.
-    where : str
 
     Raises
     ------
@@ -68,12 +74,13 @@ def orthonormal_modes(
     typical = np.median(squared[squared > 0]) if squared.any() else 1.0
     scale = 1 / np.sqrt(inertia + resistance / typical)
     mass, stiffness = mass * np.outer(scale, scale), stiffness * np.outer(scale, scale)
-    interfaces = interfaces * scale
+    interfaces = np.zeros((0, len(scale))) if interfaces is None else interfaces * scale
     rigid, rigid_coordinates = rigid_modes(mass, basis.rigid / scale[:, None], where)
 
     complement = whole = la.qr(mass @ rigid)[0][:, 6:]
+    scaled = _Scaled(mass, stiffness, rigid, interfaces)
     if options.elastic_modes is not None and (options.static_correction or options.truncation == "clamped"):
-        complement = _kept_span(mass, stiffness, complement, rigid, interfaces, inboard, options, where)
+        complement = _kept_span(scaled, complement, inboard, options, where)
     omega, elastic = dense_modes(
         complement.T @ stiffness @ complement, complement.T @ mass @ complement, None, "free link"
     )
@@ -87,7 +94,7 @@ def orthonormal_modes(
             limit=len(omega),
             remedy="ask for fewer, or keep more modes in the basis (fixed_interface_modes, free_modes)",
         )
-    flexibility = _flexibility(stiffness, interfaces, whole) if options.static_correction else None
+    flexibility = _flexibility(scaled, whole) if options.static_correction else None
     coordinates = scale[:, None] * np.hstack([rigid, complement @ elastic[:, :wanted]])
     motions = np.zeros((6 + wanted, 6))
     motions[:6] = rigid_coordinates
@@ -115,27 +122,33 @@ def mode_shapes(model: FEModel, basis: Basis, modes: OrthonormalModes) -> tuple[
     return shapes * signs, replace(modes, coordinates=modes.coordinates @ change * signs, omega=omega)
 
 
-def _flexibility(stiffness: Array, interfaces: Array, complement: Array) -> Array:
+@dataclass(frozen=True)
+class _Scaled:
+    """Mass and stiffness (k, k), rigid-body modes (k, 6) and interface displacements (b, k) of scaled columns."""
+
+    mass: Array
+    stiffness: Array
+    rigid: Array
+    interfaces: Array
+
+
+def _flexibility(link: _Scaled, complement: Array) -> Array:
     """(b, b) displacements of the interfaces under unit loads there, balanced by inertia."""
-    moved = interfaces @ complement
-    return np.asarray(moved @ la.solve(complement.T @ stiffness @ complement, moved.T, assume_a="pos"))
+    moved = link.interfaces @ complement
+    return np.asarray(moved @ la.solve(complement.T @ link.stiffness @ complement, moved.T, assume_a="pos"))
 
 
-def _kept_span(
-    mass: Array, stiffness: Array, complement: Array, rigid: Array, interfaces: Array, inboard: int, options: Reduction,
-    where: str,
-) -> Array:
+def _kept_span(link: _Scaled, complement: Array, inboard: int, options: Reduction, where: str) -> Array:
     """What the elastic modes to keep are made of: columns within the complement of the rigid-body motions."""
     count = options.elastic_modes or 0
-    k, m = complement.T @ stiffness @ complement, complement.T @ mass @ complement
+    k, m = complement.T @ link.stiffness @ complement, complement.T @ link.mass @ complement
     if options.truncation == "clamped":
-        held = interfaces[6 * inboard : 6 * inboard + 6]
-        lowest = complement.T @ _clamped_modes(mass, stiffness, rigid, held, count)
+        lowest = complement.T @ _clamped_modes(link, slice(6 * inboard, 6 * inboard + 6), count)
     else:
         lowest = dense_modes(k, m, count, "free link")[1]
     if not options.static_correction:
         return np.asarray(complement @ la.qr(lowest, mode="economic")[0])
-    static = static_span(k, interfaces @ complement, interfaces @ rigid)
+    static = static_span(k, link.interfaces @ complement, link.interfaces @ link.rigid)
     if static.shape[1] > count:
         raise FEImportError(
             Cause.MODE_COUNT,
@@ -148,8 +161,9 @@ def _kept_span(
     return np.asarray(complement @ completed(static, lowest, k, count))
 
 
-def _clamped_modes(mass: Array, stiffness: Array, rigid: Array, held: Array, count: int) -> Array:
-    """Lowest modes with some displacements (c, k) held, less their rigid-body motion."""
+def _clamped_modes(link: _Scaled, rows: slice, count: int) -> Array:
+    """Lowest modes with some interface displacements held, less their rigid-body motion."""
+    mass, stiffness, held = link.mass, link.stiffness, link.interfaces[rows]
     moving = held.any(axis=0)
     if moving.sum() == len(held):  # columns of the basis: leave them out
         free = np.eye(len(mass))[:, ~moving]
@@ -159,7 +173,7 @@ def _clamped_modes(mass: Array, stiffness: Array, rigid: Array, held: Array, cou
         free.T @ stiffness @ free, free.T @ mass @ free, count, "link with its inboard interface clamped"
     )
     span = free @ modes
-    return np.asarray(span - rigid @ (rigid.T @ mass @ span))
+    return np.asarray(span - link.rigid @ (link.rigid.T @ mass @ span))
 
 
 def mode_kinds(model: FEModel, shapes: Array, basis: Basis, coordinates: Array, stiffness: Array) -> tuple[str, ...]:

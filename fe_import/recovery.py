@@ -140,7 +140,8 @@ def mode_acceleration(model: ModalModel) -> tuple[Array, Array, Array]:
     """
     maps = required_maps(model, model.name)
     squared = (2 * np.pi * model.frequencies_hz) ** 2
-    interfaces = np.vstack([part for i in model.interface_nodes for part in model.node_shape(i.node) if part is not None])
+    shapes = [model.node_shape(i.node) for i in model.interface_nodes]
+    interfaces = np.vstack([part for both in shapes for part in both if part is not None])
     rho = model.invariants.rigid[:, 3:]
     pull = [model.invariants.X[a].T @ rho for a in range(3)]  # modal loads of ω_a ω_b
     spin = [pull[a][:, b] if a == b else pull[a][:, b] + pull[b][:, a] for a, b in SPIN_PAIRS]

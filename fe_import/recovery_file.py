@@ -24,7 +24,7 @@ def write_recovery(group: h5py.Group, maps: RecoveryMaps) -> None:
         ("modes", maps.modes, "unit modal coordinate", "place, component, mode"),
         ("inertia", maps.inertia, "unit modal force", "static, under M times mode shape; place, component, mode"),
         ("loads", maps.loads, "N and N m", "static, under interface loads; place, component, 6 per interface"),
-        ("spin", maps.spin, "rad^2/s^2", "static, of wx^2, wy^2, wz^2, wx wy, wy wz, wz wx; place, component, product"),
+        ("spin", maps.spin, "rad^2/s^2", "static, of wx^2, wy^2, wz^2, wx wy, wy wz, wz wx; place, component, pair"),
     ):
         write_array(group, name, values, f"{unit} per {per}", f"{maps.quantity}; {meaning}")
     write_array(group, "nodes", maps.nodes, "1", "node of each place, from 0")

@@ -68,7 +68,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     basis = REDUCTIONS[options.method](model, options, where)
     mass, stiffness = reduced_matrices(model, basis)
     interfaces, inboard = basis.vectors[model.interface_dofs], _inboard(model, options.inboard)
-    modes = orthonormal_modes(mass, stiffness, basis, options, interfaces, inboard, where)
+    modes = orthonormal_modes(mass, stiffness, basis, options, interfaces, where, inboard)
     checks += check_basis(model, basis, mass, stiffness, modes.omega, where)
     shapes, modes = mode_shapes(model, basis, modes)
     invariants = inertia_invariants(model.mass, shapes, model.dof_map, modes.rigid)
@@ -153,6 +153,7 @@ def provenance(link: LinkFile, model: FEModel, selection: dict[str, Any] | None 
         "method": options["method"],
         "options": json.dumps(options, sort_keys=True),
         **({"selection": json.dumps(selection, sort_keys=True)} if selection else {}),
+        **{f"source: {key}": text for key, text in model.notes.items()},
         "versions": ", ".join(f"{p} {_version(p)}" for p in packages),
     }
 

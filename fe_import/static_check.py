@@ -1,4 +1,4 @@
-"""Whether the modes kept answer static loads at the interfaces as the link does, where that was promised or is known."""
+"""Whether the modes kept answer static loads at the interfaces as the link does, where that was promised."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Rotations in space."""
+"""Rotations in space.
+
+Only what one rotation needs; `erls.lie.rotation_maps` has exponential, logarithm and tangents for many at once.
+"""
 
 from __future__ import annotations
 

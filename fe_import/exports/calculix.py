@@ -60,6 +60,8 @@ def read_calculix(files: Mapping[str, Path], options: Any, where: str) -> Export
     notes = {"program": "CalculiX, SOLVER=MATRIXSTORAGE"}
     if mesh.keywords["TRANSFORM"]:
         notes["frames"] = "*TRANSFORM does not turn the rows of these matrices"
+    if mesh.unread:
+        notes["not drawn"] = ", ".join(f"elements {kind}" for kind in sorted(mesh.unread))
     return Export(
         mass,
         stiffness,

@@ -82,7 +82,7 @@ def read_sparse(path: Path, size: int) -> sp.csc_array:
     except _FAULTS as problem:
         raise FEImportError(
             Cause.NOT_READABLE,
-            f"cannot be read as a sparse matrix: {problem}",
+            f"cannot be read as a sparse matrix: {shortened(str(problem))}",
             where=where,
             remedy="write it with scipy.sparse.save_npz",
         ) from None

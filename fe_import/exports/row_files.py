@@ -5,8 +5,8 @@ Fields are separated by blanks, commas or semicolons; ``#`` starts a comment; he
 - dofs: one line per row of the matrices, in order: ``node component`` with the component ``ux uy uz rx ry rz`` (or
   ``1`` ... ``6``, or ``rotx roty rotz``), or ``modal``. Or the mapping file of Ansys: ``row node component``, in any
   order.
-- nodes: ``node x y z``, or with the three angles of NWRITE in degrees, ``node x y z thxy thyz thzx``, when the
-  displacements of a node are counted in a frame of its own.
+- nodes: ``node x y z``, or with the three angles of Ansys' NWRITE in degrees, ``node x y z thxy thyz thzx``, when the
+  displacements of a node are counted in a frame of its own. Zeros at the end may be left out, as NWRITE does.
 - sets: ``NAME node node ...``; a repeated name goes on.
 """
 
@@ -47,8 +47,9 @@ class Place:
 def _records(file: TextFile) -> Iterator[list[str]]:
     """Fields of every line that holds some."""
     while (line := file.line()) is not None:
-        fields = re.split(r"[\s,;]+", line.partition("#")[0].strip(" \t,;"))
-        if fields != [""]:
+        text = line.partition("#")[0].strip(" \t\r\f\v,;")
+        separator = next((mark for mark in ",;" if mark in text), None)
+        if fields := [f.strip() for f in text.split(separator)] if text else []:
             yield fields
 
 
@@ -159,24 +160,23 @@ def _read_nodes(path: Path) -> Place:
                 values = [float(f.upper().replace("D", "E")) for f in fields[1:]]
             except ValueError:
                 values = [math.nan]
-            expected = (len(rows[0]),) if rows else (3, 6)
-            if not _INTEGER.match(fields[0]) or len(values) not in expected or not all(map(math.isfinite, values)):
+            if not _INTEGER.match(fields[0]) or len(values) > 6 or not all(map(math.isfinite, values)):
                 raise file.failure(
                     "expected a node and three coordinates, or also three angles",
                     line=file.number,
                     value=shortened(" ".join(fields)),
-                    remedy="write 'node x y z' or 'node x y z thxy thyz thzx', the same in every line",
+                    remedy="write 'node x y z' or 'node x y z thxy thyz thzx'",
                 )
             label = int(fields[0])
             if label in seen:
                 message = f"this node stands in line {seen[label]} already"
                 raise file.failure(message, line=file.number, value=label, remedy="remove one")
             seen[label] = file.number
-            rows.append(values)
+            rows.append(values + [0.0] * (6 - len(values)))
         if not rows:
             raise file.failure("no nodes", remedy="write 'node x y z' lines")
     table = np.array(rows)
-    orientations = node_frames(table[:, 3:]) if table.shape[1] == 6 and table[:, 3:].any() else None
+    orientations = node_frames(table[:, 3:]) if table[:, 3:].any() else None
     nothing = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
     return Place(np.fromiter(seen, dtype=np.int64), table[:, :3], orientations, {}, *nothing)
 

@@ -146,7 +146,5 @@ def lowest_free_modes(body: FreeBody, static: Array, count: int) -> tuple[Array,
             remedy="ask for more or for fewer modes",
         )
     modes = body.elastic(modes[:, 6:])
-    found, turn = dense_modes(
-        modes.T @ (body.stiffness @ modes), modes.T @ (body.mass @ modes), None, "free link"
-    )
+    found, turn = dense_modes(modes.T @ (body.stiffness @ modes), modes.T @ (body.mass @ modes), None, "free link")
     return found, modes @ turn

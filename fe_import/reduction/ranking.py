@@ -49,8 +49,7 @@ def best_ranked(
         Fewer modes than asked for (MODE_COUNT), an unknown node (BAD_REFERENCE), or nothing of what is driven arrives
         where it is observed (BAD_FIELD).
     """
-    wanted = max(FEWEST_CANDIDATES, CANDIDATES_PER_MODE * ranking.count)
-    omega, modes = lowest(min(wanted, len(parts.inner)))
+    omega, modes = _whole_groups(lowest, max(FEWEST_CANDIDATES, CANDIDATES_PER_MODE * ranking.count), len(parts.inner))
     if len(omega) < ranking.count:
         raise FEImportError(
             Cause.MODE_COUNT,
@@ -169,6 +168,13 @@ def _groups(frequencies: Array) -> list[IntArray]:
     """Positions of equal ones together."""
     apart = np.diff(frequencies) > _EQUAL * frequencies[1:]
     return np.split(np.arange(len(frequencies)), np.flatnonzero(apart) + 1)
+
+
+def _whole_groups(lowest: Callable[[int], tuple[Array, Array]], wanted: int, available: int) -> tuple[Array, Array]:
+    """The lowest modes without half a pair at the end, which would make a symmetric link asymmetric."""
+    omega, modes = lowest(min(wanted + 1, available))
+    count = len(omega) if len(omega) <= wanted else int(_groups(omega)[-1][0])
+    return omega[:count], modes[:, :count]
 
 
 def _within_groups(energies: Array, omega: Array) -> Array:

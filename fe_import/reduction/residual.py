@@ -14,9 +14,7 @@ from fe_import.model import Array
 _NEW = 1e-7  # share of a static field, in the energy norm, that counts as new; rounding leaves 1e-9 and less
 
 
-def residual_vectors(
-    static: Array, loads: Array, omega: Array, modes: Array, stiffness: sp.csc_array
-) -> Array:
+def residual_vectors(static: Array, loads: Array, omega: Array, modes: Array, stiffness: sp.csc_array) -> Array:
     """What static fields add to modes: x - Φ Ω⁻² Φᵀf, orthonormal in the energy norm.
 
     Parameters

@@ -8,7 +8,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
@@ -49,32 +48,37 @@ def link_matrices() -> tuple[SolidMesh, sp.csc_array, sp.csc_array]:
     return mesh, *assemble_solid(mesh, [MATERIAL])
 
 
-def deck() -> str:
+def deck(mesh: SolidMesh) -> str:
     """Nodes (numbers 10, 20, ...), elements and sets."""
-    mesh = link_matrices()[0]
+    kind = {"hex8": "C3D8", "tet10": "C3D10"}[mesh.element_type]
     lines = ["** a comment", "*NODE, NSET=Nall"]
     lines += [f"{10 * (k + 1)}, " + ", ".join(map(repr, p.tolist())) for k, p in enumerate(mesh.nodes)]
-    lines += ["*ELEMENT, TYPE=C3D8, ELSET=EALL"]
+    lines += [f"*ELEMENT, TYPE={kind}, ELSET=EALL"]
     lines += [", ".join(map(str, [k, *(10 * (e + 1)).tolist()])) for k, e in enumerate(mesh.elements, start=1)]
     for name in ("x0", "x1"):
         lines += [f"*NSET, NSET={name}", *(f"{10 * (n + 1)}," for n in mesh.node_sets[name])]
     return "\n".join(lines) + "\n"
 
 
-@cache
-def files() -> Files:
-    """The link as CalculiX, as Matrix Market, and as NPZ."""
-    mesh, mass, stiffness = link_matrices()
-    nodes = 10 * (1 + np.arange(len(mesh.nodes)))
-    pattern = sp.triu(stiffness).tocsc().tocoo()  # CalculiX writes both with one pattern
-    places = list(zip(*(c.tolist() for c in pattern.coords), strict=True))
+def calculix_files(mesh: SolidMesh, mass: sp.csc_array, stiffness: sp.csc_array) -> Files:
+    """The upper triangles, column by column and with one pattern, the rows and the deck."""
+    pattern = sp.triu(abs(stiffness) + abs(mass)).tocsc().tocoo()
+    places = sorted(zip(*(c.tolist() for c in pattern.coords), strict=True), key=lambda place: place[::-1])
     result = {
         name: "".join(f"{i + 1} {j + 1} {matrix[i, j]: .13e}\n" for i, j in places).encode()
         for name, matrix in (("k.sti", stiffness.toarray()), ("k.mas", mass.toarray()))
     }
-    result["k.dof"] = "".join(f"{n}.{c}\n" for n in nodes for c in (1, 2, 3)).encode()
-    result["k.inp"] = deck().encode()
-    result["rows.csv"] = ("node, component\n" + "".join(f"{n}, {c}\n" for n in nodes for c in ("ux", "uy", "uz"))).encode()
+    result["k.dof"] = "".join(f"{10 * (n + 1)}.{c}\n" for n in range(len(mesh.nodes)) for c in (1, 2, 3)).encode()
+    return {**result, "k.inp": deck(mesh).encode()}
+
+
+@cache
+def files() -> Files:
+    """The link as CalculiX, as Matrix Market, and as NPZ."""
+    mesh, mass, stiffness = link_matrices()
+    result = calculix_files(mesh, mass, stiffness)
+    rows = [f"{10 * (n + 1)}, {c}\n" for n in range(len(mesh.nodes)) for c in ("ux", "uy", "uz")]
+    result["rows.csv"] = "".join(["# a comment\n", "node, component\n", *rows]).encode()
     for name, matrix in (("k", stiffness), ("m", mass)):
         result[f"{name}.mtx"] = market(matrix)
         result[f"{name}.npz"] = npz(matrix)
@@ -100,6 +104,27 @@ def written(folder: Path, base: Table, spoiled: Files | None = None, changes: Ta
     for name, content in {**files(), **(spoiled or {})}.items():
         (folder / name).write_bytes(content)
     return load_link(write_toml(folder / "link.toml", merged(base, changes or {})))
+
+
+def swapped(name: str, old: str, new: str) -> Callable[[], Files]:
+    """One file with its first ``old`` replaced."""
+
+    def spoil() -> Files:
+        text = files()[name].decode()
+        assert old in text
+        return {name: text.replace(old, new, 1).encode()}
+
+    return spoil
+
+
+def relined(name: str, change: Callable[[list[str]], list[str]]) -> Callable[[], Files]:
+    """One file with its lines changed."""
+    return lambda: {name: ("\n".join(change(files()[name].decode().splitlines())) + "\n").encode()}
+
+
+def raw(name: str, content: bytes | Callable[[bytes], bytes]) -> Callable[[], Files]:
+    """One file with another content."""
+    return lambda: {name: content if isinstance(content, bytes) else content(files()[name])}
 
 
 class Fault(NamedTuple):

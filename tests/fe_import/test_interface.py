@@ -10,8 +10,8 @@ import pytest
 import scipy.linalg
 from solid_meshes import box, quarter_ring
 
-from fe_import.errors import Cause, FEImportError
 from fe_import.coupling import Coupling, couple_interfaces
+from fe_import.errors import Cause, FEImportError
 from fe_import.interface import InterfaceFace, interface_face
 from fe_import.mesh import SolidMesh, read_mesh
 from fe_import.model import FEModel

@@ -11,6 +11,7 @@ import pytest
 from solid_meshes import box, quarter_ring
 
 from fe_import.errors import Cause, FEImportError
+from fe_import.interface import interface_face
 from fe_import.mesh import SolidMesh, read_mesh, surface_triangles
 from fe_import.solid_elements import SOLID_ELEMENTS
 
@@ -149,7 +150,6 @@ def test_missing_file(tmp_path):
         ("garbage.msh", "hello"),
         ("cut.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 8"),
         ("empty.vtu", ""),
-        ("bad_element.inp", "*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D99\n1, 1\n"),
         ("unknown_node.inp", "*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n"),
     ],
 )
@@ -170,6 +170,8 @@ def test_unsupported_elements_are_counted(tmp_path):
     path = tmp_path / "wedge.vtu"
     meshio.write(path, meshio.Mesh(points, [("wedge", np.arange(6)[None])]))
     fails(path, Cause.UNSUPPORTED_ELEMENT, "1 wedge", "tetra10")
+    (tmp_path / "odd.inp").write_text("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D99\n1, 1\n2, 1\n")
+    fails(tmp_path / "odd.inp", Cause.UNSUPPORTED_ELEMENT, "2 C3D99")
 
 
 def test_surface_mesh(tmp_path):
@@ -198,33 +200,33 @@ def test_elements_with_unknown_nodes(tmp_path):
 
 
 def test_sets_with_foreign_nodes(tmp_path):
+    """A reference node outside of the solid: the set is left out, the rest of the mesh is read."""
     mesh = box("hex8", (1, 1, 1))
     orphaned = replace(mesh, nodes=np.vstack([mesh.nodes, [[9.0, 9.0, 9.0]]]))
-    path = written(tmp_path / "box.inp", orphaned, point_sets={"REFERENCE": np.array([8])})
-    fails(path, Cause.MESH, "'REFERENCE'", "1 nodes that belong to no solid element")
+    sets = {"REFERENCE": np.array([8]), "END": mesh.node_sets["x1"]}
+    found = read_mesh(written(tmp_path / "box.inp", orphaned, point_sets=sets))
+    assert sorted(found.node_sets) == ["END"]
+    assert "1 nodes that belong to no solid element" in found.lost_sets["REFERENCE"]
+    with pytest.raises(FEImportError, match="'REFERENCE', which is not usable: it holds 1 nodes"):
+        interface_face(found, "A", "REFERENCE")
 
 
-def test_sets_of_sets(tmp_path):
-    mesh = box("hex8", (2, 1, 1))
-    path = written(tmp_path / "box.inp", mesh, cell_sets={"A": [np.array([0])], "B": [np.array([1])]})
-    path.write_text(path.read_text() + "*ELSET, ELSET=BOTH\nA\nB\n")
-    fails(path, Cause.MESH, "'BOTH'")
-
-
-def test_two_sets_of_one_name(tmp_path):
+def test_two_sets_of_one_name(tmp_path, monkeypatch):
+    """Faces and points of one name that do not agree: neither is taken."""
     mesh = box("hex8", (1, 1, 1))
     face = mesh.elements[:, [0, 1, 2, 3]]
-    path = tmp_path / "box.inp"
+    path = tmp_path / "box.vtu"
     raw = meshio.Mesh(
         mesh.nodes,
         [("hexahedron", mesh.elements), ("quad", face)],
-        point_sets={"FACE": np.arange(3)},
-        cell_sets={"FACE": [[], np.array([0])]},
+        point_sets={"FACE": np.arange(3), "SAME": np.unique(face)},
+        cell_sets={"FACE": [[], np.array([0])], "SAME": [[], np.array([0])]},
     )
-    with pytest.MonkeyPatch.context() as patch:
-        path.touch()
-        patch.setattr(meshio, "read", lambda _: raw)
-        fails(path, Cause.MESH, "two different node sets", "'FACE'")
+    path.touch()
+    monkeypatch.setattr(meshio, "read", lambda _: raw)
+    found = read_mesh(path)
+    assert sorted(found.node_sets) == ["SAME"]
+    assert "two different node sets" in found.lost_sets["FACE"]
 
 
 def test_faults_are_found_on_reading(tmp_path):

@@ -61,6 +61,7 @@ SUPPORT = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 FAULTS = {
     "not a number": (moved(BRICK, 5, [np.nan, 0, 0]), Cause.MESH, "node 5"),
     "infinite": (moved(BRICK, 0, [0, np.inf, 0]), Cause.MESH, "node 0"),
+    "absurd": (moved(BRICK, 3, [0, 0, 1e200]), Cause.MESH, "node 3"),
     "mirrored": (
         replace(BRICK, nodes=BRICK.nodes * [1, 1, -1]),
         Cause.MESH,

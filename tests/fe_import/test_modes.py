@@ -119,7 +119,7 @@ def test_repeated_frequencies(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("direction", [[1.0, 0.0, 0.0], [0.3, -0.5, 0.7]])
-@pytest.mark.parametrize("method", ["craig-bampton", "none"])
+@pytest.mark.parametrize("method", ["craig-bampton", "craig-chang", "guyan", "none"])
 def test_mass_on_one_line(tmp_path: Path, direction: list[float], method: str) -> None:
     """A straight link of point masses has no inertia about its own line, however it lies; a body off it is enough."""
     end = (0.5 * np.array(direction)).tolist()

@@ -27,6 +27,11 @@ class JointEfforts:
         self._leading = [k for k in self._active if mechanism.joints[k].drive.feed_forward]
         self._known: tuple[float, Array] = (np.nan, np.zeros(0))
 
+    @property
+    def any(self) -> bool:
+        """Whether any force or rotor acts in a joint."""
+        return bool(self._active) or bool(self.rotors.any())
+
     def at(self, t: float, angles: Array, rates: Array) -> Array:
         """(joints,) force on each coordinate; zero for what a prescribed motion takes."""
         result = np.zeros(len(self.rotors))

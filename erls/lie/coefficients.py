@@ -1,0 +1,82 @@
+"""Functions of a squared angle x = θ² that rotations are made of, accurate from θ = 0 on.
+
+Stumpff functions (K. Stumpff, Himmelsmechanik I, 1959, ch. V):
+
+    c_k(x) = Σ_j (−x)^j / (2j + k)!,    c₀ = cos θ,  c₁ = sin θ / θ,  c₂ = (1 − cos θ)/θ²,  c₃ = (θ − sin θ)/θ³
+
+with c_k = 1/k! − x c_{k+2} and dc_k/dx = (k c_{k+2} − c_{k+1})/2. The inverse of a tangent operator needs
+
+    b(x) = (1 − (θ/2) cot(θ/2))/x = 2/(4π² − x) + Σ_k 2 (ζ(2k + 2) − 1) x^k / (2π)^(2k+2),
+
+with its pole at θ = 2π set apart; it solves 2x b' = 1/4 − 3b + x b².
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+from scipy.special import zeta
+
+from erls.lie.so3 import Array
+
+_SERIES_BELOW = 4.0  # no term of a Stumpff series exceeds the one before it there, for k ≥ 1
+_TERMS = 12
+_POLE = 4 * np.pi**2
+_RATIO_BELOW = 0.5  # of x to the pole
+_ZETA = 2 * (zeta(2 * np.arange(19) + 2) - 1)  # falls by four from term to term
+
+
+def stumpff(x: Array, highest: int) -> Array:
+    """(highest + 1, ...) c₀ to c_highest of the squared angles (...)."""
+    found = np.empty((highest + 1, *np.shape(x)))
+    inside = np.minimum(x, _SERIES_BELOW)
+    for k in (highest, highest - 1):
+        total = np.full(np.shape(x), 1 / factorial(2 * _TERMS + k))
+        for j in range(_TERMS - 1, -1, -1):
+            total = 1 / factorial(2 * j + k) - inside * total
+        found[k] = total
+    for k in range(highest - 2, -1, -1):
+        found[k] = 1 / factorial(k) - inside * found[k + 2]
+    large = np.asarray(x > _SERIES_BELOW)
+    if large.any():
+        far = np.asarray(x)[large]
+        angle = np.sqrt(far)
+        found[0, large], found[1, large] = np.cos(angle), np.sin(angle) / angle
+        for k in range(highest - 1):
+            found[k + 2, large] = (1 / factorial(k) - found[k, large]) / far
+    return found
+
+
+def stumpff_derivative(c: Array, k: int) -> Array:
+    """dc_k/dx from the first k + 3 functions ``c``."""
+    return (k * c[k + 2] - c[k + 1]) / 2
+
+
+def stumpff_second_derivative(c: Array, k: int) -> Array:
+    """d²c_k/dx² from the first k + 5 functions ``c``."""
+    return (k * stumpff_derivative(c, k + 2) - stumpff_derivative(c, k + 1)) / 2
+
+
+def inverse_coefficient(x: Array) -> tuple[Array, Array, Array]:
+    """b(x) and its first and second derivative, each (...); infinite at θ = 2π."""
+    y = np.minimum(np.asarray(x) / _POLE, _RATIO_BELOW)
+    value, slope, bend = (np.zeros(np.shape(x)) for _ in range(3))
+    for k in range(len(_ZETA) - 1, -1, -1):
+        bend = slope * 2 + y * bend
+        slope = value + y * slope
+        value = _ZETA[k] + y * value
+    gap = 1 - y
+    value = (value + 2 / gap) / _POLE
+    slope = (slope + 2 / gap**2) / _POLE**2
+    bend = (bend + 4 / gap**3) / _POLE**3
+    large = np.asarray(x > _RATIO_BELOW * _POLE)
+    if large.any():
+        far = np.asarray(x)[large]
+        half = np.sqrt(far) / 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            b = (1 - half * np.cos(half) / np.sin(half)) / far
+            first = (0.25 - 3 * b + far * b * b) / (2 * far)
+            second = (b * b - 5 * first + 2 * far * b * first) / (2 * far)
+        value[large], slope[large], bend[large] = b, first, second
+    return value, slope, bend

@@ -1,0 +1,108 @@
+"""Mesh files that would fill memory or disk: refused before they do."""
+
+from __future__ import annotations
+
+import gzip
+import resource
+import struct
+import sys
+import tracemalloc
+
+import meshio
+import numpy as np
+import pytest
+from solid_meshes import box
+
+from fe_import import mesh_guard
+from fe_import.errors import Cause, FEImportError
+from fe_import.mesh import read_mesh
+
+MSH4 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+MSH2 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+BINARY = b"$MeshFormat\n4.1 1 8\n" + struct.pack("<i", 1) + b"\n$EndMeshFormat\n"
+CUBE = box("hex8", (1, 1, 1))
+VTU = (
+    '<VTKFile type="UnstructuredGrid" version="0.1"><UnstructuredGrid>'
+    '<Piece NumberOfPoints="{}" NumberOfCells="{}"/></UnstructuredGrid></VTKFile>'
+)
+HEADERS = {
+    "nodes of MSH 4": ("a.msh", f"{MSH4}$Nodes\n1 1000000000000 1 8\n", "$Nodes"),
+    "blocks of MSH 4": ("a.msh", f"{MSH4}$Nodes\n1000000000000 8 1 8\n", "$Nodes"),
+    "elements of MSH 4": ("a.msh", f"{MSH4}$Elements\n99999999999 8 1 8\n", "$Elements"),
+    "nodes of binary MSH 4": ("a.msh", BINARY + b"$Nodes\n" + struct.pack("<QQQQ", 1, 10**12, 1, 8), "$Nodes"),
+    "nodes of MSH 2": ("a.msh", f"{MSH2}$Nodes\n1000000000000\n1 0 0 0\n", "$Nodes"),
+    "elements of MSH 2": ("a.msh", f"{MSH2}$Nodes\n0\n$EndNodes\n$Elements\n1000000000\n", "$Elements"),
+    "negative": ("a.msh", f"{MSH2}$Nodes\n-1\n", "$Nodes"),
+    "no number": ("a.msh", f"{MSH2}$Nodes\nmany\n", "$Nodes"),
+    "not finite": ("a.msh", f"{MSH2}$Nodes\nnan\n", "$Nodes"),
+    "points of VTU": ("a.vtu", VTU.format(10**12, 1), "NumberOfPoints"),
+    "cells of VTU": ("a.vtu", VTU.format(8, 10**12), "NumberOfCells"),
+}
+
+
+@pytest.mark.parametrize("name", HEADERS)
+def test_declared_sizes(tmp_path, name):
+    """A count that the file cannot hold is refused within 10 MB."""
+    file, content, words = HEADERS[name]
+    path = tmp_path / file
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    tracemalloc.start()
+    try:
+        with pytest.raises(FEImportError) as caught:
+            read_mesh(path)
+        assert tracemalloc.get_traced_memory()[1] < 1e7
+    finally:
+        tracemalloc.stop()
+    assert caught.value.cause is Cause.MESH
+    assert words in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def cube(path) -> bytes:
+    meshio.write(
+        path, meshio.Mesh(CUBE.nodes, [("hexahedron", CUBE.elements)]), "gmsh22" if path.suffix == ".msh" else None
+    )
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("suffix", [".inp", ".vtu", ".msh", ".bdf"])
+def test_packed_meshes(tmp_path, suffix):
+    """A .gz file is the file in it; nothing is left behind."""
+    path = tmp_path / f"cube{suffix}.gz"
+    path.write_bytes(gzip.compress(cube(tmp_path / f"cube{suffix}")))
+    found = read_mesh(path)
+    np.testing.assert_allclose(found.nodes, CUBE.nodes)
+    assert found.source == str(path)
+
+
+PACKED = {
+    "not gzip": (b"*NODE\n", "not a whole gzip file"),
+    "cut off": (gzip.compress(b"*NODE\n" * 1000)[:-20], "not a whole gzip file"),
+    "damaged": (gzip.compress(b"*NODE\n" * 1000)[:40] + b"????" + gzip.compress(b"*NODE\n" * 1000)[44:], "gzip"),
+    "bomb": (gzip.compress(b"\n" * 21_000_000), "far more than meshes do"),
+}
+
+
+@pytest.mark.parametrize("name", PACKED)
+def test_faulty_packed_meshes(tmp_path, name):
+    content, words = PACKED[name]
+    path = tmp_path / "cube.inp.gz"
+    path.write_bytes(content)
+    with pytest.raises(FEImportError) as caught:
+        read_mesh(path)
+    assert caught.value.cause is Cause.NOT_READABLE
+    assert words in str(caught.value)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can bound a reader's memory")
+def test_memory_of_readers_is_bounded(tmp_path, monkeypatch):
+    """A reader that asks for a hundred times what its file may need fails with one error; the bound is lifted again."""
+    path = tmp_path / "cube.vtu"
+    cube(path)
+    monkeypatch.setattr(mesh_guard, "_FREE_MEMORY", 1 << 28)
+    monkeypatch.setattr(meshio, "read", lambda _: np.ones(1 << 32))
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    with pytest.raises(FEImportError, match="Unable to allocate") as caught:
+        read_mesh(path)
+    assert caught.value.cause is Cause.NOT_READABLE
+    assert resource.getrlimit(resource.RLIMIT_AS) == before

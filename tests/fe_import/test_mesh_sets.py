@@ -1,0 +1,267 @@
+"""Sets that mesh files hold and readers lose: found again, or named with the reason."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from solid_meshes import box
+
+from fe_import.errors import Cause, FEImportError
+from fe_import.mesh import read_mesh
+from fe_import.solid_elements import SOLID_ELEMENTS
+from fe_import.solid_mesh import SolidMesh
+
+TYPES = sorted(SOLID_ELEMENTS)
+ABAQUS = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8R", "hex20": "C3D20"}
+BAR = box("hex8", (3, 1, 1))
+LABELS = 10 * np.arange(len(BAR.nodes)) + 7  # of nodes in decks: neither dense nor from 1
+
+
+def deck(mesh: SolidMesh, *more: str, split: bool = False) -> str:
+    """A deck of the mesh: node k has label 10 k + 7, element k label k + 1; ``split`` gives each a block of its own."""
+    rows = [f"{10 * k + 7}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(mesh.nodes.tolist())]
+    text = ["** a comment", "*Heading", "bar", "*Node, nset=Half", *rows[: len(rows) // 2]]
+    text += ["*NODE", *rows[len(rows) // 2 :]]
+    head = f"*Element, type={ABAQUS[mesh.element_type].lower()}, elset=Body"
+    for k, nodes in enumerate(mesh.elements):
+        if k == 0 or split:
+            text.append(head)
+        fields = [str(k + 1), *(str(10 * n + 7) for n in nodes)]
+        text += [",".join(fields[i : i + 8]) + ("," if i + 8 < len(fields) else "") for i in range(0, len(fields), 8)]
+    return "\n".join([*text, *more]) + "\n"
+
+
+def read(folder: Path, *more: str, mesh: SolidMesh = BAR, split: bool = False) -> SolidMesh:
+    path = folder / "bar.inp"
+    path.write_text(deck(mesh, *more, split=split))
+    return read_mesh(path)
+
+
+END = BAR.node_sets["x1"]
+SETS = {  # lines of the deck, node set, what it is
+    "node block": (["*NSET, NSET=X", "half"], "X", np.arange(8)),
+    "generated": (["*NSET, NSET=X, GENERATE", "7, 27, 10"], "X", np.array([0, 1, 2])),
+    "generated twice": (["*NSET, NSET=X, GENERATE", "7, 17, 10", "47, 67, 10,"], "X", np.array([0, 1, 4, 5, 6])),
+    "generated, step 1": (["*NSET, NSET=X, GENERATE", "7, 7"], "X", np.array([0])),
+    "several lines": (["*NSET, NSET=X, UNSORTED", "7,17,", "27"], "X", np.array([0, 1, 2])),
+    "stands twice": (["*NSET, NSET=X", "7", "*NSET, NSET=x", "17"], "X", np.array([0, 1])),
+    "set of sets": (["*NSET, NSET=X", "A, 17", "*NSET, NSET=a", "7"], "X", np.array([0, 1])),
+    "of elements": (["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last"], "X", np.unique(BAR.elements[2])),
+    "in an assembly": (["*NSET, NSET=X, INSTANCE=BAR-1", "7, 17"], "X", np.array([0, 1])),
+    "instance before the label": (["*NSET, NSET=X", "BAR-1.7, BAR-1.17"], "X", np.array([0, 1])),
+    "surface": (["*SURFACE, NAME=X, TYPE=ELEMENT", "3, S4"], "X", END),
+    "surface of a set": (["*ELSET, ELSET=E", "3", "*SURFACE, NAME=X", "E, s4"], "X", END),
+    "surface of nodes": (["*NSET, NSET=E", "7", "*SURFACE, TYPE=NODE, NAME=X", "E,", "17, 1."], "X", np.array([0, 1])),
+    "shell elements": (
+        ["*ELEMENT, TYPE=S4, ELSET=X", "9," + ",".join(str(LABELS[n]) for n in BAR.elements[2, [1, 2, 6, 5]])],
+        "X",
+        END,
+    ),
+    "continued keyword": (["*NSET,", "NSET=X", "7, 17"], "X", np.array([0, 1])),
+}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_sets_of_decks(tmp_path, name):
+    lines, key, expected = SETS[name]
+    found = read(tmp_path, *lines)
+    np.testing.assert_allclose(found.nodes, BAR.nodes, atol=0)
+    np.testing.assert_array_equal(found.elements, BAR.elements)
+    np.testing.assert_array_equal(found.node_sets[key], expected)
+    assert found.lost_sets == {}
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_element_sets_of_decks(tmp_path, split):
+    """Sets of one or several *ELEMENT blocks, generated, made of others, with elements that are no solids."""
+    more = [
+        "*ELSET, ELSET=ENDS, GENERATE",
+        "1, 3, 2",
+        "*ELSET, ELSET=ALL",
+        "Ends, 2",
+        "*ELEMENT, TYPE=MASS, ELSET=M",
+        "8, 7",
+    ]
+    found = read(tmp_path, *more, split=split)
+    np.testing.assert_array_equal(found.element_sets["Body"], [0, 1, 2])
+    np.testing.assert_array_equal(found.element_sets["ENDS"], [0, 2])
+    np.testing.assert_array_equal(found.element_sets["ALL"], [0, 1, 2])
+    assert "holds nothing" in found.lost_sets["M"]
+
+
+@pytest.mark.parametrize("name", sorted(ABAQUS))
+def test_surfaces_of_every_element(tmp_path, name):
+    """Faces S1, S2 ... of an element hold the corners and mid-side nodes of one face each; together all of them."""
+    mesh = box(name, (1, 1, 1))
+    faces = len(mesh.element.faces)
+    lines = [line for k in range(1, faces + 1) for line in (f"*SURFACE, NAME=F{k}", f"1, S{k}")]
+    found = read(tmp_path, *lines, mesh=mesh)
+    ours = {frozenset(face) for face in found.elements[0][found.element.faces].tolist()}
+    theirs = {frozenset(found.node_sets[f"F{k}"].tolist()) for k in range(1, faces + 1)}
+    assert ours == theirs
+
+
+LOST = {
+    "unknown set": (["*NSET, NSET=X", "NOWHERE"], "needs set 'NOWHERE'"),
+    "holds itself": (["*NSET, NSET=X", "Y", "*NSET, NSET=Y", "X"], "holds itself"),
+    "unknown node": (["*NSET, NSET=X", "7, 8"], "names node 8"),
+    "unknown element": (["*ELSET, ELSET=X", "1, 77"], "names element 77"),
+    "no such face": (["*SURFACE, NAME=X", "1, S7"], "no face S7"),
+    "free surface": (["*SURFACE, NAME=X", "Body,"], "free surface"),
+    "surface of nothing": (["*SURFACE, NAME=X", "12, S1"], "element 12"),
+    "surface and nodes": (["*NSET, NSET=X", "7", "*SURFACE, NAME=X", "1, S1"], "a surface with other nodes"),
+    "empty": (["*NSET, NSET=X"], ""),
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_sets_that_cannot_be_followed(tmp_path, name):
+    """The mesh is read without them; whoever names one is told why."""
+    lines, reason = LOST[name]
+    found = read(tmp_path, *lines)
+    assert len(found.elements) == 3
+    if reason:
+        assert reason in found.lost_sets["X"]
+        assert "X" not in {**found.node_sets, **found.element_sets}
+    else:
+        assert len(found.node_sets["X"]) == 0
+
+
+DECKS = {
+    "word for a coordinate": (["*NODE", "999, a, 0, 0"], "*NODE in line"),
+    "word for a node": (["*ELEMENT, TYPE=C3D8", "9, a, 2, 3, 4, 5, 6, 7, 8"], "*ELEMENT in line"),
+    "half an element": (["*ELEMENT, TYPE=C3D8", "9, 7, 17"], "no whole elements of 8 nodes"),
+    "element of nothing": (["*ELEMENT, TYPE=C3D4", "9, 1, 2, 3, 4"], "needs node 1,"),
+    "no type": (["*ELEMENT", "9, 7, 17"], "lacks TYPE"),
+    "no name": (["*NSET", "7"], "lacks NSET"),
+    "cylindrical": (["*NODE, SYSTEM=C", "999, 1, 2, 3"], "cylindrical"),
+    "include": (["*INCLUDE, INPUT=other.inp"], "join them"),
+    "two instances": (["*INSTANCE, NAME=A, PART=P", "*INSTANCE, NAME=B, PART=P"], "several instances"),
+    "moved instance": (["*INSTANCE, NAME=A, PART=P", "0., 0., 0.5"], "moved"),
+    "backwards": (["*NSET, NSET=X, GENERATE", "1, 9, -1"], "step of -1"),
+    "giant set": (["*NSET, NSET=X, GENERATE", "1, 999999999999, 1"], "members"),
+}
+
+
+@pytest.mark.parametrize("name", DECKS)
+def test_faulty_decks(tmp_path, name):
+    lines, words = DECKS[name]
+    with pytest.raises(FEImportError) as caught:
+        read(tmp_path, *lines)
+    assert caught.value.cause is Cause.NOT_READABLE
+    assert words in str(caught.value)
+    assert str(tmp_path / "bar.inp") in str(caught.value)
+
+
+@pytest.mark.parametrize("name", sorted(ABAQUS))
+@pytest.mark.parametrize("packed", [False, True])
+def test_properties_of_nastran(tmp_path, name, packed):
+    """PID 3 and PID 5 of a deck, through meshio and through gzip."""
+    mesh = box(name, (2, 1, 1))
+    path = tmp_path / "bar.bdf"
+    tags = np.where(np.arange(len(mesh.elements)) % 2, 5, 3)
+    meshio.write(
+        path, meshio.Mesh(mesh.nodes, [(mesh.element.meshio_name, mesh.elements)], cell_data={"nastran:ref": [tags]})
+    )
+    if packed:
+        path = tmp_path / "bar.bdf.gz"
+        path.write_bytes(gzip.compress((tmp_path / "bar.bdf").read_bytes()))
+    found = read_mesh(path)
+    np.testing.assert_array_equal(found.element_sets["PID:3"], np.flatnonzero(tags == 3))
+    np.testing.assert_array_equal(found.element_sets["PID:5"], np.flatnonzero(tags == 5))
+    assert found.source == str(path)
+
+
+def test_local_coordinates_of_nastran(tmp_path):
+    path = tmp_path / "bar.bdf"
+    meshio.write(
+        path, meshio.Mesh(BAR.nodes, [("hexahedron", BAR.elements)], point_data={"nastran:ref": np.full(16, 4)})
+    )
+    text = path.read_text()
+    assert "GRID" in text
+    with pytest.raises(FEImportError, match="local coordinate systems") as caught:
+        read_mesh(path)
+    assert caught.value.cause is Cause.MESH
+
+
+def test_integer_arrays_of_vtu(tmp_path):
+    """Numbers per cell and per point are sets; labels of every cell are not, and say so; reals are results."""
+    path = tmp_path / "bar.vtu"
+    medium = np.array([3, 3, 4])
+    raw = meshio.Mesh(
+        BAR.nodes,
+        [("hexahedron", BAR.elements)],
+        cell_data={"medium": [medium], "stress": [np.array([1.0, 2.0, 3.0])]},
+        point_data={
+            "side": (BAR.nodes[:, 0] == 3).astype(int),
+            "end": (BAR.nodes[:, 0] == BAR.nodes[:, 0].max()).astype(int),
+        },
+    )
+    meshio.write(path, raw)
+    found = read_mesh(path)
+    np.testing.assert_array_equal(found.element_sets["medium:3"], [0, 1])
+    np.testing.assert_array_equal(found.node_sets["end:1"], END)
+    assert not any("stress" in name for name in found.element_sets)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fe_import.mesh_meshio.MOST_GROUPS", 1)
+        found = read_mesh(path)
+    assert "labels and not groups" in found.lost_sets["medium"]
+
+
+@pytest.mark.parametrize("name", [t for t in TYPES if t != "hex27"])
+def test_families_of_med(tmp_path, name):
+    """Groups of elements, faces and nodes; elements numbered inside out, as Salome writes them, are turned."""
+    mesh = box(name, (2, 1, 1))
+    faces = mesh.elements[:, mesh.element.faces].reshape(-1, mesh.element.faces.shape[1])
+    ends = faces[np.isin(faces, mesh.node_sets["x1"]).all(axis=1)]
+    shape = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}[faces.shape[1]]
+    inside_out = mesh.elements[:, np.argsort(mesh.element.mirrored_order)]
+    raw = meshio.Mesh(
+        mesh.nodes,
+        [(mesh.element.meshio_name, inside_out), (shape, ends)],
+        cell_data={"cell_tags": [np.full(len(mesh.elements), -1), np.full(len(ends), -2)]},
+        point_data={"point_tags": np.where(mesh.nodes[:, 0] == 0, 1, 0)},
+    )
+    raw.cell_tags = {-1: ["BODY"], -2: ["END", "BOTH"]}
+    raw.point_tags = {1: ["ROOT"]}
+    path = tmp_path / "bar.med"
+    meshio.write(path, raw)
+    found = read_mesh(path)
+    np.testing.assert_array_equal(found.elements, mesh.elements)
+    np.testing.assert_array_equal(found.element_sets["BODY"], np.arange(len(mesh.elements)))
+    for key in ("END", "BOTH"):
+        np.testing.assert_array_equal(found.node_sets[key], mesh.node_sets["x1"])
+    np.testing.assert_array_equal(found.node_sets["ROOT"], mesh.node_sets["x0"])
+
+
+def test_groups_of_gmsh_without_names(tmp_path):
+    """Physical groups 7 and 8 that $PhysicalNames does not name."""
+    path = tmp_path / "bar.msh"
+    tags = [np.array([7, 7, 8])]
+    raw = meshio.Mesh(
+        BAR.nodes, [("hexahedron", BAR.elements)], cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}
+    )
+    meshio.write(path, raw, file_format="gmsh22", binary=False)
+    found = read_mesh(path)
+    np.testing.assert_array_equal(found.element_sets["physical:7"], [0, 1])
+    np.testing.assert_array_equal(found.element_sets["physical:8"], [2])
+
+
+def test_a_group_without_members(tmp_path):
+    """gmsh writes the names of groups whose entities were not meshed."""
+    path = tmp_path / "bar.msh"
+    tags = [np.array([1, 1, 1])]
+    raw = meshio.Mesh(
+        BAR.nodes,
+        [("hexahedron", BAR.elements)],
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+        field_data={"BODY": np.array([1, 3]), "FACE": np.array([2, 2])},
+    )
+    meshio.write(path, raw, file_format="gmsh22", binary=False)
+    found = read_mesh(path)
+    assert sorted(found.element_sets) == ["BODY"]
+    assert "holds nothing" in found.lost_sets["FACE"]
