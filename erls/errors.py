@@ -22,6 +22,8 @@ class Cause(enum.StrEnum):
     RUN_FILE = "faulty run file"
     TIME_OUT_OF_RANGE = "time outside the run"
     SINGULAR_MASS = "mass matrix not positive definite"
+    REDUNDANT_CONSTRAINTS = "redundant constraints"
+    INCONSISTENT_START = "start that does not fulfil the constraints"
     NO_EQUILIBRIUM = "no static equilibrium"
     NEWTON_FAILED = "Newton iteration did not converge"
     NOT_FINITE = "solution is no longer finite"
@@ -33,6 +35,7 @@ class Cause(enum.StrEnum):
 
 _NUMERICAL = {
     Cause.SINGULAR_MASS,
+    Cause.INCONSISTENT_START,
     Cause.NO_EQUILIBRIUM,
     Cause.NEWTON_FAILED,
     Cause.NOT_FINITE,

@@ -76,7 +76,7 @@ def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str)
     result = []
     for k, region in enumerate(solid.regions):
         choose(region.material, link.materials, f"{where}: solid.regions[{k}].material")
-        if region.set in mesh.lost_sets:
+        if region.set in mesh.lost_sets and region.set not in mesh.element_sets:
             raise FEImportError(
                 Cause.MESH,
                 f"set {region.set!r} of the mesh is not usable: {mesh.lost_sets[region.set]}",

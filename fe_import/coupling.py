@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.coupling_averaged import Patch, divided, follow_average
+from fe_import.coupling_averaged import Items, Patch, divided, follow_average
 from fe_import.coupling_rigid import follow_rigidly
 from fe_import.dependence import Dependence
+from fe_import.errors import Cause, FEImportError
 from fe_import.interface import InterfaceFace, checked_faces
 from fe_import.model import Array, IntArray, InterfaceNode
 
@@ -98,23 +99,20 @@ def couple_interfaces(
             offsets = points - face.position
             state = follow_rigidly(state, dof_map[face.nodes], offsets, interface_rows[k])
         else:
-            moving = dof_map[face.nodes, :3]
-            state = follow_average(
-                state,
-                moving,
-                points,
-                face.shares,
-                face.position,
-                interface_rows[k],
-                patches[k],
-                patch_rows[k],
-                face.name,
-                source,
-            )
+            members = Items.of_nodes(dof_map[face.nodes, :3], points, face.shares)
+            averaged = follow_average(state, members, face.position, interface_rows[k], patches[k], patch_rows[k])
+            if averaged is None:
+                raise FEImportError(
+                    Cause.INTERFACE,
+                    f"the nodes of interface {face.name!r} already move with other interfaces",
+                    where=source,
+                    remedy="let each interface have nodes of its own",
+                )
+            state = averaged
     return Coupling(
         nodes=np.vstack([nodes, *(face.position for face in faces), *(a for some in auxiliary for a in some)]),
         dof_map=np.vstack([dof_map, added]),
-        coupling=state.matrix,
+        coupling=state.matrix.tocsc(),
         independent=state.independent,
         interface_nodes=tuple(
             InterfaceNode(f.name, n + k, f.position, f.nodes, f.shares, f.coupling) for k, f in enumerate(faces)

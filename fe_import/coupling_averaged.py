@@ -28,7 +28,7 @@ from fe_import.model import Array, IntArray
 
 UNDIVIDED = 150  # nodes of a face that needs no patches: (3 * 150)^2 entries are 2 MB
 PATCH = 24  # nodes, or patches, of a patch at most
-MOST = 10_000  # nodes of a face; divided in patches it adds some 5000 entries per node, 0.6 GB
+MOST = 10_000  # nodes of a face; divided in patches it adds some 2000 entries per node, 0.25 GB
 MOST_UNDIVIDED = 1_000  # nodes of a set that cannot be divided, 100 MB
 _NARROW = 0.05  # width over length below which a patch's rotation about its length is not averaged well
 _DEPENDENT = 1e-8  # last pivot over the first when six displacements are chosen
@@ -78,27 +78,61 @@ def _moments(points: Array, weights: Array) -> tuple[Array, Array, Array]:
     return mean, r, np.trace(squares) * np.eye(3) - squares
 
 
-def average(points: Array, weights: Array, centre: Array, inertia: Array | None = None) -> Average:
-    """The average motion of points, seen from a node at ``centre``.
+@dataclass(frozen=True)
+class Items:
+    """What is averaged: nodes of a face, or patches of it.
 
-    Parameters
+    Attributes
     ----------
+    rows : (k, 3) or (k, 6) int array
+        Rows of their components; patches have rotations.
     points : (k, 3) array
     weights : (k,) array
-    centre : (3,) array
-    inertia : (k, 3, 3) array or None
-        Of patches at the points; they have rotations too.
+    inertia : (k, 3, 3) array
+        Of patches about their points, with their weights; 0 for nodes.
     """
-    whole = weights.sum()
-    weights = np.asarray(weights / whole)
-    mean, r, total = _moments(points, weights)
-    width = 3 if inertia is None else 6
-    components = np.zeros((6, len(points), width))
+
+    rows: IntArray
+    points: Array
+    weights: Array
+    inertia: Array
+
+    @staticmethod
+    def of_nodes(rows: IntArray, points: Array, weights: Array) -> Items:
+        """Nodes of a face."""
+        return Items(rows, points, weights, np.zeros((len(points), 3, 3)))
+
+    @staticmethod
+    def of_patches(rows: IntArray, patches: list[Patch]) -> Items:
+        """Patches of a face, by their auxiliary nodes."""
+        points, inertia = np.stack([p.position for p in patches]), np.stack([p.inertia for p in patches])
+        return Items(rows, points, np.array([p.weight for p in patches]), inertia)
+
+    def some(self, members: IntArray) -> Items:
+        """A part of them."""
+        return Items(self.rows[members], self.points[members], self.weights[members], self.inertia[members])
+
+    @property
+    def sizes(self) -> Array:
+        """(k, 3) or (k, 6) one over the length that makes a component comparable to a displacement."""
+        width = self.rows.shape[1]
+        result = np.ones((len(self.rows), width))
+        if width == 6:
+            result[:, 3:] /= np.sqrt(np.trace(self.inertia, axis1=1, axis2=2) / (2 * self.weights))[:, None]
+        return result
+
+
+def average(items: Items, centre: Array) -> Average:
+    """The average motion of items, seen from a node at ``centre`` (3,)."""
+    whole = items.weights.sum()
+    weights = np.asarray(items.weights / whole)
+    mean, r, total = _moments(items.points, weights)
+    total = total + items.inertia.sum(axis=0) / whole
+    components = np.zeros((6, *items.rows.shape))
     components[:3, :, :3] = weights[None, :, None] * np.eye(3)[:, None, :]
     components[3:, :, :3] = np.moveaxis(weights[:, None, None] * arm(r)[:, :, 3:].transpose(0, 2, 1), 1, 0)
-    if inertia is not None:
-        components[3:, :, 3:] = np.moveaxis(inertia / whole, 1, 0)
-        total = total + inertia.sum(axis=0) / whole
+    if items.rows.shape[1] == 6:
+        components[3:, :, 3:] = np.moveaxis(items.inertia / whole, 1, 0)
     radius = float(np.sqrt(np.trace(total) / 2))
     motion = np.zeros((6, 6))
     motion[:3] = arm((mean - centre)[None])[0]
@@ -162,25 +196,15 @@ def _halved(points: Array, members: IntArray) -> list[IntArray]:
 
 
 def follow_average(
-    state: Dependence,
-    rows: IntArray,
-    points: Array,
-    weights: Array,
-    centre: Array,
-    interface: IntArray,
-    levels: list[list[Patch]],
-    patch_rows: IntArray,
-    name: str,
-    source: str,
-) -> Dependence:
+    state: Dependence, nodes: Items, centre: Array, interface: IntArray, levels: list[list[Patch]], patch_rows: IntArray
+) -> Dependence | None:
     """Let an interface node move as its face does on average.
 
     Parameters
     ----------
     state : Dependence
-    rows : (k, 3) int array
-        Rows of the displacements of the face's nodes.
-    points, weights : (k, 3), (k,) arrays
+    nodes : Items
+        Of the face.
     centre : (3,) array
         Position of the interface node.
     interface : (6,) int array
@@ -189,57 +213,40 @@ def follow_average(
         See `divided`.
     patch_rows : (p, 6) int array
         Rows of their auxiliary nodes, level by level.
-    name, source : str
-        For messages.
 
-    Raises
-    ------
-    FEImportError
-        ``INTERFACE``: the face moves with other interfaces already.
+    Returns
+    -------
+    Dependence or None
+        None when the face moves with other interfaces already.
     """
-    inertia: Array | None = None
-    sizes = np.ones(rows.shape)
+    items = nodes
     for patches in levels:
         here, patch_rows = patch_rows[: len(patches)], patch_rows[len(patches) :]
-        parts = []
-        for p, own in zip(patches, here, strict=True):
-            m = p.members
-            equations = average(points[m], weights[m], p.position, None if inertia is None else inertia[m])
-            parts.append(_solved(state, rows[m].ravel(), equations, own, sizes[m].ravel(), name, source))
+        found = [_solved(state, items.some(p.members), p.position, own) for p, own in zip(patches, here, strict=True)]
+        parts = [f for f in found if f is not None]
+        if len(parts) < len(found):
+            return None
         state = state.following(np.concatenate([c for c, _ in parts]), sp.vstack([e for _, e in parts], format="csr"))
-        points, weights = np.stack([p.position for p in patches]), np.array([p.weight for p in patches])
-        inertia, rows = np.stack([p.inertia for p in patches]), here
-        sizes = np.ones((len(patches), 6))
-        sizes[:, 3:] /= np.sqrt(np.trace(inertia, axis1=1, axis2=2) / (2 * weights))[:, None]
-    equations = average(points, weights, centre, inertia)
-    return state.following(*_solved(state, rows.ravel(), equations, interface, sizes.ravel(), name, source))
+        items = Items.of_patches(here, patches)
+    last = _solved(state, items, centre, interface)
+    return None if last is None else state.following(*last)
 
 
-def _solved(
-    state: Dependence, rows: IntArray, equations: Average, node: IntArray, sizes: Array, name: str, source: str
-) -> tuple[IntArray, sp.csr_array]:
-    """Six of the averaged components from the node that averages and from the others.
-
-    ``sizes``: one over the length that makes a component comparable to a displacement.
-    """
-    width = len(state.independent)
+def _solved(state: Dependence, items: Items, centre: Array, node: IntArray) -> tuple[IntArray, sp.csr_array] | None:
+    """Six of the averaged components (columns), from the node that averages and from the others."""
+    equations, rows = average(items, centre), items.rows.ravel()
     terms = (sp.csr_array(equations.components) @ state.matrix[rows]).tocsc()
     used = np.flatnonzero(np.diff(terms.indptr))
     values = terms[:, used].toarray()
     size = np.zeros(state.matrix.shape[0])
-    size[rows] = sizes  # 0 for what other interfaces move
+    size[rows] = items.sizes.ravel()  # 0 for what other interfaces move
     chosen = _well_conditioned(values * size[state.independent[used]])
     if chosen is None:
-        raise FEImportError(
-            Cause.INTERFACE,
-            f"the nodes of interface {name!r} already move with other interfaces",
-            where=source,
-            remedy="let each interface have nodes of its own",
-        )
+        return None
     others = np.setdiff1d(np.arange(len(used)), chosen)
     solution = la.solve(values[:, chosen], np.hstack([equations.motion, -values[:, others]]))
     columns = np.concatenate([state.columns(node), used[others]])
-    return used[chosen], block_rows(solution, columns, width)
+    return used[chosen], block_rows(solution, columns, len(state.independent))
 
 
 def _well_conditioned(matrix: Array) -> IntArray | None:

@@ -16,19 +16,19 @@ class Dependence:
 
     Attributes
     ----------
-    matrix : (d, f) sparse CSC
+    matrix : (d, f) sparse CSR
         The identity on the rows ``independent``.
     independent : (f,) int array
         Rows that are the independent dofs, rising.
     """
 
-    matrix: sp.csc_array
+    matrix: sp.csr_array
     independent: IntArray
 
     @staticmethod
     def free(count: int) -> Dependence:
         """No constraint."""
-        return Dependence(sp.eye_array(count, format="csc"), np.arange(count))
+        return Dependence(sp.eye_array(count, format="csr"), np.arange(count))
 
     def columns(self, rows: IntArray) -> IntArray:
         """Columns of the independent dofs among rows; -1 for rows that depend on others."""
@@ -51,14 +51,14 @@ class Dependence:
         new[kept] = np.arange(len(kept))
         terms = sp.coo_array(expression)
         row, column = terms.coords
-        step = sp.csc_array(
+        step = sp.csr_array(
             (
                 np.concatenate([np.ones(len(kept)), terms.data]),
                 (np.concatenate([kept, columns[row]]), np.concatenate([new[kept], new[column]])),
             ),
             shape=(count, len(kept)),
         )
-        return Dependence(sp.csc_array(self.matrix @ step), self.independent[kept])
+        return Dependence(sp.csr_array(self.matrix @ step), self.independent[kept])
 
 
 def arm(offsets: Array) -> Array:

@@ -13,6 +13,8 @@ from fe_import.health import GROUNDING, asymmetry, grounding
 from fe_import.model import Array, FEModel, IntArray
 
 _ASYMMETRY = 1e-9
+_LARGEST = 1e60  # of mass and stiffness in any unit; squares stay finite
+_FARTHEST = 1e12
 _LOCAL = 0.3  # share of the nodes at which a link is held, beyond which the matrix is another one
 _NOTICED = 1e-3  # of the largest force
 _DIRECTED = 1e-6  # mass by direction: files carry 6 digits or more
@@ -31,11 +33,13 @@ def check_export(export: Export, where: str) -> None:
         if matrix.shape != (size, size):
             shape, square = " x ".join(map(str, matrix.shape)), f"{size} x {size}"
             raise _fault(f"the {name} matrix has the wrong size", where, shape, square, "take both of one export")
-        if not np.isfinite(matrix.data).all():
-            raise _fault(f"the {name} matrix holds numbers that are not finite", where)
+        if not (np.abs(matrix.data) <= _LARGEST).all():
+            raise _fault(f"the {name} matrix holds a number that is not finite or absurd", where, limit=_LARGEST)
         _check_symmetry(matrix, name, where)
-    if export.nodes.shape != (count, 3) or not np.isfinite(export.nodes).all() or export.labels.shape != (count,):
-        raise _fault("positions of the nodes are not finite, or some have none", where)
+    if export.nodes.shape != (count, 3) or export.labels.shape != (count,):
+        raise _fault("some nodes have no position or no number", where)
+    if not (np.abs(export.nodes) <= _FARTHEST).all():
+        raise _fault("a position is not finite or absurdly far", where, limit=_FARTHEST, remedy="check the units")
     if len(np.unique(export.labels)) < count:
         values, times = np.unique(export.labels, return_counts=True)
         raise _fault("two nodes of one number", where, int(values[times.argmax()]))

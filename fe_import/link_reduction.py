@@ -67,6 +67,8 @@ class Reduction(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         The elastic modes kept span the static response to unit loads at the interfaces and to the inertia of
         rigid-body accelerations, whichever interface holds the link: six per interface. The lowest modes of
         ``truncation`` fill the rest. The Craig-Bampton basis is completed by the static response to that inertia.
+        What moves no mass (rotations of lumped masses without rotary inertia) no mode can hold: the health report
+        then shows how much of the static flexibility is lost.
     free_modes : int, optional
         Elastic modes of the free link in the bases of ``craig-chang`` and ``mode-displacement``; 12, or all there are
         if fewer, unless given.

@@ -118,6 +118,14 @@ def _seat(interface: Interface, export: Export, names: dict[str, int], place: st
 def _face(interface: Interface, export: Export, dense: IntArray, place: str) -> InterfaceFace:
     choose(interface.face, export.node_sets, f"{place}.face")
     members = export.node_sets[interface.face]
+    if not len(members):
+        raise FEImportError(
+            Cause.INTERFACE,
+            "this set has no nodes",
+            where=f"{place}.face",
+            value=interface.face,
+            remedy="name a set of 3 nodes or more, not on one line",
+        )
     orphans = members[dense[members] < 0]
     if len(orphans):
         raise FEImportError(

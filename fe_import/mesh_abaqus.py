@@ -47,6 +47,7 @@ class _Part:
 class _Deck:
     points: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     parts: dict[str, _Part] = field(default_factory=dict)
+    kinds: dict[int, str] = field(default_factory=dict)  # type of each element
     node_sets: SetTable = field(default_factory=SetTable)
     element_sets: SetTable = field(default_factory=SetTable)
     from_elements: list[tuple[str, str]] = field(default_factory=list)  # node set, element set
@@ -131,9 +132,11 @@ def _nodes(deck: _Deck, options: dict[str, str], rows: Rows) -> None:
     for line, fields in rows:
         try:
             x, y, z = (float(f) if f.strip() else 0.0 for f in (*fields[1:4], "", "", "")[:3])
-            deck.points[int(fields[0])] = (x, y, z)
+            label = int(fields[0])
         except ValueError as problem:
             raise _at(line, problem) from None
+        if deck.points.setdefault(label, (x, y, z)) != (x, y, z):
+            raise ValueError(f"node {label} stands twice, at different places")
     if "NSET" in options:
         deck.node_sets.add(options["NSET"], [int(fields[0]) for _, fields in rows])
 
@@ -142,38 +145,44 @@ def _at(line: int, problem: ValueError) -> ValueError:
     return ValueError(f"line {line} holds what is no number ({shortened(str(problem))})")
 
 
-def _elements(deck: _Deck, options: dict[str, str], rows: Rows) -> None:
-    kind = options["TYPE"].upper()
+def _shape(kind: str) -> tuple[str, int, int]:
+    """meshio's name, dimension and number of nodes of an element type; no nodes where it cannot be read.
+
+    Solids of another shape keep their own name, to be named in messages; what is no solid then has none.
+    """
     found = _TYPE.match(kind)
     family, count = (found[1], int(found[2])) if found else ("", 0)
     if family == "STRI":
-        family, count = "S", {3: 3, 65: 6}.get(count, count)
-    table, dimension = {"C3D": (_SOLIDS, 3), "T3D": (_LINES, 1), "B3": ({}, 1), "": ({}, 1)}.get(family, (_FACES, 2))
-    if count not in table:  # solids of another shape are named with their count, what is no solid is left out
-        shape, count = kind if family in ("C3D", "SC") else "", 0
-        dimension = 3 if shape else dimension
-    else:
-        shape = table[count]
-    part = deck.parts.setdefault(kind, _Part(shape, dimension, count))
-    numbers: list[int] = []
-    for line, fields in rows:
-        try:
-            numbers += [int(f) for f in fields if f.strip()]
-        except ValueError as problem:
-            if count or shape:
+        count = {65: 6}.get(count, count)
+    if family in ("C3D", "SC"):
+        known = _SOLIDS.get(count, "") if family == "C3D" else ""
+        return known or kind, 3, count if known else 0
+    table, dimension = (_LINES, 1) if family == "T3D" else (_FACES, 2)
+    return ("", 0, 0) if family in ("", "B3") or count not in table else (table[count], dimension, count)
+
+
+def _elements(deck: _Deck, options: dict[str, str], rows: Rows) -> None:
+    kind = options["TYPE"].upper()
+    part = deck.parts.setdefault(kind, _Part(*_shape(kind)))
+    width = part.nodes + 1
+    if part.nodes:
+        numbers: list[int] = []
+        for line, fields in rows:
+            try:
+                numbers += [int(f) for f in fields if f.strip()]
+            except ValueError as problem:
                 raise _at(line, problem) from None
-    labels: list[int] = []
-    if count:
-        if len(numbers) % (count + 1):
-            raise ValueError(f"{len(numbers)} numbers are no whole elements of {count} nodes")
-        labels = numbers[:: count + 1]
-        for k, label in enumerate(labels):
-            part.cells[label] = numbers[k * (count + 1) + 1 : (k + 1) * (count + 1)]
+        if len(numbers) % width:
+            raise ValueError(f"{len(numbers)} numbers are no whole elements of {part.nodes} nodes")
     else:
-        labels = [int(fields[0]) for _, fields in rows if fields[0].strip().isdigit()]
-        part.cells.update({label: [] for label in labels})
+        numbers = [int(fields[0]) for _, fields in rows if fields[0].strip().isdigit()]
+    labels = numbers[::width]
+    for k, label in enumerate(labels):
+        nodes = numbers[k * width + 1 : (k + 1) * width]
+        if part.cells.setdefault(label, nodes) != nodes or deck.kinds.setdefault(label, kind) != kind:
+            raise ValueError(f"element {label} stands twice, with different nodes or types")
     if "ELSET" in options:
-        deck.element_sets.add(options["ELSET"], list(labels))
+        deck.element_sets.add(options["ELSET"], labels)
 
 
 def _node_set(deck: _Deck, options: dict[str, str], rows: Rows) -> None:
@@ -225,23 +234,25 @@ def _mesh(deck: _Deck, name: str) -> RawMesh:
             numbers.append({label: k for k, label in enumerate(part.cells)})
     mesh = RawMesh(np.array(list(deck.points.values()), dtype=float).reshape(-1, 3), blocks)
     cells = {label: nodes for part in deck.parts.values() for label, nodes in part.cells.items()}
-    everywhere = {label for part in deck.parts.values() for label in part.cells}
     for key, shown in deck.element_sets.names.items():
         try:
             members = deck.element_sets.members(key)
-            indices(members - everywhere, {}, "element")
+            indices(members - deck.kinds.keys(), {}, "element")
             mesh.cell_sets[shown] = [
                 np.array(sorted(own[label] for label in members & own.keys()), dtype=np.int64) for own in numbers
             ]
         except LostSet as reason:
             mesh.lost[shown] = str(reason)
-    tails: dict[str, str] = dict(deck.from_elements)
+    for target, source in deck.from_elements:
+        try:
+            corners = {node for e in deck.element_sets.members(source) for node in cells.get(e, ())}
+            deck.node_sets.add(target, sorted(corners))
+        except LostSet as reason:
+            deck.node_sets.drop(target)
+            mesh.lost[target] = str(reason)
     for key, shown in deck.node_sets.names.items():
         try:
-            members = deck.node_sets.members(key)
-            for source in (tails[t] for t in tails if t.upper() == key):
-                members |= {node for e in deck.element_sets.members(source) for node in cells.get(e, ())}
-            mesh.point_sets[shown] = indices(members, place, "node")
+            mesh.point_sets[shown] = indices(deck.node_sets.members(key), place, "node")
         except LostSet as reason:
             mesh.lost[shown] = str(reason)
     for shown, (by_nodes, rows) in deck.surfaces.items():

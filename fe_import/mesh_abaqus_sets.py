@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -39,7 +40,7 @@ class SetTable:
     items: dict[str, list[Item]] = field(default_factory=dict)
     generated: int = 0
 
-    def add(self, name: str, items: list[Item]) -> None:
+    def add(self, name: str, items: Sequence[Item]) -> None:
         """Add members to a set."""
         key = name.upper()
         self.names.setdefault(key, name)
@@ -47,6 +48,11 @@ class SetTable:
         self.generated += sum(len(i) for i in items if isinstance(i, range))
         if self.generated > MOST_MEMBERS:
             raise ValueError(f"sets of more than {MOST_MEMBERS} members")
+
+    def drop(self, name: str) -> None:
+        """Forget a set."""
+        self.names.pop(name.upper(), None)
+        self.items.pop(name.upper(), None)
 
     def members(self, name: str, above: tuple[str, ...] = ()) -> set[int]:
         """Labels of a set, other sets followed.

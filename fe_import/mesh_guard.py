@@ -22,6 +22,8 @@ _MEMORY_PER_BYTE = 64  # Python's lists of numbers over their text
 _FREE_MEMORY = 1 << 30
 _BLOCK = 1 << 20
 _HEAD = 1 << 20  # of a .vtu file, where its counts stand
+NASTRAN = (".bdf", ".fem", ".nas")
+_GRID = re.compile(rb"^GRID", re.MULTILINE)
 _VTU_COUNT = re.compile(rb'NumberOf(Points|Cells)\s*=\s*["\']\s*([^"\']*)')
 
 
@@ -64,7 +66,7 @@ def _unreadable(path: Path, message: str, limit: str | None = None) -> FEImportE
 
 
 def check_declared(path: Path, name: str) -> None:
-    """Hold the counts that a .msh or .vtu file declares against its size, before a reader takes memory for them.
+    """Hold what a file declares against what it holds, before a reader takes memory or time for it.
 
     Parameters
     ----------
@@ -76,7 +78,7 @@ def check_declared(path: Path, name: str) -> None:
     Raises
     ------
     FEImportError
-        ``MESH``: a count that is no number, or more than the file can hold.
+        ``MESH``: a count of a .msh or .vtu file that is no number, or more than it can hold; Nastran without GRID.
     """
     size = path.stat().st_size
     if size == 0:
@@ -89,6 +91,10 @@ def check_declared(path: Path, name: str) -> None:
             for section in (b"$Nodes", b"$Elements"):
                 for count in _msh_counts(text, section):
                     _check_count(section.decode(), count, size // 4, name)
+        elif path.suffix.lower() in NASTRAN and not _GRID.search(text, max(0, text.find(b"BEGIN BULK"))):
+            raise FEImportError(  # meshio would look for it for ever
+                Cause.MESH, "no GRID after BEGIN BULK", where=name, remedy="export the bulk data with its mesh"
+            )
 
 
 def _number(word: bytes) -> float:

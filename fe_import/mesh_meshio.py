@@ -17,7 +17,7 @@ import meshio
 import numpy as np
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh_guard import bounded_memory, check_declared
+from fe_import.mesh_guard import NASTRAN, bounded_memory, check_declared
 from fe_import.mesh_raw import Block, RawMesh
 
 MOST_GROUPS = 1000  # different numbers in an array; more are labels, not groups
@@ -41,7 +41,7 @@ def read_with_meshio(path: Path, name: str) -> RawMesh:
     """
     raw = _read(path, name)
     suffix = path.suffix.lower()
-    if suffix in (".bdf", ".fem", ".nas") and np.any(raw.point_data.get("nastran:ref", 0)):
+    if suffix in NASTRAN and np.any(raw.point_data.get("nastran:ref", 0)):
         raise FEImportError(
             Cause.MESH,
             "GRID points in local coordinate systems (CP) are not converted",

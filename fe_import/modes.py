@@ -92,7 +92,8 @@ def orthonormal_modes(
             where=f"{where}: reduction.elastic_modes",
             value=wanted,
             limit=len(omega),
-            remedy="ask for fewer, or keep more modes in the basis (fixed_interface_modes, free_modes)",
+            remedy="ask for fewer, keep more modes in the basis (fixed_interface_modes, free_modes), or give the mass "
+            "matrix rotary inertia",
         )
     flexibility = _flexibility(scaled, whole) if options.static_correction else None
     coordinates = scale[:, None] * np.hstack([rigid, complement @ elastic[:, :wanted]])

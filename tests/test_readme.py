@@ -136,11 +136,12 @@ def test_shipped_files_have_a_header_and_are_valid(path: Path) -> None:
     from erls import load_scene
     from fe_import import load_link
 
-    assert path.read_text(encoding="utf-8").startswith("# ")
-    if path.parent.name == "links":
-        load_link(path)
-    else:
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("# ")
+    if "[simulation]" in text:
         load_scene(path)
+    else:
+        load_link(path)
 
 
 def test_picture_and_paths_exist() -> None:

@@ -41,6 +41,18 @@ def _hair(times: tuple[float, float]) -> float:
     return _HAIR * max(abs(times[0]), abs(times[1]), 1.0)
 
 
+class MovingSystem(Protocol):
+    """What integrators ask of independent and of constrained coordinates alike."""
+
+    @property
+    def length_scales(self) -> Array:
+        """(n,) see `SecondOrderSystem`."""
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """See `SecondOrderSystem`."""
+
+
 class SecondOrderSystem(Protocol):
     """Equations of motion M(y, t) a = f(t, y, v) in independent coordinates."""
 
@@ -163,7 +175,7 @@ class Leg(NamedTuple):
     last: float
 
 
-def breakpoints(system: SecondOrderSystem, times: tuple[float, float]) -> list[float]:
+def breakpoints(system: MovingSystem, times: tuple[float, float]) -> list[float]:
     """Breakpoints strictly inside ``times``, and its end, in rising order; the legs of an integration.
 
     Breakpoints that only rounding tells apart (0.3 and 0.1 + 0.2) count once.
@@ -177,7 +189,7 @@ def breakpoints(system: SecondOrderSystem, times: tuple[float, float]) -> list[f
     return [*found, end]
 
 
-def legs(system: SecondOrderSystem, times: tuple[float, float]) -> list[Leg]:
+def legs(system: MovingSystem, times: tuple[float, float]) -> list[Leg]:
     """Stretches between breakpoints; none when ``times`` has no length.
 
     Raises
@@ -202,7 +214,7 @@ def legs(system: SecondOrderSystem, times: tuple[float, float]) -> list[Leg]:
     return [Leg(s, e, min(s + hair, (s + e) / 2), max(e - hair, (s + e) / 2)) for s, e in pairs]
 
 
-def metre_scales(system: SecondOrderSystem) -> Array:
+def metre_scales(system: MovingSystem) -> Array:
     """(n,) ``system.length_scales``, never zero: also a coordinate that moves no point gets some metres."""
     scales: Array = np.array(system.length_scales, dtype=float)
     largest = float(scales.max(initial=0.0)) or 1.0

@@ -9,11 +9,14 @@ The rules 2 to 7 of `erls.integrators.base` hold here too.
 
 from __future__ import annotations
 
-from typing import Any, Protocol, TypeAlias
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
+import numpy as np
 import scipy.sparse as sp
 
-from erls.integrators.base import Array
+from erls.errors import Cause, SceneError
+from erls.integrators.base import Array, Options, Solution
 
 Matrix: TypeAlias = Array | sp.csc_array
 Configuration: TypeAlias = Any  # never changed in place
@@ -29,6 +32,10 @@ class ConstrainedSystem(Protocol):
     @property
     def constraints(self) -> int:
         """Number of constraints m."""
+
+    @property
+    def constraint_names(self) -> tuple[str, ...]:
+        """(m,) what each constraint is, for messages."""
 
     @property
     def length_scales(self) -> Array:
@@ -76,3 +83,71 @@ class ConstrainedSystem(Protocol):
         Quintic Hermite interpolation through them must be as accurate as the method: rotations go in as the nine
         entries of their matrix, or as joint angles.
         """
+
+
+MATRICES = ("auto", "update", "frozen")
+
+
+@dataclass(frozen=True)
+class ConstrainedOptions(Options):
+    """Settings of an integration with constraints.
+
+    Attributes
+    ----------
+    iteration_matrix : str
+        ``update``: a new one in every Newton iteration; ``frozen``: one for all steps of a size; ``auto``: a new one
+        when iteration has become slow.
+    residual_tolerance : float
+        Newton iterations stop, too, when the residual is below this times the sum of the norms of its terms.
+    project_velocity : bool
+        Move velocities onto the constraints after every step; otherwise they keep to them within the accuracy of
+        the method.
+
+    Raises
+    ------
+    SceneError
+        With cause BAD_FIELD, naming the setting.
+    """
+
+    iteration_matrix: str = "auto"
+    residual_tolerance: float = 1e-10
+    project_velocity: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checks = (
+            (
+                "iteration_matrix",
+                self.iteration_matrix,
+                self.iteration_matrix in MATRICES,
+                f"one of {', '.join(MATRICES)}",
+            ),
+            (
+                "residual_tolerance",
+                self.residual_tolerance,
+                0 <= self.residual_tolerance < 1,
+                "zero or more, and below 1",
+            ),
+        )
+        for name, value, ok, right in checks:
+            if not ok:
+                message = "the integrator cannot work with this value"
+                raise SceneError(
+                    Cause.BAD_FIELD, message, where=f"options.{name}", value=value, remedy=f"must be {right}"
+                )
+
+
+class ConstrainedState(NamedTuple):
+    """Configuration, velocity (n,), acceleration (n,) and multipliers (m,)."""
+
+    q: Configuration
+    v: Array
+    a: Array
+    multipliers: Array
+
+
+@dataclass(frozen=True)
+class ConstrainedSolution(Solution):
+    """Knots of what the system stores, with the multipliers (k, m) there."""
+
+    multipliers: Array = field(default_factory=lambda: np.zeros((0, 0)))

@@ -41,6 +41,13 @@ class Tolerances:
     load: float = 0.02
     frequency: float = 0.01
 
+    def __post_init__(self) -> None:
+        for name in ("position", "load", "frequency"):
+            if not 0 < getattr(self, name) < np.inf:
+                message, remedy = "a tolerance must be a positive number", "give what does not matter to you"
+                value = getattr(self, name)
+                raise SceneError(Cause.BAD_FIELD, message, where=f"{name} tolerance", value=value, remedy=remedy)
+
 
 @dataclass(frozen=True)
 class Change:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any, TypeVar
 
-from erls.errors import Cause, SimulationError
+from erls.errors import Cause, SceneError, SimulationError
 from fe_import.errors import ReportedError
 
 A = TypeVar("A")
@@ -50,7 +50,15 @@ def run_all(
     finished : list of Finished
     complete : bool
         False after an interrupt.
+
+    Raises
+    ------
+    SceneError
+        ``workers`` is not positive.
     """
+    if workers is not None and workers < 1:
+        message = "the number of workers must be positive"
+        raise SceneError(Cause.BAD_FIELD, message, where="workers", value=workers, remedy="give 1 or more")
     count = min(workers or os.cpu_count() or 1, len(tasks))
     finished: list[Finished] = []
     try:

@@ -65,7 +65,7 @@ class _Reader:
 
     def read(self) -> Substructure:
         section, listing = "", False
-        while (line := self.text.line()) is not None:
+        for line in self.text.lines():
             if line.startswith("**"):
                 body = line.strip("* ").upper()
                 if body == "ELEMENT NODES":

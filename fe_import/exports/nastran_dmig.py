@@ -79,7 +79,7 @@ def nastran_points(files: Mapping[str, Path], positions: dict[str, Vector], wher
 
 def _bulk_points(path: Path) -> Points:
     with TextFile(path) as text:
-        return _points(read_cards(iter(text.line, None), CARDS, text.where))
+        return _points(read_cards(text.lines(), CARDS, text.where))
 
 
 def _points(cards: Iterable[Card]) -> Points:
@@ -89,7 +89,7 @@ def _points(cards: Iterable[Card]) -> Points:
 
 def _read_file(path: Path, names: frozenset[str], matrices: dict[str, _Dmig], others: list[Card]) -> None:
     with TextFile(path) as text:
-        for card in read_cards(iter(text.line, None), CARDS | {"DMIG"}, text.where):
+        for card in read_cards(text.lines(), CARDS | {"DMIG"}, text.where):
             if card.name != "DMIG":
                 others.append(card)
                 continue

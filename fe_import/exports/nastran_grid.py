@@ -12,6 +12,7 @@ from fe_import.exports.nastran_cards import Card
 from fe_import.model import Array
 
 _OTHER_FRAMES = ("CORD1R", "CORD1C", "CORD1S", "CORD2C", "CORD2S")
+_DEEPEST = 100  # coordinate systems defined in each other
 CARDS = frozenset({"GRID", "GRDSET", "SPOINT", "PLOTEL", "CORD2R", *_OTHER_FRAMES})
 
 
@@ -118,10 +119,13 @@ class _Frames:
                 limit="0 or a CORD2R",
                 remedy="export grid points with rectangular coordinate systems (CORD2R)",
             )
-        if number in self._open:
-            raise card.fault("this coordinate system is defined by itself", number)
+        if number in self._open or len(self._open) > _DEEPEST:
+            deep = number not in self._open
+            message = "is nested too deeply" if deep else "is defined by itself"
+            raise card.fault(f"this coordinate system {message}", number)
         self._open.add(number)
         frame = self._known[number] = _rectangular(card, self.get(card.integer(2, 0), card))
+        self._open.discard(number)
         return frame
 
 

@@ -25,7 +25,8 @@ _GROUNDED = 1e-5  # of the size of the terms; rounding times the condition of a 
 _EXACT = 1e-9
 _DENSE = 3000  # rows; a larger matrix is not a condensed one
 _JOINED = 50  # so many kept nodes are joined by lines when the files name none
-NOTE = (
+_NO_COMPONENT = "export displacements and rotations only; name modal coordinates (modal_nodes of 'abaqus')"
+_NOTE = (
     "reduced before the import: {rows} modal coordinates without nodes; inertia forces of inner nodes follow the kept "
     "nodes (Cardona & Geradin 1991), so fast spinning asks for kept nodes along the link"
 )
@@ -68,7 +69,7 @@ def assembled(
     if outside.any():
         first = rows[int(outside.argmax())]
         message = f"node {first[0]} has a component out of range"
-        raise _fault(message, where, int(first[1]), "1 to 6", "export displacements and rotations only")
+        raise _fault(message, where, int(first[1]), "1 to 6", _NO_COMPONENT)
     nodal = np.flatnonzero(component != MODAL)
     modal = np.flatnonzero(component == MODAL)
     _refuse_twice(rows, where)
@@ -93,7 +94,7 @@ def assembled(
     if not lines and not triangles and len(labels) <= _JOINED:
         lines = [(k, k + 1) for k in range(len(labels) - 1)]
     if len(modal):
-        notes = {**notes, "superelement": NOTE.format(rows=len(modal))}
+        notes = {**notes, "superelement": _NOTE.format(rows=len(modal))}
     export = Export(
         mass=given,
         stiffness=stiffness,

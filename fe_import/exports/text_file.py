@@ -9,6 +9,7 @@ import gzip
 import re
 import stat
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -88,6 +89,7 @@ class TextFile:
 
     def __init__(self, path: Path) -> None:
         self.path, self.where, self.number = path, str(path), 0
+        self._whole = True  # the line read last had an end
         self._text = b""  # whole lines that wait to be read; the last line of the file may lack its end
         self._tail = b""  # the beginning of the line after them
         self._at = self._total = 0
@@ -138,12 +140,22 @@ class TextFile:
         if self._at == len(self._text) and not self._fill():
             return None
         end = self._text.find(b"\n", self._at)
+        self._whole = end >= 0
         end = len(self._text) if end < 0 else end
         line, self._at = self._text[self._at : end], min(end + 1, len(self._text))
         self.number += 1
         if len(line) > LONGEST_LINE:
             raise self._too_long(self.number)
         return line.rstrip(b"\r").decode("utf-8", errors="replace")
+
+    def lines(self) -> Iterator[str]:
+        """The lines to the end of the file; the last one must end, as a number in it may be cut off."""
+        while (line := self.line()) is not None:
+            if not self._whole and line.strip():
+                raise self.failure(
+                    "the last line does not end: the file is cut off", line=self.number, remedy="export it again, whole"
+                )
+            yield line
 
     def rows(
         self, columns: int, *, count: int | None = None, stop: str = "", comment: str = "", separators: str = ""

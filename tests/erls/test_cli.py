@@ -30,6 +30,9 @@ REDUCE = {
 OPTIONS = {
     "reduce": ["--output", "-o", "--method", "--modes", "--json"],
     "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--json"],
+    "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--json"],
+    "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
+                    "--beside", "--set", "--workers", "--json"],
     "info": ["--json"],
     "view": ["--output", "-o", "--at", "--magnify", "--fps", "--speed", "--json"],
 }
@@ -249,12 +252,12 @@ def test_info(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_help_of_a_command(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 0, on stdout, every option with a sentence."""
     for flag in ("--help", "-h"):
-        out, err = run(capsys, command, flag)
+        out, err = run(capsys, *command.split(), flag)
         assert err == ""
         assert f"erls {command}" in out
         words = set(re.split(r"[\s,]+", out))
         assert words >= set(OPTIONS[command])
-    listed = {w for w in words if re.fullmatch(r"--?[a-z]+", w)} - {"--help", "-h"}
+    listed = {w for w in words if re.fullmatch(r"--?[a-z-]+", w)} - {"--help", "-h"}
     assert listed == set(OPTIONS[command])
 
 
@@ -263,8 +266,63 @@ def test_help_of_all(capsys: pytest.CaptureFixture[str]) -> None:
     out, _ = run(capsys, "--help")
     assert out == run(capsys)[0]
     for command in OPTIONS:
-        assert re.search(rf"\b{command}  +[A-Z]", out)
+        assert re.search(rf"\b{command.split()[0]}  +[A-Z]", out)
     assert re.fullmatch(r"\d+\.\d+\.\d+\n", run(capsys, "--version")[0])
+
+
+def test_compare_writes_what_it_prints(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """JSON on stdout and in the file alike; a page and a table; the numbers of the page are those of the JSON."""
+    arguments = ("compare", "scene.toml", "--formulations", "erls, erls-minimum-norm", "--workers", "1", "-o")
+    found, _ = run_json(capsys, *arguments, "c.json")
+    stored = json.loads((folder / "c.json").read_text(encoding="utf-8"))
+    walls = [o["formulations"][n].pop("wall_s") for o in (found, stored) for n in ("erls", "erls-minimum-norm")]
+    assert min(walls) > 0
+    assert found == {**stored, "output": "c.json"}
+    (pair,) = found["pairs"]
+    assert (pair["a"], pair["b"], pair["as_expected"]) == ("erls", "erls-minimum-norm", True)
+    out, _ = run(capsys, *arguments, "c.html")
+    shown = f"{pair['points']['tip']['max']:.3g}"
+    assert shown in out
+    assert f"<td>{shown}</td>" in (folder / "c.html").read_text(encoding="utf-8")
+    run(capsys, *arguments, "c.csv")
+    assert (folder / "c.csv").read_text(encoding="utf-8").startswith("t [s],erls: position elbow x [m]")
+
+
+def test_mode_study_ends_with_4_unless_converged(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The verdict decides the exit code, in text and JSON."""
+    arguments = ("study", "modes", "scene.toml", "--counts", "0,2,6,12", "--workers", "1")
+    out, _ = run(capsys, *arguments, "--tolerance", "1e-12", code=4)
+    assert "NOT converged" in out
+    loose = ("--tolerance", "1", "--load-tolerance", "1e3", "--frequency-tolerance", "1e3", "-o", "m.html")
+    found, _ = run_json(capsys, *arguments, *loose)
+    assert found["converged"] == 0
+    assert [p["elastic_modes"] for p in found["points"]] == [0, 2, 6, 12]
+    assert "converged at 0 elastic modes" in (folder / "m.html").read_text(encoding="utf-8")
+
+
+FAULTY_COMMANDS = [
+    (("compare", "scene.toml", "--formulations", "erls"), "needs two formulations"),
+    (("compare", "scene.toml", "--formulations", "erls,adams"), "adams"),
+    (("compare", "scene.toml", "-o", "c.pdf"), "ending of the report"),
+    (("compare", "scene.toml", "-o", "no/such/c.html"), "no folder"),
+    (("study", "modes", "scene.toml", "--counts", "1,two"), "whole numbers"),
+    (("study", "modes", "scene.toml", "--beside", "none.csv"), "none.csv"),
+    (("study", "modes", "scene.toml", "--tolerance", "0"), "tolerance"),
+    (("study", "modes", "scene.toml", "--tolerance", "nan"), "tolerance"),
+    (("compare", "scene.toml", "--workers", "0"), "workers"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), FAULTY_COMMANDS)
+def test_faulty_commands_of_studies(
+    folder: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
+) -> None:
+    """One message, nothing on stdout, nothing written."""
+    before = sorted(p.name for p in folder.iterdir())
+    out, err = run(capsys, *arguments, code=2)
+    assert out == ""
+    assert words in err.splitlines()[-1]
+    assert sorted(p.name for p in folder.iterdir() if p.name != "cache") == [n for n in before if n != "cache"]
 
 
 def test_out_of_memory(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

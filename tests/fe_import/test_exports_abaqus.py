@@ -105,18 +105,17 @@ def test_solid_with_faces(tmp_path: Path) -> None:
 
 
 def test_substructure_with_eigenmodes(tmp_path: Path) -> None:
-    """Retained eigenmodes at a node of their own, as modal coordinates."""
-    parts = condensed(frame_model(tmp_path), (0, 3, 6), 8)
+    """Retained eigenmodes at a node of their own, as modal coordinates; with all of them the frame itself, to 1e-9."""
+    parts = condensed(frame_model(tmp_path), (0, 3, 6), 24)
     write(tmp_path, k_mtx=substructure(parts), k_inp=deck(parts))
     options = {"options": {"modal_nodes": [MODAL_POINT]}}
     modal = reduce_link(description(tmp_path, "abaqus", REDUCED, parts, matrices=options))
     direct = reduce_link(frame_link(tmp_path, reduction={"method": "none"}))
-    assert modal.elastic_modes == 20
-    np.testing.assert_allclose(modal.frequencies_hz[6:10], direct.frequencies_hz[6:10], rtol=2e-3)
-    assert (modal.frequencies_hz[6:] >= direct.frequencies_hz[6:26] * (1 - 1e-9)).all()
-    assert "8 modal coordinates" in modal.provenance["source: superelement"]
-    with pytest.raises(FEImportError, match="no displacement or rotation|component out of range|no position"):
+    np.testing.assert_allclose(modal.frequencies_hz[6:], direct.frequencies_hz[6:], rtol=1e-9)
+    assert "24 modal coordinates" in modal.provenance["source: superelement"]
+    with pytest.raises(FEImportError, match="has a component out of range") as caught:
         reduce_link(description(tmp_path, "abaqus", REDUCED, parts))
+    assert "modal_nodes" in caught.value.remedy
 
 
 def test_mass_in_a_file_of_its_own(tmp_path: Path) -> None:
@@ -189,8 +188,8 @@ FAULTS: dict[str, tuple[Files, Files, str]] = {
     "empty": (FILES, {"k_mtx": ""}, "not a matrix of *MATRIX OUTPUT"),
     "comments only": (FILES, {"k_mtx": "** nothing\n"}, "not a matrix of *MATRIX OUTPUT"),
     "four columns": (FILES, {"k_mtx": "1,1,1,2.0\n"}, "not a matrix of *MATRIX OUTPUT"),
-    "cut within a line": (FILES, {"k_mtx": K[:-16]}, "expected 5 numbers"),
-    "cut mass": (FILES, {"m_mtx": M[: len(M) // 2]}, "differs by direction"),
+    "cut within a line": (FILES, {"k_mtx": K[:-16]}, "the last line does not end"),
+    "cut mass": (FILES, {"m_mtx": M[: M.index("21,3")]}, "differs by direction"),
     "twice": (FILES, {"k_mtx": K + LINE}, "stands at"),
     "both triangles, one twice": (FILES, {"k_mtx": matrix_input(BAR.stiffness, BAR.rows, "both") + LINE}, "stands at"),
     "not finite": (FILES, {"k_mtx": K.replace("10000.0", "nan", 1)}, "not finite"),
@@ -198,14 +197,14 @@ FAULTS: dict[str, tuple[Files, Files, str]] = {
     "fraction of a node": (FILES, {"k_mtx": K.replace("11,1", "11.5,1", 1)}, "whole number"),
     "fixed": (FILES, {"k_mtx": K.replace("11,1, 11,1, 10000.0", "11,1, 11,1, 1e36")}, "1 dofs are fixed"),
     "internal nodes": (FILES, {"k_mtx": K + "-3,1, -3,1, 5.\n-4,1,-4,1,5.\n"}, "2 nodes of the matrix are internal"),
-    "internal nodes, high": (FILES, {"k_mtx": K + "1000000001,1, 1000000001,1, 5.\n"}, "1 nodes of the matrix are int"),
+    "internal nodes, high": (FILES, {"k_mtx": K + "1000000001,1, 1000000001,1, 5.\n"}, "are internal to Abaqus"),
     "warping": (FILES, {"k_mtx": K + "11,7, 11,7, 5.\n"}, "no displacement or rotation"),
-    "missing node": (FILES, {"k_inp": DECK.replace("21, ", "22, ", 1).replace("11, 21", "11")}, "1 nodes of the matrices"),
+    "missing node": (FILES, {"k_inp": DECK.replace("21, ", "22, ", 1).replace("11, 21", "11")}, "1 nodes of the"),
     "no deck": ({"stiffness": "k.mtx", "mass": "m.mtx"}, {}, "2 nodes of the matrices"),
     "no mass": ({"stiffness": "k.mtx", "mesh": "k.inp"}, {}, "no mass matrix"),
     "asymmetric": (
         FILES,
-        {"k_mtx": matrix_input(BAR.stiffness, BAR.rows, "both").replace("21,1, 11,1, -10000.0", "21,1, 11,1, -10010.0")},
+        {"k_mtx": matrix_input(BAR.stiffness, BAR.rows, "both").replace("21,1, 11,1, -10000", "21,1, 11,1, -10010")},
         "resists rigid-body motion",
     ),
     "grounded": (FILES, {"k_mtx": K.replace(LINE, LINE.replace("10000.0", "20000.0"))}, "resists rigid-body motion"),
@@ -216,22 +215,22 @@ FAULTS: dict[str, tuple[Files, Files, str]] = {
         {"k_mtx": coordinate(BAR.stiffness), "m_mtx": coordinate(BAR.mass), "rows_txt": "11 ux\n11 uy\n"},
         "outside of the matrix",
     ),
-    "substructure, cut": (REDUCED, {"k_mtx": SUB[: SUB.rindex("*MATRIX")] + "*MATRIX,TYPE=MASS\n 2.0,\n"}, "another count"),
+    "substructure, cut": (REDUCED, {"k_mtx": SUB[: SUB.rindex("*MATRIX")] + "*MATRIX,TYPE=MASS\n 2.,\n"}, "another"),
     "substructure, one number more": (REDUCED, {"k_mtx": SUB + " 3.0,\n"}, "another count of numbers"),
     "substructure, no mass": (REDUCED, {"k_mtx": SUB[: SUB.rindex("*MATRIX")]}, "no mass matrix"),
     "substructure, no stiffness": (REDUCED, {"k_mtx": SUB.replace("STIFFNESS", "VISCOUS")}, "no stiffness matrix"),
     "substructure, mass twice": (REDUCED, {"k_mtx": SUB + "*MATRIX,TYPE=MASS\n"}, "a second matrix"),
     "substructure twice": (REDUCED, {"k_mtx": SUB + SUB}, "a second element"),
-    "substructure, not finite": (REDUCED, {"k_mtx": SUB.replace("10000.0", "inf", 1)}, "not finite"),
+    "substructure, infinite": (REDUCED, {"k_mtx": SUB.replace("10000.0", "inf", 1)}, "not finite"),
     "substructure, not a number": (REDUCED, {"k_mtx": SUB.replace("10000.0", "1*3", 1)}, "numbers expected"),
-    "substructure, node count": (REDUCED, {"k_mtx": SUB.replace("NODES= 2", "NODES= 200000000")}, "another length than"),
+    "substructure, node count": (REDUCED, {"k_mtx": SUB.replace("NODES= 2", "NODES= 20000000")}, "another length than"),
     "substructure, no nodes": (REDUCED, {"k_mtx": SUB.replace("** 11, 21\n", "")}, "another length than"),
     "substructure, no dofs": (REDUCED, {"k_mtx": SUB.replace("1, 2, 3, 4, 5, 6\n", "")}, "no dofs are stated"),
     "substructure, dofs of no node": (REDUCED, {"k_mtx": SUB.replace("5, 6\n", "5, 6\n7, 1\n")}, "belongs to no node"),
     "substructure, component": (REDUCED, {"k_mtx": SUB.replace("5, 6\n", "5, 8\n")}, "component out of range"),
-    "substructure, node twice": (REDUCED, {"k_mtx": SUB.replace("** 11, 21\n", "** 11, 11\n")}, "stands twice"),
+    "substructure, twins": (REDUCED, {"k_mtx": SUB.replace("** 11, 21\n", "** 11, 11\n")}, "stands twice"),
     "substructure, nodes no numbers": (REDUCED, {"k_mtx": SUB.replace("** 11, 21\n", "** 11, B1\n")}, "whole numbers"),
-    "substructures that differ": (FILES, {"k_mtx": SUB, "m_mtx": SUB.replace("** 11, 21", "** 21, 11")}, "different nodes or"),
+    "substructure of other nodes": (FILES, {"m_mtx": SUB.replace("** 11, 21", "** 21, 11") + "\n"}, "different nodes"),
 }  # fmt: skip
 
 
@@ -270,9 +269,8 @@ def test_spoiled_files(tmp_path: Path, name: str) -> None:
         path.write_bytes(content[:at] if cut else content[:at] + bytes([other]) + content[at + 1 :])
         try:
             found = read_abaqus(paths, AbaqusOptions(), "link.toml")
-        except FEImportError as error:
+        except FEImportError:
             refused += 1
-            assert error.exit_code == 2
             continue
         assert found.stiffness.shape == good.stiffness.shape
         np.testing.assert_array_equal(found.dof_map, good.dof_map)

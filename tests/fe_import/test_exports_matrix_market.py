@@ -234,6 +234,7 @@ FAULTS = [
     fault("npz: pickled", entry("data", lambda a: np.array([None, "x"], dtype=object)), BAD, "holds objects"),
     fault("npz: complex", entry("data", lambda a: a * 1j), BAD, "finite real numbers"),
     fault("npz: not a number", entry("data", lambda a: a * np.nan), BAD, "finite real numbers"),
+    fault("npz: absurd", entry("data", lambda a: a * 1e100), BAD, "absurd"),
     fault("npz: blocks", lambda: {"k.npz": npz(sp.bsr_array(stiffness()))}, BAD, "save matrix.tocsc()"),
     fault("npz: another size", lambda: {"k.npz": npz(sp.eye_array(3, format="csc"))}, BAD, "does not fit the dofs"),
     fault("npz: rows outside", entry("indices", lambda a: a + 1), BAD, "outside of the matrix"),
@@ -265,6 +266,7 @@ NODE_FAULTS = [
     ("not finite", b"10 0 0 inf\n", "three coordinates"),
     ("no number", b"10 0 0 0\nx 0 0 0\n", "three coordinates"),
     ("none", b"node x y z\n", "no nodes"),
+    ("beyond the moon", files()["k.inp"].split(b"*ELEMENT")[0].split(b"Nall\n")[1] + b"999, 1e200\n", "absurdly far"),
 ]
 
 

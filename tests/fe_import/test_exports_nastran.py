@@ -106,7 +106,7 @@ def test_separate_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize("sparse", ["dense", "bigmat", "nonbigmat"])
 @pytest.mark.parametrize("binary", [True, False])
 def test_every_layout_of_op4(tmp_path: Path, binary: bool, sparse: str, endian: str) -> None:
-    """Written by pyyeti in each layout, beside a complex and a rectangular matrix: read back to the last of 16 digits."""
+    """Written by pyyeti in each layout, beside a complex and a rectangular matrix: read back to the last digit."""
     op4 = importlib.import_module("pyyeti.nastran.op4")
     parts = condensed(frame_model(tmp_path), (0, 3, 6), 4)
     others = {"cplx": parts.mass[:4, :3] * (1 + 2j), "rect": parts.mass[:, :7]}
@@ -205,7 +205,8 @@ def fixed(width: int, head: str, *fields: str) -> str:
 
 
 CARD_TEXTS = {
-    "small": fixed(8, "GRID", "12", "", "1.5", "-2.5+1", "3.D-1") + fixed(8, "DMIG", "K", "1", "1", "", "2", "3", "1.5+3"),
+    "small": fixed(8, "GRID", "12", "", "1.5", "-2.5+1", "3.D-1")
+    + fixed(8, "DMIG", "K", "1", "1", "", "2", "3", "1.5+3"),
     "large": fixed(16, "GRID*", "12", "", "1.5", "-2.5+1", "CONT") + fixed(16, "*CONT", "3.D-1")
     + fixed(16, "DMIG*", "K", "1", "1") + fixed(16, "*", "2", "3", "1.5E3"),
     "free": "GRID,12,,1.5,-2.5E1,0.3\nDMIG,K,1,1,,2,3,1500.0\n",
@@ -218,13 +219,7 @@ def test_fields_of_cards(text: str) -> None:
     """Small, large and free fields, continuations, Nastran's exponents."""
     grid, entry = read_cards(text.splitlines(), frozenset({"GRID", "DMIG"}), "m.bdf")
     assert grid_points([grid]).positions[12].tolist() == [1.5, -25.0, 0.3]
-    assert (entry.integer(2), entry.integer(3), entry.integer(5), entry.integer(6), entry.real(7)) == (
-        1,
-        1,
-        2,
-        3,
-        1500.0,
-    )
+    assert [*(entry.integer(k) for k in (2, 3, 5, 6)), entry.real(7)] == [1, 1, 2, 3, 1500.0]
     before = text[: text.upper().index("DMIG")].count("\n")
     assert entry.where == f"m.bdf: line {before + 1}"
 
@@ -319,10 +314,10 @@ OP4_FAULTS: dict[str, tuple[bytes, str]] = {
     "another file": (b"\x00" + bytes(range(1, 100)), "not an OUTPUT4 file"),
     "text, another file": (b"not an OUTPUT4 file at all\n" * 9, "whole numbers in columns of eight"),
     "text, cut": (TEXT_OP4[: TEXT_OP4.rindex("       9")].encode(), "ends within"),
-    "text, short line of numbers": (TEXT_OP4.replace("000E+00", "E+00", 1).encode(), "another length"),
-    "text, columns that do not rise": (TEXT_OP4.replace("       2       1      13", "       1       1      13").encode(), "must rise"),
+    "text, short line": (TEXT_OP4.replace("000E+00", "E+00", 1).encode(), "another length"),
+    "text, columns do not rise": (TEXT_OP4.replace(f"{2:8d}{1:8d}", f"{1:8d}{1:8d}").encode(), "must rise"),
     "text, no format": (TEXT_OP4.replace("1P,3E23.16", "1P,XE23.16").encode(), "format of the numbers"),
-    "text, not a number": (TEXT_OP4.replace("1.0000000000000000E+04", "1.00000000000x0000E+04", 1).encode(), "cannot be read"),
+    "text, no number": (TEXT_OP4.replace("0000E+04", "x000E+04", 1).encode(), "cannot be read"),
     "gzip, cut": (gzip.compress(GOOD)[:-30], "cannot be read"),
 }  # fmt: skip
 
@@ -361,8 +356,15 @@ def test_files_written_here_are_read(tmp_path: Path, content: bytes) -> None:
 
 
 PCH = punch(small())
-LAST = PCH.splitlines()[-1]
+
+
+def without(start: str) -> str:
+    """The punch file without the cards that start so."""
+    return "".join(line for line in PCH.splitlines(keepends=True) if not line.startswith(start))
+
+
 DMIG_FAULTS: dict[str, tuple[str, str]] = {
+    "cut within a line": (PCH[:-3], "the last line does not end"),
     "no matrix": (PCH.replace("MAAX", "MGG"), "no DMIG matrix MAAX for the mass"),
     "no header": (PCH.replace("DMIG,KAAX,0,6,2,0,,,\n", ""), "no header before its first column"),
     "two headers": (PCH + "DMIG,KAAX,0,6,2,0\n", "two headers"),
@@ -378,10 +380,10 @@ DMIG_FAULTS: dict[str, tuple[str, str]] = {
     "component of a grid point": (PCH + "DMIG*,MAAX,11,0,\n*,11,0,1.\n", "grid point 11 has component 0"),
     "point out of range": (PCH + "DMIG*,MAAX,-4,1,\n*,11,1,1.\n", "out of range"),
     "missing grid": (
-        "\n".join(x for x in PCH.splitlines() if not x.startswith("GRID,21")),
+        without("GRID,21"),
         "1 nodes of the matrices have no",
     ),
-    "no grids": ("\n".join(x for x in PCH.splitlines() if not x.startswith("GRID")), "2 nodes of the matrices have no"),
+    "no grids": (without("GRID"), "2 nodes of the matrices have no"),
     "grid twice": ("GRID,21\n" + PCH, "stands twice"),
     "GRDSET": ("GRDSET,,,,,,3\n" + PCH, "defaults for GRID"),
     "unknown coordinate system": (PCH.replace("GRID,21,,", "GRID,21,5,"), "coordinate system 5 is not there"),
@@ -393,6 +395,10 @@ DMIG_FAULTS: dict[str, tuple[str, str]] = {
     "circular": (
         PCH.replace("GRID,21,,", "GRID,21,5,") + "CORD2R,5,6,,,,,,1.\n,1.\nCORD2R,6,5,,,,,,1.\n,1.\n",
         "defined by itself",
+    ),
+    "too deep": (
+        PCH.replace("GRID,21,,", "GRID,21,5,") + "".join(f"CORD2R,{k},{k + 1},,,,,,1.\n,1.\n" for k in range(5, 5000)),
+        "nested too deeply",
     ),
     "axes on a line": (PCH.replace("GRID,21,,", "GRID,21,5,") + "CORD2R,5,,,,,,,1.\n,0.,0.,2.\n", "on one line"),
     "INCLUDE": ("INCLUDE 'other.pch'\n" + PCH, "INCLUDE is not followed"),
@@ -488,9 +494,8 @@ def test_spoiled_files(tmp_path: Path, name: str) -> None:
         path.write_bytes(broken)
         try:
             found = read()
-        except FEImportError as error:
+        except FEImportError:
             refused += 1
-            assert error.exit_code == 2
             continue
         assert found.mass.shape == good.mass.shape
         np.testing.assert_array_equal(found.dof_map, good.dof_map)

@@ -8,8 +8,10 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from link_files import solid_link
 from solid_meshes import box
 
+from fe_import.build import build_model
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh import read_mesh
 from fe_import.solid_elements import SOLID_ELEMENTS
@@ -51,6 +53,11 @@ SETS = {  # lines of the deck, node set, what it is
     "stands twice": (["*NSET, NSET=X", "7", "*NSET, NSET=x", "17"], "X", np.array([0, 1])),
     "set of sets": (["*NSET, NSET=X", "A, 17", "*NSET, NSET=a", "7"], "X", np.array([0, 1])),
     "of elements": (["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last"], "X", np.unique(BAR.elements[2])),
+    "of elements twice": (
+        ["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last", "*NSET, NSET=X, ELSET=Body", "*NSET, NSET=Z", "X"],
+        "Z",
+        np.arange(16),
+    ),
     "in an assembly": (["*NSET, NSET=X, INSTANCE=BAR-1", "7, 17"], "X", np.array([0, 1])),
     "instance before the label": (["*NSET, NSET=X", "BAR-1.7, BAR-1.17"], "X", np.array([0, 1])),
     "surface": (["*SURFACE, NAME=X, TYPE=ELEMENT", "3, S4"], "X", END),
@@ -109,6 +116,7 @@ LOST = {
     "unknown set": (["*NSET, NSET=X", "NOWHERE"], "needs set 'NOWHERE'"),
     "holds itself": (["*NSET, NSET=X", "Y", "*NSET, NSET=Y", "X"], "holds itself"),
     "unknown node": (["*NSET, NSET=X", "7, 8"], "names node 8"),
+    "nodes of an unknown set": (["*NSET, NSET=X, ELSET=NOWHERE"], "needs set 'NOWHERE'"),
     "unknown element": (["*ELSET, ELSET=X", "1, 77"], "names element 77"),
     "no such face": (["*SURFACE, NAME=X", "1, S7"], "no face S7"),
     "free surface": (["*SURFACE, NAME=X", "Body,"], "free surface"),
@@ -136,6 +144,8 @@ DECKS = {
     "word for a node": (["*ELEMENT, TYPE=C3D8", "9, a, 2, 3, 4, 5, 6, 7, 8"], "*ELEMENT in line"),
     "half an element": (["*ELEMENT, TYPE=C3D8", "9, 7, 17"], "no whole elements of 8 nodes"),
     "element of nothing": (["*ELEMENT, TYPE=C3D4", "9, 1, 2, 3, 4"], "needs node 1,"),
+    "node twice": (["*NODE", "7, 9., 9., 9."], "node 7 stands twice"),
+    "element twice": (["*ELEMENT, TYPE=C3D8", "1, 17, 7, 27, 37, 47, 57, 67, 77"], "element 1 stands twice"),
     "no type": (["*ELEMENT", "9, 7, 17"], "lacks TYPE"),
     "no name": (["*NSET", "7"], "lacks NSET"),
     "cylindrical": (["*NODE, SYSTEM=C", "999, 1, 2, 3"], "cylindrical"),
@@ -265,3 +275,26 @@ def test_a_group_without_members(tmp_path):
     found = read_mesh(path)
     assert sorted(found.element_sets) == ["BODY"]
     assert "holds nothing" in found.lost_sets["FACE"]
+
+
+def test_gmsh_with_entities_in_no_group(tmp_path):
+    """meshio cannot read them; the message says what to switch off in gmsh."""
+    entities = "$Entities\n0 0 1 1\n1 0 0 0 0 1 1 0 0\n1 0 0 0 1 1 1 1 1 1 1\n$EndEntities\n"
+    nodes = "$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n"
+    elements = "$Elements\n2 2 1 2\n2 1 2 1\n1 1 2 3\n3 1 4 1\n2 1 2 3 4\n$EndElements\n"
+    names = '$PhysicalNames\n1\n3 1 "BODY"\n$EndPhysicalNames\n'
+    path = tmp_path / "tet.msh"
+    path.write_text(f"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n{names}{entities}{nodes}{elements}")
+    with pytest.raises(FEImportError, match=r"Mesh\.SaveAll = 0") as caught:
+        read_mesh(path)
+    assert caught.value.cause is Cause.NOT_READABLE
+
+
+def test_a_lost_set_of_a_region(tmp_path):
+    """A material's set that cannot be followed is refused with the reason."""
+    link = solid_link(tmp_path, solid={"material": "", "regions": [{"set": "SOFT", "material": "m"}]})
+    mesh = tmp_path / "box.inp"
+    mesh.write_text(mesh.read_text() + "*ELSET, ELSET=SOFT\nNOWHERE\n")
+    with pytest.raises(FEImportError, match="'SOFT' of the mesh is not usable: it needs set 'NOWHERE'") as caught:
+        build_model(link)
+    assert caught.value.where.endswith("solid.regions[0].set")

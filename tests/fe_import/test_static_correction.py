@@ -134,6 +134,19 @@ def test_links_with_few_dofs(tmp_path: Path) -> None:
             assert caught.value.remedy
 
 
+def test_rotations_without_mass_are_reported(tmp_path: Path) -> None:
+    """Lumped mass without rotary inertia: the turning under a moment holds no mass, no mode has it, and health fails."""
+    massless = {"mass": "lumped", "rotary_inertia": False}
+    link = frame_link(tmp_path, frame=massless, reduction={"static_correction": True})
+    model = build_model(link)
+    modal = reduce_model(model, link)
+    check = next(c for c in modal.health if c.name == "static flexibility between the interfaces")
+    assert not check.ok
+    assert relative(modal_flexibility(modal), held_flexibility(model)) > 0.1
+    sound = frame_link(tmp_path, frame={"mass": "lumped"}, reduction={"static_correction": True})
+    assert all(c.ok for c in reduce_model(build_model(sound), sound).health)
+
+
 def test_mass_on_the_interfaces_only(tmp_path: Path) -> None:
     """Inner nodes of next to no mass: the inertia of the inner nodes is a millionth, and still held."""
     heavy = [{"node": i["name"], "mass": 1e4, "inertia": [1e2, 1e2, 1e2]} for i in SOLID["interfaces"]]

@@ -15,7 +15,6 @@ import numpy as np
 
 from erls.formulations.base import Energy, Reaction, State
 from erls.formulations.ffr.equations import Ffr
-from erls.formulations.ffr.frame_group import exponential, tangent
 from erls.formulations.ffr.interface_motion import InterfaceMotion
 from erls.formulations.ffr.joint_conditions import (
     FrameMotion,
@@ -25,7 +24,7 @@ from erls.formulations.ffr.joint_conditions import (
     joint_motion,
     less_motion,
 )
-from erls.formulations.ffr.redundancy import redundant_rows
+from erls.lie import motion_maps
 from erls.lie.se3 import inverse, pose
 from erls.lie.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
@@ -34,9 +33,9 @@ from fe_import.model import InterfaceNode
 
 @dataclass(frozen=True)
 class Configuration:
-    """Floating frames in the world, (4, 4) each; η of all links; joint angles, which count whole turns."""
+    """Floating frames in the world, (links, 4, 4); η of all links; joint angles, which count whole turns."""
 
-    poses: tuple[Array, ...]
+    poses: Array
     eta: Array
     angles: Array
 
@@ -111,7 +110,7 @@ class ConstrainedFfr:
         """Configuration and velocity of a state of `Ffr`."""
         motion = self.reduced.motion(t, y, v)
         velocity = np.concatenate([*motion.twists, motion.eta_rates])
-        return Configuration(tuple(motion.poses), motion.eta.copy(), motion.theta), velocity
+        return Configuration(np.stack(motion.poses), motion.eta.copy(), motion.theta), velocity
 
     def initial_state(self) -> tuple[Configuration, Array]:
         """Configuration and velocity at time 0."""
@@ -119,8 +118,8 @@ class ConstrainedFfr:
 
     def compose(self, q: Configuration, increment: Array) -> Configuration:
         """q ∘ exp(increment)."""
-        poses = [world @ exponential(increment[at]) for world, at in zip(q.poses, self.twists, strict=True)]
-        moved = Configuration(tuple(poses), q.eta + increment[self.elastic], q.angles)
+        poses = q.poses @ motion_maps.exp(increment[: self.elastic.start].reshape(-1, 6))
+        moved = Configuration(poses, q.eta + increment[self.elastic], q.angles)
         still = np.zeros(self.size)
         angles = [self._angle(k, self._joint(k, moved, still)[2].pose, q.angles[k]) for k in range(len(q.angles))]
         return Configuration(moved.poses, moved.eta, np.array(angles))
@@ -135,8 +134,9 @@ class ConstrainedFfr:
     def tangent(self, increment: Array) -> Array:
         """(n, n) variation of q ∘ exp(increment) per variation of the increment."""
         result = np.eye(self.size)
-        for at in self.twists:
-            result[at, at] = tangent(increment[at])
+        blocks = motion_maps.tangent(increment[: self.elastic.start].reshape(-1, 6))
+        for at, block in zip(self.twists, blocks, strict=True):
+            result[at, at] = block
         return result
 
     def _joint(self, k: int, q: Configuration, v: Array) -> tuple[FrameMotion, FrameMotion, JointMotion]:
@@ -255,11 +255,6 @@ class ConstrainedFfr:
             result[at] = conditions.gradient(left.pose) @ left.bias + conditions.curvature(left.pose, left.twist)
         return result
 
-    def redundant(self, t: float, q: Configuration) -> tuple[str, ...]:
-        """Constraints that follow from the others, by joint and direction."""
-        rows = redundant_rows(self.constraint_matrix(t, q))
-        return tuple(self.constraint_names[k] for k in rows)
-
     def stored(self, t: float, q: Configuration, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """Position and rotation matrix of every frame, η, joint angles; with first and second derivatives."""
         places: list[Array] = []
@@ -290,7 +285,7 @@ class ConstrainedFfr:
             poses.append(pose(turn, x))
         ends = 12 * self.links, 12 * self.links + self.reduced.elastic
         velocity[self.elastic] = rate[ends[0] : ends[1]]
-        return Configuration(tuple(poses), stored[ends[0] : ends[1]], stored[ends[1] :]), velocity
+        return Configuration(np.stack(poses), stored[ends[0] : ends[1]], stored[ends[1] :]), velocity
 
     def state(self, t: float, q: Configuration, v: Array) -> State:
         """Floating frames, modal coordinates and joint angles, as in `Ffr`."""

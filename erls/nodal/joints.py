@@ -1,0 +1,223 @@
+"""Joints as constraints on the pose of an outer frame relative to an inner one, D = (Q, p).
+
+Every condition is linear in the entries of p and Q: c · p + ⟨C, Q⟩ = 0. With the relative twist η of the outer frame,
+in its axes, ṗ = Q η_v and Q̇ = Q η̃_ω. Only relative motion enters, so that a rigid motion of both frames changes
+nothing. Along a prescribed coordinate s(t) the inner frame runs ahead by exp(s ẑ) of the joint's z axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from erls.errors import Cause, SceneError
+from erls.lie import motion_maps as motions
+from erls.lie.rotation_maps import skews
+from erls.lie.so3 import Array
+from erls.nodal.scatter import IntArray
+
+GROUND = -1
+Motion = Callable[[float], tuple[float, float, float]]  # coordinate, rate, acceleration at a time
+
+Condition = tuple[str, Array, Array]  # name, c (3,), C (3, 3)
+
+
+def _along(i: int) -> Condition:
+    return f"no shift along {'xyz'[i]}", np.eye(3)[i], np.zeros((3, 3))
+
+
+def _about(i: int) -> Condition:
+    j, k = (i + 1) % 3, (i + 2) % 3
+    entries = np.zeros((3, 3))
+    entries[k, j], entries[j, k] = 0.5, -0.5
+    return f"no turn about {'xyz'[i]}", np.zeros(3), entries
+
+
+def _normal(i: int, j: int) -> Condition:
+    entries = np.zeros((3, 3))
+    entries[i, j] = 1.0
+    return f"inner {'xyz'[i]} normal to outer {'xyz'[j]}", np.zeros(3), entries
+
+
+_PINNED = [_along(i) for i in range(3)]
+_STRAIGHT = [_about(i) for i in range(3)]
+_PARALLEL = [_normal(0, 2), _normal(1, 2)]
+
+CONDITIONS: dict[str, list[Condition]] = {
+    "fixed": _PINNED + _STRAIGHT,
+    "revolute": _PINNED + _PARALLEL,
+    "prismatic": _PINNED[:2] + _STRAIGHT,
+    "cylindrical": _PINNED[:2] + _PARALLEL,
+    "universal": [*_PINNED, _normal(0, 1)],
+    "spherical": _PINNED,
+}
+"""What each joint forbids; the free axis of revolute, prismatic and cylindrical joints is z, the two axes of a universal
+joint are the inner frame's x and the outer frame's y."""
+
+_DRIVEN = {"revolute": 5, "prismatic": 2}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint between two nodes, or a node and the ground (`GROUND`).
+
+    Attributes
+    ----------
+    name, type : str
+        Type: a key of `CONDITIONS`.
+    inner, outer : int
+        Nodes.
+    inner_frame, outer_frame : (4, 4) array
+        Pose of the joint in the frame of each node, in the world for the ground.
+    motion : callable or None
+        Prescribed coordinate of a revolute or prismatic joint.
+    breakpoints : tuple
+        Times at which its acceleration jumps.
+
+    Raises
+    ------
+    SceneError
+        With cause BAD_FIELD.
+    """
+
+    name: str
+    type: str
+    inner: int
+    outer: int
+    inner_frame: Array = field(default_factory=lambda: np.eye(4))
+    outer_frame: Array = field(default_factory=lambda: np.eye(4))
+    motion: Motion | None = None
+    breakpoints: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        where = f"joint {self.name!r}"
+        if self.type not in CONDITIONS:
+            remedy = f"must be one of {', '.join(CONDITIONS)}"
+            message = "there is no such joint"
+            raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: type", value=self.type, remedy=remedy)
+        if self.motion is not None and self.type not in _DRIVEN:
+            message, remedy = "its motion cannot be prescribed", "let the joint be revolute or prismatic"
+            raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: motion", value=self.type, remedy=remedy)
+        if self.inner == self.outer:
+            message, remedy = "both frames belong to one node", "name two nodes, or the ground as one of them"
+            raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: outer", value=self.outer, remedy=remedy)
+
+    @property
+    def conditions(self) -> list[Condition]:
+        """Conditions of the type; all of them when the last freedom is prescribed."""
+        return CONDITIONS["fixed" if self.motion else self.type]
+
+
+@dataclass(frozen=True)
+class Relative:
+    """Relative motion of j joints: poses D; transform of inner twists, at D's outer end; drives' twists and rates."""
+
+    pose: Array
+    inner: Array
+    drive: Array
+    drive_rate: Array
+
+
+class JointRows:
+    """All joints of a system, condition by condition."""
+
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        self.joints = tuple(joints)
+        self.nodes: IntArray = np.array([[j.inner, j.outer] for j in joints], dtype=np.int64).reshape(-1, 2)
+        self._inner = np.array([j.inner_frame for j in joints]).reshape(-1, 4, 4)
+        self._outer = np.array([j.outer_frame for j in joints]).reshape(-1, 4, 4)
+        self._of_inner = motions.adjoint_inverse(self._inner)
+        self.of_outer = motions.adjoint_inverse(self._outer)
+        found = [(k, *condition) for k, joint in enumerate(joints) for condition in joint.conditions]
+        self.joint_of_row: IntArray = np.array([k for k, *_ in found], dtype=np.int64)
+        self.names = tuple(f"joint {joints[k].name!r}: {name}" for k, name, _, _ in found)
+        self._c = np.array([c for _, _, c, _ in found]).reshape(-1, 3)
+        self._entries = np.array([e for _, _, _, e in found]).reshape(-1, 3, 3)
+        self._driven = [k for k, joint in enumerate(joints) if joint.motion is not None]
+
+    def relative(self, t: float, inner: Array, outer: Array) -> Relative:
+        """At node poses (j, 4, 4)."""
+        transform, frame = self._of_inner, self._inner
+        drive, rate = np.zeros((2, len(self.joints), 6))
+        if self._driven:
+            ahead = np.zeros((len(self.joints), 6))
+            for k in self._driven:
+                motion, at = self.joints[k].motion, _DRIVEN[self.joints[k].type]
+                if motion is not None:
+                    ahead[k, at], drive[k, at], rate[k, at] = motion(t)
+            moved = motions.exp(ahead)
+            transform, frame = motions.adjoint_inverse(moved) @ transform, frame @ moved
+        pose = motions.inverse(inner @ frame) @ outer @ self._outer
+        return Relative(pose, transform, drive, rate)
+
+    def violation(self, relative: Relative) -> Array:
+        """(m,) Φ."""
+        d = relative.pose[self.joint_of_row]
+        shift = (self._c * d[:, :3, 3]).sum(axis=1)
+        result: Array = shift + (self._entries * d[:, :3, :3]).sum(axis=(1, 2))
+        return result
+
+    def by_twist(self, relative: Relative) -> Array:
+        """(m, 6) derivative of each condition along the relative twist η."""
+        turn = np.swapaxes(relative.pose[self.joint_of_row, :3, :3], 1, 2)
+        result = np.empty((len(self.names), 6))
+        result[:, :3] = (turn @ self._c[:, :, None])[:, :, 0]
+        result[:, 3:] = _axial(turn @ self._entries)
+        return result
+
+    def gradient(self, relative: Relative) -> Array:
+        """(m, 12) derivative by the twists of the inner and the outer node."""
+        by_twist, k = self.by_twist(relative)[:, None, :], self.joint_of_row
+        of_inner = -motions.adjoint_inverse(relative.pose) @ relative.inner
+        return np.concatenate([by_twist @ of_inner[k], by_twist @ self.of_outer[k]], axis=2)[:, 0]
+
+    def rate(self, relative: Relative) -> Array:
+        """(m,) Φ_t."""
+        drift = -(motions.adjoint_inverse(relative.pose) @ relative.drive[:, :, None])[:, :, 0]
+        result: Array = (self.by_twist(relative) * drift[self.joint_of_row]).sum(axis=1)
+        return result
+
+    def bias(self, relative: Relative, v: Array) -> Array:
+        """(m,) Φ̈ − B a at twists (j, 12) of both nodes."""
+        back = motions.adjoint_inverse(relative.pose)
+        carried = (relative.inner @ v[:, :6, None])[:, :, 0]
+        inner = carried + relative.drive
+        outer = (self.of_outer @ v[:, 6:, None])[:, :, 0]
+        twist = outer - (back @ inner[:, :, None])[:, :, 0]
+        change = relative.drive_rate - (motions.bracket(relative.drive) @ carried[:, :, None])[:, :, 0]
+        bend = motions.bracket(twist) @ back @ inner[:, :, None] - back @ change[:, :, None]
+        k = self.joint_of_row
+        turning = skews(twist[k, 3:])
+        turn = relative.pose[k, :3, :3]
+        swing = (turn @ turning @ twist[k, :3, None])[:, :, 0]
+        curve = (self._c * swing).sum(axis=1) + (self._entries * (turn @ turning @ turning)).sum(axis=(1, 2))
+        result: Array = curve + (self.by_twist(relative) * bend[k, :, 0]).sum(axis=1)
+        return result
+
+    def stiffness(self, relative: Relative, multipliers: Array) -> Array:
+        """(j, 12, 12) derivative of Bᵀλ by increments of the inner and the outer node."""
+        j = len(self.joints)
+        pull, entries = np.zeros((j, 3)), np.zeros((j, 3, 3))
+        np.add.at(pull, self.joint_of_row, multipliers[:, None] * self._c)
+        np.add.at(entries, self.joint_of_row, multipliers[:, None, None] * self._entries)
+        turn = np.swapaxes(relative.pose[:, :3, :3], 1, 2)
+        force = (turn @ pull[:, :, None])[:, :, 0]
+        spread = turn @ entries
+        wrench = np.concatenate([force, _axial(spread)], axis=1)
+        of_twist = np.zeros((j, 6, 6))
+        of_twist[:, :3, 3:] = skews(force)
+        of_twist[:, 3:, 3:] = spread - np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+        of_inner = -motions.adjoint_inverse(relative.pose) @ relative.inner
+        twist = np.concatenate([of_inner, self.of_outer], axis=2)  # η from both nodes (j, 6, 12)
+        result: Array = np.swapaxes(twist, 1, 2) @ of_twist @ twist
+        # the inner node's share of the wrench turns with the relative pose
+        result[:, :6] -= np.swapaxes(of_inner, 1, 2) @ motions.cobracket(wrench) @ twist
+        return result
+
+
+def _axial(matrices: Array) -> Array:
+    """(..., 3) z with z · ω = ⟨N, ω̃⟩."""
+    rows = [matrices[..., 2, 1] - matrices[..., 1, 2], matrices[..., 0, 2] - matrices[..., 2, 0]]
+    return np.stack([*rows, matrices[..., 1, 0] - matrices[..., 0, 1]], axis=-1)

@@ -1,0 +1,193 @@
+"""Multifrontal factorization: every front is a small dense matrix that LAPACK factorizes.
+
+A front gathers the entries of its own dofs and what eliminating its children left over for it, factorizes the own
+part, and leaves a matrix over its rows to its parent (I. S. Duff & J. K. Reid, ACM Trans. Math. Software 9, 1983;
+J. W. H. Liu, SIAM Review 34, 1992). Only lower triangles are meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import blas, lapack
+
+from fe_import.model import Array, IntArray
+from fe_import.solver.base import SINGULAR, SingularMatrix
+from fe_import.solver.elimination import Elimination
+
+_PANEL = 64  # columns of a child added at a time; what is above the diagonal is left out but for the panel's corner
+_TRUSTED = 1e-9  # of the diagonal; smaller pivots make the signs of later ones doubtful
+
+Advance = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class MultifrontalFactor:
+    """Cholesky factor of a positive definite matrix, front by front: (o, o) triangles over (r, o) rectangles."""
+
+    elimination: Elimination
+    triangles: tuple[Array, ...]
+    rectangles: tuple[Array, ...]
+
+    def solve(self, right: Array) -> Array:
+        """(n, k) or (n,) solutions."""
+        order, starts, rows = self.elimination.order, self.elimination.starts, self.elimination.rows
+        x = np.ascontiguousarray(right[order].reshape(len(order), -1), dtype=float)
+        fronts = range(len(rows))
+        for k in fronts:
+            own = x[starts[k] : starts[k + 1]]
+            own[:] = blas.dtrsm(1.0, self.triangles[k], own.T, side=1, lower=1, trans_a=1, overwrite_b=1).T
+            if len(rows[k]):
+                x[rows[k]] -= self.rectangles[k] @ own
+        for k in reversed(fronts):
+            own = x[starts[k] : starts[k + 1]]
+            if len(rows[k]):
+                own -= self.rectangles[k].T @ x[rows[k]]
+            own[:] = blas.dtrsm(1.0, self.triangles[k], own.T, side=1, lower=1, overwrite_b=1).T
+        result = np.empty_like(x)
+        result[order] = x
+        return result.reshape(right.shape)
+
+
+def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) -> MultifrontalFactor:
+    """Cholesky factor of a positive definite matrix.
+
+    Raises
+    ------
+    SingularMatrix
+        A pivot is not positive, or within rounding of zero.
+    """
+    diagonal = np.abs(matrix.diagonal())[elimination.order]
+    fronts = _Fronts(matrix, elimination)
+    triangles, rectangles = [], []
+    for k, own, across in fronts:
+        triangle, failed = lapack.dpotrf(own, lower=1, clean=0)
+        scale = diagonal[elimination.starts[k] : elimination.starts[k + 1]]
+        if failed or (triangle.diagonal() ** 2 <= SINGULAR * scale).any():
+            raise SingularMatrix
+        if len(across):
+            across = blas.dtrsm(1.0, triangle, across, side=1, lower=1, trans_a=1, overwrite_b=1)
+            fronts.eliminate_squared(k, across)
+        triangles.append(triangle)
+        rectangles.append(across)
+        advance(k)
+    return MultifrontalFactor(elimination, tuple(triangles), tuple(rectangles))
+
+
+def negative_pivots(
+    matrix: sp.csc_array, elimination: Elimination, advance: Advance, minus: Array | None = None
+) -> int | None:
+    """Number of negative eigenvalues of a symmetric matrix (Sylvester's law of inertia).
+
+    Most fronts are positive definite when few eigenvalues are negative; only the others need pivots of both signs
+    (Bunch & Kaufman, within the front). Nothing of the factor is kept.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse CSC
+    elimination : Elimination
+    advance : callable
+        Told every front that is done.
+    minus : array or None
+        Entries to subtract from those of the matrix, in the same places.
+
+    Returns
+    -------
+    int or None
+        None when a pivot is too small to trust the count.
+    """
+    diagonal = np.abs(matrix.diagonal())[elimination.order]
+    fronts = _Fronts(matrix, elimination, minus)
+    count = 0
+    for k, own, across in fronts:
+        scale = diagonal[elimination.starts[k] : elimination.starts[k + 1]]
+        triangle, failed = lapack.dpotrf(own, lower=1, clean=0)
+        if not failed and (triangle.diagonal() ** 2 > _TRUSTED * scale).all():
+            if len(across):
+                across = blas.dtrsm(1.0, triangle, across, side=1, lower=1, trans_a=1, overwrite_b=1)
+                fronts.eliminate_squared(k, across)
+        else:
+            factor, pivots, solved, failed = lapack.dsysv(own, across.T, lower=1)
+            values = _pivot_values(factor, pivots)
+            if failed > 0 or np.abs(values).min() <= _TRUSTED * scale.min():
+                return None
+            count += int((values < 0).sum())
+            fronts.eliminate(k, across, solved)
+        advance(k)
+    return count
+
+
+def _pivot_values(factor: Array, pivots: IntArray) -> Array:
+    """Eigenvalues of the 1x1 and 2x2 blocks of D in LAPACK's LDLᵀ; both rows of a 2x2 block are marked negative."""
+    values = factor.diagonal().copy()
+    k = 0
+    while k < len(values):
+        if pivots[k] > 0:
+            k += 1
+            continue
+        off = factor[k + 1, k]
+        values[k : k + 2] = np.linalg.eigvalsh([[values[k], off], [off, values[k + 1]]])
+        k += 2
+    return values
+
+
+class _Fronts:
+    """Iterates over the fronts, each gathered: number, own part (o, o), part across (r, o); one must be eliminated
+    before the next is asked for."""
+
+    def __init__(self, matrix: sp.csc_array, elimination: Elimination, minus: Array | None = None) -> None:
+        self._matrix, self._minus = matrix, minus
+        self._elimination = elimination
+        self._left: dict[int, Array] = {}
+        self._rest = np.zeros((0, 0))
+
+    def __iter__(self) -> Iterator[tuple[int, Array, Array]]:
+        order, starts, rows = self._elimination.order, self._elimination.starts, self._elimination.rows
+        place = np.empty(len(order), dtype=np.int64)
+        place[order] = np.arange(len(order))
+        local = np.empty(len(order), dtype=np.int64)
+        for k, row in enumerate(rows):
+            first, last = starts[k], starts[k + 1]
+            own, size = last - first, last - first + len(row)
+            local[first:last] = np.arange(own)
+            local[row] = np.arange(own, size)
+            front = np.zeros((size, own), order="F")
+            self._gather(front, place, local, first, last)
+            self._rest = np.zeros((len(row), len(row)), order="F")
+            for child in self._elimination.children[k]:
+                self._extend(front, local[rows[child]], self._left.pop(child))
+            yield k, front[:own], np.asfortranarray(front[own:])
+
+    def _gather(self, front: Array, place: IntArray, local: IntArray, first: int, last: int) -> None:
+        """Entries of the matrix in the columns of a front, from its own rows on."""
+        indptr = self._matrix.indptr
+        columns = self._elimination.order[first:last]
+        begin, counts = indptr[columns].astype(np.int64), indptr[columns + 1] - indptr[columns]
+        ends = np.cumsum(counts)
+        at = np.arange(ends[-1]) + np.repeat(begin - ends + counts, counts)
+        row = place[self._matrix.indices[at]]
+        later = row >= first
+        at = at[later]
+        values = self._matrix.data[at] if self._minus is None else self._matrix.data[at] - self._minus[at]
+        front[local[row[later]], np.repeat(np.arange(last - first), counts)[later]] = values
+
+    def _extend(self, front: Array, to: IntArray, left: Array) -> None:
+        """Add what a child left over; rows rise, so lower triangles stay lower triangles."""
+        own = front.shape[1]
+        inner = int(np.searchsorted(to, own))
+        for target, begin, end, shift in ((front, 0, inner, 0), (self._rest, inner, len(to), own)):
+            for j in range(begin, end, _PANEL):
+                stop = min(j + _PANEL, end)
+                target.T[to[j:stop, None] - shift, to[None, j:] - shift] += left.T[j:stop, j:]
+
+    def eliminate_squared(self, front: int, across: Array) -> None:
+        """Leave rest - across acrossᵀ to the parent."""
+        self._left[front] = blas.dsyrk(-1.0, across, beta=1.0, c=self._rest, lower=1, overwrite_c=1)
+
+    def eliminate(self, front: int, across: Array, solved: Array) -> None:
+        """Leave rest - across solved to the parent."""
+        if len(across):
+            self._left[front] = blas.dgemm(-1.0, across, solved, beta=1.0, c=self._rest, overwrite_c=1)
