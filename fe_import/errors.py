@@ -108,11 +108,12 @@ class Cause(enum.StrEnum):
     DISCONNECTED = "parts not connected"
     MODE_COUNT = "mode count out of range"
     EIGENSOLVER = "eigensolver failed"
+    TOO_LARGE = "too large for the memory"
     MODAL_FILE = "faulty modal file"
     NOT_WRITABLE = "file not writable"
 
 
-_NUMERICAL = {Cause.EIGENSOLVER}
+_NUMERICAL = {Cause.TOO_LARGE, Cause.EIGENSOLVER}
 
 
 class FEImportError(ReportedError):

@@ -1,46 +1,99 @@
-"""Factorization and lowest eigenpairs of sparse symmetric matrices, behind one small interface, verified."""
+"""Factorization and lowest eigenpairs of sparse symmetric matrices, behind one small interface, verified.
+
+The solvers are in `fe_import.solver`. Large jobs are announced (`fe_import.solver.watch`), and refused before they
+start when they do not fit into memory.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-import scipy.sparse.linalg as spla
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array
+from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chosen_solver
+from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
+from fe_import.solver.memory import gigabytes, refuse_too_large
+from fe_import.solver.multifrontal import negative_pivots
+from fe_import.solver.watch import Progress, say
 
 Matrix: TypeAlias = Array | sp.csc_array
 
 _DENSE = 600  # below this size LAPACK is faster than Lanczos and finds every mode
 _RESIDUAL = 1e-6  # relative residual of an accepted eigenpair; Lanczos to working precision gives below 1e-9
+_ANNOUNCED = 3.0  # seconds; shorter jobs are done before the message is read
 
 
-def factorize(matrix: sp.csc_array, what: str) -> Callable[[Array], Array]:
-    """Factorize a symmetric positive definite matrix; returns the solve with dense right-hand sides.
+@dataclass(frozen=True)
+class Factorization:
+    """A factorized matrix; called with right-hand sides (n,) or (n, k), it solves.
+
+    Attributes
+    ----------
+    solver : str
+    elimination : Elimination
+        With the size of the factor, and to be used again for matrices of the same pattern.
+    factor : Factor
+    """
+
+    solver: str
+    elimination: Elimination
+    factor: Factor
+
+    def __call__(self, right: Array) -> Array:
+        """Solutions."""
+        return self.factor.solve(right)
+
+
+def factorize(matrix: sp.csc_array, what: str, positions: Array | None = None, reserve: int = 0) -> Factorization:
+    """Factorize a symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse CSC
+        Both triangles.
+    what : str
+        Names the matrix in messages.
+    positions : (n, 3) array, optional
+        Where each dof sits; the order of elimination is found faster with it, and is better for compact solids.
+    reserve : int
+        Bytes that will be needed beside the factor.
 
     Raises
     ------
     FEImportError
-        Cause NOT_DEFINITE when the matrix is singular to working precision.
+        NOT_DEFINITE: the matrix is singular to working precision; TOO_LARGE: it does not fit into memory.
     """
+    matrix, solver = _canonical(matrix), chosen_solver()
+    elimination = analyse(matrix, positions)
+    needed = solver.bytes_needed(elimination)
+    refuse_too_large(needed + reserve, f"factorization of the {what}, {matrix.shape[0]} dofs,")
+    progress = _announced(elimination, f"factorizing the {what}", needed)
     try:
-        factor = spla.splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-    except RuntimeError:
+        factor = solver.factorize(matrix, elimination, progress)
+    except SingularMatrix:
         raise _singular(what) from None
-    pivots = factor.U.diagonal()
-    if (pivots <= 1e-13 * np.abs(matrix.diagonal())[factor.perm_c.argsort()]).any():
-        raise _singular(what)
+    return Factorization(solver.name, elimination, factor)
 
-    def solve(right: Array) -> Array:
-        return np.asarray(factor.solve(np.ascontiguousarray(right, dtype=float)))
 
-    return solve
+def _announced(elimination: Elimination, doing: str, needed: int) -> Progress:
+    """Say what a large job takes; hears of its progress."""
+    seconds = elimination.expected_seconds
+    if seconds > _ANNOUNCED:
+        say(f"{doing}: {len(elimination.order)} dofs, {gigabytes(needed)}, about {seconds:.0f} s")
+    return Progress(doing, elimination.operations)
+
+
+def _canonical(matrix: sp.csc_array) -> sp.csc_array:
+    matrix = matrix.tocsc()
+    if not matrix.has_canonical_format:
+        matrix = matrix.copy()
+        matrix.sum_duplicates()
+    return matrix
 
 
 def _singular(what: str) -> FEImportError:
@@ -51,10 +104,29 @@ def _singular(what: str) -> FEImportError:
     )
 
 
-def lowest_modes(stiffness: sp.csc_array, mass: sp.csc_array, count: int, what: str) -> tuple[Array, Array]:
+def lowest_modes(
+    stiffness: sp.csc_array,
+    mass: sp.csc_array,
+    count: int,
+    what: str,
+    *,
+    positions: Array | None = None,
+    solve: Factorization | None = None,
+) -> tuple[Array, Array]:
     """Lowest modes of K φ = ω² M φ with K positive definite and M positive semidefinite.
 
     Massless directions have no mode: fewer than ``count`` may come back.
+
+    Parameters
+    ----------
+    stiffness, mass : (d, d) sparse CSC
+    count : int
+    what : str
+        Names the link in messages.
+    positions : (d, 3) array, optional
+        Where each dof sits, see `factorize`.
+    solve : Factorization, optional
+        Of the stiffness, if there is one already.
 
     Returns
     -------
@@ -66,24 +138,25 @@ def lowest_modes(stiffness: sp.csc_array, mass: sp.csc_array, count: int, what: 
     Raises
     ------
     FEImportError
-        K is not positive definite (NOT_DEFINITE), or the solver failed (EIGENSOLVER).
+        K is not positive definite (NOT_DEFINITE), the solver failed (EIGENSOLVER), or there is too little memory
+        (TOO_LARGE).
     """
     size = stiffness.shape[0]
     if count == 0 or size == 0 or not mass.count_nonzero():
         return np.zeros(0), np.zeros((size, 0))
+    count = min(count, int((mass.diagonal() > 0).sum()))
     if size <= _DENSE or count > size // 4:
         return dense_modes(stiffness.toarray(), mass.toarray(), count, what)
-    solve = factorize(stiffness, what)
-    operator = spla.LinearOperator((size, size), matvec=solve, dtype=float)
-    start = np.random.default_rng(0).standard_normal(size)  # a fixed start makes the reduction reproducible
+    vectors = 8 * size * (most_vectors(count) // 2 + 4 * count)  # most spectra take less than half
+    if solve is None:
+        solve = factorize(stiffness, f"stiffness of the {what}", positions, vectors)
     try:
-        values, modes = spla.eigsh(stiffness, count, mass, sigma=0.0, OPinv=operator, v0=start, which="LM")
-    except spla.ArpackError as problem:
+        mu, modes = lowest_eigenpairs(solve, mass, count)
+    except NotConverged:
         raise FEImportError(
-            Cause.EIGENSOLVER, f"modes of the {what}: {problem}", value=count, remedy="ask for fewer modes"
+            Cause.EIGENSOLVER, f"modes of the {what} did not converge", value=count, remedy="ask for fewer modes"
         ) from None
-    order = np.argsort(values)
-    values, modes = values[order], modes[:, order]
+    values = 1 / mu
     force = stiffness @ modes
     residual = np.linalg.norm(force - mass @ modes * values, axis=0) / np.linalg.norm(force, axis=0)
     if residual.max() > _RESIDUAL:
@@ -94,17 +167,17 @@ def lowest_modes(stiffness: sp.csc_array, mass: sp.csc_array, count: int, what: 
             limit=_RESIDUAL,
             remedy="ask for fewer modes",
         )
-    omega = np.sqrt(values)
-    _check_complete(stiffness, mass, values, what)
-    omega, change = polishing(stiffness, mass, omega, modes)
+    _check_complete(stiffness, mass, values, what, solve.elimination)
+    omega, change = polishing(stiffness, mass, np.sqrt(values), modes)
     return omega, modes @ change
 
 
-def _check_complete(stiffness: sp.csc_array, mass: sp.csc_array, values: Array, what: str) -> None:
+def _check_complete(
+    stiffness: sp.csc_array, mass: sp.csc_array, values: Array, what: str, elimination: Elimination
+) -> None:
     """Refuse a spectrum with a gap: Lanczos may miss one of several modes of equal frequency.
 
-    Sylvester: K - λM has as many negative pivots as there are modes below λ. The count is trusted when the pivots
-    came from the diagonal and none is small; λ lies where the found spectrum leaves most room, above its middle.
+    K - λM is counted where the found spectrum leaves most room, above its middle.
     """
     first = len(values) // 2
     room = np.diff(np.log(values[first:]))
@@ -112,7 +185,7 @@ def _check_complete(stiffness: sp.csc_array, mass: sp.csc_array, values: Array, 
         return
     last = first + int(room.argmax())
     shift = float(np.sqrt(values[last] * values[last + 1]))
-    below = modes_below(stiffness, mass, shift)
+    below = modes_below(stiffness, mass, shift, elimination=elimination)
     if below is not None and below != last + 1:
         raise FEImportError(
             Cause.EIGENSOLVER,
@@ -123,22 +196,48 @@ def _check_complete(stiffness: sp.csc_array, mass: sp.csc_array, values: Array, 
         )
 
 
-def modes_below(stiffness: sp.csc_array, mass: sp.csc_array, shift: float) -> int | None:
+def modes_below(
+    stiffness: sp.csc_array,
+    mass: sp.csc_array,
+    shift: float,
+    *,
+    positions: Array | None = None,
+    elimination: Elimination | None = None,
+) -> int | None:
     """Number of eigenvalues of K φ = λ M φ below ``shift`` (Sylvester: negative pivots of K - λM).
 
-    None when the pivots do not tell: one is small, or they did not come from the diagonal.
+    Parameters
+    ----------
+    stiffness, mass : (d, d) sparse CSC
+    shift : float
+    positions : (d, 3) array, optional
+        Where each dof sits, see `factorize`.
+    elimination : Elimination, optional
+        Of the stiffness, if there is one already.
+
+    Returns
+    -------
+    int or None
+        None when a pivot is too small to tell.
+
+    Raises
+    ------
+    FEImportError
+        TOO_LARGE: there is too little memory.
     """
-    shifted = (stiffness - shift * mass).tocsc()
-    try:
-        factor = spla.splu(
-            shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-    except RuntimeError:
-        return None
-    pivots = factor.U.diagonal()
-    if not np.array_equal(factor.perm_r, factor.perm_c) or np.abs(pivots).min() < 1e-10 * np.abs(pivots).max():
-        return None
-    return int((pivots < 0).sum())
+    stiffness, mass = _canonical(stiffness), _canonical(mass)
+    if not _same_pattern(stiffness, mass):
+        stiffness, mass, elimination = _canonical(stiffness - shift * mass), None, None
+    if elimination is None:
+        elimination = analyse(stiffness, positions)
+    needed = elimination.peak_bytes(keep=False)
+    refuse_too_large(needed, f"count of modes of {stiffness.shape[0]} dofs")
+    progress = _announced(elimination, "counting modes", needed)
+    return negative_pivots(stiffness, elimination, progress, mass, shift)
+
+
+def _same_pattern(a: sp.csc_array, b: sp.csc_array) -> bool:
+    return a.nnz == b.nnz and np.array_equal(a.indptr, b.indptr) and np.array_equal(a.indices, b.indices)
 
 
 def dense_modes(stiffness: Array, mass: Array, count: int | None, what: str) -> tuple[Array, Array]:

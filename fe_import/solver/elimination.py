@@ -55,6 +55,12 @@ class Elimination:
         own, rows = self._sizes
         return np.asarray(own**3 / 3 + own**2 * rows + own * rows**2)
 
+    @property
+    def expected_seconds(self) -> float:
+        """Of a factorization, on one core of 2023 (30 operations and 0.12 added entries per nanosecond); machines and
+        their load differ by a factor of three."""
+        return float(self.operations.sum() / 3e10 + (self._sizes[1] ** 2).sum() / 1.2e8)
+
     def peak_bytes(self, keep: bool = True) -> int:
         """Memory of the factorization at its largest, the factor included unless it is not kept."""
         own, rows = self._sizes

@@ -58,12 +58,11 @@ def lowest_eigenpairs(solve: Callable[[Array], Array], mass: sp.csc_array, count
     """
     size = mass.shape[0]
     start = np.random.default_rng(0).standard_normal((size, block_size(count)))  # fixed: reductions are reproducible
-    scale = _mass_norm(solve(mass @ start), mass).max()
-    blocks = [_orthonormal(solve(mass @ start), [], mass, scale)[0]]
+    blocks = [_orthonormal(solve(mass @ start), [], mass)[0]]
     projected = np.zeros((0, 0))
     while True:
         image = solve(mass @ blocks[-1])
-        new, along, across = _orthonormal(image, blocks, mass, scale)
+        new, along, across = _orthonormal(image, blocks, mass)
         known = len(projected)
         projected = la.block_diag(projected, np.zeros((along.shape[1], along.shape[1])))
         projected[:, known:] = along
@@ -71,14 +70,14 @@ def lowest_eigenpairs(solve: Callable[[Array], Array], mass: sp.csc_array, count
         mu, turn = la.eigh(projected)
         mu, turn = mu[::-1], turn[:, ::-1]
         left = across @ turn[known:, :count]  # A φ - μ φ in the vectors of the new block
-        done = np.linalg.norm(left, axis=0) <= _CONVERGED * np.abs(mu[:count])
-        if new.shape[1] == 0 or (len(mu) >= count and done.all()):
+        needed = mu[:count] > _NEW * mu[0]
+        done = np.linalg.norm(left, axis=0) <= _CONVERGED * mu[:count]
+        if new.shape[1] == 0 or (len(mu) >= count and done[needed].all()):
             break
         if len(mu) + new.shape[1] > max(most_vectors(count), 2 * count):
             raise NotConverged
         blocks.append(new)
-    kept = mu[:count] > _NEW * mu[0]
-    mu, turn, left = mu[:count][kept], turn[:, :count][:, kept], left[:, kept]
+    mu, turn, left = mu[:count][needed], turn[:, :count][:, needed], left[:, needed]
     # A φ / μ instead of φ costs nothing and is free of what rounding mixed in
     modes = new @ (left / mu)
     row = 0
@@ -88,13 +87,7 @@ def lowest_eigenpairs(solve: Callable[[Array], Array], mass: sp.csc_array, count
     return mu, modes
 
 
-def _mass_norm(vectors: Array, mass: sp.csc_array) -> Array:
-    return np.asarray(np.sqrt(np.einsum("nk,nk->k", vectors, mass @ vectors).clip(min=0)))
-
-
-def _orthonormal(
-    vectors: Array, blocks: list[Array], mass: sp.csc_array, scale: float
-) -> tuple[Array, Array, Array]:
+def _orthonormal(vectors: Array, blocks: list[Array], mass: sp.csc_array) -> tuple[Array, Array, Array]:
     """What is new in some vectors.
 
     Returns
@@ -109,7 +102,8 @@ def _orthonormal(
     along = np.zeros((sum(block.shape[1] for block in blocks), vectors.shape[1]))
     across = np.eye(vectors.shape[1])
     new = vectors.copy()
-    for repeat in range(3):
+    least = _NEW * np.sqrt(np.einsum("nk,nk->k", new, mass @ new).max())
+    for _ in range(3):
         weighted = mass @ new
         if blocks:
             part = np.concatenate([block.T @ weighted for block in blocks])
@@ -122,7 +116,8 @@ def _orthonormal(
         gram = new.T @ weighted
         values, turn = la.eigh((gram + gram.T) / 2)
         size = np.sqrt(values.clip(min=0))
-        kept = size > (_NEW * scale if repeat == 0 else 0.1)
+        kept = size > least
+        least = 0.1
         new = new @ (turn[:, kept] / size[kept])
         across = (turn[:, kept] * size[kept]).T @ across
     return new, along, across

@@ -78,9 +78,13 @@ def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) 
 
 
 def negative_pivots(
-    matrix: sp.csc_array, elimination: Elimination, advance: Advance, minus: Array | None = None
+    matrix: sp.csc_array,
+    elimination: Elimination,
+    advance: Advance,
+    mass: sp.csc_array | None = None,
+    shift: float = 0.0,
 ) -> int | None:
-    """Number of negative eigenvalues of a symmetric matrix (Sylvester's law of inertia).
+    """Number of negative eigenvalues of a symmetric matrix K, or of K - λM (Sylvester's law of inertia).
 
     Most fronts are positive definite when few eigenvalues are negative; only the others need pivots of both signs
     (Bunch & Kaufman, within the front). Nothing of the factor is kept.
@@ -91,8 +95,10 @@ def negative_pivots(
     elimination : Elimination
     advance : callable
         Told every front that is done.
-    minus : array or None
-        Entries to subtract from those of the matrix, in the same places.
+    mass : (n, n) sparse CSC or None
+        M, with entries in the same places as the matrix.
+    shift : float
+        λ.
 
     Returns
     -------
@@ -100,7 +106,7 @@ def negative_pivots(
         None when a pivot is too small to trust the count.
     """
     diagonal = np.abs(matrix.diagonal())[elimination.order]
-    fronts = _Fronts(matrix, elimination, minus)
+    fronts = _Fronts(matrix, elimination, mass, shift)
     count = 0
     for k, own, across in fronts:
         scale = diagonal[elimination.starts[k] : elimination.starts[k + 1]]
@@ -138,8 +144,10 @@ class _Fronts:
     """Iterates over the fronts, each gathered: number, own part (o, o), part across (r, o); one must be eliminated
     before the next is asked for."""
 
-    def __init__(self, matrix: sp.csc_array, elimination: Elimination, minus: Array | None = None) -> None:
-        self._matrix, self._minus = matrix, minus
+    def __init__(
+        self, matrix: sp.csc_array, elimination: Elimination, mass: sp.csc_array | None = None, shift: float = 0.0
+    ) -> None:
+        self._matrix, self._mass, self._shift = matrix, mass, shift
         self._elimination = elimination
         self._left: dict[int, Array] = {}
         self._rest = np.zeros((0, 0))
@@ -171,7 +179,9 @@ class _Fronts:
         row = place[self._matrix.indices[at]]
         later = row >= first
         at = at[later]
-        values = self._matrix.data[at] if self._minus is None else self._matrix.data[at] - self._minus[at]
+        values = self._matrix.data[at]
+        if self._mass is not None:
+            values -= self._shift * self._mass.data[at]
         front[local[row[later]], np.repeat(np.arange(last - first), counts)[later]] = values
 
     def _extend(self, front: Array, to: IntArray, left: Array) -> None:

@@ -7,6 +7,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 
+import numpy as np
+
+from fe_import.model import Array
+
 _INTERVAL = 5.0  # seconds between messages on the way
 
 _tell: ContextVar[Callable[[str], None] | None] = ContextVar("tell", default=None)
@@ -30,24 +34,23 @@ def say(message: str) -> None:
 
 
 class Progress:
-    """Says every few seconds how far a computation is.
+    """Says every few seconds how far a computation is; called with the number of each step that is done.
 
     Parameters
     ----------
     what : str
         Begins each message.
-    total : float
-        Amount of work.
+    work : (n,) array
+        Of each step.
     """
 
-    def __init__(self, what: str, total: float) -> None:
-        self._what, self._total, self._done = what, total, 0.0
+    def __init__(self, what: str, work: Array) -> None:
+        self._what, self._work = what, np.cumsum(work)
         self._told = time.monotonic()
 
-    def advance(self, work: float) -> None:
-        """Some more work is done."""
-        self._done += work
+    def __call__(self, step: int) -> None:
+        """This step is done, and all before."""
         now = time.monotonic()
         if now - self._told > _INTERVAL:
             self._told = now
-            say(f"{self._what}: {100 * self._done / self._total:.0f} % done")
+            say(f"{self._what}: {100 * self._work[step] / self._work[-1]:.0f} % done")
