@@ -66,7 +66,8 @@ def reduce(
     output
         Modal file to write; LINK.modal.h5 in the current folder unless given.
     method
-        Reduction instead of the one in the description: craig-bampton or none.
+        Reduction instead of the one in the description: craig-bampton, craig-chang, guyan,
+        mode-displacement or none.
     modes
         Number of elastic modes instead of that in the description.
     json

@@ -203,7 +203,7 @@ class _Stepper:
         tolerance: rate/(1 − rate) |Δ|, with the rate of earlier steps at first (Hairer & Wanner, Solving ODEs II,
         sec. IV.8), which counts for less the older it gets.
         """
-        system, options = self.system, self.options
+        system, options, mode = self.system, self.options, self.options.iteration_matrix
         a, multipliers = np.zeros(len(d)), np.zeros(system.constraints)
         rate, before, largest = max(self.rate, _FASTEST_TRUSTED) ** 0.8, 0.0, 0.0
         rounding = _ROUNDING * self.reach
@@ -211,9 +211,8 @@ class _Stepper:
         for k in range(MAX_ITERATIONS + 1):
             q = system.compose(q0, d)
             state = ConstrainedState(q, v, a, multipliers)
-            if (k == 0 and fresh) or (k > 0 and options.iteration_matrix == "update"):
-                if not self.refresh(t, state, d):
-                    return None
+            if fresh and not self.refresh(t, state, d):
+                return None
             assert self.saddle is not None
             self.work.rhs_calls += 1
             residual, violation = system.residual(t, q, v, a), system.constraint(t, q)
@@ -226,7 +225,7 @@ class _Stepper:
             largest = max(largest, sizes[0])
             gap = float(np.abs(right[len(d) :]).max(initial=0.0))
             small = options.residual_tolerance
-            if sizes[2] <= small * (largest + sizes[1]) and gap <= small * self.reach and k > 0:
+            if k > 0 and sizes[2] <= small * (largest + sizes[1]) and gap <= small * self.reach:
                 return self.accepted(state, k, rate)
             if k == MAX_ITERATIONS:
                 break
@@ -246,10 +245,12 @@ class _Stepper:
             if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
                 q = system.compose(q0, d)
                 return self.accepted(ConstrainedState(q, v, a, multipliers), k + 1, rate)
-            left = MAX_ITERATIONS - k - 1
             # a first correction may be small by luck; later ones must lead to the goal in time
-            if rate > 2 or (k > 1 and (rate >= 1 or size * rate ** (left + 1) > goal * (1 - rate))):
+            left = _iterations(size, goal * (1 - rate), rate) if k > 0 else 0.0
+            stale = mode == "auto" and not fresh
+            if rate > 2 or (k > 1 and left > MAX_ITERATIONS - k and not stale):
                 break
+            fresh = mode == "update" or (mode == "auto" and left > REFRESH_COST)
             before = size
         self.suspect = correction
         self.reason = f"corrections of {before:.3g} m and {size:.3g} m do not shrink to {goal:.3g} m"
@@ -281,3 +282,8 @@ class _Stepper:
             else "check forces and stiffness that act there, for jumps without breakpoint first; then try a smaller "
             "step or a larger Newton tolerance",
         )
+
+
+def _iterations(size: float, goal: float, rate: float) -> float:
+    """Iterations from a correction of ``size`` down to ``goal``."""
+    return math.log(goal / size) / math.log(rate) if 0 < rate < 1 else math.inf

@@ -17,6 +17,8 @@ from erls.studies.outputs import Outputs, run_outputs
 from erls.studies.pool import run_all
 from erls.studies.spectrum import amplitude_spectrum, peaks
 from fe_import.errors import ReportedError
+from fe_import.link import load_link
+from fe_import.link_reduction import Reduction
 from fe_import.toml_file import choose
 
 SUCCESSIVE = 3  # changes below the tolerance, one after the other, before a study says "converged"
@@ -175,7 +177,8 @@ def study_modes(
                 limit=most,
                 remedy="give counts from 0 to the limit, or reduce the links with more modes",
             )
-    tasks = [(str(path), (*overrides, *(f"links.{name}.elastic_modes={count}" for name in limits))) for count in chosen]
+    fields = [_count_field(loaded, name) for name in limits]
+    tasks = [(str(path), (*overrides, *(f"{field}={count}" for field in fields))) for count in chosen]
     finished, complete = run_all(_run, tasks, progress, workers)
     limit = tolerances or Tolerances()
     points: list[Point] = []
@@ -204,6 +207,16 @@ def _available(scene: Scene) -> dict[str, int]:
         for link, model in zip(scene.record.links, models, strict=True)
         if model.elastic_modes
     }
+
+
+def _count_field(scene: Scene, name: str) -> str:
+    """Where the count goes: to the reduction, where that keeps other modes than the lowest free-free ones."""
+    link = next(one for one in scene.record.links if one.name == name)
+    if link.model:
+        options = load_link(scene.folder / link.model, link.reduction).description.reduction
+        if options.truncation != Reduction().truncation or options.static_correction:
+            return f"links.{name}.reduction.elastic_modes"
+    return f"links.{name}.elastic_modes"
 
 
 def _run(task: tuple[str, tuple[str, ...]]) -> Outputs:

@@ -1,4 +1,4 @@
-"""One table of links for every reduction: frames, solids, point masses, repeated frequencies, one to three interfaces."""
+"""One table of links for every reduction: frames, solids, point masses, equal frequencies, one to three interfaces."""
 
 from __future__ import annotations
 

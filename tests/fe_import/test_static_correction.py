@@ -135,7 +135,7 @@ def test_links_with_few_dofs(tmp_path: Path) -> None:
 
 
 def test_rotations_without_mass_are_reported(tmp_path: Path) -> None:
-    """Lumped mass without rotary inertia: the turning under a moment holds no mass, no mode has it, and health fails."""
+    """Lumped mass without rotary inertia: what turns under a moment has no mass, no mode holds it, health fails."""
     massless = {"mass": "lumped", "rotary_inertia": False}
     link = frame_link(tmp_path, frame=massless, reduction={"static_correction": True})
     model = build_model(link)
