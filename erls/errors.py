@@ -24,6 +24,7 @@ class Cause(enum.StrEnum):
     SINGULAR_MASS = "mass matrix not positive definite"
     REDUNDANT_CONSTRAINTS = "redundant constraints"
     INCONSISTENT_START = "start that does not fulfil the constraints"
+    LOOP_OPEN = "loop cannot be closed"
     NO_EQUILIBRIUM = "no static equilibrium"
     NEWTON_FAILED = "Newton iteration did not converge"
     NOT_FINITE = "solution is no longer finite"
@@ -36,6 +37,7 @@ class Cause(enum.StrEnum):
 _NUMERICAL = {
     Cause.SINGULAR_MASS,
     Cause.INCONSISTENT_START,
+    Cause.LOOP_OPEN,
     Cause.NO_EQUILIBRIUM,
     Cause.NEWTON_FAILED,
     Cause.NOT_FINITE,

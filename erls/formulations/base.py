@@ -5,17 +5,22 @@ Rules for adding a formulation:
 1. One file (more beside it if it needs them) and one line in the registry of ``erls/formulations/__init__.py``.
 2. It imports no other formulation; it shares the mechanism, the modal models, the drives and nothing else.
 3. It is a `erls.integrators.base.SecondOrderSystem` in independent coordinates; prescribed motions are eliminated.
-4. Everything that a run reports goes through `State`: whoever samples a run never asks which formulation made it.
+4. It is a `TreeFormulation`, so that `erls.formulations.closed_chain` can close loops over it.
+5. Everything that a run reports goes through `State`: whoever samples a run never asks which formulation made it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from erls.formulations.joint_frames import FrameMotion
 from erls.integrators.base import SecondOrderSystem
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.loops import LoopEnd
+from fe_import.model import IntArray
 
 
 @dataclass(frozen=True)
@@ -89,3 +94,28 @@ class Formulation(SecondOrderSystem, Protocol):
 
     def describe(self) -> dict[str, Any]:
         """Names and sizes for reports."""
+
+
+class TreeFormulation(Formulation, Protocol):
+    """A formulation whose coordinates can be tied by loops: (θ, elastic), of which ``free`` are independent.
+
+    Attributes
+    ----------
+    joints : int
+    free : int array
+        Places of the independent coordinates within (θ, elastic).
+    free_joints : int array
+        Joints without prescribed motion; their coordinates come first in y.
+    """
+
+    joints: int
+    free: IntArray
+    free_joints: IntArray
+
+    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
+        """Frames on displaced nodes of links: rows over the rates of (θ, elastic), accelerations of prescribed joints
+        within the bias.
+        """
+
+    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
+        """Joint reactions that give accelerations ``a``; the effort of a prescribed motion included."""

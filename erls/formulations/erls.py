@@ -11,6 +11,7 @@ are the projection of every link's inertia forces, weights and elastic forces on
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,11 +21,15 @@ import scipy.linalg as la
 from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State
 from erls.formulations.compatibility import Compatibility
+from erls.formulations.displaced_frame import displaced_frame
 from erls.formulations.equilibrium import held_equilibrium
+from erls.formulations.joint_frames import FrameMotion, attached, carried
 from erls.formulations.joint_turn import JointTurn, Motion, joint_turn
 from erls.formulations.link_inertia import LinkInertia, moment_about
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism, jacobians, kinematics, poses
+from erls.mechanism.links import node_shape6
+from erls.mechanism.loops import LoopEnd
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
 
@@ -319,9 +324,39 @@ class Erls:
             springs += 0.5 * joint.forces.stiffness * (turn.angle - joint.forces.rest) ** 2
         return Energy(kinetic, float(0.5 * self.stiffness @ q_d**2), gravity, springs)
 
+    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
+        """Frames on displaced nodes of links, with rows over (θ, q_d); see `TreeFormulation`."""
+        theta, rates, driven, q_d, qd_d, _ = self._expand(t, y, v, None)
+        motion = self._motion(theta, rates, q_d, qd_d)
+        chain = kinematics(self.mechanism, self.screws, theta, rates)
+        turning = jacobians(chain.transforms, self.screws)
+        bias = self.compatibility.stack(motion.g @ driven + motion.n, np.zeros(self.elastic))
+        result: list[FrameMotion] = []
+        for k, node, offset in ((int(end.link or 0), end.node, end.frame) for end in ends):
+            modes, at = self.compatibility.layout.modes[k], self.compatibility.layout.elastic_of[k]
+            move = np.zeros((modes.stop - modes.start, self.joints + self.elastic))
+            move[:6, : self.joints] = motion.g[6 * k : 6 * k + 6]
+            move[:6, self.joints :] = motion.d[6 * k : 6 * k + 6]
+            move[6:, self.joints + at.start : self.joints + at.stop] = np.eye(at.stop - at.start)
+            model = self.mechanism.links[k].model
+            shapes = node_shape6(model, node)
+            local = displaced_frame(
+                model.nodes[node], *shapes, motion.q[modes], motion.qd[modes], bias[modes], move
+            )
+            rows = np.hstack([turning[k], np.zeros((6, self.elastic))])
+            link = FrameMotion(
+                chain.poses[k], rows, chain.twists[k], chain.biases[k] + turning[k] @ driven
+            )
+            result.append(attached(carried(link, local), offset))
+        return result
+
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions at a state."""
-        found = self.evaluate(t, y, v, self.acceleration(t, y, v))
+        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
+
+    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
+        """Joint reactions that give these accelerations."""
+        found = self.evaluate(t, y, v, a)
         state = self.state(t, y, v)
         result: list[Reaction] = []
         for k, link in enumerate(self.mechanism.links):

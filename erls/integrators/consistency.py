@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from erls.errors import Cause, SimulationError
 from erls.integrators.base import Array, metre_scales
 from erls.integrators.constrained import Configuration, ConstrainedSystem, Matrix
-from erls.integrators.saddle import Saddle, Scales
+from erls.integrators.saddle import Saddle, Scales, dense
 
 _DEPENDENT = 1e-9  # of a row's size; rounding is far below, a loop that does not close far above
 _POSITION_ITERATIONS = 20
@@ -42,7 +42,7 @@ def refuse_redundant(system: ConstrainedSystem, t: float, q: Configuration) -> N
     SimulationError
         With cause REDUNDANT_CONSTRAINTS, naming them.
     """
-    found = redundant_constraints(_dense(system.constraint_matrix(t, q)), 1 / metre_scales(system))
+    found = redundant_constraints(dense(system.constraint_matrix(t, q)), 1 / metre_scales(system))
     if found:
         names = [system.constraint_names[k] for k in found]
         raise SimulationError(
@@ -135,11 +135,6 @@ def _masses(system: ConstrainedSystem, t: float, q: Configuration) -> Saddle:
             remedy="give every moving part a mass and a moment of inertia, and remove redundant joints",
         )
     return saddle
-
-
-def _dense(matrix: Matrix) -> Array:
-    result: Array = matrix.toarray() if sp.issparse(matrix) else matrix
-    return result
 
 
 def _diagonal(values: Array, like: Matrix) -> Matrix:

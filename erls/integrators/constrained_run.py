@@ -25,9 +25,7 @@ class ConstrainedRecorder(Recorder):
         See rule 7 of `erls.integrators.base`.
     """
 
-    def __init__(
-        self, system: ConstrainedSystem, t: float, start: ConstrainedState, observer: Observer | None
-    ) -> None:
+    def __init__(self, system: ConstrainedSystem, t: float, start: ConstrainedState, observer: Observer | None) -> None:
         super().__init__(len(system.stored(t, start.q, start.v, start.a)[0]), observer)
         self._system = system
         self._multipliers = np.empty((256, len(start.multipliers)))

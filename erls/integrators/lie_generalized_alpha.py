@@ -178,9 +178,7 @@ class _Stepper:
         self.saddle = None
         return False
 
-    def solve(
-        self, t: float, before: ConstrainedState, algorithmic: Array
-    ) -> tuple[ConstrainedState, Array] | None:
+    def solve(self, t: float, before: ConstrainedState, algorithmic: Array) -> tuple[ConstrainedState, Array] | None:
         """One step: the state at ``t`` and a₁, or None when Newton's method fails even with a fresh matrix."""
         mode = self.options.iteration_matrix
         known = self.pull * before.a + self.keep * algorithmic  # part of a₁ that the iteration leaves alone
@@ -203,7 +201,7 @@ class _Stepper:
         tolerance: rate/(1 − rate) |Δ|, with the rate of earlier steps at first (Hairer & Wanner, Solving ODEs II,
         sec. IV.8), which counts for less the older it gets.
         """
-        system, options, mode = self.system, self.options, self.options.iteration_matrix
+        system, mode = self.system, self.options.iteration_matrix
         a, multipliers = np.zeros(len(d)), np.zeros(system.constraints)
         rate, before, largest = max(self.rate, _FASTEST_TRUSTED) ** 0.8, 0.0, 0.0
         rounding = _ROUNDING * self.reach
@@ -211,24 +209,22 @@ class _Stepper:
         for k in range(MAX_ITERATIONS + 1):
             q = system.compose(q0, d)
             state = ConstrainedState(q, v, a, multipliers)
-            if fresh and not self.refresh(t, state, d):
-                return None
-            assert self.saddle is not None
             self.work.rhs_calls += 1
             residual, violation = system.residual(t, q, v, a), system.constraint(t, q)
             reaction = system.constraint_matrix(t, q).T @ multipliers
-            right = self.saddle.scaled(residual + reaction, violation)
             sizes = [float(np.linalg.norm(part / self.metres)) for part in (residual, reaction, residual + reaction)]
             if not math.isfinite(sum(sizes)):
-                self.suspect = right
+                self.suspect = np.concatenate([residual + reaction, violation])
                 return None
             largest = max(largest, sizes[0])
-            gap = float(np.abs(right[len(d) :]).max(initial=0.0))
-            small = options.residual_tolerance
-            if k > 0 and sizes[2] <= small * (largest + sizes[1]) and gap <= small * self.reach:
+            if k > 0 and self.balanced(sizes[2], largest + sizes[1], violation):
                 return self.accepted(state, k, rate)
             if k == MAX_ITERATIONS:
                 break
+            if fresh and not self.refresh(t, state, d):
+                return None
+            assert self.saddle is not None
+            right = self.saddle.scaled(residual + reaction, violation)
             self.work.newton_iterations += 1
             correction = self.saddle.solve(right)
             size = float(np.abs(correction).max())
@@ -255,6 +251,14 @@ class _Stepper:
         self.suspect = correction
         self.reason = f"corrections of {before:.3g} m and {size:.3g} m do not shrink to {goal:.3g} m"
         return None
+
+    def balanced(self, residual: float, terms: float, violation: Array) -> bool:
+        """Whether forces balance against the size of their terms, and the joints are closed."""
+        small = self.options.residual_tolerance
+        if residual > small * terms or self.saddle is None:
+            return False
+        gap = float(np.abs(violation * self.saddle.scales.constraint).max(initial=0.0))
+        return gap <= small * self.reach
 
     def accepted(self, state: ConstrainedState, iterations: int, rate: float) -> ConstrainedState:
         """Note how fast iteration was."""

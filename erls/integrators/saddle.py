@@ -7,6 +7,8 @@ Increments and constraints are measured in metres, forces in newtons per mass of
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg.lapack import dgetrf, dgetrs
@@ -32,8 +34,7 @@ class Scales:
     def __init__(self, metres: Array, mass: Matrix, rows: Matrix) -> None:
         self.increment = 1 / metres
         self.mass = float((mass.diagonal() * self.increment**2).max(initial=0.0)) or 1.0
-        largest = abs(rows * self.increment).max(axis=1) if rows.shape[0] else np.zeros(0)
-        sizes = largest.toarray().ravel() if sp.issparse(largest) else np.asarray(largest)
+        sizes = dense(abs(rows * self.increment).max(axis=1)).ravel() if rows.shape[0] else np.zeros(0)
         self.constraint = 1 / np.where(sizes > 0, sizes, 1.0)
 
 
@@ -79,8 +80,8 @@ class Saddle:
         """(n + m,) scaled unknowns [metres] of a scaled right-hand side."""
         if self._sparse is not None:
             found: Array = self._sparse.solve(right)
-            return found
-        found, _ = dgetrs(self._factors, self._pivots, right)
+        else:
+            found, _ = dgetrs(self._factors, self._pivots, right)
         return found
 
     def unscaled(self, unknowns: Array) -> tuple[Array, Array]:
@@ -93,9 +94,13 @@ def scaled_matrix(block: Matrix, rows: Matrix, scales: Scales, period: float) ->
     """(n + m, n + m) what `Saddle` factors, for its condition number."""
     d, s = scales.increment, scales.constraint
     force = period**2 / scales.mass
-    return _assemble(
-        block, rows.T, rows, np.concatenate([force * d, s]), np.concatenate([d, s / force])
-    )
+    return _assemble(block, rows.T, rows, np.concatenate([force * d, s]), np.concatenate([d, s / force]))
+
+
+def dense(matrix: Any) -> Array:
+    """A sparse or dense matrix as an array."""
+    result: Array = matrix.toarray() if sp.issparse(matrix) else np.asarray(matrix)
+    return result
 
 
 def _assemble(block: Matrix, columns: Matrix, rows: Matrix, left: Array, right: Array) -> Matrix:

@@ -50,12 +50,14 @@ def stumpff(x: Array, highest: int) -> Array:
 
 def stumpff_derivative(c: Array, k: int) -> Array:
     """dc_k/dx from the first k + 3 functions ``c``."""
-    return (k * c[k + 2] - c[k + 1]) / 2
+    first: Array = (k * c[k + 2] - c[k + 1]) / 2
+    return first
 
 
 def stumpff_second_derivative(c: Array, k: int) -> Array:
     """d²c_k/dx² from the first k + 5 functions ``c``."""
-    return (k * stumpff_derivative(c, k + 2) - stumpff_derivative(c, k + 1)) / 2
+    second: Array = (k * stumpff_derivative(c, k + 2) - stumpff_derivative(c, k + 1)) / 2
+    return second
 
 
 def inverse_coefficient(x: Array) -> tuple[Array, Array, Array]:

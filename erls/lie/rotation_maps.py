@@ -120,12 +120,7 @@ def _derivative(psi: Array, d: Array, f: tuple[Array, ...], g: tuple[Array, ...]
     """Derivative along d of the above; f, g with their first derivatives by x."""
     s, t = skews(psi), skews(d)
     along = 2 * (psi * d).sum(axis=-1)
-    return (
-        _scaled(f[0], t)
-        + _scaled(g[0], s @ t + t @ s)
-        + _scaled(along * f[1], s)
-        + _scaled(along * g[1], s @ s)
-    )
+    return _scaled(f[0], t) + _scaled(g[0], s @ t + t @ s) + _scaled(along * f[1], s) + _scaled(along * g[1], s @ s)
 
 
 def _second(psi: Array, d: Array, e: Array, f: tuple[Array, ...], g: tuple[Array, ...]) -> Array:

@@ -14,6 +14,7 @@ from erls.lie.se3 import joint_pose, twist_cross, twist_transform
 from erls.lie.so3 import Array
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
+from erls.mechanism.loops import Loop
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class Mechanism:
         World axes [m/s²].
     static_start : bool
         Whether the motion starts from static equilibrium with the joints held, instead of undeformed.
+    loops : tuple of Loop
+        Joints that close the chain.
     """
 
     name: str
@@ -47,6 +50,7 @@ class Mechanism:
     points: tuple[Point, ...]
     gravity: Array
     static_start: bool = False
+    loops: tuple[Loop, ...] = ()
 
 
 @dataclass(frozen=True)

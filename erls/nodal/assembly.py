@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 
 from erls.integrators.base import Array
 from erls.integrators.constrained import Matrix
@@ -137,7 +136,7 @@ class NodalSystem:
         for side in (0, 1):
             nodes = self.rows.nodes[self.rows.joint_of_row, side]
             np.add.at(force, nodes[nodes >= 0], reaction[nodes >= 0, 6 * side : 6 * side + 6])
-        return self._in_world_axes(t, q, (twist, v, rate, force), stiffness, damping)
+        return self._in_world_axes(q, (twist, rate, force), stiffness, damping)
 
     def constraint(self, t: float, q: Array) -> Array:
         """(m,) Φ."""
@@ -173,7 +172,7 @@ class NodalSystem:
         first = np.concatenate([(turn @ twist[:, :3, None]), turn @ spin], axis=2)
         second = np.concatenate([turn @ slide[:, :, None], turn @ (spin @ spin + skews(rate[:, 3:]))], axis=2)
         knot = np.concatenate([q[:, :3, 3:], turn], axis=2)
-        return tuple(np.concatenate([x[:, :, 0], x[:, :, 1:].reshape(-1, 9)], axis=1).ravel() for x in (knot, first, second))  # type: ignore[return-value]
+        return _flat(knot), _flat(first), _flat(second)
 
     def energy(self, t: float, q: Array, v: Array) -> tuple[float, float]:
         """Kinetic and potential energy [J]."""
@@ -219,14 +218,13 @@ class NodalSystem:
 
     def _in_world_axes(
         self,
-        t: float,
         q: Array,
-        known: tuple[Array, Array, Array, Array],
+        known: tuple[Array, Array, Array],
         stiffness: Matrix,
         damping: Matrix,
     ) -> tuple[Matrix, Matrix]:
         """Derivatives on R³×SO(3) from those on SE(3): chain rule over E(q) v, E(q) a + Ė v and Eᵀ f."""
-        twist, v, rate, force = known
+        twist, rate, force = known
         mass = self._mass.matrix([e.mass(q[e.nodes]) for e in self.elements])
         turn = self._turning(q)
         spin, slide = skews(twist[:, 3:]), skews(twist[:, :3])
@@ -251,3 +249,8 @@ class NodalSystem:
         with_ground = np.concatenate([per_node, np.zeros((1, 6))])
         result: Array = with_ground[self.rows.nodes[:, side]]
         return result
+
+
+def _flat(columns: Array) -> Array:
+    """(12 k,) position, then the rotation's rows, of matrices (k, 3, 4) [position | rotation]."""
+    return np.concatenate([columns[:, :, 0], columns[:, :, 1:].reshape(-1, 9)], axis=1).ravel()

@@ -53,8 +53,8 @@ CONDITIONS: dict[str, list[Condition]] = {
     "universal": [*_PINNED, _normal(0, 1)],
     "spherical": _PINNED,
 }
-"""What each joint forbids; the free axis of revolute, prismatic and cylindrical joints is z, the two axes of a universal
-joint are the inner frame's x and the outer frame's y."""
+"""What each joint forbids. The free axis of revolute, prismatic and cylindrical joints is z; the two axes of a
+universal joint are the inner frame's x and the outer frame's y."""
 
 _DRIVEN = {"revolute": 5, "prismatic": 2}
 

@@ -32,7 +32,8 @@ class Scatter:
         self._kept = (row >= 0) & (column >= 0)
         row, column = row[self._kept], column[self._kept]
         if self.sparse:
-            key, self._place = np.unique(column * shape[0] + row, return_inverse=True)
+            key, place = np.unique(column * shape[0] + row, return_inverse=True)
+            self._place: IntArray = np.asarray(place, dtype=np.int64)
             self._indices = key % shape[0]
             self._starts = np.searchsorted(key, np.arange(shape[1] + 1) * shape[0])
         else:
@@ -44,8 +45,7 @@ class Scatter:
         if self.sparse:
             summed = np.bincount(self._place, values, len(self._indices))
             return sp.csc_array((summed, self._indices, self._starts), shape=self.shape)
-        flat = np.bincount(self._place, values, self.shape[0] * self.shape[1])
-        result: Array = flat.reshape(self.shape)
+        result: Array = np.bincount(self._place, values, self.shape[0] * self.shape[1]).reshape(self.shape)
         return result
 
 

@@ -23,7 +23,7 @@ from fe_import.errors import ReportedError
 from fe_import.toml_file import choose
 
 _SAMPLES = 1000
-_SECOND_ORDER = 10.0  # times δ²/L: what two linear-deformation formulations differ by on the shipped scenes is below
+_SECOND_ORDER = 10.0  # times δ²/L, and once more per vibration period; the shipped scenes stay below 70 % of it
 
 
 @dataclass(frozen=True)
@@ -182,12 +182,12 @@ def _unreduced(scene: Scene) -> Scene:
 def pair(a: str, one: Outputs, b: str, other: Outputs) -> Pair:
     """Distances of two columns that were sampled alike."""
     deflection = max(one.deflection, other.deflection)
-    expected = _SECOND_ORDER * deflection**2 / max(one.size, 1e-300)
+    expected = (_SECOND_ORDER + _periods(one)) * deflection**2 / max(one.size, 1e-300)
     points = _distances(one.points, other.points)
     found = max((d.largest for d in points.values()), default=0.0)
     verdict, fine = _verdict(found, expected, deflection)
-    gauges = one.summary.get("gauge") != other.summary.get("gauge")
-    if gauges and fine:
+    gauges = {o.summary.get("gauge", "joint-angle") for o in (one, other)}
+    if len(gauges) > 1 and fine:
         verdict += "; coordinates theta belong to different gauges and differ more, joint angles are comparable"
     return Pair(
         a,
@@ -207,11 +207,21 @@ def pair(a: str, one: Outputs, b: str, other: Outputs) -> Pair:
     )
 
 
+def _periods(outputs: Outputs) -> float:
+    """Vibration periods in the run. Frequencies differ to first order in the deflection, so that phases drift apart."""
+    strongest = [
+        max(found, key=lambda p: p.amplitude).frequency
+        for a in outputs.accelerations.values()
+        if (found := peaks(amplitude_spectrum(outputs.times, a)))
+    ]
+    return max(strongest, default=0.0) * float(outputs.times[-1] - outputs.times[0])
+
+
 def _verdict(found: float, expected: float, deflection: float) -> tuple[str, bool]:
     if found <= expected:
         return (
             f"as expected: points differ by up to {found:.2g} m, second order in the deflection of "
-            f"{deflection:.2g} m explains {expected:.2g} m",
+            f"{deflection:.2g} m, phase drift included, explains {expected:.2g} m",
             True,
         )
     return (

@@ -283,7 +283,7 @@ def test_distance() -> None:
 
 
 def test_verdicts() -> None:
-    """Within 10 δ²/L = 5e-4 m is second order, beyond is not."""
+    """Within (10 + 20 periods) δ²/L = 1.5e-3 m is second order, beyond is not."""
     one = synthetic(1.0)
     assert pair("a", one, "b", synthetic(1.0 + 1e-4)).as_expected
     far = pair("a", one, "b", synthetic(1.01))

@@ -7,6 +7,7 @@ the tip inward on wrenches, so J itself is needed for the mass matrix only.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,11 +19,15 @@ from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State
 from erls.formulations.equilibrium import held_equilibrium
 from erls.formulations.ffr.body_frame import elastic_basis
+from erls.formulations.ffr.interface_motion import InterfaceMotion
 from erls.formulations.ffr.joint_effort import JointEfforts
 from erls.formulations.ffr.recursion import Recursion, Step, bracket
 from erls.formulations.ffr.standard_data import StandardData
+from erls.formulations.joint_frames import FrameMotion, attached, carried
 from erls.lie.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import node_shape6
+from erls.mechanism.loops import LoopEnd
 
 
 @dataclass(frozen=True)
@@ -279,10 +284,37 @@ class Ffr:
         )
         return Energy(kinetic, float(0.5 * self.stiffness @ motion.eta**2), gravity, springs)
 
+    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
+        """Frames on displaced nodes of links, with rows over (θ, η); see `TreeFormulation`."""
+        motion = self.motion(t, y, v)
+        biases, rate = [], np.zeros(6)
+        for k, (step, twist) in enumerate(zip(motion.steps, motion.twists, strict=True)):
+            rate = step.transform @ rate + step.bias + bracket(twist - step.twist, step.twist)
+            if k in self.prescribed_joints:
+                rate = rate + step.joint * self._prescribed(k, t)[2]
+            biases.append(rate)
+        jacobians = self.jacobians(motion.steps)
+        result: list[FrameMotion] = []
+        for k, node, offset in ((int(end.link or 0), end.node, end.frame) for end in ends):
+            model, at = self.mechanism.links[k].model, self.modes[k]
+            translation, rotation = node_shape6(model, node)
+            interface = InterfaceMotion(model.nodes[node], translation @ self.bases[k], rotation @ self.bases[k])
+            moved = interface.at(motion.eta[at], motion.eta_rates[at])
+            rows = np.zeros((6, self.joints + self.elastic))
+            rows[:, self.joints + at.start : self.joints + at.stop] = moved.jacobian
+            local = FrameMotion(moved.pose, rows, moved.jacobian @ motion.eta_rates[at], moved.bias)
+            link = FrameMotion(motion.poses[k], jacobians[k], motion.twists[k], biases[k])
+            result.append(attached(carried(link, local), offset))
+        return result
+
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions at a state: what the links from there outward need."""
+        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
+
+    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
+        """Joint reactions that give these accelerations."""
         motion = self.motion(t, y, v)
-        found = self.evaluate(t, motion, self.acceleration(t, y, v))
+        found = self.evaluate(t, motion, a)
         result: list[Reaction] = []
         for k, (link, wrench) in enumerate(zip(self.mechanism.links, found.wrenches, strict=True)):
             shape, _ = link.model.node_shape(link.inboard.node)

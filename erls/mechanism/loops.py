@@ -1,0 +1,78 @@
+"""Loops: joints between two links of a chain, or a link and the ground, that close it.
+
+A new kind is one line of `LOOP_TYPES`: what of the relative motion of its two frames stays zero, z being its axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from erls.lie.so3 import Array
+
+FREE, PARALLEL, HELD = "free", "parallel", "held"
+
+
+@dataclass(frozen=True)
+class LoopType:
+    """A kind of closing joint.
+
+    Attributes
+    ----------
+    sliding : tuple of int
+        Axes of the inner frame along which the outer origin does not move.
+    turning : str
+        ``free``: it turns at will; ``parallel``: its z axis stays parallel to the inner one; ``held``: not at all.
+    """
+
+    sliding: tuple[int, ...]
+    turning: str
+
+    @property
+    def has_axis(self) -> bool:
+        """Whether the direction of z matters."""
+        return self.turning == PARALLEL or len(self.sliding) < 3
+
+    @property
+    def slides(self) -> bool:
+        """Whether the outer origin moves in the inner frame."""
+        return len(self.sliding) < 3
+
+
+LOOP_TYPES: dict[str, LoopType] = {
+    "revolute": LoopType((0, 1, 2), PARALLEL),
+    "prismatic": LoopType((0, 1), HELD),
+    "cylindrical": LoopType((0, 1), PARALLEL),
+    "spherical": LoopType((0, 1, 2), FREE),
+    "fixed": LoopType((0, 1, 2), HELD),
+    "line": LoopType((0, 1), FREE),  # a point on a straight line
+    "planar": LoopType((2,), PARALLEL),
+}
+
+
+@dataclass(frozen=True)
+class LoopEnd:
+    """A joint frame on a link or on the ground.
+
+    Attributes
+    ----------
+    link : int or None
+        None is the ground.
+    node : int
+        Node of the link that carries the frame.
+    frame : (4, 4) array
+        Pose of the frame from that node, in mesh axes; on the ground, in the world.
+    """
+
+    link: int | None
+    node: int
+    frame: Array
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closing joint: ``outer`` moves against ``inner``, in whose axes its directions are named."""
+
+    name: str
+    type: LoopType
+    inner: LoopEnd
+    outer: LoopEnd
