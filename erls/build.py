@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 import platformdirs
 
+from erls.build_loops import build_loops
 from erls.errors import Cause, SceneError
 from erls.lie.se3 import inverse, pose
 from erls.lie.so3 import Array, fixed_axes
@@ -82,17 +83,15 @@ def build_mechanism(
     warnings = [w for joint, link in zip(joints, links, strict=True) for w in _arm_warnings(joint, link)]
     points = [_point(scene, k, links) for k in range(len(record.points))]
     links = _with_payloads(scene, links, points)
-    return Built(
-        Mechanism(
-            name=scene.name,
-            joints=tuple(joints),
-            links=tuple(links),
-            points=tuple(points),
-            gravity=np.array(record.gravity),
-            static_start=record.initial.deformation == "static",
-        ),
-        tuple(warnings),
+    chain = Mechanism(
+        name=scene.name,
+        joints=tuple(joints),
+        links=tuple(links),
+        points=tuple(points),
+        gravity=np.array(record.gravity),
+        static_start=record.initial.deformation == "static",
     )
+    return Built(replace(chain, loops=build_loops(scene, chain)), tuple(warnings))
 
 
 def _joints(scene: Scene) -> list[Joint]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from erls.errors import Cause, SceneError, SimulationError
 from erls.formulations.base import Energy, Formulation, State
+from erls.formulations.closed_chain import ClosedChain
 from erls.integrators.base import Solution, hermite
 from erls.lie.so3 import Array
 from erls.scene import Scene
@@ -180,6 +181,23 @@ class Run:
         number = self.joint_names.index(joint)
         _, flat, y, v = self._interpolated(t)
         return [self.formulation.reactions(*at)[number] for at in zip(flat.tolist(), y, v, strict=True)]
+
+    @property
+    def loop_names(self) -> tuple[str, ...]:
+        """Closing joints."""
+        return tuple(loop.name for loop in self.formulation.mechanism.loops)
+
+    def loop_reaction(self, loop: str, t: ArrayLike) -> tuple[Array, Array]:
+        """(..., 3) force [N] and (..., 3) moment [N m] of a closing joint on its ``link``, at its displaced node, world
+        axes.
+        """
+        choose(loop, self.loop_names, "loop", SceneError)
+        number = self.loop_names.index(loop)
+        _, flat, y, v = self._interpolated(t)
+        assert isinstance(self.formulation, ClosedChain)
+        found = [self.formulation.loop_forces(*at)[number] for at in zip(flat.tolist(), y, v, strict=True)]
+        shape = (*np.shape(t), 3)
+        return np.array([f.force for f in found]).reshape(shape), np.array([f.moment for f in found]).reshape(shape)
 
     @property
     def conservative(self) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 
 from erls.build import build_mechanism
 from erls.errors import Cause, SceneError, SimulationError
-from erls.formulations import FORMULATIONS
+from erls.formulations import FORMULATIONS, formulate
 from erls.integrators.base import Solution, Work
 from erls.mechanism.tables import read_csv
 from erls.run import Run
@@ -167,7 +167,7 @@ def load_run(path: Path | str) -> Run:
             raise
         settings = record.simulation
         choose(settings.formulation, FORMULATIONS, f"{path}: /scene simulation.formulation", SceneError)
-        formulation = FORMULATIONS[settings.formulation](built.mechanism, settings)
+        formulation = formulate(built.mechanism, settings)
         knots = file.subgroup("knots")
         t = knots.array("time", (None,))
         shape = (len(t), formulation.size)

@@ -189,8 +189,27 @@ class Initial(_Record, frozen=True):
     deformation: str = "zero"
 
 
+class Loop(_Record, frozen=True):
+    """A joint that closes a loop, between a ``node`` of ``link`` and the ground, or ``to_node`` of ``to_link``; nodes
+    are interfaces or named nodes.
+
+    ``position``: where the node meets the ground, in the world; where it is at the initial joint coordinates unless
+    given. ``axis``: in the world at those coordinates, fixed to both sides from then on; that of the joint which
+    carries the link unless given.
+    """
+
+    name: str
+    link: str
+    node: str
+    type: str = "revolute"
+    to_link: str = ""
+    to_node: str = ""
+    position: Vector | None = None
+    axis: Vector | None = None
+
+
 class SceneRecord(_Record, frozen=True):
-    """A scene: a serial chain of joints and links, what drives it, and how it is simulated."""
+    """A scene: a serial chain of joints and links, what closes and drives it, and how it is simulated."""
 
     simulation: Simulation
     joints: list[Joint]
@@ -201,6 +220,7 @@ class SceneRecord(_Record, frozen=True):
     points: list[Point] = []
     payloads: list[Payload] = []
     initial: Initial = Initial()
+    loops: list[Loop] = []
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,13 @@ from erls.errors import Cause, SceneError
 from erls.integrators import INTEGRATORS
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joints import JOINT_TYPES
+from erls.mechanism.loops import LOOP_TYPES
 from erls.mechanism.place import LARGEST, LATEST
 from fe_import.link import Damping
 from fe_import.toml_file import choose
 
 if TYPE_CHECKING:
-    from erls.scene import Link, SceneRecord, Simulation
+    from erls.scene import Link, Loop, SceneRecord, Simulation
 
 GAUGES = ("joint-angle", "minimum-norm")
 BODY_FRAMES = ("tangent", "mean-axis")
@@ -54,7 +55,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         counts = f"{len(scene.links)} links, {len(scene.joints)} joints"
         message = "joint k carries link k, so there must be as many links as joints"
         raise _bad(f"{file}: links", message, counts, "add or remove one")
-    for kind in ("joints", "links", "points"):
+    for kind in ("joints", "links", "points", "loops"):
         named = [(f"{file}: {kind}[{k}].name", item.name) for k, item in enumerate(getattr(scene, kind))]
         _check_names(named)
     for k, joint in enumerate(scene.joints):
@@ -69,6 +70,13 @@ def check_scene(scene: SceneRecord, file: str) -> None:
             raise _bad(f"{file}: points[{k}]", "give exactly one of 'node' and 'position'", point.name, remedy)
     for k, payload in enumerate(scene.payloads):
         choose(payload.point, [p.name for p in scene.points], f"{file}: payloads[{k}].point", SceneError)
+    for k, loop in enumerate(scene.loops):
+        _check_loop(loop, scene, f"{file}: loops[{k}]")
+    if scene.loops:
+        for k, joint in enumerate(scene.joints):
+            if getattr(joint.drive, "feed_forward", False):
+                message = "the inverse dynamics of the chain does not know its loops"
+                raise _bad(f"{file}: joints[{k}].drive.feed_forward", message, True, "set it to false")
 
 
 def _numbers(value: Any, path: str = "") -> Iterable[tuple[str, float]]:
@@ -140,6 +148,30 @@ def _check_link(link: Link, place: str) -> None:
         remedy = "give the inboard one at least, points = { root = [0, 0, 0] }"
         raise _bad(f"{place}.rigid.points", "a rigid link needs named points", None, remedy)
     _check_names((f"{place}.rigid.points", name) for name in link.rigid.points)
+
+
+def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
+    links = [link.name for link in scene.links]
+    choose(loop.type, LOOP_TYPES, f"{place}.type", SceneError)
+    choose(loop.link, links, f"{place}.link", SceneError)
+    if loop.to_link:
+        choose(loop.to_link, links, f"{place}.to_link", SceneError)
+    if loop.to_link == loop.link:
+        message = "a loop closes between two links, or a link and the ground"
+        raise _bad(f"{place}.to_link", message, loop.to_link, "name another link, or leave it out for the ground")
+    if bool(loop.to_link) != bool(loop.to_node):
+        remedy = "give both 'to_link' and 'to_node', or neither for the ground"
+        raise _bad(f"{place}.to_node", "a link and a node belong together", loop.to_node, remedy)
+    if loop.to_link and loop.position is not None:
+        message = "between two links the nodes say where the joint is"
+        raise _bad(f"{place}.position", message, loop.position, "remove it")
+    kind = LOOP_TYPES[loop.type]
+    if loop.axis is None and kind.slides:
+        raise _bad(f"{place}.axis", f"a {loop.type} joint needs its axis", None, "give its direction in the world")
+    if loop.axis is not None and not kind.has_axis:
+        raise _bad(f"{place}.axis", f"a {loop.type} joint has no axis", loop.axis, "remove it")
+    if loop.axis is not None and not any(loop.axis):
+        raise _bad(f"{place}.axis", "an axis needs a direction", loop.axis, "give three numbers, not all zero")
 
 
 def _check_damping(damping: Damping, place: str) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 
 from erls.build import Message, build_mechanism
 from erls.errors import SceneError, SimulationError
-from erls.formulations import FORMULATIONS
-from erls.integrators import INTEGRATORS
+from erls.formulations import FORMULATIONS, formulate, integrator
+from erls.formulations.closed_chain import ClosedChain
 from erls.integrators.base import Options, Solution
 from erls.mechanism.chain import Mechanism
 from erls.run import Run, node_positions
@@ -83,8 +83,10 @@ def simulate(
                 tell(f"warning: {text}")
 
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
-    formulation = FORMULATIONS[settings.formulation](built.mechanism, settings)
+    formulation = formulate(built.mechanism, settings)
     y, v = formulation.initial_state()
+    if isinstance(formulation, ClosedChain):
+        warn(formulation.warnings)
     options = Options(settings.step, settings.rtol, settings.atol, settings.spectral_radius)
     begun = saved = time.perf_counter()
 
@@ -108,7 +110,7 @@ def simulate(
             saved = time.perf_counter()
 
     times = (0.0, settings.duration)
-    solution = INTEGRATORS[settings.integrator](formulation, times, y, v, options, observe)
+    solution = integrator(built.mechanism, settings)(formulation, times, y, v, options, observe)
     run = make_run(solution)
     warn((*solution.warnings, *range_warnings(run)))
     run = replace(run, warnings=tuple(warned))

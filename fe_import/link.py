@@ -230,7 +230,7 @@ def load_link(path: Path | str, overrides: dict[str, Any] | None = None) -> Link
         table = data.setdefault("reduction", {})
         if isinstance(table, dict):
             if overrides.get("method", table.get("method", _METHOD)) != table.get("method", _METHOD):
-                for field in set(table) - {"elastic_modes", "form"}:  # they belong to the file's method
+                for field in set(table) - {"form"}:  # they belong to the file's method
                     del table[field]
             table.update(overrides)
     description = convert(data, LinkDescription, str(path))

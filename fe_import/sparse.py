@@ -18,7 +18,7 @@ from fe_import.model import Array
 from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chosen_solver
 from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
 from fe_import.solver.memory import gigabytes, refuse_too_large
-from fe_import.solver.multifrontal import negative_pivots
+from fe_import.solver.multifrontal import OutsidePattern, negative_pivots
 from fe_import.solver.watch import Progress, say
 
 Matrix: TypeAlias = Array | sp.csc_array
@@ -226,18 +226,18 @@ def modes_below(
         TOO_LARGE: there is too little memory.
     """
     stiffness, mass = _canonical(stiffness), _canonical(mass)
-    if not _same_pattern(stiffness, mass):
-        stiffness, mass, elimination = _canonical(stiffness - shift * mass), None, None
-    if elimination is None:
-        elimination = analyse(stiffness, positions)
+    elimination = elimination or analyse(stiffness, positions)
+    try:
+        return _count(stiffness, mass, shift, elimination)
+    except OutsidePattern:  # masses that couple what no stiffness does
+        both = _canonical(abs(stiffness) + abs(mass))
+        return _count(stiffness, mass, shift, analyse(both, positions))
+
+
+def _count(stiffness: sp.csc_array, mass: sp.csc_array, shift: float, elimination: Elimination) -> int | None:
     needed = elimination.peak_bytes(keep=False)
     refuse_too_large(needed, f"count of modes of {stiffness.shape[0]} dofs")
-    progress = _announced(elimination, "counting modes", needed)
-    return negative_pivots(stiffness, elimination, progress, mass, shift)
-
-
-def _same_pattern(a: sp.csc_array, b: sp.csc_array) -> bool:
-    return a.nnz == b.nnz and np.array_equal(a.indptr, b.indptr) and np.array_equal(a.indices, b.indices)
+    return negative_pivots(stiffness, elimination, _announced(elimination, "counting modes", needed), mass, shift)
 
 
 def dense_modes(stiffness: Array, mass: Array, count: int | None, what: str) -> tuple[Array, Array]:

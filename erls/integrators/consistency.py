@@ -48,7 +48,6 @@ def refuse_redundant(system: ConstrainedSystem, t: float, q: Configuration) -> N
         raise SimulationError(
             Cause.REDUNDANT_CONSTRAINTS,
             f"{len(names)} constraints say nothing that others do not say: {'; '.join(names)}",
-            where=f"t = {t:.9g} s",
             value=len(names),
             limit=0,
             remedy="give one of the joints of the loop more freedom, or let a link of it be flexible",
@@ -131,7 +130,6 @@ def _masses(system: ConstrainedSystem, t: float, q: Configuration) -> Saddle:
         raise SimulationError(
             Cause.SINGULAR_MASS,
             f"no acceleration follows from the forces: {what} has neither mass nor a constraint of its own",
-            where=f"t = {t:.9g} s",
             remedy="give every moving part a mass and a moment of inertia, and remove redundant joints",
         )
     return saddle

@@ -25,6 +25,7 @@ from erls.integrators.base import Array, Leg, Observer, legs, metre_scales
 from erls.integrators.consistency import (
     consistent_acceleration,
     consistent_start,
+    consistent_velocity,
     refuse_redundant,
 )
 from erls.integrators.constrained import (
@@ -146,6 +147,9 @@ class _Stepper:
                 algorithmic = self.change_step(span / count / (1 << halvings), state.a, algorithmic)
                 continue
             state, algorithmic = found
+            if self.options.project_velocity:
+                self.work.factorizations += 1
+                state = state._replace(v=consistent_velocity(self.system, min(t, leg.last), state.q, state.v))
             at, served = target, served + 1
             self.recorder.add(t, state)
             self.recorder.accept(t)

@@ -74,15 +74,14 @@ class Saddle:
 
     def scaled(self, force: Array, constraint: Array) -> Array:
         """(n + m,) right-hand side [metres]."""
-        return self._left * np.concatenate([force, constraint])
+        right: Array = self._left * np.concatenate([force, constraint])
+        return right
 
     def solve(self, right: Array) -> Array:
         """(n + m,) scaled unknowns [metres] of a scaled right-hand side."""
         if self._sparse is not None:
-            found: Array = self._sparse.solve(right)
-        else:
-            found, _ = dgetrs(self._factors, self._pivots, right)
-        return found
+            return np.asarray(self._sparse.solve(right), dtype=float)
+        return np.asarray(dgetrs(self._factors, self._pivots, right)[0], dtype=float)
 
     def unscaled(self, unknowns: Array) -> tuple[Array, Array]:
         """Increment (n,) and multipliers (m,) of scaled unknowns."""

@@ -22,6 +22,7 @@ from erls.lie.so3 import Array
 
 _SERIES_BELOW = 4.0  # no term of a Stumpff series exceeds the one before it there, for k ≥ 1
 _TERMS = 12
+_INVERSE_FACTORIALS = np.array([1 / factorial(k) for k in range(2 * _TERMS + 12)])
 _POLE = 4 * np.pi**2
 _RATIO_BELOW = 0.5  # of x to the pole
 _ZETA = 2 * (zeta(2 * np.arange(19) + 2) - 1)  # falls by four from term to term
@@ -31,20 +32,20 @@ def stumpff(x: Array, highest: int) -> Array:
     """(highest + 1, ...) c₀ to c_highest of the squared angles (...)."""
     found = np.empty((highest + 1, *np.shape(x)))
     inside = np.minimum(x, _SERIES_BELOW)
-    for k in (highest, highest - 1):
-        total = np.full(np.shape(x), 1 / factorial(2 * _TERMS + k))
-        for j in range(_TERMS - 1, -1, -1):
-            total = 1 / factorial(2 * j + k) - inside * total
-        found[k] = total
+    last = np.zeros((2, *np.shape(x)))  # the two highest, from the smallest term on
+    for j in range(_TERMS, -1, -1):
+        first = 2 * j + highest - 1
+        last = _INVERSE_FACTORIALS[first : first + 2].reshape(2, *(1,) * np.ndim(x)) - inside * last
+    found[highest - 1 :] = last
     for k in range(highest - 2, -1, -1):
-        found[k] = 1 / factorial(k) - inside * found[k + 2]
+        found[k] = _INVERSE_FACTORIALS[k] - inside * found[k + 2]
     large = np.asarray(x > _SERIES_BELOW)
     if large.any():
         far = np.asarray(x)[large]
         angle = np.sqrt(far)
         found[0, large], found[1, large] = np.cos(angle), np.sin(angle) / angle
         for k in range(highest - 1):
-            found[k + 2, large] = (1 / factorial(k) - found[k, large]) / far
+            found[k + 2, large] = (_INVERSE_FACTORIALS[k] - found[k, large]) / far
     return found
 
 
@@ -63,15 +64,16 @@ def stumpff_second_derivative(c: Array, k: int) -> Array:
 def inverse_coefficient(x: Array) -> tuple[Array, Array, Array]:
     """b(x) and its first and second derivative, each (...); infinite at θ = 2π."""
     y = np.minimum(np.asarray(x) / _POLE, _RATIO_BELOW)
-    value, slope, bend = (np.zeros(np.shape(x)) for _ in range(3))
+    value, slope, bend = np.zeros((3, *np.shape(x)))
     for k in range(len(_ZETA) - 1, -1, -1):
         bend = slope * 2 + y * bend
         slope = value + y * slope
         value = _ZETA[k] + y * value
     gap = 1 - y
-    value = (value + 2 / gap) / _POLE
-    slope = (slope + 2 / gap**2) / _POLE**2
-    bend = (bend + 4 / gap**3) / _POLE**3
+    found = np.empty((3, *np.shape(x)))
+    found[0] = (value + 2 / gap) / _POLE
+    found[1] = (slope + 2 / gap**2) / _POLE**2
+    found[2] = (bend + 4 / gap**3) / _POLE**3
     large = np.asarray(x > _RATIO_BELOW * _POLE)
     if large.any():
         far = np.asarray(x)[large]
@@ -80,5 +82,5 @@ def inverse_coefficient(x: Array) -> tuple[Array, Array, Array]:
             b = (1 - half * np.cos(half) / np.sin(half)) / far
             first = (0.25 - 3 * b + far * b * b) / (2 * far)
             second = (b * b - 5 * first + 2 * far * b * first) / (2 * far)
-        value[large], slope[large], bend[large] = b, first, second
-    return value, slope, bend
+        found[:, large] = b, first, second
+    return found[0], found[1], found[2]

@@ -21,6 +21,8 @@ from erls.lie.coefficients import (
 )
 from erls.lie.so3 import Array
 
+_ONE = np.eye(3)
+
 
 def skews(a: Array) -> Array:
     """(..., 3, 3) matrices of the cross products by vectors (..., 3)."""
@@ -113,7 +115,7 @@ def _scaled(factor: Array, matrix: Array) -> Array:
 def _value(psi: Array, f: Array, g: Array) -> Array:
     """1 + f ψ̃ + g ψ̃²."""
     s = skews(psi)
-    return np.eye(3) + _scaled(f, s) + _scaled(g, s @ s)
+    return _ONE + _scaled(f, s) + _scaled(g, s @ s)
 
 
 def _derivative(psi: Array, d: Array, f: tuple[Array, ...], g: tuple[Array, ...]) -> Array:

@@ -19,6 +19,8 @@ from erls.nodal.elements import Elements
 from erls.nodal.joints import Joint, JointRows, Relative
 from erls.nodal.scatter import Scatter, dofs
 
+_ONE_AND_HALF = 1.5 * np.eye(3)
+
 
 class NodalSystem:
     """A mechanism of nodal elements; a `erls.integrators.constrained.ConstrainedSystem`.
@@ -53,6 +55,7 @@ class NodalSystem:
         self._constraint = Scatter([numbers], [joint_places[self.rows.joint_of_row]], (m, n))
         nodes = 6 * np.arange(self.count)[:, None] + np.arange(6)
         self._nodes = Scatter([nodes], [nodes], (n, n))
+        self._last: tuple[float, Array, Relative | None] = (0.0, poses, None)  # configurations never change in place
 
     @property
     def size(self) -> int:
@@ -97,7 +100,7 @@ class NodalSystem:
         """(k, 4, 4) poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
         moved: Array = self.group.move(q, increment.reshape(-1, 6))
         turn = moved[:, :3, :3]
-        moved[:, :3, :3] = turn @ (1.5 * np.eye(3) - 0.5 * np.swapaxes(turn, 1, 2) @ turn)
+        moved[:, :3, :3] = turn @ (_ONE_AND_HALF - 0.5 * np.swapaxes(turn, 1, 2) @ turn)
         return moved
 
     def tangent(self, increment: Array) -> Matrix:
@@ -132,7 +135,7 @@ class NodalSystem:
         if self.local:
             return stiffness, damping
         force = self._forces(t, q, twist, rate).reshape(-1, 6)
-        reaction = self.rows.gradient(relative) * multipliers[:, None]
+        reaction = relative.gradient * multipliers[:, None]
         for side in (0, 1):
             nodes = self.rows.nodes[self.rows.joint_of_row, side]
             np.add.at(force, nodes[nodes >= 0], reaction[nodes >= 0, 6 * side : 6 * side + 6])
@@ -144,7 +147,7 @@ class NodalSystem:
 
     def constraint_matrix(self, t: float, q: Array) -> Matrix:
         """(m, n) B."""
-        rows = self._constraint.matrix([self.rows.gradient(self._relative(t, q))[:, None, :]])
+        rows = self._constraint.matrix([self._relative(t, q).gradient[:, None, :]])
         return rows if self.local else rows @ self._turning(q)
 
     def constraint_rate(self, t: float, q: Array) -> Array:
@@ -160,7 +163,7 @@ class NodalSystem:
         if self.local:
             return bias
         swing = np.concatenate([self._at_joint_ends(rate, side) for side in (0, 1)], axis=1)
-        gradient = self.rows.gradient(relative)
+        gradient = relative.gradient
         result: Array = bias + (gradient * swing[self.rows.joint_of_row]).sum(axis=1)
         return result
 
@@ -188,7 +191,7 @@ class NodalSystem:
         back = np.swapaxes(q[:, :3, :3], 1, 2)
         twist, rate = v.copy(), a.copy()
         twist[:, :3] = (back @ v[:, :3, None])[:, :, 0]
-        rate[:, :3] = (back @ a[:, :3, None])[:, :, 0] - np.cross(v[:, 3:], twist[:, :3])
+        rate[:, :3] = (back @ a[:, :3, None])[:, :, 0] - _crossed(v[:, 3:], twist[:, :3])
         return twist, rate
 
     def _forces(self, t: float, q: Array, twist: Array, rate: Array) -> Array:
@@ -232,7 +235,7 @@ class NodalSystem:
         swing[:, :3, 3:] = slide  # of E v by a turn
         by_velocity[:, :3, :3] = -spin @ np.swapaxes(q[:, :3, :3], 1, 2)  # of Ė v
         by_velocity[:, :3, 3:] = slide
-        fixed = rate[:, :3] + np.cross(twist[:, 3:], twist[:, :3])  # E a
+        fixed = rate[:, :3] + _crossed(twist[:, 3:], twist[:, :3])  # E a
         by_turn[:, :3, 3:] = skews(fixed) - spin @ slide  # of E a + Ė v
         of_force[:, :3, 3:] = -q[:, :3, :3] @ skews(force[:, :3])
         swing, by_velocity, by_turn, of_force = (
@@ -242,13 +245,24 @@ class NodalSystem:
         return whole, turn.T @ (damping @ turn + mass @ by_velocity)
 
     def _relative(self, t: float, q: Array) -> Relative:
+        known_t, known_q, known = self._last
+        if known is not None and known_t == t and known_q is q:
+            return known
         with_ground = np.concatenate([q, np.eye(4)[None]])  # the ground is the last node, −1
-        return self.rows.relative(t, with_ground[self.rows.nodes[:, 0]], with_ground[self.rows.nodes[:, 1]])
+        found = self.rows.relative(t, with_ground[self.rows.nodes[:, 0]], with_ground[self.rows.nodes[:, 1]])
+        self._last = t, q, found
+        return found
 
     def _at_joint_ends(self, per_node: Array, side: int) -> Array:
         with_ground = np.concatenate([per_node, np.zeros((1, 6))])
         result: Array = with_ground[self.rows.nodes[:, side]]
         return result
+
+
+def _crossed(a: Array, b: Array) -> Array:
+    """(k, 3) a × b."""
+    result: Array = (skews(a) @ b[:, :, None])[:, :, 0]
+    return result
 
 
 def _flat(columns: Array) -> Array:

@@ -112,12 +112,29 @@ class Joint:
 
 @dataclass(frozen=True)
 class Relative:
-    """Relative motion of j joints: poses D; transform of inner twists, at D's outer end; drives' twists and rates."""
+    """Relative motion of j joints, which all conditions start from.
+
+    Attributes
+    ----------
+    pose : (j, 4, 4) array
+        D.
+    inner, back : (j, 6, 6) array
+        Transform of the inner node's twist to the inner frame, and from there to the outer frame.
+    drive, drive_rate : (j, 6) array
+        Twist of the inner frame by a prescribed motion, and its rate.
+    by_twist : (m, 6) array
+        Derivative of each condition along the relative twist η.
+    gradient : (m, 12) array
+        Derivative by the twists of the inner and the outer node.
+    """
 
     pose: Array
     inner: Array
+    back: Array
     drive: Array
     drive_rate: Array
+    by_twist: Array
+    gradient: Array
 
 
 class JointRows:
@@ -129,7 +146,7 @@ class JointRows:
         self._inner = np.array([j.inner_frame for j in joints]).reshape(-1, 4, 4)
         self._outer = np.array([j.outer_frame for j in joints]).reshape(-1, 4, 4)
         self._of_inner = motions.adjoint_inverse(self._inner)
-        self.of_outer = motions.adjoint_inverse(self._outer)
+        self._of_outer = motions.adjoint_inverse(self._outer)
         found = [(k, *condition) for k, joint in enumerate(joints) for condition in joint.conditions]
         self.joint_of_row: IntArray = np.array([k for k, *_ in found], dtype=np.int64)
         self.names = tuple(f"joint {joints[k].name!r}: {name}" for k, name, _, _ in found)
@@ -150,7 +167,15 @@ class JointRows:
             moved = motions.exp(ahead)
             transform, frame = motions.adjoint_inverse(moved) @ transform, frame @ moved
         pose = motions.inverse(inner @ frame) @ outer @ self._outer
-        return Relative(pose, transform, drive, rate)
+        back, of_row = motions.adjoint_inverse(pose), self.joint_of_row
+        turn = np.swapaxes(pose[of_row, :3, :3], 1, 2)
+        by_twist = np.empty((len(self.names), 6))
+        by_twist[:, :3] = (turn @ self._c[:, :, None])[:, :, 0]
+        by_twist[:, 3:] = _axial(turn @ self._entries)
+        gradient = np.empty((len(self.names), 12))
+        gradient[:, :6] = -(by_twist[:, None, :] @ (back @ transform)[of_row])[:, 0]
+        gradient[:, 6:] = (by_twist[:, None, :] @ self._of_outer[of_row])[:, 0]
+        return Relative(pose, transform, back, drive, rate, by_twist, gradient)
 
     def violation(self, relative: Relative) -> Array:
         """(m,) Φ."""
@@ -159,32 +184,18 @@ class JointRows:
         result: Array = shift + (self._entries * d[:, :3, :3]).sum(axis=(1, 2))
         return result
 
-    def by_twist(self, relative: Relative) -> Array:
-        """(m, 6) derivative of each condition along the relative twist η."""
-        turn = np.swapaxes(relative.pose[self.joint_of_row, :3, :3], 1, 2)
-        result = np.empty((len(self.names), 6))
-        result[:, :3] = (turn @ self._c[:, :, None])[:, :, 0]
-        result[:, 3:] = _axial(turn @ self._entries)
-        return result
-
-    def gradient(self, relative: Relative) -> Array:
-        """(m, 12) derivative by the twists of the inner and the outer node."""
-        by_twist, k = self.by_twist(relative)[:, None, :], self.joint_of_row
-        of_inner = -motions.adjoint_inverse(relative.pose) @ relative.inner
-        return np.concatenate([by_twist @ of_inner[k], by_twist @ self.of_outer[k]], axis=2)[:, 0]
-
     def rate(self, relative: Relative) -> Array:
         """(m,) Φ_t."""
-        drift = -(motions.adjoint_inverse(relative.pose) @ relative.drive[:, :, None])[:, :, 0]
-        result: Array = (self.by_twist(relative) * drift[self.joint_of_row]).sum(axis=1)
+        drift = -(relative.back @ relative.drive[:, :, None])[:, :, 0]
+        result: Array = (relative.by_twist * drift[self.joint_of_row]).sum(axis=1)
         return result
 
     def bias(self, relative: Relative, v: Array) -> Array:
         """(m,) Φ̈ − B a at twists (j, 12) of both nodes."""
-        back = motions.adjoint_inverse(relative.pose)
+        back = relative.back
         carried = (relative.inner @ v[:, :6, None])[:, :, 0]
         inner = carried + relative.drive
-        outer = (self.of_outer @ v[:, 6:, None])[:, :, 0]
+        outer = (self._of_outer @ v[:, 6:, None])[:, :, 0]
         twist = outer - (back @ inner[:, :, None])[:, :, 0]
         change = relative.drive_rate - (motions.bracket(relative.drive) @ carried[:, :, None])[:, :, 0]
         bend = motions.bracket(twist) @ back @ inner[:, :, None] - back @ change[:, :, None]
@@ -193,7 +204,7 @@ class JointRows:
         turn = relative.pose[k, :3, :3]
         swing = (turn @ turning @ twist[k, :3, None])[:, :, 0]
         curve = (self._c * swing).sum(axis=1) + (self._entries * (turn @ turning @ turning)).sum(axis=(1, 2))
-        result: Array = curve + (self.by_twist(relative) * bend[k, :, 0]).sum(axis=1)
+        result: Array = curve + (relative.by_twist * bend[k, :, 0]).sum(axis=1)
         return result
 
     def stiffness(self, relative: Relative, multipliers: Array) -> Array:
@@ -209,8 +220,8 @@ class JointRows:
         of_twist = np.zeros((j, 6, 6))
         of_twist[:, :3, 3:] = skews(force)
         of_twist[:, 3:, 3:] = spread - np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-        of_inner = -motions.adjoint_inverse(relative.pose) @ relative.inner
-        twist = np.concatenate([of_inner, self.of_outer], axis=2)  # η from both nodes (j, 6, 12)
+        of_inner = -relative.back @ relative.inner
+        twist = np.concatenate([of_inner, self._of_outer], axis=2)  # η from both nodes (j, 6, 12)
         result: Array = np.swapaxes(twist, 1, 2) @ of_twist @ twist
         # the inner node's share of the wrench turns with the relative pose
         result[:, :6] -= np.swapaxes(of_inner, 1, 2) @ motions.cobracket(wrench) @ twist

@@ -43,15 +43,15 @@ class Scatter:
         """The sum of all blocks."""
         values = np.concatenate([b.ravel() for b in blocks])[self._kept] if blocks else np.zeros(0)
         if self.sparse:
-            summed = np.bincount(self._place, values, len(self._indices))
+            summed: Array = np.asarray(np.bincount(self._place, values, len(self._indices)), dtype=float)
             return sp.csc_array((summed, self._indices, self._starts), shape=self.shape)
-        result: Array = np.bincount(self._place, values, self.shape[0] * self.shape[1]).reshape(self.shape)
-        return result
+        flat: Array = np.asarray(np.bincount(self._place, values, self.shape[0] * self.shape[1]), dtype=float)
+        return flat.reshape(self.shape)
 
 
 def dofs(nodes: IntArray) -> IntArray:
     """(e, 6k) coordinates of the nodes (e, k) of elements; those of the ground, node −1, are negative."""
     numbers = 6 * nodes[..., None] + np.arange(6)
     numbers = np.where(nodes[..., None] < 0, -1, numbers)
-    result: IntArray = numbers.reshape(*nodes.shape[:-1], -1)
+    result: IntArray = numbers.reshape(*nodes.shape[:-1], 6 * nodes.shape[-1])
     return result

@@ -26,7 +26,7 @@ from fe_import.solver.elimination import Elimination
 SINGULAR = 1e-13  # pivot per diagonal entry: rounding
 
 
-class SingularMatrix(Exception):  # noqa: N818 a finding, reported by `fe_import.sparse` with what it means
+class SingularMatrix(Exception):
     """The matrix is not positive definite to working precision."""
 
 

@@ -92,7 +92,7 @@ def _best_cut(level: _Level, positions: Array | None) -> tuple[Flags, Flags]:
         else:
             better = (size < best[2])[level.part]
             best = np.where(better, side, best[0]), np.where(better, separator, best[1]), np.minimum(size, best[2])
-    assert best is not None  # noqa: S101 there is always a coordinate
+    assert best is not None
     return best[0], best[1]
 
 

@@ -132,4 +132,4 @@ def _fronts(
 def _ranges(first: IntArray, last: IntArray) -> IntArray:
     """first[0] ... last[0] - 1, first[1] ... last[1] - 1, and so on."""
     length = last - first
-    return np.arange(length.sum()) + np.repeat(first - np.cumsum(length) + length, length)
+    return np.asarray(np.arange(length.sum()) + np.repeat(first - np.cumsum(length) + length, length))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,7 +72,7 @@ def _pattern_keys(matrix: sp.csc_array) -> NDArray[np.uint64]:
         terms = np.where(rows == np.repeat(np.arange(start, stop), counts), np.uint64(0), number[rows])
         filled = start + np.flatnonzero(counts)
         keys[filled] += np.add.reduceat(terms, matrix.indptr[filled] - matrix.indptr[start])
-    return keys
+    return np.asarray(keys)
 
 
 def _chunks(indptr: IntArray) -> list[tuple[int, int]]:
@@ -80,4 +81,4 @@ def _chunks(indptr: IntArray) -> list[tuple[int, int]]:
     cuts = [int(np.searchsorted(indptr, indptr[0], side="right")) - 1] if n else [0]
     while cuts[-1] < n:
         cuts.append(max(cuts[-1] + 1, int(np.searchsorted(indptr, indptr[cuts[-1]] + _CHUNK, side="right")) - 1))
-    return list(zip(cuts[:-1], cuts[1:], strict=True))
+    return list(itertools.pairwise(cuts))

@@ -7,7 +7,7 @@ J. W. H. Liu, SIAM Review 34, 1992). Only lower triangles are meant.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,29 +24,41 @@ _TRUSTED = 1e-9  # of the diagonal; smaller pivots make the signs of later ones 
 Advance = Callable[[int], None]
 
 
+class OutsidePattern(Exception):
+    """A matrix has entries that the elimination does not foresee."""
+
+
 @dataclass(frozen=True)
 class MultifrontalFactor:
-    """Cholesky factor of a positive definite matrix, front by front: (o, o) triangles over (r, o) rectangles."""
+    """Cholesky factor of a positive definite matrix, front by front.
+
+    Attributes
+    ----------
+    elimination : Elimination
+    inverses : tuple of (o, o) arrays
+        Inverse triangles: a product is faster than a substitution where right-hand sides are few.
+    rectangles : tuple of (r, o) arrays
+        What is below the triangles.
+    """
 
     elimination: Elimination
-    triangles: tuple[Array, ...]
+    inverses: tuple[Array, ...]
     rectangles: tuple[Array, ...]
 
     def solve(self, right: Array) -> Array:
         """(n, k) or (n,) solutions."""
         order, starts, rows = self.elimination.order, self.elimination.starts, self.elimination.rows
         x = np.ascontiguousarray(right[order].reshape(len(order), -1), dtype=float)
-        fronts = range(len(rows))
-        for k in fronts:
+        for k, row in enumerate(rows):
             own = x[starts[k] : starts[k + 1]]
-            own[:] = blas.dtrsm(1.0, self.triangles[k], own.T, side=1, lower=1, trans_a=1, overwrite_b=1).T
-            if len(rows[k]):
-                x[rows[k]] -= self.rectangles[k] @ own
-        for k in reversed(fronts):
+            own[:] = self.inverses[k] @ own
+            if len(row):
+                x[row] -= self.rectangles[k] @ own
+        for k in reversed(range(len(rows))):
             own = x[starts[k] : starts[k + 1]]
             if len(rows[k]):
                 own -= self.rectangles[k].T @ x[rows[k]]
-            own[:] = blas.dtrsm(1.0, self.triangles[k], own.T, side=1, lower=1, overwrite_b=1).T
+            own[:] = self.inverses[k].T @ own
         result = np.empty_like(x)
         result[order] = x
         return result.reshape(right.shape)
@@ -61,8 +73,8 @@ def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) 
         A pivot is not positive, or within rounding of zero.
     """
     diagonal = np.abs(matrix.diagonal())[elimination.order]
-    fronts = _Fronts(matrix, elimination)
-    triangles, rectangles = [], []
+    fronts = _Fronts([(matrix, 1.0)], elimination)
+    inverses, rectangles = [], []
     for k, own, across in fronts:
         triangle, failed = lapack.dpotrf(own, lower=1, clean=0)
         scale = diagonal[elimination.starts[k] : elimination.starts[k + 1]]
@@ -71,20 +83,20 @@ def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) 
         if len(across):
             across = blas.dtrsm(1.0, triangle, across, side=1, lower=1, trans_a=1, overwrite_b=1)
             fronts.eliminate_squared(k, across)
-        triangles.append(triangle)
+        inverses.append(np.tril(lapack.dtrtri(triangle, lower=1, overwrite_c=1)[0]))
         rectangles.append(across)
         advance(k)
-    return MultifrontalFactor(elimination, tuple(triangles), tuple(rectangles))
+    return MultifrontalFactor(elimination, tuple(inverses), tuple(rectangles))
 
 
 def negative_pivots(
     matrix: sp.csc_array,
     elimination: Elimination,
     advance: Advance,
-    mass: sp.csc_array | None = None,
-    shift: float = 0.0,
+    mass: sp.csc_array,
+    shift: float,
 ) -> int | None:
-    """Number of negative eigenvalues of a symmetric matrix K, or of K - λM (Sylvester's law of inertia).
+    """Number of negative eigenvalues of K - λM (Sylvester's law of inertia).
 
     Most fronts are positive definite when few eigenvalues are negative; only the others need pivots of both signs
     (Bunch & Kaufman, within the front). Nothing of the factor is kept.
@@ -92,11 +104,12 @@ def negative_pivots(
     Parameters
     ----------
     matrix : (n, n) sparse CSC
+        K.
     elimination : Elimination
     advance : callable
         Told every front that is done.
-    mass : (n, n) sparse CSC or None
-        M, with entries in the same places as the matrix.
+    mass : (n, n) sparse CSC
+        M.
     shift : float
         λ.
 
@@ -104,9 +117,14 @@ def negative_pivots(
     -------
     int or None
         None when a pivot is too small to trust the count.
+
+    Raises
+    ------
+    OutsidePattern
+        A matrix has entries that the elimination does not foresee.
     """
     diagonal = np.abs(matrix.diagonal())[elimination.order]
-    fronts = _Fronts(matrix, elimination, mass, shift)
+    fronts = _Fronts([(matrix, 1.0), (mass, -shift)], elimination)
     count = 0
     for k, own, across in fronts:
         scale = diagonal[elimination.starts[k] : elimination.starts[k + 1]]
@@ -141,57 +159,59 @@ def _pivot_values(factor: Array, pivots: IntArray) -> Array:
 
 
 class _Fronts:
-    """Iterates over the fronts, each gathered: number, own part (o, o), part across (r, o); one must be eliminated
-    before the next is asked for."""
+    """Iterates over the fronts of a sum of matrices, each front gathered: number, own part (o, o), part across (r, o).
+    One must be eliminated before the next is asked for."""
 
-    def __init__(
-        self, matrix: sp.csc_array, elimination: Elimination, mass: sp.csc_array | None = None, shift: float = 0.0
-    ) -> None:
-        self._matrix, self._mass, self._shift = matrix, mass, shift
-        self._elimination = elimination
+    def __init__(self, terms: Sequence[tuple[sp.csc_array, float]], elimination: Elimination) -> None:
+        self._terms, self._elimination = terms, elimination
+        count = len(elimination.order)
+        self._place = np.empty(count, dtype=np.int64)
+        self._place[elimination.order] = np.arange(count)
+        self._local = np.empty(count, dtype=np.int64)
         self._left: dict[int, Array] = {}
         self._rest = np.zeros((0, 0))
 
     def __iter__(self) -> Iterator[tuple[int, Array, Array]]:
-        order, starts, rows = self._elimination.order, self._elimination.starts, self._elimination.rows
-        place = np.empty(len(order), dtype=np.int64)
-        place[order] = np.arange(len(order))
-        local = np.empty(len(order), dtype=np.int64)
-        for k, row in enumerate(rows):
-            first, last = starts[k], starts[k + 1]
-            own, size = last - first, last - first + len(row)
-            local[first:last] = np.arange(own)
-            local[row] = np.arange(own, size)
+        starts = self._elimination.starts
+        owner = np.full(len(self._place), -1)
+        for k, row in enumerate(self._elimination.rows):
+            own, size = starts[k + 1] - starts[k], starts[k + 1] - starts[k] + len(row)
+            self._local[starts[k] : starts[k + 1]] = np.arange(own)
+            self._local[row] = np.arange(own, size)
+            owner[starts[k] : starts[k + 1]] = owner[row] = k
             front = np.zeros((size, own), order="F")
-            self._gather(front, place, local, first, last)
+            for matrix, factor in self._terms:
+                self._gather(matrix, factor, front, owner, k)
             self._rest = np.zeros((len(row), len(row)), order="F")
             for child in self._elimination.children[k]:
-                self._extend(front, local[rows[child]], self._left.pop(child))
+                self._extend(front, self._local[self._elimination.rows[child]], self._left.pop(child))
             yield k, front[:own], np.asfortranarray(front[own:])
 
-    def _gather(self, front: Array, place: IntArray, local: IntArray, first: int, last: int) -> None:
-        """Entries of the matrix in the columns of a front, from its own rows on."""
-        indptr = self._matrix.indptr
+    def _gather(self, matrix: sp.csc_array, factor: float, front: Array, owner: IntArray, k: int) -> None:
+        """Add entries of a matrix in the columns of a front, from its own rows on."""
+        first, last = self._elimination.starts[k], self._elimination.starts[k + 1]
         columns = self._elimination.order[first:last]
-        begin, counts = indptr[columns].astype(np.int64), indptr[columns + 1] - indptr[columns]
+        begin = matrix.indptr[columns].astype(np.int64)
+        counts = matrix.indptr[columns + 1] - begin
         ends = np.cumsum(counts)
         at = np.arange(ends[-1]) + np.repeat(begin - ends + counts, counts)
-        row = place[self._matrix.indices[at]]
+        row = self._place[matrix.indices[at]]
         later = row >= first
-        at = at[later]
-        values = self._matrix.data[at]
-        if self._mass is not None:
-            values -= self._shift * self._mass.data[at]
-        front[local[row[later]], np.repeat(np.arange(last - first), counts)[later]] = values
+        row = row[later]
+        if (owner[row] != k).any():
+            raise OutsidePattern
+        to = self._local[row] + np.repeat(np.arange(last - first) * len(front), counts)[later]
+        front.T.reshape(-1)[to] += factor * matrix.data[at[later]]
 
     def _extend(self, front: Array, to: IntArray, left: Array) -> None:
         """Add what a child left over; rows rise, so lower triangles stay lower triangles."""
         own = front.shape[1]
         inner = int(np.searchsorted(to, own))
         for target, begin, end, shift in ((front, 0, inner, 0), (self._rest, inner, len(to), own)):
+            flat, height = target.T.reshape(-1), len(target)
             for j in range(begin, end, _PANEL):
                 stop = min(j + _PANEL, end)
-                target.T[to[j:stop, None] - shift, to[None, j:] - shift] += left.T[j:stop, j:]
+                flat[(to[j:stop, None] - shift) * height + (to[j:] - shift)] += left.T[j:stop, j:]
 
     def eliminate_squared(self, front: int, across: Array) -> None:
         """Leave rest - across acrossᵀ to the parent."""

@@ -1,0 +1,131 @@
+"""Integration of chains with loops: constrained coordinates for generalized-α, decaying errors for the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from erls.errors import Cause, SimulationError
+from erls.formulations.closed_chain import ClosedChain
+from erls.integrators import INTEGRATORS
+from erls.integrators.base import Integrator, Observer, Options, SecondOrderSystem, Solution
+from erls.integrators.constrained import ConstrainedOptions
+from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
+from erls.lie.so3 import Array
+
+NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
+_ITS_OWN = (Cause.INTERRUPTED, Cause.SINGULAR_MASS)
+
+
+class TiedCoordinates:
+    """The coordinates of a chain with the conditions of its loops; a `ConstrainedSystem`."""
+
+    def __init__(self, chain: ClosedChain) -> None:
+        self.chain, self.tree, self.kept = chain, chain.tree, chain.kept
+        self.size, self.constraints = chain.size, len(chain.kept)
+        self.constraint_names = tuple(chain.rows.names[k] for k in chain.kept)
+        self.length_scales, self.breakpoints = chain.metres, chain.breakpoints
+        self._still = np.zeros(chain.size)
+
+    def compose(self, q: Array, increment: Array) -> Array:
+        """q + increment."""
+        return q + increment
+
+    def tangent(self, increment: Array) -> None:
+        """The identity."""
+        return None
+
+    def residual(self, t: float, q: Array, v: Array, a: Array) -> Array:
+        """(n,) of the chain."""
+        return self.tree.residual(t, q, v, a)
+
+    def mass_matrix(self, t: float, q: Array) -> Array:
+        """(n, n) of the chain."""
+        return self.tree.mass_matrix(t, q)
+
+    def stiffness_and_damping(
+        self, t: float, q: Array, v: Array, a: Array, multipliers: Array
+    ) -> tuple[Array, Array]:
+        """Those of the chain."""
+        return self.tree.stiffness_and_damping(t, q, v)
+
+    def constraint(self, t: float, q: Array) -> Array:
+        """(m,) Φ."""
+        return np.asarray(self.chain.closure(t, q, self._still).violation[self.kept])
+
+    def constraint_matrix(self, t: float, q: Array) -> Array:
+        """(m, n) Φ_y."""
+        return np.asarray(self.chain.closure(t, q, self._still).rows[self.kept][:, self.tree.free])
+
+    def constraint_rate(self, t: float, q: Array) -> Array:
+        """(m,) Φ_t."""
+        return np.asarray(self.chain.closure(t, q, self._still).rate[self.kept])
+
+    def constraint_bias(self, t: float, q: Array, v: Array) -> Array:
+        """(m,) Φ̈ at zero accelerations."""
+        return np.asarray(self.chain.closure(t, q, v).bias[self.kept])
+
+    def stored(self, t: float, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """The coordinates themselves.
+
+        Raises
+        ------
+        SimulationError
+            LOOP_OPEN: a condition left out as redundant is violated.
+        """
+        self.chain.refuse_open(t, self.chain.closure(t, q, v))
+        return q, v, a
+
+
+def loop_integrator(name: str) -> Integrator:
+    """The integrator of that name for a `ClosedChain`; failures near a dead point name the loop."""
+
+    def integrate(
+        system: SecondOrderSystem,
+        times: tuple[float, float],
+        y: Array,
+        v: Array,
+        options: Options,
+        observer: Observer | None = None,
+    ) -> Solution:
+        assert isinstance(system, ClosedChain)
+        solution: Solution
+        if name == "generalized_alpha" and len(system.kept):
+            settings = ConstrainedOptions(
+                options.step, options.rtol, options.atol, options.spectral_radius, options.newton_tolerance
+            )
+            solution = lie_generalized_alpha(TiedCoordinates(system), times, y, v, settings, observer)
+        else:
+            watch = _watching(system, observer)
+            solution = INTEGRATORS[name](system, times, y, v, options, watch)
+        failure = solution.failure
+        if failure is None or failure.cause in _ITS_OWN:
+            return solution
+        return replace(solution, failure=_dead_point(system, solution) or failure)
+
+    return integrate
+
+
+def _watching(chain: ClosedChain, observer: Observer | None) -> Observer:
+    """An observer that refuses steps at which a loop has come apart; within a step a trial may."""
+
+    def observe(t: float, knots: Callable[[], Solution]) -> None:
+        found = knots()
+        chain.refuse_open(t, chain.closure(t, found.y[-1], found.v[-1]))
+        if observer is not None:
+            observer(t, knots)
+
+    return observe
+
+
+def _dead_point(chain: ClosedChain, solution: Solution) -> SimulationError | None:
+    """A failed run that ended where a loop locks."""
+    t, y, v = float(solution.t[-1]), solution.y[-1], solution.v[-1]
+    if not (np.isfinite(y).all() and np.isfinite(v).all()):
+        return None
+    found = chain.closure(t, y, v)
+    begin = chain.stiffest(chain.closure(0.0, chain.start.y, np.zeros(chain.size)))[0]
+    here = chain.stiffest(found)
+    return chain.locked(t, found, here) if here[0] < NEAR * begin else None

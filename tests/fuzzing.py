@@ -1,0 +1,384 @@
+"""Damaged files by the thousand: seeded mutations, and what a reader may make of them.
+
+A reader may refuse a damaged file with an error of the package. What it accepts must be one of:
+
+- unchanged: everything that it read is as in the sound file;
+- value: the damage put one number or word in the place of another of equal syntax (same lines, same fields), which no
+  reader can tell from an intended one; nothing else about the file changed;
+- lines: of a text format that states no counts, whole lines are gone, moved or repeated (its other lines are as
+  they were, but for one).
+
+Anything else is a silent acceptance: entries lost by a cut, shifted fields, garbage read as numbers, numbers that are
+not finite. So are another exception than the package's own, and a case that takes longer than its time limit.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import math
+import re
+import signal
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_import.errors import ReportedError
+
+Facts = frozenset[Any]
+_NUMBER = re.compile(rb"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?(?![\w.])")
+_FORTRAN = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))([-+]\d+)")  # Nastran's 1.5+3
+_FIELDS = re.compile(r"[\s,;=()\"'<>\[\]{}]+")
+_BAD_NUMBERS = (b"nan", b"1e400", b"-1", b"123456789012345678901234567890", b"0", b"inf", b"7.5", b"1e30", b"2147483648")
+_TOKENS = (b",", b"*", b"%", b"\n", b"\0", b"\xff", b" ", b"=", b'"', b"1_0", b"\x1f\x8b", b"-", b".", b"**", b"$", b"\r\n")
+
+
+@dataclass(frozen=True)
+class Damage:
+    """One mutated file: how it was made, and its bytes."""
+
+    kind: str
+    content: bytes
+
+
+def _flip(data: bytes, rng: np.random.Generator) -> bytes:
+    at = int(rng.integers(len(data)))
+    return data[:at] + bytes([data[at] ^ (1 << int(rng.integers(8)))]) + data[at + 1 :]
+
+
+def _byte(data: bytes, rng: np.random.Generator) -> bytes:
+    at = int(rng.integers(len(data)))
+    return data[:at] + bytes([int(rng.integers(256))]) + data[at + 1 :]
+
+
+def _letter(data: bytes, rng: np.random.Generator) -> bytes:
+    at = int(rng.integers(len(data)))
+    return data[:at] + bytes(rng.choice(list(b"0123456789-+eEDxX. ,;\n*$#")) for _ in "x") + data[at + 1 :]
+
+
+def _cut(data: bytes, rng: np.random.Generator) -> bytes:
+    return data[: int(rng.integers(len(data)))]
+
+
+def _cut_behind_a_line(data: bytes, rng: np.random.Generator) -> bytes:
+    ends = [k + 1 for k, byte in enumerate(data[:-1]) if byte == 10]
+    return data[: int(rng.choice(ends))] if ends else data[: len(data) // 2]
+
+
+def _span(data: bytes, rng: np.random.Generator, most: int = 64) -> slice:
+    begin = int(rng.integers(len(data)))
+    return slice(begin, min(len(data), begin + int(rng.integers(1, most))))
+
+
+def _lines(data: bytes, rng: np.random.Generator) -> tuple[list[bytes], slice]:
+    lines = data.splitlines(keepends=True)
+    begin = int(rng.integers(len(lines)))
+    return lines, slice(begin, begin + int(rng.integers(1, 4)))
+
+
+def _delete(data: bytes, rng: np.random.Generator) -> bytes:
+    span = _span(data, rng)
+    return data[: span.start] + data[span.stop :]
+
+
+def _repeat(data: bytes, rng: np.random.Generator) -> bytes:
+    span = _span(data, rng)
+    return data[: span.stop] + data[span] + data[span.stop :]
+
+
+def _swap(data: bytes, rng: np.random.Generator) -> bytes:
+    length = int(rng.integers(1, 1 + min(64, len(data) // 2)))
+    a, b = sorted(int(k) for k in rng.integers(0, len(data) - length + 1, 2))
+    if b < a + length:
+        return data
+    return data[:a] + data[b : b + length] + data[a + length : b] + data[a : a + length] + data[b + length :]
+
+
+def _delete_lines(data: bytes, rng: np.random.Generator) -> bytes:
+    lines, span = _lines(data, rng)
+    return b"".join(lines[: span.start] + lines[span.stop :])
+
+
+def _repeat_lines(data: bytes, rng: np.random.Generator) -> bytes:
+    lines, span = _lines(data, rng)
+    return b"".join(lines[: span.stop] + lines[span] + lines[span.stop :])
+
+
+def _swap_lines(data: bytes, rng: np.random.Generator) -> bytes:
+    lines = data.splitlines(keepends=True)
+    a, b = (int(k) for k in rng.integers(0, len(lines), 2))
+    lines[a], lines[b] = lines[b], lines[a]
+    return b"".join(lines)
+
+
+def _insert(data: bytes, rng: np.random.Generator) -> bytes:
+    at = int(rng.integers(len(data) + 1))
+    return data[:at] + rng.bytes(int(rng.integers(1, 17))) + data[at:]
+
+
+def _insert_token(data: bytes, rng: np.random.Generator) -> bytes:
+    at = int(rng.integers(len(data) + 1))
+    return data[:at] + _TOKENS[int(rng.integers(len(_TOKENS)))] + data[at:]
+
+
+def _number(data: bytes, rng: np.random.Generator) -> bytes:
+    found = list(_NUMBER.finditer(data))
+    if not found:
+        return _byte(data, rng)
+    chosen = found[int(rng.integers(len(found)))]
+    return data[: chosen.start()] + _BAD_NUMBERS[int(rng.integers(len(_BAD_NUMBERS)))] + data[chosen.end() :]
+
+
+def _overwrite(data: bytes, rng: np.random.Generator) -> bytes:
+    span = _span(data, rng, 17)
+    block = rng.choice([0, 127, 128, 240, 255], span.stop - span.start).astype(np.uint8).tobytes()
+    return data[: span.start] + block + data[span.stop :]
+
+
+_EVERYWHERE = {
+    "flip a bit": _flip,
+    "change a byte": _byte,
+    "cut": _cut,
+    "delete a block": _delete,
+    "repeat a block": _repeat,
+    "swap two blocks": _swap,
+    "insert random bytes": _insert,
+}
+IN_BINARY: Mapping[str, Callable[[bytes, np.random.Generator], bytes]] = {**_EVERYWHERE, "overwrite": _overwrite}
+IN_TEXT: Mapping[str, Callable[[bytes, np.random.Generator], bytes]] = {
+    **_EVERYWHERE,
+    "change a character": _letter,
+    "cut behind a line": _cut_behind_a_line,
+    "delete lines": _delete_lines,
+    "repeat lines": _repeat_lines,
+    "swap two lines": _swap_lines,
+    "insert a mark": _insert_token,
+    "replace a number": _number,
+}
+
+
+def damaged(data: bytes, rng: np.random.Generator, *, binary: bool) -> Damage:
+    """One mutation of a file."""
+    kinds = IN_BINARY if binary else IN_TEXT
+    name = list(kinds)[int(rng.integers(len(kinds)))]
+    return Damage(name, kinds[name](data, rng))
+
+
+def _kind(word: str) -> str:
+    try:
+        int(word)
+        return "integer"
+    except ValueError:
+        pass
+    text = word.upper().replace("D", "E")
+    if match := _FORTRAN.fullmatch(text):
+        text = f"{match[1]}E{match[2]}"
+    try:
+        return "real" if math.isfinite(float(text)) else "not finite"
+    except ValueError:
+        return "word"
+
+
+def same_syntax(before: str, after: str) -> bool:
+    """Whether two lines have the same fields, one number in the place of another, or one word."""
+    if before == after:
+        return True
+    old, new = (_FIELDS.split(line.strip()) for line in (before, after))
+    number = {"integer", "real"}
+    pairs = [(_kind(a), _kind(b)) for a, b in zip(old, new, strict=False)]
+    return len(old) == len(new) and all(a == b or {a, b} <= number for a, b in pairs)
+
+
+def _texts(data: bytes) -> list[str]:
+    return data.decode("utf-8", errors="replace").splitlines()
+
+
+def replaces_a_value(before: bytes, after: bytes, *, binary: bool) -> bool:
+    """Whether the damage put a value in the place of another, and did nothing else to the file."""
+    if binary:
+        if len(before) != len(after):
+            return False
+        changed = [k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b]
+        return not changed or changed[-1] - changed[0] < 16
+    old, new = _texts(before), _texts(after)
+    if len(old) != len(new):
+        return False
+    changed = [k for k, (a, b) in enumerate(zip(old, new, strict=True)) if a != b]
+    return len(changed) <= 1 and all(same_syntax(old[k], new[k]) for k in changed)
+
+
+def keeps_lines(before: bytes, after: bytes) -> bool:
+    """Whether the file has whole lines of the sound one only, but for one of the same syntax or one cut short."""
+    old = _texts(before)
+    known = set(old)
+    new = [line for line in _texts(after) if line not in known]
+    if not new:
+        return True
+    return len(new) == 1 and any(same_syntax(line, new[0]) or line.startswith(new[0]) for line in old)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader with sound files.
+
+    Attributes
+    ----------
+    name : str
+    files : dict of bytes
+        By name.
+    targets : tuple of str
+        Files to damage.
+    read : callable
+        What a folder with the files holds.
+    facts : callable
+        Everything that was read, as a set; equal sets mean equal content.
+    binary : bool
+    counts : bool
+        Whether lost lines must be noticed: the format states how much it holds, or what it holds must fit together.
+    packed : bool
+        Files are compressed; any change must be noticed.
+    judge : callable, optional
+        ``judge(content, found)`` in place of the comparison of facts, for formats in which any sound text is legal:
+        whether all that stands in the file was taken as it stands.
+    """
+
+    name: str
+    files: Mapping[str, bytes]
+    targets: tuple[str, ...]
+    read: Callable[[Path], Any]
+    facts: Callable[[Any], Facts]
+    binary: bool = False
+    counts: bool = True
+    packed: bool = False
+    judge: Callable[[bytes, Any], bool] | None = None
+
+
+@dataclass
+class Report:
+    """What became of the cases of one reader."""
+
+    cases: int = 0
+    accepted: Counter[str] = field(default_factory=Counter)
+    refused: Counter[str] = field(default_factory=Counter)
+    slowest: float = 0.0
+    faults: list[str] = field(default_factory=list)
+
+
+class TimedOut(BaseException):
+    """A case took too long; no handler of a reader may swallow it."""
+
+
+@contextlib.contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise `TimedOut` in the main thread behind so many seconds (Unix; elsewhere no limit)."""
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def stop(*_: Any) -> None:
+        raise TimedOut
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def attempt(read: Callable[[], Any], report: Report, limit: float) -> Any:
+    """What was read; None when it was refused, or failed otherwise, which the report then says."""
+    report.cases += 1
+    begin = time.perf_counter()
+    try:
+        with time_limit(limit):
+            return read()
+    except ReportedError as error:
+        if not (error.remedy and error.where and "\n" not in str(error) and len(str(error)) < 1000):
+            report.faults.append(f"a poor message: {error!s:.600}")
+        report.refused[str(error.cause)] += 1
+    except TimedOut:
+        report.faults.append(f"took longer than {limit} s")
+    except Exception as problem:
+        place = problem.__traceback__
+        while place is not None and place.tb_next is not None:
+            place = place.tb_next
+        spot = "" if place is None else f" ({Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno})"
+        report.faults.append(f"{type(problem).__name__}: {problem!s:.200}{spot}")
+    finally:
+        report.slowest = max(report.slowest, time.perf_counter() - begin)
+    return None
+
+
+def fuzz(reader: Reader, seeds: Sequence[int], folder: Path, limit: float = 5.0, keep: Path | None = None) -> Report:
+    """Damage the files of a reader once for each seed, and judge what it makes of them.
+
+    Parameters
+    ----------
+    reader : Reader
+    seeds : sequence of int
+    folder : Path
+        Empty; holds the files.
+    limit : float
+        Of a case [s].
+    keep : Path, optional
+        Folder for the files of faulty cases.
+    """
+    sound = {name: gzip.compress(data, mtime=0) if reader.packed else data for name, data in reader.files.items()}
+    for name, data in sound.items():
+        (folder / name).write_bytes(data)
+    expected = reader.facts(reader.read(folder))
+    report = Report()
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        target = reader.targets[int(rng.integers(len(reader.targets)))]
+        before = sound[target]
+        damage = damaged(before, rng, binary=reader.binary or reader.packed)
+        (folder / target).write_bytes(damage.content)
+        count = len(report.faults)
+        found = attempt(lambda: reader.read(folder), report, limit)
+        if found is not None:
+            verdict = _verdict(reader, before, damage.content, found, expected)
+            if verdict:
+                report.accepted[verdict] += 1
+            else:
+                report.faults.append("silently accepted")
+        if len(report.faults) > count:
+            report.faults[-1] = f"{reader.name}, {target}, seed {seed} ({damage.kind}): {report.faults[-1]}"
+            if keep is not None:
+                (keep / f"{seed}-{target}").write_bytes(damage.content)
+        (folder / target).write_bytes(before)
+    return report
+
+
+def _verdict(reader: Reader, before: bytes, after: bytes, found: Any, expected: Facts) -> str:
+    """``unchanged``, ``value`` or ``lines``; empty for what must not be."""
+    if reader.judge is not None:
+        if not reader.judge(after, found):
+            return ""
+        return "unchanged" if reader.facts(found) == expected else "value"
+    if reader.facts(found) == expected:
+        return "unchanged"
+    if reader.packed:
+        return ""
+    if replaces_a_value(before, after, binary=reader.binary):
+        return "value"
+    return "lines" if not reader.counts and not reader.binary and keeps_lines(before, after) else ""
+
+
+def fuzz_all(
+    readers: Sequence[Reader], cases: int, first_seed: int = 0, limit: float = 5.0, keep: Path | None = None
+) -> dict[str, Report]:
+    """Reports by reader, ``cases`` of each."""
+    reports = {}
+    for reader in readers:
+        with tempfile.TemporaryDirectory() as folder:
+            reports[reader.name] = fuzz(reader, range(first_seed, first_seed + cases), Path(folder), limit, keep)
+    return reports
