@@ -22,9 +22,15 @@ import heavy_top  # the system of the tests
 from erls.integrators.constrained import ConstrainedOptions
 
 EXPECTED = {
-    "R³×SO(3)": {4e-3: (0.280, 241), 2e-3: (0.0688, 57.7), 1e-3: (0.0171, 14.2), 5e-4: (4.28e-3, 3.54), 2.5e-4: (1.07e-3, 0.885)},
+    "R³×SO(3)": {
+        4e-3: (0.280, 241),
+        2e-3: (0.0688, 57.7),
+        1e-3: (0.0171, 14.2),
+        5e-4: (4.28e-3, 3.54),
+        2.5e-4: (1.07e-3, 0.885),
+    },
     "SE(3)": {4e-3: (1.45, 818), 2e-3: (0.774, 643), 1e-3: (0.205, 185), 5e-4: (0.0518, 46.8), 2.5e-4: (0.0130, 11.7)},
-}  # fmt: skip
+}
 
 
 def errors(finest: float) -> None:

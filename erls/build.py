@@ -32,6 +32,7 @@ from fe_import.modal_file import ModalModel, read_modal_file
 from fe_import.model import InterfaceNode
 from fe_import.modes import damping_ratios
 from fe_import.reduce import reduce_cached
+from fe_import.solver.watch import telling
 from fe_import.toml_file import choose
 
 Message = Callable[[str], None]
@@ -155,7 +156,8 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
     else:
         path = scene.folder / link.model
         description = _within(f"{place}.model", lambda: load_link(path, {**link.reduction, "form": "orthonormal"}))
-        model, cached = reduce_cached(description, cache_folder())
+        with telling(tell):
+            model, cached = reduce_cached(description, cache_folder())
         tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({path.name})")
     wanted = 0 if not link.flexible else link.elastic_modes
     if wanted is None:

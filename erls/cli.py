@@ -83,7 +83,7 @@ def reduce(
     refuse_unwritable(target, link)
     begun = time.perf_counter()
     tell(f"reducing {link}")
-    model = reduce_link(description)
+    model = reduce_link(description, tell)
     write_modal_file(target, model)
     summary = {
         **reduction_summary(model),

@@ -9,6 +9,7 @@ import numpy as np
 from erls.formulations.base import State
 from erls.lie.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
+from erls.mechanism.loops import LoopEnd
 from erls.run import Run
 from fe_import.build import inertia_matrix
 
@@ -86,7 +87,23 @@ def _joint_loads(run: Run, number: int, times: Array, states: list[State]) -> Ar
             arm = arm - _place(run, state, number, link.outboard.node)
             about = moment[k] + cross(arm, force[k])
             result[k, names.index(link.outboard.name)] -= np.concatenate([turn @ force[k], turn @ about])
+    for loop in mechanism.loops:
+        for end, sign in ((loop.outer, 1.0), (loop.inner, -1.0)):
+            nodes = [i.node for i in link.model.interface_nodes]
+            if end.link != number or end.node not in nodes:
+                continue
+            force, moment = run.loop_reaction(loop.name, times)
+            for k, state in enumerate(states):
+                turn = state.poses[number][:3, :3].T
+                arm = _end(run, state, loop.outer) - _place(run, state, number, end.node)
+                about = moment[k] + cross(arm, force[k])
+                result[k, nodes.index(end.node)] += sign * np.concatenate([turn @ force[k], turn @ about])
     return result
+
+
+def _end(run: Run, state: State, end: LoopEnd) -> Array:
+    """(3,) world position of the frame of a closing joint, which sits on its node."""
+    return end.frame[:3, 3] if end.link is None else _place(run, state, end.link, end.node)
 
 
 def _place(run: Run, state: State, number: int, node: int) -> Array:

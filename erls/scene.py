@@ -38,6 +38,9 @@ class Simulation(_Record, frozen=True):
         Of ``erls``: ``joint-angle`` (θ is the joint angle) or ``minimum-norm`` (five rows per joint, as in the paper).
     body_frame : str
         Of ``ffr``: ``tangent`` at the inboard interface, or ``mean-axis``.
+    coordinates : str
+        ``independent`` (joint angles), or, of ``ffr``, ``absolute``: the frames themselves, tied by joints with
+        multipliers, index 3.
     integrator : str
         ``generalized_alpha`` or one of SciPy's: ``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``.
     step : float, optional
@@ -52,6 +55,7 @@ class Simulation(_Record, frozen=True):
     formulation: str = "erls"
     gauge: str = "joint-angle"
     body_frame: str = "tangent"
+    coordinates: str = "independent"
     integrator: str = DEFAULT_INTEGRATOR
     step: float | None = None
     rtol: float = 1e-8

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from erls.errors import Cause, SceneError
-from erls.integrators import INTEGRATORS
+from erls.integrators import DEFAULT, INTEGRATORS
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joints import JOINT_TYPES
 from erls.mechanism.loops import LOOP_TYPES
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 GAUGES = ("joint-angle", "minimum-norm")
 BODY_FRAMES = ("tangent", "mean-axis")
+COORDINATES = ("independent", "absolute")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
 MOST_STEPS = 100_000_000  # fill any memory; more are a slip
@@ -73,6 +74,9 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     for k, loop in enumerate(scene.loops):
         _check_loop(loop, scene, f"{file}: loops[{k}]")
     if scene.loops:
+        if scene.simulation.coordinates != "independent":
+            message, right = "loops tie independent coordinates", "remove it, or the loops"
+            raise _bad(f"{file}: simulation.coordinates", message, scene.simulation.coordinates, right)
         for k, joint in enumerate(scene.joints):
             if getattr(joint.drive, "feed_forward", False):
                 message = "the inverse dynamics of the chain does not know its loops"
@@ -95,6 +99,12 @@ def _check_simulation(s: Simulation, place: str) -> None:
     choose(s.integrator, INTEGRATORS, f"{place}.integrator", SceneError)
     choose(s.gauge, GAUGES, f"{place}.gauge", SceneError)
     choose(s.body_frame, BODY_FRAMES, f"{place}.body_frame", SceneError)
+    choose(s.coordinates, COORDINATES, f"{place}.coordinates", SceneError)
+    if s.coordinates == "absolute":
+        for name, value, right in (("formulation", s.formulation, "ffr"), ("integrator", s.integrator, DEFAULT)):
+            if value != right:
+                message = "absolute coordinates do not go with this"
+                raise _bad(f"{place}.{name}", message, value, f"use {right}, or coordinates = 'independent'")
     for name in ("duration", "step", "atol"):
         value = getattr(s, name)
         if value is not None and not value > 0:

@@ -10,7 +10,8 @@ import scipy.sparse as sp
 
 from fe_import.coupling import couple_interfaces
 from fe_import.errors import Cause, FEImportError
-from fe_import.export_checks import check_export, refuse_grounded
+from fe_import.export_checks import check_export
+from fe_import.export_rigid import free_of_ground
 from fe_import.exports import EXPORTS, Export, ExportFormat
 from fe_import.link import LinkFile, Matrices
 from fe_import.matrices_interfaces import matrices_interfaces, named_nodes
@@ -59,8 +60,7 @@ def matrices_model(link: LinkFile) -> FEModel:
         source=where,
         notes=export.notes,
     )
-    refuse_grounded(model, export.labels[kept], where)
-    return model
+    return free_of_ground(model, export.labels[kept], where)
 
 
 def read_export(link: LinkFile, matrices: Matrices) -> Export:

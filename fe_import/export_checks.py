@@ -1,4 +1,4 @@
-"""What must hold for every export, whatever its format: rows, nodes and matrices belong together; the link is free."""
+"""What must hold for every export, whatever its format: rows, nodes and matrices belong together."""
 
 from __future__ import annotations
 
@@ -8,16 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
+from fe_import.export_rigid import listed
 from fe_import.exports import Export
-from fe_import.health import GROUNDING, asymmetry, grounding
-from fe_import.model import Array, FEModel, IntArray
+from fe_import.health import asymmetry
 
 _ASYMMETRY = 1e-9
 _LARGEST = 1e60  # of mass and stiffness in any unit; squares stay finite
 _FARTHEST = 1e12
-_LOCAL = 0.3  # share of the nodes at which a link is held, beyond which the matrix is another one
-_NOTICED = 1e-3  # of the largest force
-_DIRECTED = 1e-6  # mass by direction: files carry 6 digits or more
 
 
 def check_export(export: Export, where: str) -> None:
@@ -91,75 +88,12 @@ def _check_nodes(export: Export, where: str) -> None:
             Cause.GROUNDED,
             f"{held.sum()} nodes lack some of their three displacements: held, or dependent in an equation",
             where=where,
-            value=_listed(export.labels[held]),
+            value=listed(export.labels[held]),
             remedy="export the free link without supports and equations",
         )
     if (turning % 3 != 0).any():
-        labels = _listed(export.labels[turning % 3 != 0])
+        labels = listed(export.labels[turning % 3 != 0])
         raise _fault("a node needs all three rotations or none", where, labels, remedy="export all six components")
-
-
-def refuse_grounded(model: FEModel, labels: IntArray, where: str) -> None:
-    """Refuse a link that is held, or whose matrices are not those of its nodes, and say which it probably is.
-
-    Parameters
-    ----------
-    model : FEModel
-    labels : (n,) int array
-        Numbers of its first nodes in the program that exported it.
-    where : str
-
-    Raises
-    ------
-    FEImportError
-        ``GROUNDED``; ``EXPORT``: the mass differs by direction.
-    """
-    rigid = model.rigid_body_modes()
-    moved = rigid[:, :3].T @ (model.mass @ rigid[:, :3])
-    mass = float(np.trace(moved)) / 3
-    if np.abs(moved - mass * np.eye(3)).max() > _DIRECTED * abs(mass):
-        raise _fault(
-            "the mass of the link differs by direction",
-            where,
-            np.diag(moved).tolist(),
-            f"equal to {_DIRECTED:g}",
-            "check the order of the dofs, and that the file is whole",
-        )
-    if (resisting := grounding(model)) > GROUNDING:
-        message, remedy = _reason(model, rigid, labels)
-        raise FEImportError(
-            Cause.GROUNDED, message, where=f"{where}: matrices", value=resisting, limit=GROUNDING, remedy=remedy
-        )
-
-
-def _reason(model: FEModel, rigid: Array, labels: IntArray) -> tuple[str, str]:
-    """What a stiffness that resists rigid-body motion probably is, and what to do."""
-    rows = model.dof_map[: len(labels), :3]
-    force = np.abs(model.stiffness @ rigid)
-    terms = (abs(model.stiffness) @ np.abs(rigid)).max(axis=0)
-    if (force[:, :3].max(axis=0) <= GROUNDING * terms[:3]).all():
-        return (
-            "the stiffness resists rotations of the link, not its translations: the nodes are not where the matrices "
-            "have them",
-            "check the unit of length, the mesh, the order of the dofs and the frames of the nodes",
-        )
-    size = force[rows, :3].max(axis=(1, 2))
-    held = size > _NOTICED * size.max()
-    if held.mean() <= _LOCAL:
-        return (
-            f"the stiffness resists rigid-body motion at nodes {_listed(labels[held])}",
-            "a link must be free: remove supports, springs to ground and penalty stiffness from the export",
-        )
-    return (
-        "the stiffness resists rigid-body motion at most nodes: it is probably the block of the kept dofs of a larger "
-        "matrix, not the condensed one (CalculiX 2.20 writes this for *SUBSTRUCTURE GENERATE)",
-        "export the full matrices, in CalculiX by *FREQUENCY, SOLVER=MATRIXSTORAGE, or check the order of the dofs",
-    )
-
-
-def _listed(labels: IntArray) -> str:
-    more = f" and {len(labels) - 8} more" if len(labels) > 8 else ""
-    return ", ".join(map(str, labels[:8])) + more
 
 
 def _fault(message: str, where: str, value: Any = None, limit: Any = None, remedy: str = "") -> FEImportError:

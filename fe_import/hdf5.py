@@ -19,6 +19,7 @@ import h5py
 
 from fe_import.errors import ReportedError
 from fe_import.hdf5_audit import Limits, audit
+from fe_import.hdf5_seal import ATTRIBUTE, seal_of
 from fe_import.hdf5_sink import Sink
 from fe_import.hdf5_values import REMEDY, Reader, translated, write_array, write_attribute, write_strings
 from fe_import.output_file import refusal
@@ -38,6 +39,9 @@ def open_for_reading(
     path: Path | str, error: type[ReportedError], cause: enum.StrEnum, *, max_bytes: float = 8e9
 ) -> Iterator[Reader]:
     """Reader of the root group of a file that has passed `audit`.
+
+    When the block ends without an error, the content is held against the seal that `write_atomically` left, if there is
+    one: specific faults are named first.
 
     Parameters
     ----------
@@ -76,6 +80,9 @@ def open_for_reading(
         with translated(where, error, cause):
             audit(file, Limits(status.st_size, max_bytes), fail)
         yield Reader(file, where, error, cause)
+        with translated(where, error, cause):
+            if ATTRIBUTE in file.attrs and seal_of(file) != Reader(file, where, error, cause).attribute(ATTRIBUTE, str):
+                raise fail("", "the content is not what was written: damaged, or changed by hand")
     finally:
         with contextlib.suppress(Exception):  # nothing was written; a damaged file may fail to close
             file.close()
@@ -130,6 +137,7 @@ def _fill(sink: Sink, write: Callable[[h5py.Group], None]) -> None:
         # v108: the oldest format whose metadata carry checksums; MATLAB and Julia read it
         with h5py.File(sink, "w", libver=("v108", "v108")) as file:
             write(file)
+            write_attribute(file, ATTRIBUTE, seal_of(file))
     finally:
         if sink.problem is not None:  # what h5py makes of lost bytes is of no interest
             raise sink.problem

@@ -163,7 +163,7 @@ def _missing_modes(model: FEModel, omega: Array) -> tuple[HealthCheck, ...]:
     last = first + int(np.diff(np.log(elastic[first : half + 1])).argmax())
     limit = float(np.sqrt(elastic[last] * elastic[last + 1]))
     mass, stiffness = model.reduced_matrices()
-    below = modes_below(stiffness, mass, limit**2)
+    below = modes_below(stiffness, mass, limit**2, positions=model.dof_positions())
     if below is None:
         return ()
     name = f"free-free modes below {limit / (2 * np.pi):.5g} Hz that the basis lacks"

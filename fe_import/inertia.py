@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from fe_import.model import Array, IntArray
 
+_BLOCK = 8  # modes turned and weighted at a time: fields of a large model are long
+
 
 @dataclass(frozen=True)
 class InertiaInvariants:
@@ -118,9 +120,14 @@ def inertia_invariants(
     rigid : (n, 6) array
         Modal coordinates of the rigid-body motions.
     """
-    turned_shapes = [turned(shapes, dof_map, a) for a in range(3)]
-    weighted = [mass @ field for field in turned_shapes]
-    m = shapes.T @ (mass @ shapes)
-    x = np.stack([shapes.T @ w for w in weighted])
-    z = np.stack([np.stack([turned_shapes[a].T @ weighted[b] for b in range(3)]) for a in range(3)])
+    count = shapes.shape[1]
+    m, x, z = np.empty((count, count)), np.empty((3, count, count)), np.empty((3, 3, count, count))
+    for start in range(0, count, _BLOCK):
+        some = slice(start, start + _BLOCK)
+        m[:, some] = shapes.T @ (mass @ shapes[:, some])
+        for b in range(3):
+            weighted = mass @ turned(shapes[:, some], dof_map, b)
+            x[b, :, some] = shapes.T @ weighted
+            for a in range(3):  # A_aᵀ = -A_a
+                z[a, b, :, some] = -shapes.T @ turned(weighted, dof_map, a)
     return InertiaInvariants((m + m.T) / 2, x, z, rigid)

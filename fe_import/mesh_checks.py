@@ -159,7 +159,15 @@ def _check_connections(mesh: SolidMesh) -> None:
             "remove doubled or overlapping elements",
         )
     incidence = sp.csr_array((np.ones(len(label)), (owner, label)))
-    parts, part = connected_components(incidence @ incidence.T, directed=False)
+    shared = (incidence @ incidence.T).tocoo()
+    twins = (shared.row != shared.col) & (shared.data == len(mesh.element.faces))
+    if twins.any():
+        raise _faulty(
+            mesh,
+            f"two elements have the same corners, one is {_element(mesh, int(shared.row[twins.argmax()]))}",
+            "remove doubled elements",
+        )
+    parts, part = connected_components(shared, directed=False)
     if parts > 1:
         sizes = np.bincount(part)
         smallest = _element(mesh, int((part == sizes.argmin()).argmax()))

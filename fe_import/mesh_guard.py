@@ -91,6 +91,7 @@ def check_declared(path: Path, name: str) -> None:
             for section in (b"$Nodes", b"$Elements"):
                 for count in _msh_counts(text, section):
                     _check_count(section.decode(), count, size // 4, name)
+            _check_sections(text, name)
         elif path.suffix.lower() in NASTRAN and not _GRID.search(text, max(0, text.find(b"BEGIN BULK"))):
             raise FEImportError(  # meshio would look for it for ever
                 Cause.MESH, "no GRID after BEGIN BULK", where=name, remedy="export the bulk data with its mesh"
@@ -104,17 +105,63 @@ def _number(word: bytes) -> float:
         return float("nan")
 
 
+def _msh_format(text: mmap.mmap) -> list[bytes]:
+    """The words of a .msh file up to its version, type of file and size of numbers."""
+    return text[: text.find(b"\n", text.find(b"$MeshFormat") + 12) + 1].split()
+
+
+def _is_text(text: mmap.mmap) -> bool:
+    return _msh_format(text)[2:3] == [b"0"]
+
+
 def _msh_counts(text: mmap.mmap, section: bytes) -> list[float]:
     """Blocks and members of a section; of MSH 2 its members."""
-    head = text[: text.find(b"\n", text.find(b"$MeshFormat") + 12) + 1].split()
+    head = _msh_format(text)
     place = text.find(section + b"\n")
     if place < 0 or len(head) < 4:
         return []
     begin = place + len(section) + 1
-    if head[1].startswith(b"4") and head[2] == b"1":
+    if head[1].startswith(b"4") and not _is_text(text):
         return [float(n) for n in struct.unpack("=QQ", text[begin : begin + 16].ljust(16, b"\0"))]
     end = text.find(b"\n", begin)
     return [_number(word) for word in text[begin : end if end >= 0 else None].split()[:2]]
+
+
+def _check_sections(text: mmap.mmap, name: str) -> None:
+    """Sections of a .msh file end, and there are as many physical names as it says."""
+    for section in (b"Nodes", b"Elements", b"PhysicalNames", b"Entities"):
+        begin, end = text.find(b"$" + section + b"\n"), text.find(b"$End" + section)
+        if begin >= 0 and end < begin:
+            raise _damaged(f"${section.decode()} does not end", name)
+        if section == b"Elements" and begin >= 0:
+            most = 1 + int(sum(_msh_counts(text, b"$Elements")))
+            if _is_text(text) and (lines := text[begin:end].count(b"\n") - 1) > most:
+                raise _damaged(f"$Elements has {lines} lines, {most} are declared", name)
+        if section == b"PhysicalNames" and begin >= 0:
+            count, *names = text[begin:end].decode("utf-8", "replace").splitlines()[1:] or [""]
+            if count.strip() != str(len(names)):
+                raise _damaged(f"$PhysicalNames declares another count than its {len(names)} lines", name)
+
+
+def _damaged(message: str, name: str) -> FEImportError:
+    return FEImportError(Cause.MESH, message, where=name, remedy="the file is damaged or cut off; write the mesh again")
+
+
+def check_found(path: Path, name: str, points: int, cells: int) -> None:
+    """Hold what was read of a .msh file against what it declares.
+
+    Raises
+    ------
+    FEImportError
+        ``MESH``.
+    """
+    if path.suffix.lower() != ".msh":
+        return
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
+        for section, found in ((b"$Nodes", points), (b"$Elements", cells)):
+            declared = _msh_counts(text, section)
+            if declared and declared[-1] != found:
+                raise _damaged(f"{section.decode()} declares {declared[-1]:.0f}, {found} were found", name)
 
 
 def _check_count(what: str, count: float, limit: int, name: str) -> None:

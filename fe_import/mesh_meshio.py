@@ -17,7 +17,7 @@ import meshio
 import numpy as np
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh_guard import NASTRAN, bounded_memory, check_declared
+from fe_import.mesh_guard import NASTRAN, bounded_memory, check_declared, check_found
 from fe_import.mesh_raw import Block, RawMesh
 
 MOST_GROUPS = 1000  # different numbers in an array; more are labels, not groups
@@ -48,7 +48,8 @@ def read_with_meshio(path: Path, name: str) -> RawMesh:
             where=name,
             remedy="export the mesh in the basic coordinate system",
         )
-    blocks = [Block(b.type, b.dim, b.data) for b in raw.cells]
+    blocks = [_block(b, name) for b in raw.cells]
+    check_found(path, name, len(raw.points), sum(len(b.cells) for b in blocks))
     mesh = RawMesh(raw.points, blocks, mirrored=suffix == ".med")
     mesh.point_sets.update({str(key): points for key, points in raw.point_sets.items()})
     for key, cells in raw.cell_sets.items():
@@ -61,9 +62,25 @@ def read_with_meshio(path: Path, name: str) -> RawMesh:
         for group, members in _groups(key, list(per_block), mesh, named):
             mesh.cell_sets.setdefault(group, members)
     for key, values in raw.point_data.items():
+        if suffix in NASTRAN and key == "nastran:ref":
+            continue  # coordinate systems, no groups
         for group, members in _groups(key, [values], mesh, []):
             mesh.point_sets.setdefault(group, members[0])
     return mesh
+
+
+def _block(cells: Any, name: str) -> Block:
+    data, width = np.asarray(cells.data), meshio._mesh.num_nodes_per_cell.get(cells.type)
+    if data.ndim != 2 or data.dtype.kind not in "iu" or (width is not None and data.shape[1] != width):
+        raise FEImportError(
+            Cause.MESH,
+            f"cells of type {cells.type} have another number of nodes than these have",
+            where=name,
+            value=" x ".join(map(str, data.shape)),
+            limit=width,
+            remedy="the file is damaged or cut off; write the mesh again",
+        )
+    return Block(cells.type, cells.dim, data)
 
 
 def _read(path: Path, name: str) -> Any:

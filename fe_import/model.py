@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -150,8 +151,19 @@ class FEModel:
                 modes[self.dof_map[:, component], 3 + axis] = fields[axis]
         return modes
 
+    def dof_positions(self) -> Array:
+        """(f, 3) where each independent dof sits; the centre of the nodes for those of no node [m]."""
+        positions = np.tile(self.nodes.mean(axis=0), (self.mass.shape[0], 1))
+        for rows in self.dof_map.T:
+            positions[rows[rows >= 0]] = self.nodes[rows >= 0]
+        return positions[self.independent]
+
     def reduced_matrices(self) -> tuple[sp.csc_array, sp.csc_array]:
         """Mass and stiffness over the independent dofs, the coupling eliminated."""
+        return self._reduced_matrices
+
+    @cached_property
+    def _reduced_matrices(self) -> tuple[sp.csc_array, sp.csc_array]:
         if self.coupling is None:
             return self.mass, self.stiffness
         c = self.coupling

@@ -109,7 +109,7 @@ def inertia_relief(model: FEModel, rigid: Array, loads: Array) -> Array:
     held = la.qr(moving.T, mode="r", pivoting=True)[-1][:6]  # six dofs that hold the link without strain
     free = np.setdiff1d(np.arange(len(moving)), held)
     inner = stiffness[free][:, free].tocsc()
-    solve = factorize(inner, "stiffness of the held link")
+    solve = factorize(inner, "stiffness of the held link", model.dof_positions()[free])
     result = np.zeros_like(force)
     result[free] = solve(force[free])
     result[free] += solve(force[free] - inner @ result[free])

@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import importlib.metadata
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,17 +25,21 @@ from fe_import.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal
 from fe_import.plausibility import plausible_link, plausible_materials
 from fe_import.recovery import recovery_maps
 from fe_import.reduction import REDUCTIONS, Basis
+from fe_import.solver import chosen_solver
+from fe_import.solver.watch import telling
 from fe_import.static_check import check_static
 from fe_import.toml_file import choose
 
 
-def reduce_link(link: LinkFile | Path | str) -> ModalModel:
+def reduce_link(link: LinkFile | Path | str, tell: Callable[[str], None] | None = None) -> ModalModel:
     """Reduce the finite-element model of a link.
 
     Parameters
     ----------
     link : LinkFile, Path or str
         A link description, or its file.
+    tell : callable, optional
+        Gets a message when a long computation begins, with the memory and time that it takes, and on its way.
 
     Returns
     -------
@@ -56,7 +61,8 @@ def reduce_link(link: LinkFile | Path | str) -> ModalModel:
     """
     if not isinstance(link, LinkFile):
         link = load_link(link)
-    return reduce_model(build_model(link), link)
+    with telling(tell):
+        return reduce_model(build_model(link), link)
 
 
 def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
@@ -151,6 +157,7 @@ def provenance(link: LinkFile, model: FEModel, selection: dict[str, Any] | None 
         "interface_dofs": str(len(model.interface_dofs)),
         "kind": model.kind,
         "method": options["method"],
+        "solver": chosen_solver().name,
         "options": json.dumps(options, sort_keys=True),
         **({"selection": json.dumps(selection, sort_keys=True)} if selection else {}),
         **{f"source: {key}": text for key, text in model.notes.items()},
@@ -204,6 +211,7 @@ def reduction_summary(model: ModalModel) -> dict[str, Any]:
     return {
         "link": model.name,
         "method": model.provenance.get("method", ""),
+        "solver": model.provenance.get("solver", ""),
         "form": model.form,
         "dofs": int(model.provenance.get("dofs", 0)),
         "interface_dofs": int(model.provenance.get("interface_dofs", 0)),

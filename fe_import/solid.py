@@ -1,27 +1,18 @@
-"""Mass and stiffness of a solid link: 3-D linear elasticity, assembled by scikit-fem.
-
-With G_ab[i, j] = ∫ ∂_a φ_i ∂_b φ_j the stiffness between component a of node i and b of node j is λ G_ab +
-μ G_ba + μ δ_ab tr G (Lamé's λ, μ), so that scalar integrals are enough. The shape functions interpolate the
-geometry as well (isoparametric elements), hex20's curved sides with its own twenty.
-"""
+"""Mass and stiffness of a solid link: 3-D linear elasticity of isotropic materials."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-import skfem
-from skfem.mapping import MappingIsoparametric
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import IntArray
+from fe_import.solid_assembly import NodePattern, chunks, element_masses, element_stiffnesses
 from fe_import.solid_mesh import SolidMesh
-
-_CHUNK_VALUES = 2_000_000  # shape function values held at a time
 
 
 @dataclass(frozen=True)
@@ -75,64 +66,13 @@ def assemble_solid(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> tuple
         ``BAD_FIELD``: material out of range, elements without or with two materials.
     """
     assigned = _assigned_elements(mesh, materials)
-    element = mesh.element
-    local_nodes = np.ascontiguousarray(mesh.elements[:, element.skfem_order].T)
-    topology = element.topology(np.ascontiguousarray(mesh.nodes.T), local_nodes, elem=type(element.shape))
-    node_of_dof = np.empty(len(mesh.nodes), dtype=np.int64)
-    node_of_dof[topology.dofs.element_dofs] = local_nodes
-
-    mass: Any = 0
-    stiffness: dict[tuple[int, int], Any] = dict.fromkeys(_GRADIENT_FORMS, 0)
+    pattern = NodePattern(mesh)
+    masses, stiffnesses = np.zeros(pattern.size), np.zeros(9 * pattern.size)
     for material, elements in zip(materials, assigned, strict=True):
-        lam, mu = material.lame
-        for basis in _bases(mesh, topology, elements, element.mass_order):
-            mass = mass + material.density * sp.csr_array(_MASS_FORM.assemble(basis))
-        for basis in _bases(mesh, topology, elements, element.stiffness_order):
-            g = {ab: sp.csr_array(form.assemble(basis)) for ab, form in _GRADIENT_FORMS.items()}
-            trace = g[0, 0] + g[1, 1] + g[2, 2]
-            for (a, b), g_ab in g.items():
-                block = lam * g_ab + mu * g_ab.T
-                stiffness[a, b] = stiffness[a, b] + (block + mu * trace if a == b else block)
-
-    blocks = [[stiffness[a, b] if a <= b else stiffness[b, a].T for b in range(3)] for a in range(3)]
-    return (
-        _node_major(sp.block_diag([mass] * 3), node_of_dof),
-        _node_major(sp.block_array(blocks), node_of_dof),
-    )
-
-
-def _gradient_form(a: int, b: int) -> Any:
-    return skfem.BilinearForm(lambda u, v, _: v.grad[a] * u.grad[b])
-
-
-_GRADIENT_FORMS = {(a, b): _gradient_form(a, b) for a in range(3) for b in range(a, 3)}
-_MASS_FORM = skfem.BilinearForm(lambda u, v, _: v * u)
-
-
-def _bases(mesh: SolidMesh, topology: Any, elements: IntArray, order: int) -> Iterator[Any]:
-    """Scalar bases over a few elements at a time, which bounds the memory."""
-    element = mesh.element
-    quadrature = element.quadrature(order)
-    step = max(1, _CHUNK_VALUES // (len(element.reference_nodes) * quadrature[1].size))
-    for start in range(0, len(elements), step):
-        yield skfem.Basis(
-            topology,
-            element.shape,
-            mapping=MappingIsoparametric(topology, element.shape),  # it caches Jacobians as long as it lives
-            elements=elements[start : start + step],
-            quadrature=quadrature,
-            dofs=topology.dofs,
-            disable_doflocs=True,
-        )
-
-
-def _node_major(matrix: Any, node_of_dof: IntArray) -> sp.csc_array:
-    """Rows (component, scikit-fem's dof) -> rows 3 * node + component, symmetric to the last bit."""
-    n = len(node_of_dof)
-    row = (3 * node_of_dof + np.arange(3)[:, None]).ravel()
-    coo = sp.coo_array(matrix)
-    ordered = sp.csc_array((coo.data, (row[coo.coords[0]], row[coo.coords[1]])), shape=(3 * n, 3 * n))
-    return sp.csc_array((ordered + ordered.T) / 2)
+        for some in chunks(mesh, elements):
+            pattern.add_masses(masses, some, element_masses(mesh, some, material.density))
+            pattern.add_stiffnesses(stiffnesses, some, element_stiffnesses(mesh, some, *material.lame))
+    return pattern.mass(masses), pattern.stiffness(stiffnesses)
 
 
 def _assigned_elements(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> list[IntArray]:

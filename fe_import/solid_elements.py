@@ -101,6 +101,13 @@ class SolidElement:
         middle = [at[frozenset(corners[c] for c in between)] for between in self.midpoints]
         return np.array([*corners, *middle], dtype=np.int64)
 
+    def shape_values(self, points: Array) -> Array:
+        """(k, q) shape functions at points (3, q)."""
+        values = np.empty((len(self.reference_nodes), points.shape[1]))
+        for local, node in enumerate(self.skfem_order):
+            values[node] = self.shape.lbasis(points, local)[0]
+        return values
+
     def shape_gradients(self, points: Array) -> Array:
         """Derivatives of the shape functions with respect to the reference coordinates.
 

@@ -7,12 +7,11 @@ start when they do not fit into memory.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 
+from fe_import.dense import dense_modes, polishing, singular_matrix
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array
 from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chosen_solver
@@ -21,7 +20,7 @@ from fe_import.solver.memory import gigabytes, refuse_too_large
 from fe_import.solver.multifrontal import OutsidePattern, negative_pivots
 from fe_import.solver.watch import Progress, say
 
-Matrix: TypeAlias = Array | sp.csc_array
+__all__ = ["Factorization", "dense_modes", "factorize", "lowest_modes", "modes_below", "polishing"]
 
 _DENSE = 600  # below this size LAPACK is faster than Lanczos and finds every mode
 _RESIDUAL = 1e-6  # relative residual of an accepted eigenpair; Lanczos to working precision gives below 1e-9
@@ -76,7 +75,7 @@ def factorize(matrix: sp.csc_array, what: str, positions: Array | None = None, r
     try:
         factor = solver.factorize(matrix, elimination, progress)
     except SingularMatrix:
-        raise _singular(what) from None
+        raise singular_matrix(what) from None
     return Factorization(solver.name, elimination, factor)
 
 
@@ -94,14 +93,6 @@ def _canonical(matrix: sp.csc_array) -> sp.csc_array:
         matrix = matrix.copy()
         matrix.sum_duplicates()
     return matrix
-
-
-def _singular(what: str) -> FEImportError:
-    return FEImportError(
-        Cause.NOT_DEFINITE,
-        f"the {what} is singular or unstable: some part can move without strain",
-        remedy="connect all parts, remove hinges inside the link, or give the free part stiffness",
-    )
 
 
 def lowest_modes(
@@ -238,62 +229,3 @@ def _count(stiffness: sp.csc_array, mass: sp.csc_array, shift: float, eliminatio
     needed = elimination.peak_bytes(keep=False)
     refuse_too_large(needed, f"count of modes of {stiffness.shape[0]} dofs")
     return negative_pivots(stiffness, elimination, _announced(elimination, "counting modes", needed), mass, shift)
-
-
-def dense_modes(stiffness: Array, mass: Array, count: int | None, what: str) -> tuple[Array, Array]:
-    """`lowest_modes` of small dense matrices; all modes with mass when ``count`` is None."""
-    try:
-        # solved as M φ = μ K φ, μ = 1/ω²: massless directions are the null space of M, and the largest μ, the
-        # lowest modes, are the most accurate
-        diagonal = np.diag(stiffness)
-        if not (diagonal > 0).all():
-            raise _singular(what)
-        scale = 1 / np.sqrt(diagonal)
-        mass, stiffness = mass * np.outer(scale, scale), stiffness * np.outer(scale, scale)
-        mu, modes = la.eigh(mass, stiffness)
-    except (la.LinAlgError, ValueError):
-        raise _singular(what) from None
-    mu, modes = mu[::-1], modes[:, ::-1]
-    finite = mu > 1e-13 * mu[:1]
-    mu, modes = mu[finite][:count], modes[:, finite][:, :count]
-    omega, change = polishing(stiffness, mass, 1 / np.sqrt(mu), modes / np.sqrt(mu))
-    return omega, scale[:, None] * (modes / np.sqrt(mu)) @ change
-
-
-def polishing(stiffness: Matrix, mass: Matrix, omega: Array, modes: Array) -> tuple[Array, Array]:
-    """What makes the upper modes as accurate as the lower ones.
-
-    Solved for μ = 1/ω², a mode is known to rounding times μ₁/μ, so that the highest of many are neither
-    mass-orthonormal nor modes. All are orthonormalized, the lowest first, and those above the geometric middle of
-    the spectrum are found again within their span as eigenvectors for ω², where they are the accurate ones.
-
-    Parameters
-    ----------
-    stiffness, mass : (d, d) dense or sparse
-    omega : (m,) array
-        In rising order.
-    modes : (d, m) array
-
-    Returns
-    -------
-    omega : (m,) array
-    change : (m, m) array
-        Near the identity; ``modes @ change`` are the better modes.
-    """
-    change = _orthonormalizing(modes, mass)
-    high = omega**2 > omega[:1] * omega[-1:]
-    if len(omega) == 0 or omega[-1] < 100 * omega[0]:
-        return omega, change
-    change[:, high] = change[:, high] @ _orthonormalizing(modes @ change[:, high], mass)
-    stiff = modes @ change[:, high]
-    squared, turn = la.eigh(stiff.T @ (stiffness @ stiff))
-    change[:, high] = change[:, high] @ (turn * np.where(np.diag(turn) < 0, -1.0, 1.0))
-    omega = np.concatenate([omega[~high], np.sqrt(squared)])
-    order = np.argsort(omega, kind="stable")  # a pair of equal frequencies may stand on both sides of the middle
-    return omega[order], change[:, order]
-
-
-def _orthonormalizing(modes: Array, mass: Matrix) -> Array:
-    """(m, m) upper triangle that makes nearly mass-orthonormal modes orthonormal, the first ones first."""
-    lower = la.cholesky(modes.T @ (mass @ modes), lower=True)
-    return np.asarray(la.solve_triangular(lower, np.eye(len(lower)), lower=True).T)

@@ -3,19 +3,19 @@
 A reader may refuse a damaged file with an error of the package. What it accepts must be one of:
 
 - unchanged: everything that it read is as in the sound file;
-- value: the damage put one number or word in the place of another of equal syntax (same lines, same fields), which no
-  reader can tell from an intended one; nothing else about the file changed;
-- lines: of a text format that states no counts, whole lines are gone, moved or repeated (its other lines are as
-  they were, but for one).
+- value: the damage put one number or word in the place of another of equal syntax (same lines, same fields; a swap of
+  two blocks some of them), which no reader can tell from an intended one; nothing else about the file changed;
+- told: a set of a mesh cannot be followed any more, and the mesh says so;
+- lines: of a text format that states no counts, whole lines are gone or moved (its other lines are as they were, but
+  for one of the same syntax or cut short), or what was read is part of what was there.
 
 Anything else is a silent acceptance: entries lost by a cut, shifted fields, garbage read as numbers, numbers that are
-not finite. So are another exception than the package's own, and a case that takes longer than its time limit.
+not finite. Another exception than the package's own, and a case that takes longer than its time limit, are faults too.
 """
 
 from __future__ import annotations
 
 import contextlib
-import gzip
 import math
 import re
 import signal
@@ -34,9 +34,9 @@ from fe_import.errors import ReportedError
 Facts = frozenset[Any]
 _NUMBER = re.compile(rb"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?(?![\w.])")
 _FORTRAN = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))([-+]\d+)")  # Nastran's 1.5+3
-_FIELDS = re.compile(r"[\s,;=()\"'<>\[\]{}]+")
-_BAD_NUMBERS = (b"nan", b"1e400", b"-1", b"123456789012345678901234567890", b"0", b"inf", b"7.5", b"1e30", b"2147483648")
-_TOKENS = (b",", b"*", b"%", b"\n", b"\0", b"\xff", b" ", b"=", b'"', b"1_0", b"\x1f\x8b", b"-", b".", b"**", b"$", b"\r\n")
+_FIELDS = tuple(re.compile(rf"[\s,;{more}]+") for more in ("", r"=\"'<>\[\]{}"))  # of tables, of keywords and records
+_NUMBERS = (b"nan", b"inf", b"1e400", b"1e30", b"-1", b"0", b"7.5", b"2147483648", b"123456789012345678901234567890")
+_MARKS = [*b', * ** % $ = " - . 1_0 \xff \0 #'.split(b" "), b" ", b"\n", b"\r\n"]
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def _insert(data: bytes, rng: np.random.Generator) -> bytes:
 
 def _insert_token(data: bytes, rng: np.random.Generator) -> bytes:
     at = int(rng.integers(len(data) + 1))
-    return data[:at] + _TOKENS[int(rng.integers(len(_TOKENS)))] + data[at:]
+    return data[:at] + _MARKS[int(rng.integers(len(_MARKS)))] + data[at:]
 
 
 def _number(data: bytes, rng: np.random.Generator) -> bytes:
@@ -132,7 +132,7 @@ def _number(data: bytes, rng: np.random.Generator) -> bytes:
     if not found:
         return _byte(data, rng)
     chosen = found[int(rng.integers(len(found)))]
-    return data[: chosen.start()] + _BAD_NUMBERS[int(rng.integers(len(_BAD_NUMBERS)))] + data[chosen.end() :]
+    return data[: chosen.start()] + _NUMBERS[int(rng.integers(len(_NUMBERS)))] + data[chosen.end() :]
 
 
 def _overwrite(data: bytes, rng: np.random.Generator) -> bytes:
@@ -189,38 +189,37 @@ def same_syntax(before: str, after: str) -> bool:
     """Whether two lines have the same fields, one number in the place of another, or one word."""
     if before == after:
         return True
-    old, new = (_FIELDS.split(line.strip()) for line in (before, after))
     number = {"integer", "real"}
-    pairs = [(_kind(a), _kind(b)) for a, b in zip(old, new, strict=False)]
-    return len(old) == len(new) and all(a == b or {a, b} <= number for a, b in pairs)
+    for fields in _FIELDS:
+        old, new = (fields.split(line.strip()) for line in (before, after))
+        pairs = [(_kind(a), _kind(b)) for a, b in zip(old, new, strict=False)]
+        if len(old) == len(new) and all(a == b or {a, b} <= number for a, b in pairs):
+            return True
+    return False
 
 
 def _texts(data: bytes) -> list[str]:
-    return data.decode("utf-8", errors="replace").splitlines()
+    return [line for line in data.decode("utf-8", errors="replace").splitlines() if line.strip()]
 
 
 def replaces_a_value(before: bytes, after: bytes, *, binary: bool) -> bool:
-    """Whether the damage put a value in the place of another, and did nothing else to the file."""
+    """Whether the damage put values in the place of others, and did nothing else to the file."""
     if binary:
-        if len(before) != len(after):
-            return False
-        changed = [k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b]
-        return not changed or changed[-1] - changed[0] < 16
+        return len(before) == len(after)
     old, new = _texts(before), _texts(after)
-    if len(old) != len(new):
-        return False
-    changed = [k for k, (a, b) in enumerate(zip(old, new, strict=True)) if a != b]
-    return len(changed) <= 1 and all(same_syntax(old[k], new[k]) for k in changed)
+    changed = [(a, b) for a, b in zip(old, new, strict=False) if a != b]
+    return len(old) == len(new) and len(changed) <= 4 and all(same_syntax(a, b) for a, b in changed)
 
 
 def keeps_lines(before: bytes, after: bytes) -> bool:
-    """Whether the file has whole lines of the sound one only, but for one of the same syntax or one cut short."""
+    """Whether the file has lines of the sound one only, but for one of the same syntax, cut short, or of labels."""
     old = _texts(before)
     known = set(old)
     new = [line for line in _texts(after) if line not in known]
-    if not new:
-        return True
-    return len(new) == 1 and any(same_syntax(line, new[0]) or line.startswith(new[0]) for line in old)
+    if len(new) > 1:
+        return False
+    one = new[0] if new else ""
+    return not re.search(r"[^\d,;\s]", one) or any(line.startswith(one) or same_syntax(line, one) for line in old)
 
 
 @dataclass(frozen=True)
@@ -241,11 +240,17 @@ class Reader:
     binary : bool
     counts : bool
         Whether lost lines must be noticed: the format states how much it holds, or what it holds must fit together.
-    packed : bool
-        Files are compressed; any change must be noticed.
+    ends : bool
+        Whether a cut must be noticed.
+    damage : callable, optional
+        ``damage(content, rng)`` in place of `damaged`.
+    exact : bool
+        Whether every change must be noticed: the format has checksums.
     judge : callable, optional
         ``judge(content, found)`` in place of the comparison of facts, for formats in which any sound text is legal:
         whether all that stands in the file was taken as it stands.
+    told : callable, optional
+        Names of the sets that the content says are lost; their facts are tuples that begin with ``set``.
     """
 
     name: str
@@ -255,8 +260,11 @@ class Reader:
     facts: Callable[[Any], Facts]
     binary: bool = False
     counts: bool = True
-    packed: bool = False
+    ends: bool = True
+    damage: Callable[[bytes, np.random.Generator], Damage] | None = None
+    exact: bool = False
     judge: Callable[[bytes, Any], bool] | None = None
+    told: Callable[[Any], Facts] | None = None
 
 
 @dataclass
@@ -331,21 +339,20 @@ def fuzz(reader: Reader, seeds: Sequence[int], folder: Path, limit: float = 5.0,
     keep : Path, optional
         Folder for the files of faulty cases.
     """
-    sound = {name: gzip.compress(data, mtime=0) if reader.packed else data for name, data in reader.files.items()}
-    for name, data in sound.items():
+    for name, data in reader.files.items():
         (folder / name).write_bytes(data)
     expected = reader.facts(reader.read(folder))
     report = Report()
     for seed in seeds:
         rng = np.random.default_rng(seed)
         target = reader.targets[int(rng.integers(len(reader.targets)))]
-        before = sound[target]
-        damage = damaged(before, rng, binary=reader.binary or reader.packed)
+        before = reader.files[target]
+        damage = reader.damage(before, rng) if reader.damage else damaged(before, rng, binary=reader.binary)
         (folder / target).write_bytes(damage.content)
         count = len(report.faults)
         found = attempt(lambda: reader.read(folder), report, limit)
         if found is not None:
-            verdict = _verdict(reader, before, damage.content, found, expected)
+            verdict = _verdict(reader, before, damage, found, expected)
             if verdict:
                 report.accepted[verdict] += 1
             else:
@@ -358,19 +365,25 @@ def fuzz(reader: Reader, seeds: Sequence[int], folder: Path, limit: float = 5.0,
     return report
 
 
-def _verdict(reader: Reader, before: bytes, after: bytes, found: Any, expected: Facts) -> str:
-    """``unchanged``, ``value`` or ``lines``; empty for what must not be."""
+def _verdict(reader: Reader, before: bytes, damage: Damage, found: Any, expected: Facts) -> str:
+    """``unchanged``, ``value``, ``told`` or ``lines``; empty for what must not be."""
+    facts = reader.facts(found)
     if reader.judge is not None:
-        if not reader.judge(after, found):
-            return ""
-        return "unchanged" if reader.facts(found) == expected else "value"
-    if reader.facts(found) == expected:
+        taken = reader.judge(damage.content, found)
+        return "" if not taken else "unchanged" if facts == expected else "value"
+    if facts == expected:
         return "unchanged"
-    if reader.packed:
+    if reader.exact:
         return ""
-    if replaces_a_value(before, after, binary=reader.binary):
+    if replaces_a_value(before, damage.content, binary=reader.binary):
         return "value"
-    return "lines" if not reader.counts and not reader.binary and keeps_lines(before, after) else ""
+    if reader.told is not None:
+        lost = reader.told(found)
+        if facts == frozenset(f for f in expected if not (f[0] == "set" and f[1] in lost)):
+            return "told"
+    if reader.counts or (reader.ends and damage.kind.startswith("cut")):
+        return ""
+    return "lines" if facts < expected or keeps_lines(before, damage.content) else ""
 
 
 def fuzz_all(

@@ -9,6 +9,7 @@ from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.closed_run import loop_integrator
 from erls.formulations.erls import Erls
 from erls.formulations.ffr import Ffr
+from erls.formulations.ffr.absolute import absolute_generalized_alpha
 from erls.integrators import INTEGRATORS
 from erls.integrators.base import Integrator
 from erls.mechanism.chain import Mechanism
@@ -27,7 +28,9 @@ def formulate(mechanism: Mechanism, settings: Simulation) -> Formulation:
 
 
 def integrator(mechanism: Mechanism, settings: Simulation) -> Integrator:
-    """The integrator that the settings name, for chains or for loops."""
+    """The integrator that the settings name, for chains, for loops, or for absolute coordinates."""
+    if settings.coordinates == "absolute":
+        return absolute_generalized_alpha
     return loop_integrator(settings.integrator) if mechanism.loops else INTEGRATORS[settings.integrator]
 
 

@@ -19,6 +19,7 @@ import scipy.linalg as la
 
 from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State, TreeFormulation
+from erls.formulations.loop_failures import comes_apart, locks
 from erls.formulations.loop_rows import Closure, LoopForce, LoopRows, about
 from erls.formulations.loop_start import Start, find_start, start_velocity
 from erls.formulations.loop_static import closed_equilibrium
@@ -120,18 +121,8 @@ class ClosedChain:
         worst = int(np.argmax(gaps))
         if not gaps[worst] > OPEN * self.reach:
             return
-        left_out = worst not in self.kept
-        raise SimulationError(
-            Cause.LOOP_OPEN,
-            f"{self.rows.names[worst]}: the joint comes apart"
-            + (", in a direction that followed from the other conditions at the start" if left_out else ""),
-            where=f"t = {t:.9g} s",
-            value=f"{gaps[worst]:.3g} m",
-            limit=f"{OPEN * self.reach:.3g} m",
-            remedy="start outside of special positions (links in line or in one plane)"
-            if left_out
-            else "check whether the loop can reach this position; try smaller tolerances or steps",
-        )
+        limit = OPEN * self.reach
+        raise comes_apart(t, self.rows.names[worst], float(gaps[worst]), limit, worst not in self.kept)
 
     def accelerations(self, t: float, y: Array, v: Array, decay: float = 0.0) -> tuple[Array, Array, Closure]:
         """Accelerations (n,), multipliers of all rows (m,) and the conditions at a state.
@@ -153,7 +144,7 @@ class ClosedChain:
         free, flexibility = np.split(la.cho_solve(factor, np.column_stack([-force, rows.T])), [1], axis=1)
         scaled = _solve(rows @ flexibility, rows @ free[:, 0] + (self.row_metres * wanted)[kept])
         if scaled is None:
-            raise self.locked(t, found, self.stiffest(found))
+            raise self.locked(t, self.stiffest(found))
         along = self.row_metres[:, None] * found.rows[:, self.tree.free]
         every = np.linalg.lstsq(along.T, rows.T @ scaled, rcond=DEPENDENT)[0] if len(kept) < len(along) else scaled
         return np.asarray(free[:, 0] - flexibility @ scaled), np.asarray(self.row_metres * every), found
@@ -165,21 +156,17 @@ class ClosedChain:
             return 1.0, 0
         return float(values[-1]), int(self.rows.owner[self.kept[np.abs(left[:, -1]).argmax()]])
 
-    def locked(self, t: float, found: Closure, stiffest: tuple[float, int]) -> SimulationError:
+    @cached_property
+    def stiffest_at_start(self) -> float:
+        """Smallest singular value there."""
+        return self.stiffest(self.closure(0.0, self.start.y, np.zeros(self.size)))[0]
+
+    def locked(self, t: float, stiffest: tuple[float, int]) -> SimulationError:
         """The loop cannot move on."""
-        begin = self.stiffest(self.closure(0.0, self.start.y, np.zeros(self.size)))[0]
-        return SimulationError(
-            Cause.LOOP_OPEN,
-            f"loop {self.mechanism.loops[stiffest[1]].name!r} locks: in this singular position (a dead point, links in "
-            "line) its joints cannot follow",
-            where=f"t = {t:.9g} s",
-            value=f"{stiffest[0]:.3g} metres per metre",
-            limit=f"{begin:.3g} at the start",
-            remedy="keep the drive within what the lengths of the links allow, or end the run before",
-        )
+        return locks(t, self.mechanism.loops[stiffest[1]].name, stiffest[0], self.stiffest_at_start)
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
-        """(n,) accelerations, with decay of what loops are open by; NaN where they lock, which integrators step around."""
+        """(n,) accelerations, with decay of what loops are open by; NaN where they lock: integrators step around it."""
         try:
             return self.accelerations(t, y, v, DECAY)[0]
         except SimulationError as problem:
@@ -196,7 +183,7 @@ class ClosedChain:
         return np.asarray(self.mass_matrix(t, y) @ (a - self.acceleration(t, y, v)))
 
     def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
-        """Those of the chain along motions that the loops allow, and the decay of the others."""
+        """Those of the chain with what the loops' forces take of them, and the decay; not symmetric."""
         stiffness, damping = self.tree.stiffness_and_damping(t, y, v)
         rows = self.scaled_rows(self.closure(t, y, v), self.kept) * self.metres
         moves = np.linalg.solve(self.mass_matrix(t, y), rows.T)
@@ -204,8 +191,8 @@ class ClosedChain:
         along = np.eye(self.size) - moves @ loads
         across = rows.T @ loads
         return (
-            along.T @ stiffness @ along + DECAY**2 * across,
-            along.T @ damping @ along + 2 * DECAY * across,
+            along.T @ stiffness + DECAY**2 * across,
+            along.T @ damping + 2 * DECAY * across,
         )
 
     def initial_state(self) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
 from erls.lie.so3 import Array
 
 NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
+AT = 1e-3  # of the same: adaptive steps would shrink for ever
 _ITS_OWN = (Cause.INTERRUPTED, Cause.SINGULAR_MASS)
 
 
@@ -109,11 +110,15 @@ def loop_integrator(name: str) -> Integrator:
 
 
 def _watching(chain: ClosedChain, observer: Observer | None) -> Observer:
-    """An observer that refuses steps at which a loop has come apart; within a step a trial may."""
+    """An observer that refuses steps at which a loop has come apart or locks; within a step a trial may."""
 
     def observe(t: float, knots: Callable[[], Solution]) -> None:
         found = knots()
-        chain.refuse_open(t, chain.closure(t, found.y[-1], found.v[-1]))
+        closure = chain.closure(t, found.y[-1], found.v[-1])
+        chain.refuse_open(t, closure)
+        here = chain.stiffest(closure)
+        if here[0] < AT * chain.stiffest_at_start:
+            raise chain.locked(t, here)
         if observer is not None:
             observer(t, knots)
 
@@ -125,7 +130,5 @@ def _dead_point(chain: ClosedChain, solution: Solution) -> SimulationError | Non
     t, y, v = float(solution.t[-1]), solution.y[-1], solution.v[-1]
     if not (np.isfinite(y).all() and np.isfinite(v).all()):
         return None
-    found = chain.closure(t, y, v)
-    begin = chain.stiffest(chain.closure(0.0, chain.start.y, np.zeros(chain.size)))[0]
-    here = chain.stiffest(found)
-    return chain.locked(t, found, here) if here[0] < NEAR * begin else None
+    here = chain.stiffest(chain.closure(t, y, v))
+    return chain.locked(t, here) if here[0] < NEAR * chain.stiffest_at_start else None

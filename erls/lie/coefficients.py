@@ -23,6 +23,10 @@ from erls.lie.so3 import Array
 _SERIES_BELOW = 4.0  # no term of a Stumpff series exceeds the one before it there, for k ≥ 1
 _TERMS = 12
 _INVERSE_FACTORIALS = np.array([1 / factorial(k) for k in range(2 * _TERMS + 12)])
+_SUFFICIENT = [  # squared angles up to which term 0, 1, ... may be the last one, for each highest function
+    np.array([(1e-17 * factorial(2 * j + 1 + k) / factorial(max(k - 1, 0))) ** (1 / (j + 1)) for j in range(_TERMS)])
+    for k in range(8)
+]
 _POLE = 4 * np.pi**2
 _RATIO_BELOW = 0.5  # of x to the pole
 _ZETA = 2 * (zeta(2 * np.arange(19) + 2) - 1)  # falls by four from term to term
@@ -33,7 +37,7 @@ def stumpff(x: Array, highest: int) -> Array:
     found = np.empty((highest + 1, *np.shape(x)))
     inside = np.minimum(x, _SERIES_BELOW)
     last = np.zeros((2, *np.shape(x)))  # the two highest, from the smallest term on
-    for j in range(_TERMS, -1, -1):
+    for j in range(int(np.searchsorted(_SUFFICIENT[highest], np.max(inside, initial=0.0))), -1, -1):
         first = 2 * j + highest - 1
         last = _INVERSE_FACTORIALS[first : first + 2].reshape(2, *(1,) * np.ndim(x)) - inside * last
     found[highest - 1 :] = last
@@ -65,7 +69,9 @@ def inverse_coefficient(x: Array) -> tuple[Array, Array, Array]:
     """b(x) and its first and second derivative, each (...); infinite at θ = 2π."""
     y = np.minimum(np.asarray(x) / _POLE, _RATIO_BELOW)
     value, slope, bend = np.zeros((3, *np.shape(x)))
-    for k in range(len(_ZETA) - 1, -1, -1):
+    ratio = float(np.max(y, initial=0.0)) / 4  # of one term to the next
+    last = len(_ZETA) - 1 if ratio > 0.1 else int(-37 / np.log(max(ratio, 1e-17))) + 2
+    for k in range(last, -1, -1):
         bend = slope * 2 + y * bend
         slope = value + y * slope
         value = _ZETA[k] + y * value

@@ -65,7 +65,15 @@ def exp(xi: Array) -> Array:
 
 def log(h: Array) -> Array:
     """(..., 6) twists of motions (..., 4, 4), turning by at most π; at π as `erls.lie.rotation_maps.log`."""
-    psi = rotations.log(h[..., :3, :3])
+    return _with_turn(h, rotations.log(h[..., :3, :3]))
+
+
+def log_near(h: Array, near: Array) -> Array:
+    """(..., 6) the twists of motions (..., 4, 4) whose turn is closest to that of ``near`` (..., 6)."""
+    return _with_turn(h, rotations.log_near(h[..., :3, :3], near[..., 3:]))
+
+
+def _with_turn(h: Array, psi: Array) -> Array:
     back = np.swapaxes(rotations.tangent_inverse(psi), -1, -2)
     return np.concatenate([_times(back, h[..., :3, 3]), psi], axis=-1)
 

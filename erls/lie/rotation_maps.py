@@ -65,6 +65,17 @@ def log(rotation: Array) -> Array:
     return vectors
 
 
+def log_near(rotation: Array, near: Array) -> Array:
+    """(..., 3) the rotation vectors of rotations (..., 3, 3) closest to ``near``: they may pass π, and turn on."""
+    psi = log(rotation)
+    angle = np.sqrt(_squared(psi))
+    safe = np.where(angle > 0, angle, 1.0)
+    along = (psi * near).sum(axis=-1) / safe  # of near on the axis; without a turn there is no axis to go on about
+    turns = np.where(angle > 0, np.round((along - angle) / (2 * np.pi)), 0.0)
+    onward: Array = psi * (1 + 2 * np.pi * turns / safe)[..., None]
+    return onward
+
+
 def tangent(psi: Array) -> Array:
     """(..., 3, 3) T."""
     c = stumpff(_squared(psi), 3)

@@ -42,7 +42,11 @@ def read_csv(path: Path, where: str) -> NDArray[np.float64]:
     rows: list[list[float]] = []
     header = False
     for number, raw in enumerate(_read_text(path, where).split("\n"), start=1):
-        line = raw.split("#", 1)[0].strip()
+        line, mark, _ = raw.partition("#")
+        if mark and line and not line[-1].isspace():
+            remedy = "put a blank before a comment"
+            raise _fault(path, f"line {number}", "a comment begins within a number", raw.strip()[:40], remedy=remedy)
+        line = line.strip()
         if not line:
             continue
         fields = _split(line)

@@ -6,8 +6,10 @@ the world's axes; with ν = E [u; ω], E = diag(Rᵀ, 1), forces become Eᵀ f a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -17,20 +19,26 @@ from erls.lie.groups import SE3, Group
 from erls.lie.rotation_maps import skews
 from erls.nodal.elements import Elements
 from erls.nodal.joints import Joint, JointRows, Relative
-from erls.nodal.scatter import Scatter, dofs
+from erls.nodal.scatter import IntArray, Scatter, dofs
 
 _ONE_AND_HALF = 1.5 * np.eye(3)
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """A configuration: poses (k, 4, 4) of the nodes, and what each kind of elements remembers."""
+
+    poses: Array
+    memory: tuple[Any, ...]
 
 
 class NodalSystem:
     """A mechanism of nodal elements; a `erls.integrators.constrained.ConstrainedSystem`.
 
-    Its configuration is the (k, 4, 4) poses of the k nodes.
-
     Parameters
     ----------
     poses : (k, 4, 4) array
-        Nodes as built; they tell the size of the mechanism.
+        Nodes as built.
     elements : sequence of Elements
     joints : sequence of Joint
     group : Group
@@ -43,7 +51,7 @@ class NodalSystem:
         self.count, self.elements, self.group = len(poses), tuple(elements), group
         self.local = group is SE3
         self.rows = JointRows(joints)
-        self._poses = poses
+        self.start = Nodes(poses, tuple(e.remember(poses[e.nodes], None) for e in self.elements))
         n, m = self.size, self.constraints
         places = [dofs(e.nodes) for e in elements]
         joint_places = dofs(self.rows.nodes)
@@ -55,7 +63,11 @@ class NodalSystem:
         self._constraint = Scatter([numbers], [joint_places[self.rows.joint_of_row]], (m, n))
         nodes = 6 * np.arange(self.count)[:, None] + np.arange(6)
         self._nodes = Scatter([nodes], [nodes], (n, n))
-        self._last: tuple[float, Array, Relative | None] = (0.0, poses, None)  # configurations never change in place
+        self._last: tuple[float, Nodes, Relative | None] = (
+            0.0,
+            self.start,
+            None,
+        )  # configurations never change in place
 
     @property
     def size(self) -> int:
@@ -82,7 +94,7 @@ class NodalSystem:
                     reach[node] = max(reach[node], float(np.linalg.norm(frame[:3, 3])))
         for element in self.elements:
             for nodes in element.nodes:
-                places = self._poses[nodes, :3, 3]
+                places = self.start.poses[nodes, :3, 3]
                 far = np.linalg.norm(places[:, None] - places, axis=2).max(axis=1)
                 reach[nodes] = np.maximum(reach[nodes], far)
         least = float(reach.max(initial=0.0)) or 1.0
@@ -96,39 +108,45 @@ class NodalSystem:
         found = {t for e in self.elements for t in e.breakpoints}
         return tuple(sorted(found | {t for j in self.rows.joints for t in j.breakpoints}))
 
-    def compose(self, q: Array, increment: Array) -> Array:
-        """(k, 4, 4) poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
-        moved: Array = self.group.move(q, increment.reshape(-1, 6))
+    def at(self, poses: Array, near: Nodes | None = None) -> Nodes:
+        """Configuration at poses (k, 4, 4), with elements wound up as they are nearby (as built unless given)."""
+        before = (near or self.start).memory
+        found = (e.remember(poses[e.nodes], m) for e, m in zip(self.elements, before, strict=True))
+        return Nodes(poses, tuple(found))
+
+    def compose(self, q: Nodes, increment: Array) -> Nodes:
+        """Poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
+        moved: Array = self.group.move(q.poses, increment.reshape(-1, 6))
         turn = moved[:, :3, :3]
         moved[:, :3, :3] = turn @ (_ONE_AND_HALF - 0.5 * np.swapaxes(turn, 1, 2) @ turn)
-        return moved
+        return self.at(moved, q)
 
     def tangent(self, increment: Array) -> Matrix:
         """(n, n) a block for each node."""
         return self._nodes.matrix([self.group.tangent(increment.reshape(-1, 6))])
 
-    def residual(self, t: float, q: Array, v: Array, a: Array) -> Array:
+    def residual(self, t: float, q: Nodes, v: Array, a: Array) -> Array:
         """(n,) inertia and internal forces less loads."""
         twist, twist_rate = self._twists(q, v, a)
         return self._turned(q, self._forces(t, q, twist, twist_rate))
 
-    def mass_matrix(self, t: float, q: Array) -> Matrix:
+    def mass_matrix(self, t: float, q: Nodes) -> Matrix:
         """(n, n)"""
-        mass = self._mass.matrix([e.mass(q[e.nodes]) for e in self.elements])
+        mass = self._mass.matrix([e.mass(q.poses[e.nodes], m) for e, m in self._each(q)])
         if self.local:
             return mass
         turn = self._turning(q)
         return turn.T @ mass @ turn
 
     def stiffness_and_damping(
-        self, t: float, q: Array, v: Array, a: Array, multipliers: Array
+        self, t: float, q: Nodes, v: Array, a: Array, multipliers: Array, material: bool = False
     ) -> tuple[Matrix, Matrix]:
-        """(n, n) twice, exact."""
+        """(n, n) twice; ``material`` as in `erls.nodal.elements.Elements`."""
         twist, rate = self._twists(q, v, a)
-        found = [
-            e.derivatives(t, q[e.nodes], *(x[e.nodes].reshape(len(e.nodes), -1) for x in (twist, rate)))
-            for e in self.elements
-        ]
+        found = []
+        for element, memory in self._each(q):
+            motion = _of_elements(twist, element.nodes), _of_elements(rate, element.nodes)
+            found.append(element.derivatives(t, q.poses[element.nodes], memory, *motion, material=material))
         relative = self._relative(t, q)
         stiffness = self._stiffness.matrix([*(k for k, _ in found), self.rows.stiffness(relative, multipliers)])
         damping = self._mass.matrix([c for _, c in found])
@@ -141,20 +159,20 @@ class NodalSystem:
             np.add.at(force, nodes[nodes >= 0], reaction[nodes >= 0, 6 * side : 6 * side + 6])
         return self._in_world_axes(q, (twist, rate, force), stiffness, damping)
 
-    def constraint(self, t: float, q: Array) -> Array:
+    def constraint(self, t: float, q: Nodes) -> Array:
         """(m,) Φ."""
         return self.rows.violation(self._relative(t, q))
 
-    def constraint_matrix(self, t: float, q: Array) -> Matrix:
+    def constraint_matrix(self, t: float, q: Nodes) -> Matrix:
         """(m, n) B."""
         rows = self._constraint.matrix([self._relative(t, q).gradient[:, None, :]])
         return rows if self.local else rows @ self._turning(q)
 
-    def constraint_rate(self, t: float, q: Array) -> Array:
+    def constraint_rate(self, t: float, q: Nodes) -> Array:
         """(m,) Φ_t."""
         return self.rows.rate(self._relative(t, q))
 
-    def constraint_bias(self, t: float, q: Array, v: Array) -> Array:
+    def constraint_bias(self, t: float, q: Nodes, v: Array) -> Array:
         """(m,) Φ̈ − B a."""
         twist, rate = self._twists(q, v, np.zeros_like(v))
         ends = np.concatenate([self._at_joint_ends(twist, side) for side in (0, 1)], axis=1)
@@ -167,88 +185,91 @@ class NodalSystem:
         result: Array = bias + (gradient * swing[self.rows.joint_of_row]).sum(axis=1)
         return result
 
-    def stored(self, t: float, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+    def stored(self, t: float, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """(12 k,) position and rotation matrix of each node, with first and second derivatives."""
         twist, rate = self._twists(q, v, a)
-        turn, spin = q[:, :3, :3], skews(twist[:, 3:])
+        turn, spin = q.poses[:, :3, :3], skews(twist[:, 3:])
         slide = rate[:, :3] + (spin @ twist[:, :3, None])[:, :, 0]
         first = np.concatenate([(turn @ twist[:, :3, None]), turn @ spin], axis=2)
         second = np.concatenate([turn @ slide[:, :, None], turn @ (spin @ spin + skews(rate[:, 3:]))], axis=2)
-        knot = np.concatenate([q[:, :3, 3:], turn], axis=2)
+        knot = np.concatenate([q.poses[:, :3, 3:], turn], axis=2)
         return _flat(knot), _flat(first), _flat(second)
 
-    def energy(self, t: float, q: Array, v: Array) -> tuple[float, float]:
+    def energy(self, t: float, q: Nodes, v: Array) -> tuple[float, float]:
         """Kinetic and potential energy [J]."""
         twist, _ = self._twists(q, v, np.zeros_like(v))
-        pairs = [e.energy(t, q[e.nodes], twist[e.nodes].reshape(len(e.nodes), -1)) for e in self.elements]
+        pairs = [e.energy(t, q.poses[e.nodes], m, _of_elements(twist, e.nodes)) for e, m in self._each(q)]
         return sum(k for k, _ in pairs), sum(p for _, p in pairs)
 
-    def _twists(self, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
+    def _each(self, q: Nodes) -> Iterator[tuple[Elements, Any]]:
+        return zip(self.elements, q.memory, strict=True)
+
+    def _twists(self, q: Nodes, v: Array, a: Array) -> tuple[Array, Array]:
         """(k, 6) twists of all nodes in their own axes, and their rates."""
         v, a = v.reshape(-1, 6), a.reshape(-1, 6)
         if self.local:
             return v, a
-        back = np.swapaxes(q[:, :3, :3], 1, 2)
+        back = np.swapaxes(q.poses[:, :3, :3], 1, 2)
         twist, rate = v.copy(), a.copy()
         twist[:, :3] = (back @ v[:, :3, None])[:, :, 0]
         rate[:, :3] = (back @ a[:, :3, None])[:, :, 0] - _crossed(v[:, 3:], twist[:, :3])
         return twist, rate
 
-    def _forces(self, t: float, q: Array, twist: Array, rate: Array) -> Array:
+    def _forces(self, t: float, q: Nodes, twist: Array, rate: Array) -> Array:
         """(n,) wrenches in node axes."""
         result = np.zeros(self.size)
-        for element, place in zip(self.elements, self._places, strict=True):
+        for (element, memory), place in zip(self._each(q), self._places, strict=True):
             nodes = element.nodes
-            shape = (len(nodes), -1)
-            found = element.forces(t, q[nodes], twist[nodes].reshape(shape), rate[nodes].reshape(shape))
+            motion = _of_elements(twist, nodes), _of_elements(rate, nodes)
+            found = element.forces(t, q.poses[nodes], memory, *motion)
             result += np.bincount(place.ravel(), found.ravel(), self.size)
         return result
 
-    def _turned(self, q: Array, force: Array) -> Array:
+    def _turned(self, q: Nodes, force: Array) -> Array:
         """Eᵀ f."""
         if self.local:
             return force
         blocks = force.reshape(-1, 6).copy()
-        blocks[:, :3] = (q[:, :3, :3] @ blocks[:, :3, None])[:, :, 0]
+        blocks[:, :3] = (q.poses[:, :3, :3] @ blocks[:, :3, None])[:, :, 0]
         return blocks.ravel()
 
-    def _turning(self, q: Array) -> Matrix:
+    def _turning(self, q: Nodes) -> Matrix:
         """(n, n) E."""
         blocks = np.zeros((self.count, 6, 6))
-        blocks[:, :3, :3] = np.swapaxes(q[:, :3, :3], 1, 2)
+        blocks[:, :3, :3] = np.swapaxes(q.poses[:, :3, :3], 1, 2)
         blocks[:, 3:, 3:] = np.eye(3)
         return self._nodes.matrix([blocks])
 
     def _in_world_axes(
         self,
-        q: Array,
+        q: Nodes,
         known: tuple[Array, Array, Array],
         stiffness: Matrix,
         damping: Matrix,
     ) -> tuple[Matrix, Matrix]:
         """Derivatives on R³×SO(3) from those on SE(3): chain rule over E(q) v, E(q) a + Ė v and Eᵀ f."""
         twist, rate, force = known
-        mass = self._mass.matrix([e.mass(q[e.nodes]) for e in self.elements])
+        mass = self._mass.matrix([e.mass(q.poses[e.nodes], m) for e, m in self._each(q)])
         turn = self._turning(q)
         spin, slide = skews(twist[:, 3:]), skews(twist[:, :3])
         swing, by_velocity, by_turn, of_force = np.zeros((4, self.count, 6, 6))
         swing[:, :3, 3:] = slide  # of E v by a turn
-        by_velocity[:, :3, :3] = -spin @ np.swapaxes(q[:, :3, :3], 1, 2)  # of Ė v
+        by_velocity[:, :3, :3] = -spin @ np.swapaxes(q.poses[:, :3, :3], 1, 2)  # of Ė v
         by_velocity[:, :3, 3:] = slide
         fixed = rate[:, :3] + _crossed(twist[:, 3:], twist[:, :3])  # E a
         by_turn[:, :3, 3:] = skews(fixed) - spin @ slide  # of E a + Ė v
-        of_force[:, :3, 3:] = -q[:, :3, :3] @ skews(force[:, :3])
+        of_force[:, :3, 3:] = -q.poses[:, :3, :3] @ skews(force[:, :3])
         swing, by_velocity, by_turn, of_force = (
             self._nodes.matrix([b]) for b in (swing, by_velocity, by_turn, of_force)
         )
         whole = turn.T @ (stiffness @ turn + damping @ swing + mass @ by_turn) + of_force
         return whole, turn.T @ (damping @ turn + mass @ by_velocity)
 
-    def _relative(self, t: float, q: Array) -> Relative:
+    def _relative(self, t: float, q: Nodes) -> Relative:
         known_t, known_q, known = self._last
         if known is not None and known_t == t and known_q is q:
             return known
-        with_ground = np.concatenate([q, np.eye(4)[None]])  # the ground is the last node, −1
+        with_ground = np.concatenate([q.poses, np.eye(4)[None]])  # the ground is the last node, −1
         found = self.rows.relative(t, with_ground[self.rows.nodes[:, 0]], with_ground[self.rows.nodes[:, 1]])
         self._last = t, q, found
         return found
@@ -257,6 +278,11 @@ class NodalSystem:
         with_ground = np.concatenate([per_node, np.zeros((1, 6))])
         result: Array = with_ground[self.rows.nodes[:, side]]
         return result
+
+
+def _of_elements(per_node: Array, nodes: IntArray) -> Array:
+    """(e, 6k) twists of the nodes (e, k) of elements."""
+    return per_node[nodes].reshape(len(nodes), 6 * nodes.shape[1])
 
 
 def _crossed(a: Array, b: Array) -> Array:

@@ -3,6 +3,9 @@
 Every condition is linear in the entries of p and Q: c · p + ⟨C, Q⟩ = 0. With the relative twist η of the outer frame,
 in its axes, ṗ = Q η_v and Q̇ = Q η̃_ω. Only relative motion enters, so that a rigid motion of both frames changes
 nothing. Along a prescribed coordinate s(t) the inner frame runs ahead by exp(s ẑ) of the joint's z axis.
+
+Conditions are written in the axes of the inner frame, in whose node their gradient does not change on the way. A joint
+between the ground and a node is therefore taken from the node's side, with −s.
 """
 
 from __future__ import annotations
@@ -35,22 +38,23 @@ def _about(i: int) -> Condition:
     return f"no turn about {'xyz'[i]}", np.zeros(3), entries
 
 
-def _normal(i: int, j: int) -> Condition:
+def _normal(name: str, i: int, j: int) -> Condition:
+    """Axis i of the inner frame at a right angle to axis j of the outer one."""
     entries = np.zeros((3, 3))
     entries[i, j] = 1.0
-    return f"inner {'xyz'[i]} normal to outer {'xyz'[j]}", np.zeros(3), entries
+    return name, np.zeros(3), entries
 
 
 _PINNED = [_along(i) for i in range(3)]
 _STRAIGHT = [_about(i) for i in range(3)]
-_PARALLEL = [_normal(0, 2), _normal(1, 2)]
+_PARALLEL = [_normal("no tilt of x", 0, 2), _normal("no tilt of y", 1, 2)]
 
 CONDITIONS: dict[str, list[Condition]] = {
     "fixed": _PINNED + _STRAIGHT,
     "revolute": _PINNED + _PARALLEL,
     "prismatic": _PINNED[:2] + _STRAIGHT,
     "cylindrical": _PINNED[:2] + _PARALLEL,
-    "universal": [*_PINNED, _normal(0, 1)],
+    "universal": [*_PINNED, _normal("axes at right angles", 0, 1)],
     "spherical": _PINNED,
 }
 """What each joint forbids. The free axis of revolute, prismatic and cylindrical joints is z; the two axes of a
@@ -142,9 +146,10 @@ class JointRows:
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         self.joints = tuple(joints)
-        self.nodes: IntArray = np.array([[j.inner, j.outer] for j in joints], dtype=np.int64).reshape(-1, 2)
-        self._inner = np.array([j.inner_frame for j in joints]).reshape(-1, 4, 4)
-        self._outer = np.array([j.outer_frame for j in joints]).reshape(-1, 4, 4)
+        sides = [((j.inner, j.inner_frame), (j.outer, j.outer_frame))[:: self._sign(j)] for j in joints]
+        self.nodes: IntArray = np.array([[i, o] for (i, _), (o, _) in sides], dtype=np.int64).reshape(-1, 2)
+        self._inner = np.array([frame for (_, frame), _ in sides]).reshape(-1, 4, 4)
+        self._outer = np.array([frame for _, (_, frame) in sides]).reshape(-1, 4, 4)
         self._of_inner = motions.adjoint_inverse(self._inner)
         self._of_outer = motions.adjoint_inverse(self._outer)
         found = [(k, *condition) for k, joint in enumerate(joints) for condition in joint.conditions]
@@ -152,7 +157,15 @@ class JointRows:
         self.names = tuple(f"joint {joints[k].name!r}: {name}" for k, name, _, _ in found)
         self._c = np.array([c for _, _, c, _ in found]).reshape(-1, 3)
         self._entries = np.array([e for _, _, _, e in found]).reshape(-1, 3, 3)
+        turned = [j.type == "universal" and self._sign(j) < 0 for j in joints]  # its two axes differ
+        for row, k in enumerate(self.joint_of_row):
+            if turned[k]:
+                self._entries[row] = self._entries[row].T.copy()
         self._driven = [k for k, joint in enumerate(joints) if joint.motion is not None]
+
+    @staticmethod
+    def _sign(joint: Joint) -> int:
+        return -1 if joint.inner == GROUND else 1
 
     def relative(self, t: float, inner: Array, outer: Array) -> Relative:
         """At node poses (j, 4, 4)."""
@@ -163,7 +176,8 @@ class JointRows:
             for k in self._driven:
                 motion, at = self.joints[k].motion, _DRIVEN[self.joints[k].type]
                 if motion is not None:
-                    ahead[k, at], drive[k, at], rate[k, at] = motion(t)
+                    coordinate = self._sign(self.joints[k]) * np.array(motion(t))
+                    ahead[k, at], drive[k, at], rate[k, at] = coordinate
             moved = motions.exp(ahead)
             transform, frame = motions.adjoint_inverse(moved) @ transform, frame @ moved
         pose = motions.inverse(inner @ frame) @ outer @ self._outer

@@ -82,11 +82,14 @@ class RigidBodies:
         self.matrices = np.array([b.matrix for b in bodies]).reshape(-1, 6, 6)
         self.gravity = np.asarray(gravity, dtype=float)
 
-    def mass(self, poses: Array) -> Array:
+    def remember(self, poses: Array, before: None) -> None:
+        """Nothing."""
+
+    def mass(self, poses: Array, memory: None) -> Array:
         """(b, 6, 6) constant."""
         return self.matrices
 
-    def forces(self, t: float, poses: Array, v: Array, a: Array) -> Array:
+    def forces(self, t: float, poses: Array, memory: None, v: Array, a: Array) -> Array:
         """(b, 6) inertia less weight."""
         push = a.copy()
         push[:, :3] -= self._gravity(poses)
@@ -95,14 +98,16 @@ class RigidBodies:
         result: Array = (self.matrices @ push[:, :, None] - turning)[:, :, 0]
         return result
 
-    def derivatives(self, t: float, poses: Array, v: Array, a: Array) -> tuple[Array, Array]:
+    def derivatives(
+        self, t: float, poses: Array, memory: None, v: Array, a: Array, material: bool = False
+    ) -> tuple[Array, Array]:
         """(b, 6, 6) twice: weight turns with the body; gyroscopic forces."""
         stiffness = np.zeros_like(self.matrices)
         stiffness[:, :, 3:] = -self.matrices[:, :, :3] @ skews(self._gravity(poses))
         momentum = (self.matrices @ v[:, :, None])[:, :, 0]
         return stiffness, -np.swapaxes(bracket(v), 1, 2) @ self.matrices - cobracket(momentum)
 
-    def energy(self, t: float, poses: Array, v: Array) -> tuple[float, float]:
+    def energy(self, t: float, poses: Array, memory: None, v: Array) -> tuple[float, float]:
         """Kinetic energy and that of gravity."""
         kinetic = 0.5 * float(np.einsum("bi,bij,bj", v, self.matrices, v))
         h = poses[:, 0]

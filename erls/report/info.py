@@ -94,6 +94,9 @@ def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
         ("joint", "type", "drive", "link", "source"), rows
     )
     text += "\n\npoints: " + (", ".join(p.name for p in record.points) or "none")
+    if record.loops:
+        joined = (f"{x.name} ({x.type}, {x.link} to {x.to_link or 'ground'})" for x in record.loops)
+        text += "\nloops: " + ", ".join(joined)
     text += "\nsimulation: " + ", ".join(f"{k} = {v}" for k, v in simulation.items() if v is not None)
     return {"file": "scene", "scene": scene.name, **msgspec.to_builtins(record)}, text
 

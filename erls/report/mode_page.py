@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from erls.report.tables import table
 from erls.studies.mode_count import SUCCESSIVE, ModeStudy, Point
 
 _LARGEST_FILE = 1_000_000
+_COLUMN = re.compile(r"joint .+|point .+ [xyz]")
 
 
 @dataclass(frozen=True)
@@ -57,15 +59,20 @@ def read_printed(path: Path) -> Printed:
     if not rows or [c.strip() for c in rows[0][:2]] != ["elastic_modes", "t"] or len(rows[0]) < 3:
         raise _bad(path, "not a table of published figures", ", ".join(rows[0]) if rows else None)
     columns = tuple(c.strip() for c in rows[0][2:])
+    for column in columns:
+        if not _COLUMN.fullmatch(column) or columns.count(column) > 1:
+            raise _bad(path, "a column names no joint or axis of a point, or stands twice", column)
     found: dict[int, tuple[float, ...]] = {}
     times: set[float] = set()
     for number, row in enumerate(rows[1:], start=2):
         try:
             values = [float(c) for c in row]
-            if len(values) != len(rows[0]) or not np.isfinite(values).all() or values[0] != int(values[0]):
+            if len(values) != len(rows[0]) or not np.isfinite(values).all() or "_" in "".join(row):
                 raise ValueError
         except ValueError:
             raise _bad(path, f"row {number} does not fit the header", ", ".join(row)) from None
+        if values[0] != int(values[0]) or values[0] < 0 or int(values[0]) in found:
+            raise _bad(path, f"row {number}: a mode count is a whole number and stands once", row[0])
         found[int(values[0])] = tuple(values[2:])
         times.add(values[1])
     if len(times) != 1:

@@ -29,7 +29,7 @@ def modal_report(model: ModalModel) -> str:
     head = (
         f"{model.name}: {p.get('kind', 'link')} model, {p.get('dofs', '?')} dofs, "
         f"{len(model.interface_nodes)} interfaces ({', '.join(i.name for i in model.interface_nodes)}), "
-        f"reduced by {p.get('method', '?')} to {model.modes} coordinates"
+        f"reduced by {p.get('method', '?')} to {model.modes} coordinates (solver {p.get('solver', '?')})"
     )
     parts = [head]
     if model.form == "orthonormal":

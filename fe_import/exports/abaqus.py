@@ -15,13 +15,8 @@ from fe_import.exports.base import Export, ExportFormat
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import read_inp
 from fe_import.exports.points import MODAL, Points, points_of, rows_of
-from fe_import.exports.superelement import assembled
+from fe_import.exports.superelement import assembled, refuse_cut
 from fe_import.link import Vector
-
-_NOT_CONDENSED = (
-    "remove *BOUNDARY from the substructure; CalculiX (2.20) writes the block of the kept dofs instead of the "
-    "condensed matrix, so export its full matrices (*FREQUENCY, SOLVER=MATRIXSTORAGE; format 'calculix')"
-)
 
 
 class AbaqusOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -75,6 +70,8 @@ def _read_full(files: Mapping[str, Path], points: Points) -> Export:
             remedy="write both with *MATRIX OUTPUT, FORMAT=MATRIX INPUT, or give the file 'dofs' with a row per line",
         )
     matrices = {role: entries.matrix(codes) for role, entries in found.items()}
+    if "mass" in matrices:
+        refuse_cut(matrices["mass"], rows, str(files["mass"]))
     notes = {"program": "Abaqus, *MATRIX GENERATE"}
     return assembled(matrices.get("mass"), matrices["stiffness"], rows, points, str(files["stiffness"]), notes)
 
@@ -107,7 +104,7 @@ def _read_reduced(files: Mapping[str, Path], options: AbaqusOptions, points: Poi
                 remedy="write both with one *SUBSTRUCTURE MATRIX OUTPUT",
             )
         held = other.matrices
-    return assembled(held.get("MASS"), stiffness, rows, points, str(path), notes, _NOT_CONDENSED)
+    return assembled(held.get("MASS"), stiffness, rows, points, str(path), notes)
 
 
 ABAQUS = ExportFormat(

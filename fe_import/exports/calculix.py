@@ -22,8 +22,8 @@ from fe_import.exports.dofs import COMPONENTS, dof_map_of_rows
 from fe_import.exports.entries import matrix_of_entries
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import InpMesh, read_inp
-from fe_import.exports.text_file import TextFile
 from fe_import.model import IntArray
+from fe_import.text_file import TextFile
 
 _ROW = re.compile(r"(\d{1,15})\.(\d{1,4})")  # as text: 4.10 is not 4.1
 _EQUATIONS = ("EQUATION", "MPC", "RIGID BODY", "TIE", "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTING COUPLING")

@@ -1,8 +1,7 @@
-"""Element types of input decks: how many nodes they have, and their faces and lines for pictures."""
+"""Faces and lines of the elements of input decks, for pictures."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,8 +10,6 @@ from fe_import.model import IntArray
 from fe_import.solid_elements import SOLID_ELEMENTS
 from fe_import.solid_mesh import FACE_TRIANGLES
 
-_COUNTED = re.compile(r"(?:C3D|S|M3D|R3D|SFM3D|SC|T3D|CSS)(\d+)[A-Z]*\Z")  # the number is that of the nodes
-_NODES = {"B31": 2, "B33": 2, "B32": 3, "MASS": 1, "ROTARYI": 1, "SPRING1": 1, "SPRING2": 2, "SPRINGA": 2}
 _SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}
 _WEDGE = {
     6: ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
@@ -21,13 +18,6 @@ _WEDGE = {
         *((0, 1, 4, 3, 6, 13, 9, 12), (1, 2, 5, 4, 7, 14, 10, 13), (2, 0, 3, 5, 8, 12, 11, 14)),
     ),
 }
-
-
-def node_count(kind: str) -> int | None:
-    """Nodes of an element of this type, None for a type that is not known."""
-    if match := _COUNTED.match(kind):
-        return int(match.group(1))
-    return _NODES.get(re.sub(r"(?<=B3\d)[A-Z]+\Z", "", kind))
 
 
 def picture(elements: Mapping[str, IntArray]) -> tuple[IntArray, IntArray]:

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from fe_import.exports.base import Export, ExportFormat
 from fe_import.exports.entries import matrix_of_entries
 from fe_import.exports.row_files import place_rows
-from fe_import.exports.text_file import Rows, TextFile
+from fe_import.text_file import Rows, TextFile
 
 _CHOICES = (("matrix",), ("coordinate", "array"), ("real", "integer", "double"), ("general", "symmetric"))
 _REMEDY = "write a real matrix, coordinate or array, general or symmetric"

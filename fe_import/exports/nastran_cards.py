@@ -15,6 +15,7 @@ from fe_import.errors import Cause, FEImportError
 
 _INTEGER = re.compile(r"[+-]?\d{1,18}")
 _REAL = re.compile(r"([+-]?(?:\d+\.\d*|\.\d+|\d+(?=[EDed])))(?:[EDed]?([+-]\d{1,4})|[EDed](\d{1,4}))?")
+_COMMENT_IN_WORD = re.compile(r"[^\s,]\$")
 _DATA_COLUMNS = 72  # the rest of a line names its continuation
 _FREE_FORMAT = 10  # a comma among the first ten columns
 
@@ -72,7 +73,8 @@ def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Itera
     Raises
     ------
     FEImportError
-        ``EXPORT``: an INCLUDE that would have to be followed.
+        ``EXPORT``: an INCLUDE that would have to be followed; a line behind a card that is neither a card nor its
+        continuation.
     """
     name, fields, start = "", [], 0
     for number, raw in enumerate(lines, start=1):
@@ -80,11 +82,15 @@ def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Itera
         if not line:
             continue
         head, data = _split(line)
+        if name and _COMMENT_IN_WORD.search(raw):
+            raise _damaged(f"{where}: line {number}", "a comment begins within a field", raw)
         if not head or head[0] in "+*":
             if name:
                 fields += data
             continue
         if name:
+            if not head[0].isalpha():
+                raise _damaged(f"{where}: line {number}", "neither a card nor the continuation of one", raw)
             yield Card(name, tuple(fields), f"{where}: line {start}")
         name = ""
         keyword = head.rstrip("*").upper()
@@ -101,6 +107,10 @@ def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Itera
             name, fields, start = keyword, data, number
     if name:
         yield Card(name, tuple(fields), f"{where}: line {start}")
+
+
+def _damaged(where: str, message: str, line: str) -> FEImportError:
+    return FEImportError(Cause.EXPORT, message, where=where, value=line.strip()[:60], remedy="export again")
 
 
 def _split(line: str) -> tuple[str, list[str]]:

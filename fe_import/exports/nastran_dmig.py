@@ -20,10 +20,10 @@ from fe_import.exports.entries import matrix_of_entries
 from fe_import.exports.nastran_cards import Card, read_cards
 from fe_import.exports.nastran_grid import CARDS, grid_points
 from fe_import.exports.points import Points, points_of
-from fe_import.exports.superelement import assembled
-from fe_import.exports.text_file import TextFile
+from fe_import.exports.superelement import assembled, refuse_cut
 from fe_import.link import Vector
 from fe_import.model import IntArray
+from fe_import.text_file import TextFile
 
 _SQUARE, _SYMMETRIC = 1, 6
 _FORMS = {2: "rectangular", 9: "rectangular"}
@@ -160,7 +160,9 @@ def _export(stiffness: _Dmig, mass: _Dmig, points: Points) -> Export:
             )
     where = stiffness.where.rpartition(": line ")[0]
     notes = {"program": "Nastran, DMIG", "matrices": f"{stiffness.name}, {mass.name}"}
-    return assembled(_matrix(mass, codes), _matrix(stiffness, codes), rows, points, where, notes)
+    inertia = _matrix(mass, codes)
+    refuse_cut(inertia, rows, mass.where.rpartition(": line ")[0])
+    return assembled(inertia, _matrix(stiffness, codes), rows, points, where, notes)
 
 
 def _matrix(entries: _Dmig, codes: IntArray) -> sp.csc_array:

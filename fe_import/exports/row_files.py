@@ -24,8 +24,8 @@ from fe_import.errors import Cause, FEImportError, shortened
 from fe_import.exports.dofs import COMPONENTS, MODAL, dof_map_of_rows
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import read_inp
-from fe_import.exports.text_file import TextFile
 from fe_import.model import Array, IntArray
+from fe_import.text_file import TextFile
 
 _INTEGER = re.compile(r"\d{1,15}\Z")
 _NAMES = {name: k for k, name in enumerate(COMPONENTS)}
@@ -53,6 +53,18 @@ def _records(file: TextFile) -> Iterator[list[str]]:
             yield fields
 
 
+def _real(text: str) -> float:
+    try:
+        return math.nan if "_" in text else float(text.upper().replace("D", "E"))
+    except ValueError:
+        return math.nan
+
+
+def _is_header(fields: list[str]) -> bool:
+    """Words only: a line with a number in it is a row, faulty or not."""
+    return all(math.isnan(_real(f)) for f in fields) and not _INTEGER.match(fields[0])
+
+
 def read_dofs(path: Path) -> tuple[IntArray, IntArray]:
     """Node number and component of each row.
 
@@ -72,8 +84,8 @@ def read_dofs(path: Path) -> tuple[IntArray, IntArray]:
     rows: list[int] = []
     with TextFile(path) as file:
         for fields in _records(file):
-            if not nodes and fields[0] != "modal" and not _INTEGER.match(fields[0]):
-                continue  # a header
+            if not nodes and fields[0] != "modal" and _is_header(fields):
+                continue
             if fields == ["modal"]:
                 fields = ["0", "modal"]
             numbers, component = fields[:-1], fields[-1].lower()
@@ -154,12 +166,9 @@ def _read_nodes(path: Path) -> Place:
     seen: dict[int, int] = {}
     with TextFile(path) as file:
         for fields in _records(file):
-            if not rows and not fields[0][0].isdigit():
-                continue  # a header
-            try:
-                values = [float(f.upper().replace("D", "E")) for f in fields[1:]]
-            except ValueError:
-                values = [math.nan]
+            if not rows and _is_header(fields):
+                continue
+            values = [_real(f) for f in fields[1:]]
             if not _INTEGER.match(fields[0]) or len(values) > 6 or not all(map(math.isfinite, values)):
                 raise file.failure(
                     "expected a node and three coordinates, or also three angles",
@@ -203,6 +212,10 @@ def _read_sets(path: Path, labels: IntArray) -> dict[str, IntArray]:
     sets: dict[str, set[int]] = {}
     with TextFile(path) as file:
         for name, *members in _records(file):
+            if not members:
+                message = "a name and its nodes belong into one line"
+                remedy = "write 'NAME node node ...'"
+                raise file.failure(message, line=file.number, value=shortened(name), remedy=remedy)
             for text in members:
                 node = place.get(int(text)) if _INTEGER.match(text) else None
                 if node is None:

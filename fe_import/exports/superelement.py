@@ -10,7 +10,6 @@ centrifugal and Coriolis forces on modal coordinates.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,9 +20,6 @@ from fe_import.exports.base import Export
 from fe_import.exports.points import MODAL, Points
 from fe_import.model import Array, IntArray
 
-_GROUNDED = 1e-5  # of the size of the terms; rounding times the condition of a slender link leaves 1e-6
-_EXACT = 1e-9
-_DENSE = 3000  # rows; a larger matrix is not a condensed one
 _JOINED = 50  # so many kept nodes are joined by lines when the files name none
 _NO_COMPONENT = "export displacements and rotations only; name modal coordinates (modal_nodes of 'abaqus')"
 _NOTE = (
@@ -39,14 +35,13 @@ def assembled(
     points: Points,
     where: str,
     notes: dict[str, str],
-    grounded: str = "export a free link: without supports (SPC, *BOUNDARY) and springs to ground",
 ) -> Export:
     """The export of matrices whose rows are named.
 
     Parameters
     ----------
     mass, stiffness : (d, d) sparse CSC
-        Without a mass the stiffness is still looked at, before that is refused.
+        Without a mass an empty one is taken: the stiffness is looked at before that is refused.
     rows : (d, 2) int array
         Number of the node and component 1 to 6 of each row; component `MODAL` for modal coordinates, whatever their
         number.
@@ -55,14 +50,12 @@ def assembled(
     where : str
         File that names the rows, for messages.
     notes : dict of str
-    grounded : str
-        Remedy against a stiffness that resists rigid-body motion.
 
     Raises
     ------
     FEImportError
         ``EXPORT``: a component out of range, a row that stands twice, a modal coordinate without mass or stiffness;
-        ``BAD_REFERENCE``: a node without position; ``GROUNDED``.
+        ``BAD_REFERENCE``: a node without position.
     """
     component = rows[:, 1]
     outside = (component < 0) | (component > 6)
@@ -73,8 +66,10 @@ def assembled(
     nodal = np.flatnonzero(component != MODAL)
     modal = np.flatnonzero(component == MODAL)
     _refuse_twice(rows, where)
-    given = stiffness if mass is None else mass
-    _refuse_empty(given, stiffness, rows, modal, where)
+    if mass is None:
+        mass = sp.csc_array(stiffness.shape)
+    else:
+        _refuse_empty(mass, stiffness, rows, modal, where)
     labels, node = np.unique(rows[nodal, 0], return_inverse=True)
     dof_map = np.full((len(labels), 6), -1, dtype=np.int64)
     dof_map[node, component[nodal] - 1] = nodal
@@ -95,8 +90,8 @@ def assembled(
         lines = [(k, k + 1) for k in range(len(labels) - 1)]
     if len(modal):
         notes = {**notes, "superelement": _NOTE.format(rows=len(modal))}
-    export = Export(
-        mass=given,
+    return Export(
+        mass=mass,
         stiffness=stiffness,
         nodes=np.array([points.positions[int(label)] for label in labels]).reshape(-1, 3),
         labels=labels,
@@ -108,65 +103,30 @@ def assembled(
         triangles=np.array(triangles, dtype=np.int64).reshape(-1, 3),
         notes=notes,
     )
-    export = without_grounding(export, where, grounded)
-    if mass is None:
-        raise _fault("no mass matrix", where, None, remedy="export it as well; a file of its own has the role 'mass'")
-    return export
 
 
-def rigid_motions(export: Export) -> Array:
-    """(d, 6) rows of unit translations and of unit rotations about the origin; modal coordinates rest."""
-    x, y, z = export.nodes.T
-    fields = np.tile(np.eye(6), (len(x), 1, 1))
-    for axis, component, arm in ((0, 1, -z), (0, 2, y), (1, 0, z), (1, 2, -x), (2, 0, -y), (2, 1, x)):
-        fields[:, component, 3 + axis] = arm  # rotation ω moves x by ω × x
-    if export.orientations is not None:
-        turned = export.orientations.transpose(0, 2, 1)
-        fields = np.concatenate([turned @ fields[:, :3], turned @ fields[:, 3:]], axis=1)
-    result = np.zeros((export.mass.shape[0], 6))
-    kept = export.dof_map >= 0
-    result[export.dof_map[kept]] = fields[kept]
-    return result
+def refuse_cut(mass: sp.csc_array, rows: IntArray, where: str) -> None:
+    """Refuse a mass whose last rows are empty where all rows of the same components before them are not.
 
-
-def without_grounding(export: Export, where: str, remedy: str) -> Export:
-    """The export with a stiffness that does not resist rigid-body motions of its nodes.
-
-    A condensed stiffness is a small difference of large numbers, so rounding leaves it some resistance. It is taken
-    away, and noted: K' = PᵀKP, P = 1 - R (RᵀMR)⁻¹ RᵀM with the rigid motions R, keeps the strain energy of all motions
-    without momentum, and with it the elastic frequencies.
+    For formats that do not say how many entries they hold. Massless rows are legal, but seldom only the last ones.
 
     Raises
     ------
     FEImportError
-        ``GROUNDED``: more than rounding.
+        ``EXPORT``.
     """
-    motions = rigid_motions(export)
-    stiffness = export.stiffness
-    force = np.abs(stiffness @ motions).max(axis=0)
-    terms = (abs(stiffness) @ np.abs(motions)).max(axis=0)
-    resisting = float((force / np.where(terms > 0, terms, 1.0)).max())
-    if resisting > _GROUNDED:
-        raise FEImportError(
-            Cause.GROUNDED,
-            "the stiffness matrix resists rigid-body motion: it is not that of a free link",
-            where=where,
-            value=resisting,
-            limit=_GROUNDED,
-            remedy=remedy,
-        )
-    if resisting <= _EXACT or len(motions) > _DENSE:
-        return export
-    momentum = (export.mass @ motions).T
-    inertia = motions.T @ momentum.T
-    if np.linalg.matrix_rank(inertia, hermitian=True) < 6:
-        return export  # refused later, with its reason
-    along = np.linalg.solve(inertia, momentum)
-    strained = stiffness.toarray()
-    strained -= (stiffness @ motions) @ along
-    strained -= along.T @ (motions.T @ strained)
-    notes = {**export.notes, "grounding": f"rounding of {resisting:.1e} of the stiffness removed"}
-    return replace(export, stiffness=sp.csc_array(strained), notes=notes)
+    held = mass.diagonal() > 0
+    last = int(np.flatnonzero(held).max(initial=-1))
+    for component in np.unique(rows[last + 1 :, 1]):
+        alike = np.flatnonzero(rows[: last + 1, 1] == component)
+        if len(alike) and held[alike].all():
+            first = rows[last + 1]
+            raise _fault(
+                "the last rows of the mass matrix are empty: the file is cut off",
+                where,
+                f"node {first[0]}, component {first[1]}",
+                remedy="export again; if these rows have no mass indeed, give them a little",
+            )
 
 
 def _fault(message: str, where: str, value: Any, limit: Any = None, remedy: str = "") -> FEImportError:

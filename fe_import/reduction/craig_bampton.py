@@ -58,7 +58,8 @@ def _fixed_interface_modes(
     def lowest(count: int) -> tuple[Array, Array]:
         if available == 0:
             return np.zeros(0), np.zeros((0, 0))
-        return lowest_modes(parts.inner_stiffness, parts.inner_mass, count, "link with clamped interfaces")
+        what = "link with clamped interfaces"
+        return lowest_modes(parts.inner_stiffness, parts.inner_mass, count, what, solve=parts.solve)
 
     if options.selection == "frequency":
         return below_frequency(lowest, options, available, where)

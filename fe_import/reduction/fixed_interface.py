@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +11,7 @@ import scipy.sparse as sp
 from fe_import.inertia import mass_properties
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import interface_places
-from fe_import.sparse import factorize
+from fe_import.sparse import Factorization, factorize
 
 
 @dataclass(frozen=True)
@@ -26,6 +25,8 @@ class Partition:
         Positions of the interface dofs, in the order of the interfaces, and of all others.
     rigid : (f, 6) array
         Unit translations, and unit rotations about the centre of mass.
+    positions : (f, 3) array
+        Of the dofs.
     """
 
     mass: sp.csc_array
@@ -33,6 +34,7 @@ class Partition:
     boundary: IntArray
     inner: IntArray
     rigid: Array
+    positions: Array
 
     @cached_property
     def inner_mass(self) -> sp.csc_array:
@@ -51,12 +53,13 @@ class Partition:
 
     def static(self, loads: Array) -> Array:
         """Response of the inner dofs to loads on them, interfaces clamped, with one step of iterative refinement."""
-        found = self._solve(loads)
-        return np.asarray(found + self._solve(loads - self.inner_stiffness @ found))
+        found = self.solve(loads)
+        return np.asarray(found + self.solve(loads - self.inner_stiffness @ found))
 
     @cached_property
-    def _solve(self) -> Callable[[Array], Array]:
-        return factorize(self.inner_stiffness, "stiffness of the inner nodes")
+    def solve(self) -> Factorization:
+        """Of K_ii."""
+        return factorize(self.inner_stiffness, "stiffness of the inner nodes", self.positions[self.inner])
 
     def clamped_field(self, inner: Array) -> Array:
         """(f, k) fields with the interfaces at rest."""
@@ -74,7 +77,7 @@ def partition(model: FEModel) -> Partition:
     centre = mass_properties(rigid.T @ (mass @ rigid)).centre_of_mass
     for axis in range(3):
         rigid[:, 3 + axis] -= rigid[:, :3] @ np.cross(np.eye(3)[axis], centre)
-    return Partition(mass, stiffness, boundary, inner, rigid)
+    return Partition(mass, stiffness, boundary, inner, rigid, model.dof_positions())
 
 
 def constraint_modes(parts: Partition) -> Array:

@@ -8,7 +8,6 @@ With P = 1 - R RᵀM the response is P K_c⁻¹ Pᵀ f (Craig & Chang, AIAA J. 1
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,7 +18,7 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import interface_places
 from fe_import.reduction.rigid_modes import rigid_modes
-from fe_import.sparse import dense_modes, factorize, lowest_modes
+from fe_import.sparse import Factorization, dense_modes, factorize, lowest_modes
 
 _RIGID = 1e-6  # ω² of a rigid-body mode, per the shift; rounding leaves 1e-9 on a slender solid
 
@@ -37,6 +36,8 @@ class FreeBody:
         Coordinates of unit translations and unit rotations about the mesh origin in them.
     interfaces : (b,) int array
         Positions of the interface dofs; the first six are the support.
+    places : (f, 3) array
+        Where each dof sits.
     """
 
     mass: sp.csc_array
@@ -44,6 +45,7 @@ class FreeBody:
     rigid: Array
     motions: Array
     interfaces: IntArray
+    places: Array
 
     @cached_property
     def _rest(self) -> IntArray:
@@ -54,8 +56,9 @@ class FreeBody:
         return self.stiffness[self._rest][:, self._rest].tocsc()
 
     @cached_property
-    def _solve(self) -> Callable[[Array], Array]:
-        return factorize(self._supported, "stiffness of the link held at its first interface")
+    def _solve(self) -> Factorization:
+        what = "stiffness of the link held at its first interface"
+        return factorize(self._supported, what, self.places[self._rest])
 
     def elastic(self, fields: Array) -> Array:
         """The fields without their rigid-body motion."""
@@ -99,7 +102,7 @@ def free_body(model: FEModel, where: str) -> FreeBody:
     """
     mass, stiffness = model.reduced_matrices()
     rigid, motions = rigid_modes(mass, model.rigid_body_modes()[model.independent], where)
-    return FreeBody(mass, stiffness, rigid, motions, interface_places(model))
+    return FreeBody(mass, stiffness, rigid, motions, interface_places(model), model.dof_positions())
 
 
 def lowest_free_modes(body: FreeBody, static: Array, count: int) -> tuple[Array, Array]:
@@ -135,7 +138,7 @@ def lowest_free_modes(body: FreeBody, static: Array, count: int) -> tuple[Array,
         return np.zeros(0), np.zeros((body.mass.shape[0], 0))
     shift = float((strain[moved] / inertia[moved]).min())
     shifted = (body.stiffness + shift * body.mass).tocsc()
-    omega, modes = lowest_modes(shifted, body.mass, count + 6, "free link")
+    omega, modes = lowest_modes(shifted, body.mass, count + 6, "free link", positions=body.places)
     above = omega**2 / shift - 1  # ω² of the free link, per the shift
     if (above < _RIGID).sum() != 6:
         raise FEImportError(

@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from fe_import.model import Array, IntArray
 from fe_import.solver.graph import Graph
 
-LEAF = 40  # vertices that are not cut further
+LEAF = 20  # vertices that are not cut further
 _WINDOW = 0.1  # the cut is within this share of the vertices from the middle
 
 Flags = NDArray[np.bool_]

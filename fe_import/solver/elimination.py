@@ -105,9 +105,7 @@ def _children_first(number: IntArray) -> IntArray:
     return np.lexsort((np.arange(len(number)), -depth, last))
 
 
-def _fronts(
-    graph: Graph, place: IntArray, starts: IntArray
-) -> tuple[list[IntArray], tuple[tuple[int, ...], ...]]:
+def _fronts(graph: Graph, place: IntArray, starts: IntArray) -> tuple[list[IntArray], tuple[tuple[int, ...], ...]]:
     """Rows of each front, among the sorted vertices, and its children."""
     size, count = len(place), len(starts) - 1
     front = np.repeat(np.arange(count), np.diff(starts))

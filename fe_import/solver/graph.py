@@ -36,43 +36,45 @@ class Graph:
 
 def matrix_graph(matrix: sp.csc_array) -> Graph:
     """Graph of a symmetric matrix; an entry whose mirror image is not stored counts all the same."""
-    _, first, vertex = np.unique(_pattern_keys(matrix), return_index=True, return_inverse=True)
+    keys, symmetric = _pattern_keys(matrix)
+    if not symmetric:
+        pattern = sp.csc_array((np.ones(matrix.nnz, dtype=np.int8), matrix.indices, matrix.indptr), matrix.shape)
+        matrix = (pattern + pattern.T).tocsc()
+        keys, _ = _pattern_keys(matrix)
+    _, first, vertex = np.unique(keys, return_index=True, return_inverse=True)
     chosen = matrix[:, first]
     is_first = np.zeros(matrix.shape[0], dtype=bool)
     is_first[first] = True
-    below, above = [np.zeros((2, 0), dtype=np.int32)], [np.zeros((2, 0), dtype=np.int32)]
+    edges = [np.zeros((2, 0), dtype=np.int32)]
     for start, stop in _chunks(chosen.indptr):
         rows = chosen.indices[chosen.indptr[start] : chosen.indptr[stop]]
         columns = np.repeat(np.arange(start, stop), np.diff(chosen.indptr[start : stop + 1]))
         seen = is_first[rows]
         pair = np.stack([columns[seen], vertex[rows[seen]]]).astype(np.int32)
-        below.append(pair[:, pair[1] > pair[0]])
-        above.append(pair[::-1, pair[1] < pair[0]])
-    edges = np.concatenate(below, axis=1)
-    if _checksum(edges) != sum(map(_checksum, above)) % 2**64:
-        edges = np.concatenate([edges, *above], axis=1)
-    return Graph(vertex.astype(np.int64), first.astype(np.int64), edges[0], edges[1])
+        edges.append(pair[:, pair[1] > pair[0]])
+    a, b = np.concatenate(edges, axis=1)
+    return Graph(vertex.astype(np.int64), first.astype(np.int64), a, b)
 
 
-def _checksum(edges: NDArray[np.int32]) -> int:
-    """Equal for equal sets of edges, in whatever order."""
-    a, b = edges.astype(np.uint64)
-    mixed = (a << np.uint64(32) | b) * np.uint64(0x9E3779B97F4A7C15)
-    return int(((mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)).sum(dtype=np.uint64))
+def _pattern_keys(matrix: sp.csc_array) -> tuple[NDArray[np.uint64], bool]:
+    """(n,) keys, equal for columns with entries in the same rows, and whether the pattern is symmetric.
 
-
-def _pattern_keys(matrix: sp.csc_array) -> NDArray[np.uint64]:
-    """(n,) keys, equal for columns with entries in the same rows: sums of random 64-bit numbers, one per row."""
+    A key is the sum of random 64-bit numbers, one per row; sums over all entries of the product of a number of the
+    row and another of the column tell whether these can change roles.
+    """
     n = matrix.shape[0]
-    number = np.random.default_rng(0).integers(1, 2**63, n, dtype=np.uint64)
+    number = np.random.default_rng(0).integers(1, 2**63, (2, n), dtype=np.uint64)
     keys = number.copy()  # the diagonal counts whether or not it is stored
     for start, stop in _chunks(matrix.indptr):
         rows = matrix.indices[matrix.indptr[start] : matrix.indptr[stop]]
         counts = np.diff(matrix.indptr[start : stop + 1])
-        terms = np.where(rows == np.repeat(np.arange(start, stop), counts), np.uint64(0), number[rows])
+        own = rows == np.repeat(np.arange(start, stop), counts)
         filled = start + np.flatnonzero(counts)
-        keys[filled] += np.add.reduceat(terms, matrix.indptr[filled] - matrix.indptr[start])
-    return np.asarray(keys)
+        for k in range(2):
+            terms = number[k][rows]
+            terms[own] = 0
+            keys[k, filled] += np.add.reduceat(terms, matrix.indptr[filled] - matrix.indptr[start])
+    return keys[0], bool((keys[0] * number[1]).sum() == (keys[1] * number[0]).sum())
 
 
 def _chunks(indptr: IntArray) -> list[tuple[int, int]]:

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from fe_import.model import Array
 
-_CONVERGED = 1e-10  # error of A φ = μ φ, per μ, in the mass norm
+_CONVERGED = 1e-9  # error of A φ = μ φ, per μ, in the mass norm
 _NEW = 1e-10  # part of a vector that is new, per its size; below is rounding
 
 

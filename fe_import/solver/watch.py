@@ -18,8 +18,8 @@ _tell: ContextVar[Callable[[str], None] | None] = ContextVar("tell", default=Non
 
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None] | None) -> Iterator[None]:
-    """Send messages of what runs inside to ``tell``; nowhere when None."""
-    token = _tell.set(tell)
+    """Send messages of what runs inside to ``tell``; when None, to whom they went before."""
+    token = _tell.set(tell or _tell.get())
     try:
         yield
     finally:

@@ -32,7 +32,8 @@ def spin(group: str, end: float, options: ConstrainedOptions, speed: str = "fast
     """Run to ``end``; at the start the node's axes are those of the world, so that both groups start alike."""
     omega = SPINS[speed]
     start = np.concatenate([np.cross(omega, ARM), omega])
-    return lie_generalized_alpha(heavy_top(group), (0, end), pose(position=ARM)[None], start, options)
+    system = heavy_top(group)
+    return lie_generalized_alpha(system, (0, end), system.start, start, options)
 
 
 def reference() -> dict[str, Array]:

@@ -50,7 +50,8 @@ def joint(name: str, length: float, degrees: float | None = None, **more: Any) -
 def four_bar(**changes: Any) -> dict[str, Any]:
     """A rigid four-bar in the plane of x and z; its crank starts at 60 deg."""
     names = ("crank", "coupler", "rocker")
-    joints = [joint(f"j{k}", length, angle) for k, (length, angle) in enumerate(zip(LENGTHS, (60, -40, -100), strict=True))]
+    starts = zip(LENGTHS, (60.0, -40.0, -100.0), strict=True)
+    joints = [joint(f"j{k}", length, angle) for k, (length, angle) in enumerate(starts)]
     links = [
         {"name": name, "rigid": bar(length, mass), "mesh_pose": {"frame": "joint"}}
         for name, length, mass in zip(names, LENGTHS, MASSES, strict=True)
@@ -87,8 +88,10 @@ def slider_crank(**changes: Any) -> dict[str, Any]:
 
 
 def run(folder: Path, data: dict[str, Any], name: str = "erls", **simulation: Any) -> Run:
-    """Simulate in one of `FORMULATIONS`."""
+    """Simulate in one of `FORMULATIONS`; adaptive integrators choose their steps unless told."""
     settings = {**data["simulation"], **FORMULATIONS[name], **simulation}
+    if simulation.get("integrator", "generalized_alpha") != "generalized_alpha" and "step" not in simulation:
+        settings["step"] = 0.1
     return simulate(scenes.write_toml(folder / "loop.toml", {**data, "simulation": settings}))
 
 
@@ -99,6 +102,14 @@ def chain(folder: Path, data: dict[str, Any], name: str = "erls") -> ClosedChain
     if settings["formulation"] == "ffr":
         return ClosedChain(Ffr(mechanism, settings.get("body_frame", "tangent")))
     return ClosedChain(Erls(mechanism, settings.get("gauge", "joint-angle")))
+
+
+def work(run: Run, *joints: str) -> float:
+    """∫ effort · rate dt over a run, by Gauss's rule with 24 points."""
+    at, weights = np.polynomial.legendre.leggauss(24)
+    t = run.end * (at + 1) / 2
+    power = sum(run.joint_effort(name, t) * run.joint_rate(name, t) for name in joints)
+    return float(weights @ power) * run.end / 2
 
 
 def four_bar_angles(crank: Array) -> tuple[Array, Array]:

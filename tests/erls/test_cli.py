@@ -24,7 +24,7 @@ SIMULATE = {
     "warnings",
 }  # fmt: skip
 REDUCE = {
-    "link", "method", "dofs", "interface_dofs", "elastic_modes", "frequencies_hz", "mass", "centre_of_mass",
+    "link", "method", "solver", "dofs", "interface_dofs", "elastic_modes", "frequencies_hz", "mass", "centre_of_mass",
     "inertia", "health", "wall_s", "peak_memory_mb", "output",
 }  # fmt: skip
 OPTIONS = {

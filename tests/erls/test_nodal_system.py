@@ -12,7 +12,7 @@ from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
 from erls.lie import motion_maps as motions
 from erls.lie.groups import R3_SO3, SE3, Group
 from erls.lie.so3 import Array
-from erls.nodal.assembly import NodalSystem
+from erls.nodal.assembly import NodalSystem, Nodes
 from erls.nodal.joints import CONDITIONS, GROUND, Joint
 from erls.nodal.rigid_body import RigidBodies, RigidBody
 from erls.nodal.scatter import DENSE_UP_TO
@@ -60,9 +60,9 @@ def test_derivatives_against_differences(kind: str, group: str) -> None:
     system = _random(kind, GROUPS[group], 4, motion=kind in ("revolute", "prismatic"))
     rng = np.random.default_rng(5)
     v, a = rng.standard_normal((2, system.size))
-    multipliers, t, q, e = rng.standard_normal(system.constraints), 0.7, system._poses, 1e-5
+    multipliers, t, q, e = rng.standard_normal(system.constraints), 0.7, system.start, 1e-5
 
-    def total(t: float, q: Array, v: Array) -> Array:
+    def total(t: float, q: Nodes, v: Array) -> Array:
         return system.residual(t, q, v, a) + system.constraint_matrix(t, q).T @ multipliers
 
     stiffness, damping = system.stiffness_and_damping(t, q, v, a, multipliers)
@@ -90,9 +90,9 @@ def test_stored_derivatives_and_energy(group: str) -> None:
     system = _random("fixed", GROUPS[group], 8)
     rng = np.random.default_rng(9)
     v, a = rng.standard_normal((2, system.size))
-    q, e = system._poses, 1e-5
+    q, e = system.start, 1e-5
 
-    def at(s: float) -> tuple[Array, Array]:
+    def at(s: float) -> tuple[Nodes, Array]:
         return system.compose(q, s * v + s * s / 2 * a), v + s * a
 
     knots = [system.stored(0.0, *at(s), a) for s in (-e, 0.0, e)]
@@ -107,12 +107,12 @@ def test_both_groups_describe_one_system() -> None:
     local, world = (_random("revolute", g, 12) for g in (SE3, R3_SO3))
     rng = np.random.default_rng(13)
     v, a = rng.standard_normal((2, 12))
-    q = local._poses
-    to_world = la.block_diag(*(b for h in q for b in (h[:3, :3], np.eye(3))))
+    q = local.start
+    to_world = la.block_diag(*(b for h in q.poses for b in (h[:3, :3], np.eye(3))))
     swing = np.concatenate(
         [
             np.concatenate([h[:3, :3] @ np.cross(w[3:], w[:3]), np.zeros(3)])
-            for h, w in zip(q, v.reshape(2, 6), strict=True)
+            for h, w in zip(q.poses, v.reshape(2, 6), strict=True)
         ]
     )
     found = world.residual(0.0, q, to_world @ v, to_world @ a + swing)
@@ -127,7 +127,7 @@ def test_joints_allow_their_motions_only(kind: str) -> None:
     system = NodalSystem(
         np.eye(4)[None], [RigidBodies([RigidBody(0, 1.0, np.eye(3))], G)], [Joint("j", kind, GROUND, 0)]
     )
-    q = system._poses
+    q = system.start
     free = la.null_space(system.constraint_matrix(0.0, q))
     assert free.shape[1] == len(ALLOWED[kind])
     outside = np.delete(free, ALLOWED[kind], axis=0)
@@ -146,14 +146,16 @@ def test_rigid_motions_leave_constraints_and_forces_alone() -> None:
     bodies = [RigidBody(k, 1.0, _inertia(rng)) for k in (0, 1)]
     joint = Joint("j", "universal", 0, 1, *motions.exp(rng.standard_normal((2, 6))))
     system = NodalSystem(poses, [RigidBodies(bodies, np.zeros(3))], [joint])
-    moved = motions.exp(rng.standard_normal(6)) @ poses
+    moved = system.at(motions.exp(rng.standard_normal(6)) @ poses)
     v, a = rng.standard_normal((2, 12))
-    np.testing.assert_allclose(system.residual(0, moved, v, a), system.residual(0, poses, v, a), atol=1e-14)
-    np.testing.assert_allclose(system.constraint(0, moved), system.constraint(0, poses), atol=1e-14)
-    np.testing.assert_allclose(system.constraint_matrix(0, moved), system.constraint_matrix(0, poses), atol=1e-14)
+    np.testing.assert_allclose(system.residual(0, moved, v, a), system.residual(0, system.start, v, a), atol=1e-14)
+    np.testing.assert_allclose(system.constraint(0, moved), system.constraint(0, system.start), atol=1e-14)
+    np.testing.assert_allclose(
+        system.constraint_matrix(0, moved), system.constraint_matrix(0, system.start), atol=1e-14
+    )
 
 
-def _chain(count: int) -> tuple[NodalSystem, Array, Array]:
+def _chain(count: int) -> tuple[NodalSystem, Nodes, Array]:
     """Rods of 0.1 m and 0.1 kg in a row along x, revolute about y, the first to the ground, at rest."""
     poses = np.array([motions.poses(np.eye(3), np.array([0.05 + 0.1 * k, 0, 0])) for k in range(count)])
     about_y = motions.exp(np.array([0, 0, 0, -np.pi / 2, 0, 0]))
@@ -162,7 +164,7 @@ def _chain(count: int) -> tuple[NodalSystem, Array, Array]:
     joints += [Joint(f"j{k}", "revolute", k - 1, k, ends[1], ends[0]) for k in range(1, count)]
     bodies = [RigidBody(k, 0.1, np.diag([1e-5, 8.3e-5, 8.3e-5])) for k in range(count)]
     system = NodalSystem(poses, [RigidBodies(bodies, np.array([0, 0, -9.81]))], joints)
-    return system, poses, np.zeros(system.size)
+    return system, system.start, np.zeros(system.size)
 
 
 def test_sparse_and_dense_assembly_agree(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -208,7 +210,7 @@ def test_redundant_constraints_are_named() -> None:
     apart = motions.poses(np.eye(3), np.array([0, 0, 1.0]))
     joints = [Joint("low", "revolute", GROUND, 0), Joint("high", "revolute", GROUND, 0, apart, apart)]
     system = NodalSystem(np.eye(4)[None], [RigidBodies([RigidBody(0, 1.0, np.eye(3))], G)], joints)
-    found = lie_generalized_alpha(system, (0, 1), system._poses, np.zeros(6), ConstrainedOptions())
+    found = lie_generalized_alpha(system, (0, 1), system.start, np.zeros(6), ConstrainedOptions())
     assert isinstance(found.failure, SimulationError)
     assert found.failure.cause is Cause.REDUNDANT_CONSTRAINTS
     assert found.failure.message.count("'high'") == 5

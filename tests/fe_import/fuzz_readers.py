@@ -2,56 +2,34 @@
 
 from __future__ import annotations
 
+import gzip
 import importlib
 import tempfile
-import tomllib
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import h5py
 import meshio
-import msgspec
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 from exported_files import CALCULIX, MARKET, NPZ, files
 from fuzzing import Facts, Reader
-from link_files import FRAME, toml
+from fuzzing_facts import content, taken
+from fuzzing_hdf5 import edited
+from link_files import toml
 from modal_models import synthetic_model
 from solid_meshes import box
 from superelements import Reduced, condensed, deck, frame_model, matrix_input, punch, substructure
 
 from fe_import.build import build_model
+from fe_import.health import check_model
 from fe_import.link import LinkDescription, load_link
 from fe_import.mesh import read_mesh
-from fe_import.modal_file import read_modal_file, write_modal_file
+from fe_import.modal_file import ModalModel, read_modal_file, validate, write_modal_file, write_modal_group
 from fe_import.model import FEModel
 from fe_import.solid_mesh import SolidMesh
-
-
-def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Every value of nested tables, records and arrays with its place."""
-    if hasattr(value, "__dataclass_fields__"):
-        value = {name: getattr(value, name) for name in value.__dataclass_fields__}
-    elif isinstance(value, msgspec.Struct):
-        value = msgspec.to_builtins(value)
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from leaves(item, (*path, key))
-    elif isinstance(value, (list, tuple)):
-        yield (*path, "length", len(value))
-        for k, item in enumerate(value):
-            yield from leaves(item, (*path, k))
-    elif isinstance(value, np.ndarray):
-        yield (*path, value.shape, value.dtype.str, value.tobytes())
-    else:
-        yield (*path, value)
-
-
-def content(value: Any) -> Facts:
-    """Facts of records."""
-    return frozenset(leaves(value))
 
 
 def mesh_facts(mesh: SolidMesh) -> Facts:
@@ -59,10 +37,10 @@ def mesh_facts(mesh: SolidMesh) -> Facts:
     places = [tuple(p) for p in mesh.nodes.tolist()]
     found: set[Any] = {("type", mesh.element_type), *(("node", p) for p in places)}
     found |= {("element", tuple(places[n] for n in e)) for e in mesh.elements.tolist()}
-    found |= {("node set", name, places[n]) for name, members in mesh.node_sets.items() for n in members}
+    found |= {("set", name, places[n]) for name, members in mesh.node_sets.items() for n in members}
     for name, members in mesh.element_sets.items():
-        found |= {("element set", name, tuple(places[n] for n in mesh.elements[e])) for e in members}
-    return frozenset(found | {("lost", name) for name in mesh.lost_sets})
+        found |= {("set", name, tuple(places[n] for n in mesh.elements[e])) for e in members}
+    return frozenset(found)
 
 
 def model_facts(model: FEModel) -> Facts:
@@ -82,8 +60,10 @@ def model_facts(model: FEModel) -> Facts:
 
 
 def built(folder: Path) -> FEModel:
-    """The model of the folder's link."""
-    return build_model(load_link(folder / "link.toml"))
+    """The model of the folder's link, as it is reduced: checked."""
+    model = build_model(load_link(folder / "link.toml"))
+    check_model(model, model.source)
+    return model
 
 
 def description(table: dict[str, Any]) -> bytes:
@@ -110,27 +90,23 @@ def _solid_exports() -> Iterator[Reader]:
         "nodes.txt": ("\n".join(nodes) + "\n").encode(),
         "sets.txt": "".join(f"{n} {' '.join(map(str, m))}\n" for n, m in _labelled_sets()).encode(),
     }
-    flat = {**MARKET, "matrices": {**MARKET["matrices"], "files": {
-        "stiffness": "k.mtx", "mass": "m.mtx", "dofs": "rows.csv", "nodes": "nodes.txt", "sets": "sets.txt"}}}  # fmt: skip
+    roles = {role: name for role, name in MARKET["matrices"]["files"].items() if role != "mesh"}
+    roles |= {"nodes": "nodes.txt", "sets": "sets.txt"}
+    flat = {**MARKET, "matrices": {**MARKET["matrices"], "files": roles}}
+    countless = {"counts": False, "ends": False}
     for name, table, targets, options in (
         ("calculix: matrices, dofs", CALCULIX, ("k.sti", "k.mas", "k.dof"), {}),
-        ("calculix: deck", CALCULIX, ("k.inp",), {"counts": False}),
+        ("calculix: deck", CALCULIX, ("k.inp",), countless),
         ("matrix market", MARKET, ("k.mtx", "m.mtx", "rows.csv"), {}),
-        ("nodes, sets", flat, ("nodes.txt", "sets.txt"), {"counts": False}),
-        ("npz", NPZ, ("k.npz", "m.npz"), {"binary": True}),
+        ("nodes, sets", flat, ("nodes.txt", "sets.txt"), countless),
+        ("npz", NPZ, ("k.npz", "m.npz"), {"binary": True, "exact": True}),
     ):
         used = {*table["matrices"]["files"].values()}
         held = {n: c for n, c in {**sound, **text}.items() if n in used}
         yield Reader(name, {**held, "link.toml": description(table)}, targets, built, model_facts, **options)
-    packed = {n: sound[n] for n in ("k.sti", "k.mas", "k.dof", "k.inp")}
-    yield Reader(
-        "calculix, gzip", packed, tuple(packed), _packed_calculix, model_facts, packed=True
-    )
-
-
-def _packed_calculix(folder: Path) -> FEModel:
-    (folder / "link.toml").write_bytes(description(CALCULIX))
-    return built(folder)
+    packed = {n: gzip.compress(sound[n], mtime=0) for n in ("k.sti", "k.mas", "k.dof", "k.inp")}
+    held = {**packed, "link.toml": description(CALCULIX)}
+    yield Reader("calculix, gzip", held, tuple(packed), built, model_facts, binary=True, exact=True)
 
 
 def _labelled_nodes() -> Iterator[tuple[int, list[float]]]:
@@ -155,14 +131,15 @@ def _reduced_exports() -> Iterator[Reader]:
     }
     names = {"stiffness": "k.mtx", "mass": "m.mtx", "mesh": "k.inp"}
     link = _link("abaqus", names, parts.labels)
-    yield Reader("abaqus: matrices", {**entries, "link.toml": link}, ("k.mtx", "m.mtx"), built, model_facts)
-    yield Reader("abaqus: deck", {**entries, "link.toml": link}, ("k.inp",), built, model_facts, counts=False)
+    held = {**entries, "link.toml": link}
+    yield Reader("abaqus: matrices", held, ("k.mtx", "m.mtx"), built, model_facts, counts=False)
+    yield Reader("abaqus: deck", held, ("k.inp",), built, model_facts, counts=False, ends=False)
     held = {"k.mtx": substructure(parts).encode(), "k.inp": nodes}
     link = _link("abaqus", {"stiffness": "k.mtx", "mesh": "k.inp"}, parts.labels, options={"modal_nodes": [900_000]})
     yield Reader("abaqus: substructure", {**held, "link.toml": link}, ("k.mtx",), built, model_facts)
     link = _link("nastran-dmig", {"stiffness": "k.pch"}, parts.labels)
     held = {"k.pch": punch(parts).encode(), "link.toml": link}
-    yield Reader("nastran: dmig", held, ("k.pch",), built, model_facts)
+    yield Reader("nastran: dmig", held, ("k.pch",), built, model_facts, counts=False)
     op4 = importlib.import_module("pyyeti.nastran.op4")
     link = _link("nastran-op4", {"stiffness": "k.op4"}, parts.labels, options={
         "boundary": parts.labels, "positions": places})  # fmt: skip
@@ -208,38 +185,36 @@ def _meshes() -> Iterator[Reader]:
             path = Path(folder) / f"box{suffix}"
             meshio.write(path, data)
             sound[suffix] = path.read_bytes()
-    sound[".inp.gz"] = sound[".inp"]
-    options = {
-        ".inp": {"counts": False}, ".bdf": {"counts": False}, ".vtk": {"binary": True}, ".inp.gz": {"packed": True},
-    }  # fmt: skip
+    hexes = meshio.Mesh(mesh.nodes, part.cells[:1])
+    for suffix, form, binary in (("-2.msh", "gmsh22", False), ("-binary.msh", "gmsh", True)):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"box{suffix}"
+            meshio.write(path, hexes, form, binary=binary)
+            sound[suffix] = path.read_bytes()
+    sound[".inp.gz"] = gzip.compress(sound[".inp"], mtime=0)
+    options: dict[str, Any] = {
+        ".inp": {"counts": False, "ends": False},
+        ".bdf": {"counts": False, "ends": False},
+        ".vtu": {"counts": False},
+        ".vtk": {"binary": True},
+        "-binary.msh": {"binary": True},
+        ".inp.gz": {"binary": True, "exact": True},
+    }
     for suffix, data in sound.items():
         name = f"box{suffix}"
-        yield Reader(
-            f"mesh {suffix}", {name: data}, (name,), _mesh_of(name), mesh_facts, **options.get(suffix, {})
-        )
+        more = {"told": _lost, **options.get(suffix, {})}
+        yield Reader(f"mesh {suffix}", {name: data}, (name,), _mesh_of(name), mesh_facts, **more)
+
+
+def _lost(mesh: SolidMesh) -> Facts:
+    return frozenset(mesh.lost_sets)
 
 
 def _mesh_of(name: str) -> Callable[[Path], SolidMesh]:
     return lambda folder: read_mesh(folder / name)
 
 
-# ---- descriptions, modal files -----------------------------------------------------------------------------------------
-
-
-def taken(text: bytes, record: Any) -> bool:
-    """Whether every value of a TOML file is in the record as it stands."""
-
-    def flat(value: Any, path: tuple[Any, ...] = ()) -> dict[tuple[Any, ...], Any]:
-        if isinstance(value, dict):
-            items: Any = value.items()
-        elif isinstance(value, (list, tuple)):
-            items = enumerate(value)
-        else:
-            return {path: value}
-        return {k: v for key, item in items for k, v in flat(item, (*path, key)).items()}
-
-    held = flat(msgspec.to_builtins(record))
-    return all(held.get(path) == value for path, value in flat(tomllib.loads(text.decode())).items())
+# ---- descriptions, modal files ---------------------------------------------------------------------------------------
 
 
 FRAME_TOML = b"""name = "arm"
@@ -284,19 +259,38 @@ ratio = 0.01
 
 
 def _description(folder: Path) -> LinkDescription:
-    return load_link(folder / "link.toml").description
+    link = load_link(folder / "link.toml")
+    build_model(link)
+    return link.description
 
 
-def _judge_link(text: bytes, found: LinkDescription) -> bool:
-    return taken(text, found)
-
-
-@cache
-def modal_bytes() -> bytes:
-    """A modal file."""
+def _modal_files() -> Iterator[Reader]:
+    """Sealed, damaged and edited; and without a seal, in the newest and the oldest format, where only checks help."""
     with tempfile.TemporaryDirectory() as folder:
-        write_modal_file(Path(folder) / "m.h5", synthetic_model(1))
-        return (Path(folder) / "m.h5").read_bytes()
+        path = Path(folder) / "m.h5"
+        write_modal_file(path, synthetic_model(1))
+        sound = {"sealed": path.read_bytes()}
+        for version in ("v108", "earliest"):
+            with h5py.File(path, "w", libver=(version, "v108")) as file:
+                write_modal_group(file, synthetic_model(1))
+            sound[version] = path.read_bytes()
+    exact: dict[str, Any] = {"binary": True, "exact": True}
+    yield Reader("modal file", {"m.h5": sound["sealed"]}, ("m.h5",), _modal, content, **exact)
+    yield Reader("modal file, edited", {"m.h5": sound["sealed"]}, ("m.h5",), _modal, content, damage=edited, **exact)
+    for version in ("v108", "earliest"):
+        held = {"m.h5": sound[version]}
+        name = f"modal file, {version}, no seal"
+        yield Reader(name, held, ("m.h5",), _modal, content, binary=True, judge=_valid)
+        yield Reader(f"{name}, edited", held, ("m.h5",), _modal, content, judge=_valid, damage=edited)
+
+
+def _modal(folder: Path) -> ModalModel:
+    return read_modal_file(folder / "m.h5")
+
+
+def _valid(_: bytes, model: ModalModel) -> bool:
+    validate(model, "again")
+    return True
 
 
 @cache
@@ -306,8 +300,6 @@ def readers() -> tuple[Reader, ...]:
         *_solid_exports(),
         *_reduced_exports(),
         *_meshes(),
-        Reader("link.toml", {"link.toml": FRAME_TOML}, ("link.toml",), _description, content, judge=_judge_link),
-        Reader(
-            "modal file", {"m.h5": modal_bytes()}, ("m.h5",), lambda f: read_modal_file(f / "m.h5"), content, binary=True
-        ),
+        Reader("link.toml", {"link.toml": FRAME_TOML}, ("link.toml",), _description, content, judge=taken),
+        *_modal_files(),
     )

@@ -168,7 +168,7 @@ def test_substructure_of_calculix_is_refused(tmp_path: Path) -> None:
         "matrices": {"format": "abaqus", "files": {"stiffness": "l_hex20_sub.mtx.gz", "mesh": "l_hex20.inp.gz"}},
         "interfaces": [{"name": "root", "face": "IFA"}, {"name": "tip", "face": "IFB"}],
     }
-    with pytest.raises(FEImportError, match="block of the kept dofs instead of the condensed matrix") as caught:
+    with pytest.raises(FEImportError, match="block of the kept dofs of a larger matrix") as caught:
         reduce_link(write_toml(tmp_path / "link.toml", table))
     assert caught.value.cause is Cause.GROUNDED
     assert caught.value.value > 0.1
@@ -189,7 +189,10 @@ FAULTS: dict[str, tuple[Files, Files, str]] = {
     "comments only": (FILES, {"k_mtx": "** nothing\n"}, "not a matrix of *MATRIX OUTPUT"),
     "four columns": (FILES, {"k_mtx": "1,1,1,2.0\n"}, "not a matrix of *MATRIX OUTPUT"),
     "cut within a line": (FILES, {"k_mtx": K[:-16]}, "the last line does not end"),
-    "cut mass": (FILES, {"m_mtx": M[: M.index("21,3")]}, "differs by direction"),
+    "cut mass": (FILES, {"m_mtx": M[: M.index("21,3")]}, "the file is cut off"),
+    "cut mass, a node less": (FILES, {"m_mtx": M[: M.index("21,1")]}, "the file is cut off"),
+    "mass lacks a node": (FILES, {"m_mtx": "".join(k for k in M.splitlines(True) if "11,1" not in k)}, "by direction"),
+    "static moment one way": (FILES, {"m_mtx": M + "21,5, 21,1, 0.5\n"}, "static moments of the link differ"),
     "twice": (FILES, {"k_mtx": K + LINE}, "stands at"),
     "both triangles, one twice": (FILES, {"k_mtx": matrix_input(BAR.stiffness, BAR.rows, "both") + LINE}, "stands at"),
     "not finite": (FILES, {"k_mtx": K.replace("10000.0", "nan", 1)}, "not finite"),
@@ -205,7 +208,7 @@ FAULTS: dict[str, tuple[Files, Files, str]] = {
     "asymmetric": (
         FILES,
         {"k_mtx": matrix_input(BAR.stiffness, BAR.rows, "both").replace("21,1, 11,1, -10000", "21,1, 11,1, -10010")},
-        "resists rigid-body motion",
+        "is not symmetric",
     ),
     "grounded": (FILES, {"k_mtx": K.replace(LINE, LINE.replace("10000.0", "20000.0"))}, "resists rigid-body motion"),
     "turned dofs": (FILES, {"k_inp": DECK + "*TRANSFORM, NSET=ENDS\n0.,1.,0.,-1.,0.,0.\n"}, "*TRANSFORM turns"),
@@ -250,35 +253,6 @@ def test_faulty_files(tmp_path: Path, name: str) -> None:
     assert error.remedy
     assert len(str(error)) < 600
     assert "\n" not in str(error)
-
-
-@pytest.mark.parametrize("name", ["entries", "substructure"])
-def test_spoiled_files(tmp_path: Path, name: str) -> None:
-    """60 files each with one byte changed, or cut: an error of ours, or rows as before and one other value or place."""
-    rng = np.random.default_rng(23)
-    content = (K if name == "entries" else SUB).encode()
-    write(tmp_path, m_mtx=M, k_inp=DECK)
-    path, files = tmp_path / "k.mtx", FILES if name == "entries" else REDUCED
-    paths = {role: tmp_path / file for role, file in files.items()}
-    path.write_bytes(content)
-    good = read_abaqus(paths, AbaqusOptions(), "link.toml")
-    refused = 0
-    for _ in range(60):
-        at, other = int(rng.integers(len(content))), int(rng.integers(256))
-        cut = rng.random() < 0.3
-        path.write_bytes(content[:at] if cut else content[:at] + bytes([other]) + content[at + 1 :])
-        try:
-            found = read_abaqus(paths, AbaqusOptions(), "link.toml")
-        except FEImportError:
-            refused += 1
-            continue
-        assert found.stiffness.shape == good.stiffness.shape
-        np.testing.assert_array_equal(found.dof_map, good.dof_map)
-        changed = [abs(a - b).toarray() > 0 for a, b in ((found.mass, good.mass), (found.stiffness, good.stiffness))]
-        places = sum(int(np.triu(c).sum()) for c in changed)
-        assert places <= 2 or "grounding" in found.notes
-        assert np.isfinite(found.stiffness.data).all()
-    assert refused > 20
 
 
 def test_compressed_files(tmp_path: Path) -> None:

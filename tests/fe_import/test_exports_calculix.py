@@ -245,7 +245,7 @@ FAULTS = [
     fault("parts", swapped("k.inp", "*NODE", "*PART, NAME=P\n*NODE"), BAD, "flat deck"),
     fault("a node twice", swapped("k.inp", "*ELEMENT", "10, 1.0\n*ELEMENT"), BAD, "stands twice"),
     fault("a bad coordinate", swapped("k.inp", "0.0", "0..0"), BAD, "expected a finite number"),
-    fault("a set of nothing", swapped("k.inp", "*NSET", "*NSET, NSET=A\nB\n*NSET"), BAD, "no set of this name"),
+    fault("a set of nothing", swapped("k.inp", "*NSET", "*NSET, NSET=A\nB\n*NSET"), BAD, "needs set 'B'"),
     fault("a set without end", swapped("k.inp", "*NSET", "*NSET, NSET=A, GENERATE\n1, 900000000000\n*NSET"), BAD,
           "members"),
     fault("an element too short", relined("k.inp", lambda lines: [f"{line}\n*ELEMENT, TYPE=C3D8\n9, 10, 20"

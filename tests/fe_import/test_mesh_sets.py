@@ -48,6 +48,19 @@ SETS = {  # lines of the deck, node set, what it is
     "node block": (["*NSET, NSET=X", "half"], "X", np.arange(8)),
     "generated": (["*NSET, NSET=X, GENERATE", "7, 27, 10"], "X", np.array([0, 1, 2])),
     "generated twice": (["*NSET, NSET=X, GENERATE", "7, 17, 10", "47, 67, 10,"], "X", np.array([0, 1, 4, 5, 6])),
+    "generated, parameter cut short": (["*NSET, NSET=X, GEN", "7, 27, 10"], "X", np.array([0, 1, 2])),
+    "deeply nested": (
+        [line for k in range(3000) for line in (f"*NSET, NSET=N{k}", f"N{k + 1}")]
+        + ["*NSET, NSET=N3000", "7", "*NSET, NSET=X", "N0"],
+        "X",
+        np.array([0]),
+    ),
+    "nested twice at each of 60 levels": (
+        [line for k in range(60) for line in (f"*NSET, NSET=N{k}", f"N{k + 1}, N{k + 1}")]
+        + ["*NSET, NSET=N60", "7", "*NSET, NSET=X", "N0"],
+        "X",
+        np.array([0]),
+    ),
     "generated, step 1": (["*NSET, NSET=X, GENERATE", "7, 7"], "X", np.array([0])),
     "several lines": (["*NSET, NSET=X, UNSORTED", "7,17,", "27"], "X", np.array([0, 1, 2])),
     "stands twice": (["*NSET, NSET=X", "7", "*NSET, NSET=x", "17"], "X", np.array([0, 1])),
@@ -140,20 +153,31 @@ def test_sets_that_cannot_be_followed(tmp_path, name):
 
 
 DECKS = {
-    "word for a coordinate": (["*NODE", "999, a, 0, 0"], "*NODE in line"),
-    "word for a node": (["*ELEMENT, TYPE=C3D8", "9, a, 2, 3, 4, 5, 6, 7, 8"], "*ELEMENT in line"),
-    "half an element": (["*ELEMENT, TYPE=C3D8", "9, 7, 17"], "no whole elements of 8 nodes"),
-    "element of nothing": (["*ELEMENT, TYPE=C3D4", "9, 1, 2, 3, 4"], "needs node 1,"),
+    "word for a coordinate": (["*NODE", "999, a, 0, 0"], "expected a finite number"),
+    "word for a node": (["*ELEMENT, TYPE=C3D8", "9, a, 2, 3, 4, 5, 6, 7, 8"], "expected a whole number"),
+    "half an element": (["*ELEMENT, TYPE=C3D8", "9, 7, 17"], "an element of type C3D8 has 8 nodes"),
+    "element of nothing": (["*ELEMENT, TYPE=C3D4", "9, 1, 2, 3, 4"], "needs a node that is not in the deck; got 1"),
     "node twice": (["*NODE", "7, 9., 9., 9."], "node 7 stands twice"),
     "element twice": (["*ELEMENT, TYPE=C3D8", "1, 17, 7, 27, 37, 47, 57, 67, 77"], "element 1 stands twice"),
     "no type": (["*ELEMENT", "9, 7, 17"], "lacks TYPE"),
     "no name": (["*NSET", "7"], "lacks NSET"),
     "cylindrical": (["*NODE, SYSTEM=C", "999, 1, 2, 3"], "cylindrical"),
-    "include": (["*INCLUDE, INPUT=other.inp"], "join them"),
+    "include": (["*INCLUDE, INPUT=other.inp"], "join the files"),
     "two instances": (["*INSTANCE, NAME=A, PART=P", "*INSTANCE, NAME=B, PART=P"], "several instances"),
     "moved instance": (["*INSTANCE, NAME=A, PART=P", "0., 0., 0.5"], "moved"),
     "backwards": (["*NSET, NSET=X, GENERATE", "1, 9, -1"], "step of -1"),
     "giant set": (["*NSET, NSET=X, GENERATE", "1, 999999999999, 1"], "members"),
+    "six fields of a node": (["*NODE", "999, 0.5, 0.5, 0.5, 7, 8"], "a node and three coordinates"),
+    "parameters of digits": (["*ELEMENT, TYPE=C3D,8", "9, 7, 17"], "no such parameter; got '8'"),
+    "data in the keyword line": (["*NSET, NSET=X, 7, 17"], "no such parameter; got '7'"),
+    "misspelled": (["*NSET, NSET=X, GENERTE", "7, 27, 10"], "no such parameter"),
+    "nodes of another file": (["*NODE, INPUT=nodes.txt"], "is not followed"),
+    "generated nodes": (["*NGEN", "7, 27, 10"], "*NGEN is not followed"),
+    "another frame": (["*SYSTEM", "0, 0, 1, 1, 0, 1"], "*SYSTEM is not followed"),
+    "cut off": (["*STEP", "*FREQUENCY"], "*STEP without *END STEP"),
+    "number with a fraction in a set": (["*NSET, NSET=X", "7, 1.7"], "neither a number nor"),
+    "a mark in a set": (["*NSET, NSET=X", "7, &"], "neither a number nor"),
+    "a keyword in a set": (["*NSET, NSET=X", "7, 17*NSET, NSET=Y"], "neither a number nor"),
 }
 
 

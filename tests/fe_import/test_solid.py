@@ -9,6 +9,9 @@ import pytest
 import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
+import skfem
+from skfem.helpers import ddot, dot, sym_grad, trace
+from skfem.mapping import MappingIsoparametric
 from solid_meshes import box, quarter_ring
 
 from fe_import.errors import Cause, FEImportError
@@ -176,11 +179,48 @@ def test_two_materials_add_up():
     assert x @ mass @ x == pytest.approx((7850 + 1000) / 2, rel=1e-12)
 
 
+def assembled_by_scikit_fem(mesh: SolidMesh, material: SolidMaterial) -> tuple[sp.csc_array, sp.csc_array]:
+    """Mass and stiffness by scikit-fem's assembly of the weak form with vectorial elements."""
+    element = mesh.element
+    local_nodes = np.ascontiguousarray(mesh.elements[:, element.skfem_order].T)
+    topology = element.topology(np.ascontiguousarray(mesh.nodes.T), local_nodes, elem=type(element.shape))
+    lam, mu = material.lame
+    matrices = []
+    for order, form in (
+        (element.mass_order, lambda u, v, _: material.density * dot(u, v)),
+        (
+            element.stiffness_order,
+            lambda u, v, _: lam * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * mu * ddot(sym_grad(u), sym_grad(v)),
+        ),
+    ):
+        basis = skfem.Basis(
+            topology,
+            skfem.ElementVector(element.shape),
+            mapping=MappingIsoparametric(topology, element.shape),
+            quadrature=element.quadrature(order),
+        )
+        row = np.empty(basis.N, dtype=np.int64)
+        for k in range(len(local_nodes)):
+            for component in range(3):
+                row[basis.element_dofs[3 * k + component]] = 3 * local_nodes[k] + component
+        coo = sp.coo_array(skfem.BilinearForm(form).assemble(basis))
+        matrices.append(sp.csc_array((coo.data, (row[coo.coords[0]], row[coo.coords[1]])), shape=coo.shape))
+    return matrices[0], matrices[1]
+
+
+@pytest.mark.parametrize(("name", "distortion", "curvature"), DISTORTED)
+def test_assembly_against_scikit_fem(name, distortion, curvature):
+    """Every entry of both matrices, to 1e-12 of the largest: rounding of sums over up to 125 points."""
+    mesh = box(name, (3, 2, 2), (1.0, 0.8, 1.2), distortion, curvature)
+    for ours, reference in zip(assemble_solid(mesh, [STEEL]), assembled_by_scikit_fem(mesh, STEEL), strict=True):
+        assert abs(ours - reference).max() < 1e-12 * abs(reference).max()
+
+
 def test_chunks_do_not_matter(monkeypatch):
     """Assembly element by element gives the matrices of one go, to rounding."""
     mesh = box("tet10", (2, 1, 1))
     reference = assemble_solid(mesh, [STEEL])
-    monkeypatch.setattr("fe_import.solid._CHUNK_VALUES", 1)
+    monkeypatch.setattr("fe_import.solid_assembly._CHUNK_VALUES", 1)
     for one_go, chunked in zip(reference, assemble_solid(mesh, [STEEL]), strict=True):
         assert abs(one_go - chunked).max() < 1e-14 * abs(one_go).max()
 

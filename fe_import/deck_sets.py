@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +11,19 @@ import numpy as np
 from fe_import.model import IntArray
 
 MOST_MEMBERS = 20_000_000  # of generated sets, together; a deck of a few lines must not fill the memory
-Item = int | range | str  # a label, labels, or the name of another set
+_MOST_FOLLOWED = 5 * MOST_MEMBERS  # of all sets when they are followed
+
+
+@dataclass(frozen=True)
+class NodesOf:
+    """The nodes of the elements of a set."""
+
+    element_set: str
+
+
+Item = int | range | str | NodesOf  # a label, labels, the name of another set
+_LABEL = re.compile(r"(?:[A-Za-z_][^=*]*\.)?(\d{1,18})\Z")
+_NAME = re.compile(r"[A-Za-z_][^=*]*\Z")
 
 # corners of face S1, S2 ... of an element of that many corners, in the deck's (meshio's) order
 _FACES = {
@@ -18,6 +31,12 @@ _FACES = {
     4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
 }
 _CORNERS = {4: 4, 10: 4, 8: 8, 20: 8, 27: 8}
+_TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+_HEX_EDGES = (
+    *((0, 1), (1, 2), (2, 3), (3, 0)),
+    *((4, 5), (5, 6), (6, 7), (7, 4)),
+    *((0, 4), (1, 5), (2, 6), (3, 7)),
+)
 
 
 class LostSet(Exception):
@@ -30,18 +49,28 @@ class SetTable:
 
     Attributes
     ----------
+    nodes_of : callable
+        Nodes of the elements of a set, for node sets made of them.
     names : dict
         Name in capitals -> as first written.
     items : dict
         Name in capitals -> what it holds.
     """
 
+    nodes_of: Callable[[str], set[int]] | None = None
     names: dict[str, str] = field(default_factory=dict)
     items: dict[str, list[Item]] = field(default_factory=dict)
     generated: int = 0
+    followed: int = 0
 
     def add(self, name: str, items: Sequence[Item]) -> None:
-        """Add members to a set."""
+        """Add members to a set.
+
+        Raises
+        ------
+        ValueError
+            Generated sets with more members than memory should hold.
+        """
         key = name.upper()
         self.names.setdefault(key, name)
         self.items.setdefault(key, []).extend(items)
@@ -49,42 +78,84 @@ class SetTable:
         if self.generated > MOST_MEMBERS:
             raise ValueError(f"sets of more than {MOST_MEMBERS} members")
 
-    def drop(self, name: str) -> None:
-        """Forget a set."""
-        self.names.pop(name.upper(), None)
-        self.items.pop(name.upper(), None)
-
-    def members(self, name: str, above: tuple[str, ...] = ()) -> set[int]:
+    def members(self, name: str) -> set[int]:
         """Labels of a set, other sets followed.
 
         Raises
         ------
         LostSet
-            A set that does not exist, or that holds itself.
+            A set that does not exist, that holds itself, or that has too many members together with others.
         """
-        key = name.upper()
-        if key not in self.items:
-            raise LostSet(f"it needs set {name!r}, which the deck does not define")
-        if key in above:
-            raise LostSet(f"set {name!r} holds itself")
         found: set[int] = set()
-        for item in self.items[key]:
-            if isinstance(item, str):
-                found |= self.members(item, (*above, key))
-            else:
-                found.update([item] if isinstance(item, int) else item)
+        for key in self._within(name):
+            for item in self.items[key]:
+                if isinstance(item, NodesOf):
+                    found |= self.nodes_of(item.element_set) if self.nodes_of else set()
+                elif not isinstance(item, str):
+                    found.update([item] if isinstance(item, int) else item)
+        self.followed += len(found)
+        if self.followed > _MOST_FOLLOWED:
+            raise LostSet(f"all sets together have more than {_MOST_FOLLOWED} members")
         return found
+
+    def _within(self, name: str) -> list[str]:
+        """The set and all that it is made of, each once; without recursion, as decks may nest them deeply."""
+        done: list[str] = []
+        known: set[str] = set()
+        open_: list[tuple[str, Iterator[str]]] = []
+        above: set[str] = set()
+        waiting = [name]
+        while True:
+            if waiting:
+                asked = waiting.pop()
+                key = asked.upper()
+                if key in above:
+                    raise LostSet(f"set {asked!r} holds itself")
+                if key not in self.items:
+                    raise LostSet(f"it needs set {asked!r}, which the deck does not define")
+                if key not in known:
+                    known.add(key)
+                    above.add(key)
+                    open_.append((key, iter([i for i in self.items[key] if isinstance(i, str)])))
+            if not open_:
+                return done
+            key, rest = open_[-1]
+            following = next(rest, None)
+            if following is not None:
+                waiting.append(following)
+            else:
+                open_.pop()
+                above.discard(key)
+                done.append(key)
 
 
 def set_items(fields: list[str], generate: bool) -> list[Item]:
-    """What a data line of *NSET or *ELSET holds; an instance's name before a label is dropped."""
-    words = [f.strip().strip('"') for f in fields if f.strip()]
+    """What a data line of *NSET or *ELSET holds; an instance's name before a label is dropped.
+
+    Raises
+    ------
+    ValueError
+        What is neither a label nor a name.
+    """
+    words = [f for f in fields if f]
     if generate and words:
+        if not 2 <= len(words) <= 3 or not all(w.isascii() and w.lstrip("+-").isdigit() and len(w) < 19 for w in words):
+            raise ValueError("a generated set needs first, last and step")
         first, last, step = (int(w) for w in (*words, "1")[:3])
         if step < 1:
             raise ValueError(f"a step of {step} in a generated set")
         return [range(first, last + 1, step)]
-    return [int(tail) if (tail := w.rpartition(".")[2]).isdigit() else w for w in words]
+    return [_item(w) for w in words]
+
+
+def _item(word: str) -> Item:
+    if len(word) > 1 and word[0] == word[-1] == '"':
+        return word[1:-1]
+    if label := _LABEL.match(word):
+        return int(label[1])
+    if _NAME.match(word):
+        return word
+    raise ValueError(f"{word!r} is neither a number nor the name of a set")
 
 
 def surface_nodes(
@@ -98,14 +169,17 @@ def surface_nodes(
         Sets or elements that do not exist, faces of other elements than solids, free surfaces without a face.
     """
     found: set[int] = set()
+    table = node_sets if by_nodes else elements
     for row in rows:
-        (item,) = set_items(row[:1], generate=False) or [""]
-        table = node_sets if by_nodes else elements
-        labels = table.members(item) if isinstance(item, str) else {item} if isinstance(item, int) else set(item)
+        try:
+            (item,) = set_items(row[:1], generate=False) or [""]
+        except ValueError as problem:
+            raise LostSet(str(problem)) from None
+        labels = {item} if isinstance(item, int) else table.members(str(item))
         if by_nodes:
             found |= labels
             continue
-        face = row[1].strip().upper() if len(row) > 1 else ""
+        face = row[1].upper() if len(row) > 1 else ""
         for label in labels:
             if label not in connectivity:
                 raise LostSet(f"it needs element {label}, which the deck does not define")
@@ -127,14 +201,6 @@ def _face_nodes(nodes: list[int], face: str) -> list[int]:
     edges = _HEX_EDGES if corners == 8 else _TET_EDGES
     inside = [k for k, edge in enumerate(edges, start=corners) if k < len(nodes) and chosen.issuperset(edge)]
     return [nodes[k] for k in (*sorted(chosen), *inside)]
-
-
-_TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-_HEX_EDGES = (
-    *((0, 1), (1, 2), (2, 3), (3, 0)),
-    *((4, 5), (5, 6), (6, 7), (7, 4)),
-    *((0, 4), (1, 5), (2, 6), (3, 7)),
-)
 
 
 def indices(labels: set[int], place: dict[int, int], what: str) -> IntArray:

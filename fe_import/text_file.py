@@ -78,17 +78,20 @@ class TextFile:
     Parameters
     ----------
     path : Path
+    where : str, optional
+        To name in messages in place of the path.
+    cause : Cause
+        Of faulty content.
 
     Attributes
     ----------
     where : str
-        The path, for messages.
     number : int
         Number of the last line that was read, from 1.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.where, self.number = path, str(path), 0
+    def __init__(self, path: Path, where: str = "", cause: Cause = Cause.EXPORT) -> None:
+        self.path, self.where, self.number, self.cause = path, where or str(path), 0, cause
         self._whole = True  # the line read last had an end
         self._text = b""  # whole lines that wait to be read; the last line of the file may lack its end
         self._tail = b""  # the beginning of the line after them
@@ -129,11 +132,11 @@ class TextFile:
         value: Any = None,
         limit: Any = None,
         remedy: str = "export the file again",
-        cause: Cause = Cause.EXPORT,
+        cause: Cause | None = None,
     ) -> FEImportError:
         """An error that names this file, and a line of it when ``line`` is given."""
         where = self.where if line is None else f"{self.where}: line {line}"
-        return FEImportError(cause, message, where=where, value=value, limit=limit, remedy=remedy)
+        return FEImportError(cause or self.cause, message, where=where, value=value, limit=limit, remedy=remedy)
 
     def line(self) -> str | None:
         """The next line without its end, None behind the last one."""

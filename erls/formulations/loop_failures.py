@@ -1,0 +1,32 @@
+"""How a loop fails while it moves: it comes apart, or it locks."""
+
+from __future__ import annotations
+
+from erls.errors import Cause, SimulationError
+
+
+def comes_apart(t: float, row: str, gap: float, limit: float, left_out: bool) -> SimulationError:
+    """A condition is violated by ``gap`` [m]; ``left_out``: it followed from others at the start."""
+    why = ", in a direction that followed from the other conditions at the start" if left_out else ""
+    return SimulationError(
+        Cause.LOOP_OPEN,
+        f"{row}: the joint comes apart{why}",
+        where=f"t = {t:.9g} s",
+        value=f"{gap:.3g} m",
+        limit=f"{limit:.3g} m",
+        remedy="start outside of special positions (links in line or in one plane)"
+        if left_out
+        else "check whether the loop can reach this position; try smaller tolerances or steps",
+    )
+
+
+def locks(t: float, loop: str, value: float, start: float) -> SimulationError:
+    """The smallest singular value of the conditions has fallen from ``start`` to ``value``."""
+    return SimulationError(
+        Cause.LOOP_OPEN,
+        f"loop {loop!r} locks: in this singular position (a dead point, links in line) its joints cannot follow",
+        where=f"t = {t:.9g} s",
+        value=f"{value:.3g} metres per metre",
+        limit=f"{start:.3g} at the start",
+        remedy="keep the drive within what the lengths of the links allow, or end the run before",
+    )

@@ -1,0 +1,182 @@
+"""Static equilibrium of nodal systems: load steps, Newton's method with a line search, three tangents.
+
+At a load parameter t, which loads and prescribed motions read as the time, forces balance: g(t, q) + Bᵀ λ = 0, Φ = 0.
+A load step that does not converge is halved. The tangent is
+
+- ``full``: the exact derivative. A step that overshoots is cut: the next correction with the same matrix must be
+  shorter (P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 3.3);
+- ``material``: without the change of the directions of internal forces. It converges linearly, from farther away;
+- ``frozen``: the material tangent at the start of each load step, factored once for it. Slender beams in coarse meshes
+  need many small load steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from erls.errors import Cause, SceneError, SimulationError
+from erls.integrators.base import Array, metre_scales
+from erls.integrators.saddle import Saddle, Scales
+from erls.nodal.assembly import NodalSystem, Nodes
+
+TANGENTS = ("full", "material", "frozen")
+MAX_ITERATIONS = 60
+SMALLEST_CUT = 1 / 64
+SMALLEST_STEP = 1e-4  # of the load parameter
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """One configuration at rest: load parameter, multipliers (m,) of the joints, iterations since the one before."""
+
+    t: float
+    q: Nodes
+    multipliers: Array
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Statics:
+    """Equilibria in the order of load parameters, what they took, and why there are no more."""
+
+    path: tuple[Equilibrium, ...]
+    factorizations: int
+    cut_steps: int
+    failure: SimulationError | None = None
+
+
+def solve_statics(
+    system: NodalSystem,
+    start: Nodes,
+    steps: int = 1,
+    tangent: str = "full",
+    tolerance: float = 1e-12,
+    end: float = 1.0,
+) -> Statics:
+    """Equilibria at load parameters from ``end / steps`` to ``end`` in equal steps.
+
+    Parameters
+    ----------
+    system : NodalSystem
+        On SE(3); the tangent is that of its elements.
+    start : Nodes
+        Where iteration starts.
+    steps : int
+        Load steps.
+    tangent : str
+        A member of `TANGENTS`.
+    tolerance : float
+        Last correction, of the size of the mechanism.
+    end : float
+        Last load parameter.
+
+    Returns
+    -------
+    Statics
+        With ``failure`` of cause NO_EQUILIBRIUM where even small load steps fail; what was found is kept.
+
+    Raises
+    ------
+    SceneError
+        With cause BAD_FIELD when there is no such tangent.
+    """
+    if tangent not in TANGENTS:
+        remedy = f"must be one of {', '.join(TANGENTS)}"
+        raise SceneError(Cause.BAD_FIELD, "there is no such tangent", where="tangent", value=tangent, remedy=remedy)
+    solver = _Solver(system, tangent, tolerance)
+    at, q, multipliers = 0.0, start, np.zeros(system.constraints)
+    found: list[Equilibrium] = []
+    step, used = end / steps, 0
+    failure = None
+    while at < end * (1 - 1e-12):
+        target = min(at + step, end)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a step too far, which is found and cut
+            result = solver.balance(target, q, multipliers)
+        used += solver.iterations
+        if result is None:
+            step /= 2
+            if step < SMALLEST_STEP * end:
+                failure = solver.failure(target)
+                break
+            continue
+        q, multipliers = result
+        at = target
+        if abs(at * steps / end - round(at * steps / end)) < 1e-9:
+            found.append(Equilibrium(at, q, multipliers, used))
+            step, used = end / steps, 0
+        else:
+            step = min(step, (np.floor(at * steps / end + 1e-9) + 1) * end / steps - at)
+    return Statics(tuple(found), solver.factorizations, solver.cuts, failure)
+
+
+class _Solver:
+    """Newton's method at one load parameter after another."""
+
+    def __init__(self, system: NodalSystem, tangent: str, tolerance: float) -> None:
+        self.system, self.tangent, self.metres = system, tangent, metre_scales(system)
+        self.goal = tolerance * float(np.linalg.norm(np.ptp(system.start.poses[:, :3, 3], axis=0)).clip(1e-300))
+        self.rest = np.zeros(system.size)
+        self.iterations = self.factorizations = self.cuts = 0
+        self.size = 0.0
+
+    def balance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Nodes, Array] | None:
+        """Equilibrium at ``t``, or None."""
+        saddle: Saddle | None = None
+        self.iterations = 0
+        right = self.imbalance(t, q, multipliers)
+        while self.iterations < MAX_ITERATIONS:
+            if saddle is None or self.tangent != "frozen":
+                saddle = self.factor(t, q, multipliers)
+            if saddle.singular is not None:
+                return None
+            self.iterations += 1
+            correction = saddle.solve(saddle.scaled(*right))
+            size = float(np.linalg.norm(correction))
+            if not np.isfinite(size):
+                return None
+            move, change = saddle.unscaled(correction)
+            cut = 1.0
+            while True:
+                new_q = self.system.compose(q, -cut * move)
+                new_multipliers = multipliers - cut * change
+                new_right = self.imbalance(t, new_q, new_multipliers)
+                left = float(np.linalg.norm(saddle.solve(saddle.scaled(*new_right))))
+                if self.tangent != "full" or left <= (1 - cut / 4) * size or size <= self.goal:
+                    break
+                cut /= 2
+                self.cuts += 1
+                if cut < SMALLEST_CUT:
+                    return None
+            q, multipliers, right = new_q, new_multipliers, new_right
+            self.size = size
+            displaced = float(np.abs(correction[: self.system.size]).max(initial=0.0))
+            if cut == 1.0 and displaced <= self.goal:
+                return q, multipliers
+        return None
+
+    def imbalance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Array, Array]:
+        """Forces (n,) and joints (m,) out of balance."""
+        forces = self.system.residual(t, q, self.rest, self.rest)
+        return forces + self.system.constraint_matrix(t, q).T @ multipliers, self.system.constraint(t, q)
+
+    def factor(self, t: float, q: Nodes, multipliers: Array) -> Saddle:
+        """The tangent, in metres and units of its own stiffness."""
+        stiffness, _ = self.system.stiffness_and_damping(
+            t, q, self.rest, self.rest, multipliers, material=self.tangent != "full"
+        )
+        rows = self.system.constraint_matrix(t, q)
+        self.factorizations += 1
+        return Saddle(stiffness, rows.T, rows, Scales(self.metres, abs(stiffness), rows), 1.0)
+
+    def failure(self, t: float) -> SimulationError:
+        """Small load steps failed too."""
+        return SimulationError(
+            Cause.NO_EQUILIBRIUM,
+            f"no equilibrium beyond load parameter {t:.4g}: corrections of {self.size:.3g} m do not shrink",
+            where=f"load parameter {t:.9g}",
+            value=f"step {SMALLEST_STEP:g}",
+            limit=f"{MAX_ITERATIONS} iterations",
+            remedy="check the supports; look for buckling there; or let the motion be computed in time",
+        )
