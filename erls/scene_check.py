@@ -13,7 +13,7 @@ from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joints import JOINT_TYPES
 from erls.mechanism.loops import LOOP_TYPES
 from erls.mechanism.place import LARGEST, LATEST
-from fe_import.link import Damping
+from fe_import.link import check_damping
 from fe_import.toml_file import choose
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def _check_link(link: Link, place: str) -> None:
         message = "a mode count cannot be negative"
         raise _bad(f"{place}.elastic_modes", message, link.elastic_modes, "give 0 or more")
     if link.damping is not None:
-        _check_damping(link.damping, f"{place}.damping")
+        check_damping(link.damping, f"{place}.damping", SceneError)
     if link.rigid is None:
         return
     for name in ("elastic_modes", "damping"):
@@ -182,15 +182,6 @@ def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
         raise _bad(f"{place}.axis", f"a {loop.type} joint has no axis", loop.axis, "remove it")
     if loop.axis is not None and not any(loop.axis):
         raise _bad(f"{place}.axis", "an axis needs a direction", loop.axis, "give three numbers, not all zero")
-
-
-def _check_damping(damping: Damping, place: str) -> None:
-    given = {name: value for name, value in msgspec.to_builtins(damping).items() if value is not None}
-    if len(given) > 1:
-        raise _bad(place, "more than one kind of damping", " and ".join(given), "keep one")
-    for path, value in _numbers(given):
-        if value < 0:
-            raise _bad(f"{place}.{path}", "damping cannot be negative", value, "give 0 or more")
 
 
 def _bad(where: str, message: str, value: Any, remedy: str) -> SceneError:

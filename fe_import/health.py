@@ -145,7 +145,10 @@ def check_basis(
     if len(carried):
         least = float(carried.sum(axis=0)[:3].min())
         checks.append(HealthCheck("share of mass in fixed-interface modes, least direction", least, NO_LIMIT))
-    remedy = "look for loose parts, hinges, supports and matrices of another model"
+    remedy = (
+        "look for loose parts, hinges, supports and matrices of another model; a slender or very stiff part of "
+        "many small elements loses the digits too"
+    )
     _refuse(((check, remedy) for check in checks), where)
     return (*checks, *_missing_modes(model, omega), HealthCheck("condition of the basis", _condition(mass), NO_LIMIT))
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import msgspec
 
-from fe_import.errors import Cause, FEImportError
+from fe_import.errors import Cause, FEImportError, ReportedError
 from fe_import.link_reduction import Reduction, check_reduction_options
 from fe_import.sections import Section, check_section
 from fe_import.toml_file import choose, convert, read_toml
@@ -282,6 +282,11 @@ def _check(link: LinkDescription, file: str) -> None:
                 raise _fail(place, "a name must not be empty", name, "name the node")
             if not isinstance(position, int) and not all(map(math.isfinite, position)):
                 raise _fail(place, "a position must be finite", position, "give three numbers")
+    if link.matrices is not None:
+        for field in ("materials", "sections"):
+            if getattr(link, field):
+                message = "exported matrices hold stiffness and mass already"
+                raise _fail(f"{file}: {field}", message, remedy="remove the table")
     if not link.interfaces:
         raise _fail(f"{file}: interfaces", "a link needs at least one interface", remedy="add [[interfaces]]")
     seen: set[str] = set()
@@ -309,16 +314,32 @@ def _check(link: LinkDescription, file: str) -> None:
     for k, p in enumerate(link.masses):
         if not (math.isfinite(p.mass) and p.mass >= 0):
             raise _fail(f"{file}: masses[{k}].mass", "a mass cannot be negative", p.mass, "give 0 or more")
-    _check_damping(link.damping, file)
+    check_damping(link.damping, f"{file}: damping")
 
 
-def _check_damping(d: Damping, file: str) -> None:
+def check_damping(d: Damping, where: str, error: type[ReportedError] = FEImportError) -> None:
+    """Refuse damping that is stated twice, negative, or more than critical.
+
+    Raises
+    ------
+    ReportedError
+        Of class ``error``, BAD_FIELD.
+    """
     given = [n for n in ("ratio", "ratios", "rayleigh") if getattr(d, n) is not None]
     if len(given) > 1:
-        raise _fail(f"{file}: damping", "more than one kind of damping", " and ".join(given), "keep one")
+        message, value = "more than one kind of damping", " and ".join(given)
+        raise error(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one")
     for field, value in _damping_numbers(d):
+        place = f"{where}.{field}"
         if not (math.isfinite(value) and value >= 0):
-            raise _fail(f"{file}: damping.{field}", "damping cannot be negative", value, "give 0 or more")
+            raise error(
+                Cause.BAD_FIELD, "damping cannot be negative", where=place, value=value, remedy="give 0 or more"
+            )
+        if value > 1 and "rayleigh" not in field:
+            message = "a damping ratio above 1 is more than critical"
+            raise error(
+                Cause.BAD_FIELD, message, where=place, value=value, limit=1, remedy="ratios are no percentages: give 0.02"
+            )
 
 
 def _damping_numbers(d: Damping) -> Iterator[tuple[str, float]]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -160,10 +159,6 @@ class FEModel:
 
     def reduced_matrices(self) -> tuple[sp.csc_array, sp.csc_array]:
         """Mass and stiffness over the independent dofs, the coupling eliminated."""
-        return self._reduced_matrices
-
-    @cached_property
-    def _reduced_matrices(self) -> tuple[sp.csc_array, sp.csc_array]:
         if self.coupling is None:
             return self.mass, self.stiffness
         c = self.coupling

@@ -73,7 +73,7 @@ _SIZE = Range(
     above='mm read as m? set units.length = "mm"',
 )
 _MASS = Range(
-    *("mass of the link", "kg", 1e-6, 1e5, 1e-18, 1e12),
+    *("mass of the link", "kg", 1e-9, 1e6, 1e-18, 1e12),
     below='t read as kg? set units.mass = "t"; mm read as m? set units.length = "mm"',
     above='g read as kg? set units.mass = "g"; a mesh in mm read as m? set units.length = "mm"',
 )

@@ -71,6 +71,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     choose(options.method, REDUCTIONS, f"{where}: reduction.method")
     units = unit_factors(link.description, where)
     checks = plausible_materials(link.description.materials, *units, where) + check_model(model, where)
+    _unit_checks(model, np.zeros(0), where)  # a slipped unit is named before the work is done
     basis = REDUCTIONS[options.method](model, options, where)
     mass, stiffness = reduced_matrices(model, basis)
     interfaces, inboard = basis.vectors[model.interface_dofs], _inboard(model, options.inboard)

@@ -31,8 +31,8 @@ def rigid_motion_by_stiffness(model: FEModel, basis: Basis, stiffness: Array) ->
     Returns
     -------
     float
-        Largest departure of any nodal component, per largest component of the motion; infinite when the interface
-        does not hold the link.
+        Largest departure of any nodal component, per largest component of the motion, rotations counted by what they
+        move at the far end of the link; infinite when the interface does not hold the link.
     """
     rows = model.dof_map[model.interface_nodes[0].node]
     geometry = model.rigid_body_modes()
@@ -53,7 +53,17 @@ def rigid_motion_by_stiffness(model: FEModel, basis: Basis, stiffness: Array) ->
         found = la.solve(matrix, right, assume_a="sym")[:count] * scale[:, None]
     except (la.LinAlgError, la.LinAlgWarning):
         return float("inf")
-    return float((np.abs(basis.vectors @ found - geometry).max(axis=0) / np.abs(geometry).max(axis=0)).max())
+    lengths = _lengths(model)
+    departure = np.abs(basis.vectors @ found - geometry).T * lengths
+    return float((departure.max(axis=1) / (np.abs(geometry).T * lengths).max(axis=1)).max())
+
+
+def _lengths(model: FEModel) -> Array:
+    """(d,) size of the link for rotations, 1 for displacements, so that both are lengths in any unit."""
+    lengths = np.ones(model.mass.shape[0])
+    turning = model.dof_map[:, 3:]
+    lengths[turning[turning >= 0]] = np.linalg.norm(np.ptp(model.nodes, axis=0))
+    return lengths
 
 
 def _stiffness_scale(model: FEModel, basis: Basis, stiffness: Array, held: Array) -> Array:

@@ -57,7 +57,7 @@ def read_toml(path: Path, error: type[ReportedError] = FEImportError) -> dict[st
                 limit="50 MB",
                 remedy="give a TOML description; meshes and matrices are files of their own",
             )
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # editors on Windows put a mark before the first line
     except FileNotFoundError:
         raise error(
             Cause.FILE_NOT_FOUND,
@@ -65,7 +65,10 @@ def read_toml(path: Path, error: type[ReportedError] = FEImportError) -> dict[st
             where=str(path),
             remedy="check the path, relative paths start at the file that names them",
         ) from None
-    except (OSError, ValueError) as problem:  # not UTF-8, or a path with a NUL character
+    except UnicodeDecodeError:
+        remedy = "give a TOML description in UTF-8; modal files, meshes and matrices are none"
+        raise error(Cause.NOT_READABLE, "not a text in UTF-8", where=str(path), remedy=remedy) from None
+    except (OSError, ValueError) as problem:  # also a path with a NUL character
         raise error(
             Cause.NOT_READABLE, f"cannot be read: {problem}", where=str(path), remedy="give a UTF-8 TOML file"
         ) from None

@@ -31,15 +31,17 @@ class BeamSection:
     inertia: Array
 
     def __post_init__(self) -> None:
-        for name, least in (("stiffness", 0.0), ("inertia", -1e-12)):
+        for name, least in (("stiffness", 1e-15), ("inertia", -1e-12)):
             matrix = np.asarray(getattr(self, name))
             size = float(np.abs(matrix).max(initial=0.0))
             good = matrix.shape == (6, 6) and np.isfinite(size) and np.abs(matrix - matrix.T).max() <= 1e-12 * size
-            if not good or np.linalg.eigvalsh(matrix).min() <= least * size - (name == "inertia") * 1e-300:
-                remedy = "give a symmetric 6x6 matrix; no strain may be free of force, no motion of negative mass"
-                message = "no section has this"
+            if not good or np.linalg.eigvalsh(matrix).min() < least * size or (name == "stiffness" and size == 0):
                 raise SceneError(
-                    Cause.BAD_FIELD, message, where=f"section: {name}", value=matrix.tolist(), remedy=remedy
+                    Cause.BAD_FIELD,
+                    "no section has this",
+                    where=f"section: {name}",
+                    value=matrix.tolist(),
+                    remedy="give a symmetric 6x6 matrix; no strain may be free of force, no motion of negative mass",
                 )
 
 

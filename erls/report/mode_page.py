@@ -72,7 +72,7 @@ def read_printed(path: Path) -> Printed:
         except ValueError:
             raise _bad(path, f"row {number} does not fit the header", ", ".join(row)) from None
         if values[0] != int(values[0]) or values[0] < 0 or int(values[0]) in found:
-            raise _bad(path, f"row {number}: a mode count is a whole number and stands once", row[0])
+            raise _bad(path, f"row {number} does not fit: a mode count is a whole number and stands once", row[0])
         found[int(values[0])] = tuple(values[2:])
         times.add(values[1])
     if len(times) != 1:

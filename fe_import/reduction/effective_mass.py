@@ -19,7 +19,7 @@ _MASSLESS = 1e-12  # of the largest; rounding leaves 1e-15
 def fixed_interface_table(parts: Partition, omega: Array, modes: Array) -> FixedInterfaceModes:
     """Frequencies, and the share of the link's mass and of its inertia about the centre of mass in each mode."""
     participation = modes.T @ parts.inertia
-    total = np.diag(parts.rigid.T @ (parts.mass @ parts.rigid))
+    total = np.diag(parts.rigid_mass)
     share = np.divide(participation**2, total, out=np.zeros_like(participation), where=total > _MASSLESS * total.max())
     return FixedInterfaceModes(omega / (2 * np.pi), share)
 
@@ -37,7 +37,7 @@ def carried_shares(parts: Partition) -> Callable[[Array], Array]:
     """
     inertia = parts.inertia
     carried = np.array([b @ _mass_solve(parts.inner_mass, b) for b in inertia.T])
-    total = np.diag(parts.rigid.T @ (parts.mass @ parts.rigid))
+    total = np.diag(parts.rigid_mass)
     carried[carried <= 1e-9 * total] = np.nan
 
     def shares(modes: Array) -> Array:

@@ -16,40 +16,54 @@ from fe_import.sparse import Factorization, factorize
 
 @dataclass(frozen=True)
 class Partition:
-    """Matrices over the independent dofs, and which of them are interface dofs.
+    """Matrices over the independent dofs by interface dofs (b) and inner dofs (i).
+
+    Those over all f = b + i dofs are made when they are asked for: of a large model they fill as much memory as the
+    model itself.
 
     Attributes
     ----------
-    mass, stiffness : (f, f) sparse CSC
+    model : FEModel
     boundary, inner : int arrays
         Positions of the interface dofs, in the order of the interfaces, and of all others.
     rigid : (f, 6) array
         Unit translations, and unit rotations about the centre of mass.
-    positions : (f, 3) array
-        Of the dofs.
+    rigid_forces : (f, 6) array
+        Mass times these.
+    inner_mass, inner_stiffness : (i, i) sparse CSC
+        M_ii, K_ii.
+    boundary_stiffness : (i, b) array
+        K_ib.
     """
 
-    mass: sp.csc_array
-    stiffness: sp.csc_array
+    model: FEModel
     boundary: IntArray
     inner: IntArray
     rigid: Array
-    positions: Array
+    rigid_forces: Array
+    inner_mass: sp.csc_array
+    inner_stiffness: sp.csc_array
+    boundary_stiffness: Array
 
-    @cached_property
-    def inner_mass(self) -> sp.csc_array:
-        """M_ii."""
-        return self.mass[self.inner][:, self.inner].tocsc()
+    @property
+    def mass(self) -> sp.csc_array:
+        """(f, f) mass matrix."""
+        return self.model.reduced_matrices()[0]
 
-    @cached_property
-    def inner_stiffness(self) -> sp.csc_array:
-        """K_ii."""
-        return self.stiffness[self.inner][:, self.inner].tocsc()
+    @property
+    def stiffness(self) -> sp.csc_array:
+        """(f, f) stiffness matrix."""
+        return self.model.reduced_matrices()[1]
 
-    @cached_property
+    @property
+    def rigid_mass(self) -> Array:
+        """(6, 6) mass matrix of the rigid-body motions."""
+        return np.asarray(self.rigid.T @ self.rigid_forces)
+
+    @property
     def inertia(self) -> Array:
         """(i, 6) inertia forces on the inner dofs per unit rigid-body acceleration."""
-        return np.asarray((self.mass @ self.rigid)[self.inner])
+        return self.rigid_forces[self.inner]
 
     def static(self, loads: Array) -> Array:
         """Response of the inner dofs to loads on them, interfaces clamped, with one step of iterative refinement."""
@@ -59,11 +73,12 @@ class Partition:
     @cached_property
     def solve(self) -> Factorization:
         """Of K_ii."""
-        return factorize(self.inner_stiffness, "stiffness of the inner nodes", self.positions[self.inner])
+        positions = self.model.dof_positions()[self.inner]
+        return factorize(self.inner_stiffness, "stiffness of the inner nodes", positions)
 
     def clamped_field(self, inner: Array) -> Array:
         """(f, k) fields with the interfaces at rest."""
-        fields = np.zeros((self.mass.shape[0], inner.shape[1]))
+        fields = np.zeros((len(self.rigid), inner.shape[1]))
         fields[self.inner] = inner
         return fields
 
@@ -77,7 +92,17 @@ def partition(model: FEModel) -> Partition:
     centre = mass_properties(rigid.T @ (mass @ rigid)).centre_of_mass
     for axis in range(3):
         rigid[:, 3 + axis] -= rigid[:, :3] @ np.cross(np.eye(3)[axis], centre)
-    return Partition(mass, stiffness, boundary, inner, rigid, model.dof_positions())
+    columns = stiffness[:, inner]
+    return Partition(
+        model,
+        boundary,
+        inner,
+        rigid,
+        mass @ rigid,
+        mass[:, inner][inner].tocsc(),
+        columns[inner].tocsc(),
+        columns[boundary].toarray().T,
+    )
 
 
 def constraint_modes(parts: Partition) -> Array:
@@ -92,10 +117,10 @@ def constraint_modes(parts: Partition) -> Array:
         The inner stiffness is singular.
     """
     count = len(parts.boundary)
-    fields = np.zeros((parts.mass.shape[0], count))
+    fields = np.zeros((len(parts.rigid), count))
     fields[parts.boundary, np.arange(count)] = 1.0
     if len(parts.inner):
-        psi = -parts.static(parts.stiffness[parts.inner][:, parts.boundary].toarray())
+        psi = -parts.static(parts.boundary_stiffness)
         rigid = parts.rigid[parts.boundary]
         fields[parts.inner] = psi + (parts.rigid[parts.inner] - psi @ rigid) @ np.linalg.pinv(rigid)
     return fields

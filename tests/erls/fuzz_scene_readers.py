@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from functools import cache
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +41,18 @@ friction = { force = 0.05 }
 drive = { type = "torque", profiles = [{ shape = "step", start = 0.1, end = 0.4, value = -0.5 }] }
 [[links]]
 name = "upper"
-rigid = { mass = 0.5, centre_of_mass = [0.2, 0, 0], inertia = [1e-3, 2e-3, 2e-3], points = { in = [0, 0, 0], out = [0.5, 0, 0] } }
+[links.rigid]
+mass = 0.5
+centre_of_mass = [0.2, 0, 0]
+inertia = [1e-3, 2e-3, 2e-3]
+points = { in = [0, 0, 0], out = [0.5, 0, 0] }
 [[links]]
 name = "lower"
-rigid = { mass = 0.5, centre_of_mass = [0.2, 0, 0], inertia = [1e-3, 2e-3, 2e-3], points = { end = [0.5, 0, 0] } }
+[links.rigid]
+mass = 0.5
+centre_of_mass = [0.2, 0, 0]
+inertia = [1e-3, 2e-3, 2e-3]
+points = { end = [0.5, 0, 0] }
 [[points]]
 name = "hand"
 link = "lower"
@@ -64,7 +72,6 @@ elastic_modes,t,joint shoulder,point tip x
 """
 
 
-@cache
 def run_bytes() -> bytes:
     """A short run of a flexible link and a rigid one."""
     with tempfile.TemporaryDirectory() as name:
@@ -108,22 +115,28 @@ def _printed_facts(printed: Printed) -> Facts:
     return frozenset([head, *((modes, *values) for modes, values in printed.rows.items())])
 
 
-@cache
-def readers() -> tuple[Reader, ...]:
-    """All of them."""
+def _load(folder: Path) -> Run:
+    return load_run(folder / "r.h5")
+
+
+def _run_files() -> Iterator[Reader]:
     held = {"r.h5": run_bytes()}
-    exact: dict[str, Any] = {"binary": True, "exact": True}
-    countless = {"counts": False, "ends": False}
-    return (
-        Reader("run file", held, ("r.h5",), lambda f: load_run(f / "r.h5"), run_facts, **exact),
-        Reader("run file, edited", held, ("r.h5",), lambda f: load_run(f / "r.h5"), run_facts, damage=edited, **exact),
-        Reader("scene.toml", {"scene.toml": SCENE}, ("scene.toml",), scene_of, content, judge=taken),
-        Reader(
-            "table of a drive", {"t.csv": TABLE.encode()}, ("t.csv",), lambda f: read_csv(f / "t.csv", "drive"), _rows,
-            **countless,
-        ),
-        Reader(
-            "published figures", {"p.csv": PRINTED}, ("p.csv",), lambda f: read_printed(f / "p.csv"), _printed_facts,
-            **countless,
-        ),
-    )  # fmt: skip
+    yield Reader("run file", held, ("r.h5",), _load, run_facts, binary=True, exact=True)
+    yield Reader("run file, edited", held, ("r.h5",), _load, run_facts, damage=edited, exact=True)
+
+
+def _scenes() -> Iterator[Reader]:
+    yield Reader("scene.toml", {"scene.toml": SCENE}, ("scene.toml",), scene_of, content, judge=taken)
+
+
+def _tables() -> Iterator[Reader]:
+    countless: dict[str, Any] = {"counts": False, "ends": False}
+    held = {"t.csv": TABLE.encode()}
+    yield Reader("table of a drive", held, ("t.csv",), lambda f: read_csv(f / "t.csv", "drive"), _rows, **countless)
+    held = {"p.csv": PRINTED}
+    yield Reader(
+        "published figures", held, ("p.csv",), lambda f: read_printed(f / "p.csv"), _printed_facts, **countless
+    )
+
+
+GROUPS: dict[str, Callable[[], Iterator[Reader]]] = {"run files": _run_files, "scenes": _scenes, "tables": _tables}

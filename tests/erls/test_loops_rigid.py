@@ -13,6 +13,7 @@ from loop_scenes import GROUND, LENGTHS, MASSES
 from scipy.integrate import solve_ivp
 
 from erls.errors import Cause, SimulationError
+from erls.formulations.closed_chain import ClosedChain
 from erls.lie.so3 import Array
 from erls.run import Run
 from erls.run_file import load_run, write_run
@@ -25,8 +26,10 @@ def _complex(positions: Array) -> Array:
     return np.asarray(positions[..., 0] + 1j * positions[..., 2])
 
 
-@pytest.mark.parametrize("integrator", ["generalized_alpha", "dop853"])
-@pytest.mark.parametrize("name", ["erls", "minimum-norm", "ffr"])
+DRIVEN = [*((name, "generalized_alpha") for name in ("erls", "minimum-norm", "ffr")), ("ffr", "dop853")]
+
+
+@pytest.mark.parametrize(("name", "integrator"), DRIVEN)
 def test_driven_four_bar_keeps_to_the_closed_form(tmp_path: Path, name: str, integrator: str) -> None:
     """Pins and middles of all links at any time, between steps too; 1e-10 m asked, closed forms hold to rounding."""
     data = loop_scenes.driven(loop_scenes.four_bar(), loop_scenes.steady(60.0, RATE))
@@ -94,21 +97,24 @@ def test_free_four_bar_against_one_coordinate(tmp_path: Path, name: str) -> None
     t = np.linspace(0, run.end, 30)
     np.testing.assert_allclose(run.joint_angle("j0", t), _one_coordinate(t), atol=1e-8)
     assert np.ptp(run.energy(t).total) < 1e-8
-    opening = max(np.abs(run.formulation.openings(run.formulation.closure(*k))).max() for k in _knots(run))  # type: ignore[attr-defined]
-    assert opening < 1e-9  # before states are moved onto the conditions
+    assert _widest(run) < 1e-9
 
 
 def test_generalized_alpha_is_of_second_order_in_loops(tmp_path: Path) -> None:
-    """Crank angle of the free four-bar against the one-coordinate equation; steps of 4 and 2 ms."""
+    """Crank angle of the free four-bar against the one-coordinate equation; steps of 4 and 2 ms. Loops stay closed."""
     t = np.array([0.3])
     exact = _one_coordinate(np.array([0.0, *t]))[1:]
     runs = [loop_scenes.run(tmp_path, loop_scenes.four_bar(), step=h, duration=0.3) for h in (4e-3, 2e-3)]
     errors = [abs(float((run.joint_angle("j0", t) - exact)[0])) for run in runs]
     assert 1.8 < np.log2(errors[0] / errors[1]) < 2.2
+    assert _widest(runs[0]) < 1e-10
 
 
-def _knots(run: Run) -> list[tuple[float, Array, Array]]:
-    return list(zip(run.solution.t.tolist(), run.solution.y, run.solution.v, strict=True))
+def _widest(run: Run) -> float:
+    """Largest opening at knots [m], before states are moved onto the conditions."""
+    chain, knots = run.formulation, zip(run.solution.t.tolist(), run.solution.y, run.solution.v, strict=True)
+    assert isinstance(chain, ClosedChain)
+    return max(float(np.abs(chain.openings(chain.closure(*knot))).max()) for knot in knots)
 
 
 @pytest.mark.parametrize(("name", "scene"), [("erls", "four-bar"), ("ffr", "slider-crank")])
@@ -217,10 +223,10 @@ def _five_bar() -> dict[str, Any]:
 def test_five_bar_robot_runs(tmp_path: Path) -> None:
     """It closes from a guess, has one freedom beside its motor, and both formulations and the work balance agree."""
     runs = {
-        name: loop_scenes.run(tmp_path, _five_bar(), name, integrator="dop853", duration=0.1, rtol=1e-9, atol=1e-10)
+        name: loop_scenes.run(tmp_path, _five_bar(), name, integrator="dop853", duration=0.06, rtol=1e-9, atol=1e-10)
         for name in ("erls", "ffr")
     }
-    t = np.linspace(0, 0.1, 11)
+    t = np.linspace(0, 0.06, 11)
     for run in runs.values():
         assert run.summary()["degrees_of_freedom"] == 1
         np.testing.assert_allclose(run.position("foot", t), np.tile([0.25, 0.0, 0.0], (11, 1)), atol=1e-13)
@@ -240,14 +246,14 @@ def test_spatial_loop_with_a_ball_joint(tmp_path: Path) -> None:
     loops = [{"name": "ball", "type": "spherical", "link": "l5", "node": "tip", "position": [0.5, 0.2, 0.1]}]
     data = {**loop_scenes.four_bar(), "joints": joints, "links": links, "loops": loops}
     data["points"] = [{"name": "end", "link": "l5", "node": "tip"}, {"name": "knee", "link": "l2", "node": "tip"}]
-    exact = loop_scenes.run(tmp_path, data, "ffr", integrator="dop853", duration=0.05, rtol=1e-9)
+    exact = loop_scenes.run(tmp_path, data, "ffr", integrator="dop853", duration=0.03, rtol=1e-9)
     assert exact.summary()["degrees_of_freedom"] == 3
     assert not any("follow from the others" in w for w in exact.warnings)
-    t = np.linspace(0, 0.05, 11)
+    t = np.linspace(0, 0.03, 11)
     np.testing.assert_allclose(exact.position("end", t), np.tile([0.5, 0.2, 0.1], (11, 1)), atol=1e-13)
     assert np.ptp(exact.energy(t).total) < 1e-8
     for integrator, distance in {"generalized_alpha": 2e-5, "radau": 1e-6}.items():  # 1 ms, second order; rtol 1e-8
-        run = loop_scenes.run(tmp_path, data, "erls", integrator=integrator, duration=0.05)
+        run = loop_scenes.run(tmp_path, data, "erls", integrator=integrator, duration=0.03)
         assert np.abs(run.position("knee", t) - exact.position("knee", t)).max() < distance
 
 
@@ -263,7 +269,7 @@ def test_run_file_keeps_loops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert again.warnings == run.warnings
 
 
-@pytest.mark.parametrize("integrator", ["generalized_alpha", "dop853", "rk45"])
+@pytest.mark.parametrize("integrator", ["generalized_alpha", "dop853"])
 def test_lock_up_is_named(tmp_path: Path, integrator: str) -> None:
     """A rocker driven beyond its dead point, where crank and coupler stretch out: loop and time are named."""
     data = loop_scenes.four_bar()

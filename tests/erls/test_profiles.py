@@ -257,6 +257,7 @@ FAULTY_CSV = {
     "repeated": ("0,1\n0,2\n", "line 2, column 0", "0.0"),
     "one row": ("0,1\n", "t.csv", "got 1, limit 2"),
     "empty": ("# nothing\n", "t.csv", "no numbers"),
+    "comment in a number": ("0 1 # c\n1 2.#5\n", "line 2", "comment begins within"),
 }
 
 

@@ -249,6 +249,9 @@ def test_published_figures_stand_beside_ours(l_scene: Path, tmp_path: Path) -> N
         ("elastic_modes,t,joint a\n1.5,0.5,1\n", "row 2 does not fit"),
         ("elastic_modes,t,joint a\n1,0.5,nan\n", "row 2 does not fit"),
         ("elastic_modes,t,joint a\n1,0.5,1\n2,0.6,1\n", "at one time"),
+        ("elastic_modes,t,joint a\n1,0.5,1\n1,0.5,2\n", "row 3 does not fit"),
+        ("elastic_modes,t,joint a\n1,0.5,1_0\n", "row 2 does not fit"),
+        ("elastic_modes,t,point a\n1,0.5,1\n", "names no joint or axis"),
         ("#" * 1_000_001, "too large"),
     ],
 )

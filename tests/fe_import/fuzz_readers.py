@@ -6,7 +6,6 @@ import gzip
 import importlib
 import tempfile
 from collections.abc import Callable, Iterator
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -293,13 +292,14 @@ def _valid(_: bytes, model: ModalModel) -> bool:
     return True
 
 
-@cache
-def readers() -> tuple[Reader, ...]:
-    """All of them."""
-    return (
-        *_solid_exports(),
-        *_reduced_exports(),
-        *_meshes(),
-        Reader("link.toml", {"link.toml": FRAME_TOML}, ("link.toml",), _description, content, judge=taken),
-        *_modal_files(),
-    )
+def _descriptions() -> Iterator[Reader]:
+    yield Reader("link.toml", {"link.toml": FRAME_TOML}, ("link.toml",), _description, content, judge=taken)
+
+
+GROUPS: dict[str, Callable[[], Iterator[Reader]]] = {
+    "full matrices": _solid_exports,
+    "reduced matrices": _reduced_exports,
+    "meshes": _meshes,
+    "descriptions": _descriptions,
+    "modal files": _modal_files,
+}

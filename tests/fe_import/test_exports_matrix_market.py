@@ -229,6 +229,8 @@ FAULTS = [
           files={"nodes": "nodes.csv"}),
     fault("a mesh without numbers", lambda: {"k.msh": b"$MeshFormat"}, BAD, "must be an input deck",
           files={"mesh": "k.msh"}),
+    fault("a set without nodes", lambda: {"sets.txt": b"A 10 20\nB\n"}, BAD, "belong into one line",
+          files={"sets": "sets.txt"}),
     fault("a set of no node", lambda: {"sets.txt": b"A 10 20 21\n"}, BAD, "names what is no node",
           files={"sets": "sets.txt"}),
     fault("npz: pickled", entry("data", lambda a: np.array([None, "x"], dtype=object)), BAD, "holds objects"),
@@ -266,6 +268,7 @@ NODE_FAULTS = [
     ("not finite", b"10 0 0 inf\n", "three coordinates"),
     ("no number", b"10 0 0 0\nx 0 0 0\n", "three coordinates"),
     ("none", b"node x y z\n", "no nodes"),
+    ("a first line that looks like a header", b"x10 0 0 0\n20 1 0 0\n", "three coordinates"),
     ("beyond the moon", files()["k.inp"].split(b"*ELEMENT")[0].split(b"Nall\n")[1] + b"999, 1e200\n", "absurdly far"),
 ]
 

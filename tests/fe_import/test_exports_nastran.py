@@ -407,6 +407,8 @@ DMIG_FAULTS: dict[str, tuple[str, str]] = {
         PCH.replace("DMIG*,MAAX,11,1,\n*,11,1,2.0", "DMIG*,MAAX,11,1,\n*,11,1,5.0"),
         "differs by direction",
     ),
+    "a line that is no card": (PCH.replace("*,11,1,10000.0", "*,11,1,10000.0\n72"), "neither a card nor"),
+    "a comment in a number": (PCH.replace("*,11,1,10000.0", "*,11,1,100$00.0"), "a comment begins within a field"),
     "imaginary part": (PCH.replace("*,11,1,10000.0", "*,11,1,10000.0,1.0"), "imaginary part"),
 }
 
@@ -459,49 +461,3 @@ def test_gzip_bomb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "m.op4").write_bytes(gzip.compress(bytes(25_000_000)))
     with pytest.raises(FEImportError, match="unpacks to far more"):
         read_op4({"stiffness": tmp_path / "m.op4"}, Op4Options(boundary=[1]), "link.toml")
-
-
-def spoiled(content: bytes, rng: np.random.Generator) -> tuple[bytes, bool]:
-    """Content with a byte changed, or cut (True)."""
-    place = int(rng.integers(len(content)))
-    if rng.random() < 0.3:
-        return content[:place], True
-    other = int(rng.integers(256))
-    return content[:place] + bytes([other]) + content[place + 1 :], False
-
-
-@pytest.mark.parametrize("name", ["binary", "text", "punch"])
-def test_spoiled_files(tmp_path: Path, name: str) -> None:
-    """60 files each with one byte changed, or cut: an error of ours, or rows as before and one other value or place.
-
-    A digit of a value that is changed for another cannot be told from the value that was meant.
-    """
-    rng = np.random.default_rng(17)
-    content = {"binary": GOOD, "text": TEXT_OP4.encode(), "punch": PCH.encode()}[name]
-    path = tmp_path / "m"
-    positions = {"11": (0.0, 0.0, 0.0), "21": (1.0, 0.0, 0.0)}
-
-    def read() -> Any:
-        if name == "punch":
-            return read_dmig({"stiffness": path}, DmigOptions(), "link.toml")
-        return read_op4({"stiffness": path}, Op4Options(boundary=[11, 21], positions=positions), "link.toml")
-
-    path.write_bytes(content)
-    good = read()
-    refused = 0
-    for _ in range(60):
-        broken, cut = spoiled(content, rng)
-        path.write_bytes(broken)
-        try:
-            found = read()
-        except FEImportError:
-            refused += 1
-            continue
-        assert found.mass.shape == good.mass.shape
-        np.testing.assert_array_equal(found.dof_map, good.dof_map)
-        changed = [abs(a - b).toarray() > 0 for a, b in ((found.mass, good.mass), (found.stiffness, good.stiffness))]
-        places = sum(int(np.triu(c).sum()) for c in changed)
-        assert places == 0 or not cut
-        assert places <= 2 or "grounding" in found.notes  # one changed, or one that moved
-        assert np.isfinite(found.stiffness.data).all()
-    assert refused > 20

@@ -176,6 +176,7 @@ FAULTS = [
     frame("too many ratios", {"damping": {"ratios": [0.01] * 19}}, BAD, "damping.ratios", "limit 18"),
     frame("two kinds of damping", {"damping": {"ratio": 0.01, "rayleigh": {"beta": 1e-4}}}, BAD, "damping", "keep one"),
     frame("negative damping", {"damping": {"ratios": [0.01, -0.01]}}, BAD, "damping.ratios[1]", "negative"),
+    frame("damping in percent", {"damping": {"ratio": 2.0}}, BAD, "damping.ratio", "give 0.02"),
     frame("nan damping", {"damping": {"rayleigh": {"beta": math.nan}}}, BAD, "damping.rayleigh.beta"),
     # frame or solid
     frame("frame and solid", {"solid": SOLID["solid"]}, BAD, "", "exactly one of the tables"),
@@ -274,6 +275,12 @@ def test_files_that_are_no_description(tmp_path: Path, content: bytes, cause: Ca
         load_link(path)
     checked(caught.value, str(path))
     assert caught.value.cause is cause
+
+
+def test_byte_order_mark(tmp_path: Path) -> None:
+    path = write_toml(tmp_path / "link.toml", FRAME)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert load_link(path).description == frame_link(tmp_path).description
 
 
 def test_files_that_are_no_files(tmp_path: Path) -> None:

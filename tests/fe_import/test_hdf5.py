@@ -336,6 +336,64 @@ def fill(group: h5py.Group) -> None:
     write_attribute(group.create_group("c"), "text", "é")
 
 
+def _unsealed(change: Callable[[h5py.File], None]) -> Callable[[h5py.File], None]:
+    """Without the seal."""
+
+    def apply(file: h5py.File) -> None:
+        change(file)
+        del file.attrs["content_sha256"]
+
+    return apply
+
+
+def _set_value(file: h5py.File) -> None:
+    file["a/values"][1] = 7.0
+
+
+def _set_attribute(file: h5py.File) -> None:
+    file["a"].attrs["note"] = "other"
+
+
+SEALED: dict[str, tuple[Callable[[h5py.File], None], bool]] = {
+    "nothing": (lambda file: None, True),
+    "a value": (_set_value, False),
+    "an attribute": (_set_attribute, False),
+    "a dataset dropped that nobody reads": (lambda file: file.__delitem__("a/texts"), False),
+    "a dataset renamed that nobody reads": (lambda file: file.move("a/texts", "a/text"), False),
+    "a dataset more": (lambda file: file.create_dataset("more", data=1.0) and None, False),
+    "another seal": (lambda file: file.attrs.modify("content_sha256", b"0" * 64), False),
+    "no seal": (_unsealed(_set_value), True),
+}
+
+
+@pytest.mark.parametrize("name", SEALED)
+def test_the_seal_holds_for_content_as_it_was_written(tmp_path: Path, name: str) -> None:
+    """Any change is refused when the file has been read; a file of another program has no seal."""
+    change, accepted = SEALED[name]
+    path = tmp_path / "a.h5"
+
+    def write(group: h5py.Group) -> None:
+        write_array(group, "a/values", np.arange(5.0), "m", "values")
+        write_strings(group, "a/texts", ("x", "ü"), "texts")
+        write_attribute(group["a"], "note", "as it was")
+
+    write_atomically(path, write, FEImportError, UNWRITABLE)
+    with h5py.File(path, "r+") as file:
+        change(file)
+
+    def read() -> float:
+        with open_for_reading(path, FEImportError, FAULT) as reader:
+            return float(reader.subgroup("a").array("values", (5,))[1])
+
+    if accepted:
+        assert read() == (7.0 if name == "no seal" else 1.0)
+        return
+    with pytest.raises(FEImportError, match="not what was written") as caught:
+        read()
+    assert caught.value.cause is FAULT
+    assert str(path) in caught.value.where
+
+
 def test_equal_content_gives_equal_bytes(tmp_path: Path) -> None:
     write_atomically(tmp_path / "a.h5", fill, FEImportError, UNWRITABLE)
     time.sleep(1.1)  # time stamps in HDF5 count seconds

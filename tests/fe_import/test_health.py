@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
-from link_files import dense, frame_link, solid_link, straight_link
+from link_files import FRAME, dense, frame_link, solid_link, straight_link
 
 from fe_import.build import build_model
 from fe_import.errors import Cause, FEImportError
@@ -130,6 +130,20 @@ def test_rigid_motions_tell_faults_apart(tmp_path: Path) -> None:
     assert max(rigid_motion_as_eigenmodes(mass, loose, basis.rigid, first)) > 0.01 or not np.isfinite(
         rigid_motion_by_stiffness(model, basis, loose)
     )
+
+
+def test_rigid_motions_in_any_unit(tmp_path: Path) -> None:
+    """The same frame a thousand times smaller, held by a rotational spring as much smaller, departs as much."""
+    found = []
+    for size in (1.0, 1e-3):
+        nodes = {name: [size * x for x in place] for name, place in FRAME["frame"]["nodes"].items()}
+        section = {"shape": "rectangular", "width": 0.01 * size, "height": 0.02 * size}
+        model = build_model(frame_link(tmp_path, frame={"nodes": nodes}, sections={"s": section}))
+        basis, _, stiffness = basis_of(model)
+        stiffness[10, 10] += 3.0 * size**3  # N m/rad, to ground at the second interface: E L³
+        found.append(rigid_motion_by_stiffness(model, basis, stiffness))
+    assert found[0] > 1e-3
+    assert found[1] == pytest.approx(found[0], rel=1e-9)  # rounding of a solution with a condition of 1e5
 
 
 def test_interface_that_does_not_hold(tmp_path: Path) -> None:

@@ -99,6 +99,7 @@ FAULTS = {
         Cause.MESH,
         "more than two elements share a face",
     ),
+    "doubled": (replace(CUBE, elements=np.repeat(CUBE.elements, 2, axis=0)), Cause.MESH, "have the same corners"),
     "two parts": (joined(BRICK, shifted(CUBE, (5, 0, 0))), Cause.DISCONNECTED, "2 parts"),
     "hinged at an edge": (
         joined(CURVED, shifted(CURVED, (1, 1, 0))),

@@ -59,6 +59,43 @@ def test_declared_sizes(tmp_path, name):
     assert str(path) in str(caught.value)
 
 
+def bar(**lines: str) -> str:
+    """Two tetrahedra in MSH 4.1, lines replaced."""
+    text = (
+        f'{MSH4}$PhysicalNames\n1\n3 1 "body"\n$EndPhysicalNames\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 1 0\n'
+        "$EndEntities\n$Nodes\n1 5 1 5\n3 1 0 5\n1\n2\n3\n4\n5\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n$EndNodes\n"
+        "$Elements\n1 2 1 2\n3 1 4 2\n1 1 2 3 4\n2 2 5 3 4\n$EndElements\n"
+    )
+    for old, new in lines.items():
+        assert old in text
+        text = text.replace(old, new, 1)
+    return text
+
+
+DAMAGED = {
+    "elements cut off": ({"2 2 5 3 4\n$EndElements\n": ""}, "$Elements does not end"),
+    "nodes do not end": ({"$EndNodes\n": ""}, "$Nodes does not end"),
+    "an element less": ({"2 2 5 3 4\n": ""}, ""),
+    "an element more": ({"2 2 5 3 4\n": "2 2 5 3 4\n3 1 2 3 5\n"}, "$Elements has 5 lines, 4 are declared"),
+    "a name more": ({'3 1 "body"\n': '3 1 "body"\n3 2 "more"\n'}, "$PhysicalNames declares another count"),
+    "a block less": ({"$Elements\n1 2 1 2\n": "$Elements\n1 3 1 3\n"}, "$Elements declares 3, 2 were found"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_sections_of_gmsh(tmp_path, name):
+    """What is cut off, lost or doubled does not fit the counts."""
+    lines, words = DAMAGED[name]
+    path = tmp_path / "a.msh"
+    path.write_text(bar())
+    assert len(read_mesh(path).elements) == 2
+    path.write_text(bar(**lines))
+    with pytest.raises(FEImportError) as caught:
+        read_mesh(path)
+    assert words in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
 def cube(path) -> bytes:
     meshio.write(
         path, meshio.Mesh(CUBE.nodes, [("hexahedron", CUBE.elements)]), "gmsh22" if path.suffix == ".msh" else None

@@ -1,0 +1,300 @@
+"""Time and memory of reducing solid links, stage by stage, and side by side with Exudyn.
+
+    python benchmarks/reduction.py [--dofs 10000,50000,150000,400000] [--modes 12,40] [--json FILE]
+    python benchmarks/reduction.py --exudyn [--dofs 136000] [--json FILE]
+
+An L of legs 0.5 m and section 0.01 m x 0.03 m of hex20, two rigid interfaces (12 dofs). Every case runs in a process
+of its own; times are CPU times, so that a busy machine changes little, memory is the largest so far. Set
+OMP_NUM_THREADS to choose the threads of the linear algebra.
+
+With ``--exudyn`` (extra: pip install exudyn==1.13.6), both get the same matrices and find the modes with clamped
+interfaces and the static modes; ours then also counts the modes, to know that none is missing, which Exudyn does not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+
+import fe_import.build_solid
+import fe_import.reduce
+import fe_import.solver
+import fe_import.sparse
+from fe_import.coupling import couple_interfaces
+from fe_import.errors import FEImportError
+from fe_import.interface import InterfaceFace
+from fe_import.modal_file import write_modal_file
+from fe_import.model import FEModel
+from fe_import.reduction import fixed_interface
+from fe_import.solid import SolidMaterial, assemble_solid
+from fe_import.solid_elements import SOLID_ELEMENTS
+from fe_import.solid_mesh import SolidMesh
+
+LEG, WIDTH, HEIGHT = 0.5, 0.01, 0.03
+LINK = """
+name = "l"
+[materials.steel]
+youngs_modulus = 2e11
+poissons_ratio = 0.3
+density = 7800.0
+[solid]
+mesh = "l.inp"
+material = "steel"
+[[interfaces]]
+name = "root"
+face = "root"
+[[interfaces]]
+name = "tip"
+face = "tip"
+[reduction]
+fixed_interface_modes = {modes}
+"""
+STAGES = [  # name, module, function; a stage within a stage counts for itself only
+    ("read mesh", fe_import.build_solid, "read_mesh"),
+    ("assembly", fe_import.build_solid, "assemble_solid"),
+    ("order of elimination", fe_import.sparse, "analyse"),
+    ("factorization", fixed_interface, "factorize"),
+    ("constraint modes", sys.modules["fe_import.reduction.craig_bampton"], "constraint_modes"),
+    ("eigenmodes", fe_import.sparse, "lowest_eigenpairs"),
+    ("inertia counts", fe_import.sparse, "negative_pivots"),
+    ("invariants", fe_import.reduce, "inertia_invariants"),
+    ("health checks", fe_import.reduce, "check_model"),
+    ("health checks", fe_import.reduce, "check_basis"),
+    ("health checks", fe_import.reduce, "check_reduction"),
+    ("health checks", fe_import.reduce, "mode_residuals"),
+]
+
+
+def l_mesh(dofs: int) -> SolidMesh:
+    """An L along x and y of cubic hex20 elements, with about so many dofs; sets root and tip."""
+    size = (2 * LEG * WIDTH * HEIGHT * 12.5 / dofs) ** (1 / 3)  # about four nodes to an element, and the surface
+    across, up = (max(1, round(length / size)) for length in (WIDTH, HEIGHT))
+    layer = 2 * (across + 1) * (up + 1) + across * (up + 1) + up * (across + 1)  # nodes per element along
+    along = round((dofs / 3 / layer - across) / 2)
+    grid = np.meshgrid(np.arange(along + across), np.arange(along + across), np.arange(up), indexing="ij")
+    cells = np.stack([g.ravel() for g in grid], axis=1)
+    cells = cells[(cells[:, 0] >= along) | (cells[:, 1] < across)]
+    element = SOLID_ELEMENTS["hex20"]
+    corners = 2 * (cells[:, None, :] + np.array(element.corner_coordinates))
+    places = [corners[:, k] for k in range(8)]
+    places += [corners[:, list(between)].sum(axis=1) // len(between) for between in element.midpoints]
+    base = 2 * max(along + across, up) + 1
+    keys = np.stack(places, axis=1) @ np.array([base * base, base, 1])
+    used, elements = np.unique(keys, return_inverse=True)
+    lattice = np.stack([used // base**2, used // base % base, used % base], axis=1)
+    nodes = lattice / 2 * [LEG / along, LEG / along, HEIGHT / up]
+    sets = {"root": np.flatnonzero(lattice[:, 0] == 0), "tip": np.flatnonzero(lattice[:, 1] == lattice[:, 1].max())}
+    return SolidMesh(nodes, elements.reshape(keys.shape), "hex20", node_sets=sets, source="benchmark")
+
+
+def peak_mb() -> float:
+    """Largest memory of this process so far."""
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+
+
+class Stages:
+    """CPU time by stage, without the stages within, and the peak of memory at the end of each."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.peak_mb: dict[str, float] = {}
+        self._running: list[str] = []
+        self._since = time.process_time()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """What runs inside belongs to the stage."""
+        self._charge()
+        self._running.append(name)
+        try:
+            yield
+        finally:
+            self._charge()
+            self._running.pop()
+            self.peak_mb[name] = peak_mb()
+
+    def _charge(self) -> None:
+        now = time.process_time()
+        if self._running:
+            self.seconds[self._running[-1]] = self.seconds.get(self._running[-1], 0.0) + now - self._since
+        self._since = now
+
+    def wrap(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The function, timed."""
+
+        @functools.wraps(function)
+        def timed(*arguments: Any, **options: Any) -> Any:
+            with self.stage(name):
+                return function(*arguments, **options)
+
+        return timed
+
+
+def reduce_case(dofs: int, modes: int) -> dict[str, Any]:
+    """Reduce and write; stages, mesh and result."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_mesh(l_mesh(dofs), folder / "l.inp")
+        (folder / "l.toml").write_text(LINK.format(modes=modes), encoding="utf-8")
+        stages = Stages()
+        for stage, module, function in STAGES:
+            setattr(module, function, stages.wrap(stage, getattr(module, function)))
+        begun, wall = time.process_time(), time.perf_counter()
+        try:
+            with stages.stage("other"):
+                model = fe_import.reduce.reduce_link(folder / "l.toml", lambda text: print(text, file=sys.stderr))
+        except FEImportError as problem:
+            return {"asked_dofs": dofs, "modes": modes, "refused": str(problem), "peak_mb": peak_mb()}
+        with stages.stage("write"):
+            write_modal_file(folder / "l.modal.h5", model)
+    return {
+        "dofs": int(model.provenance["dofs"]),
+        "modes": modes,
+        "solver": model.provenance["solver"],
+        "healthy": all(check.ok for check in model.health),
+        "first_frequency_hz": float(model.frequencies_hz[6]),
+        "cpu_s": time.process_time() - begun,
+        "wall_s": time.perf_counter() - wall,
+        "peak_mb": peak_mb(),
+        "stages": {s: {"cpu_s": t, "peak_mb": stages.peak_mb[s]} for s, t in stages.seconds.items()},
+    }
+
+
+def write_mesh(mesh: SolidMesh, path: Path) -> None:
+    """An Abaqus input file, without leaving the mesh in memory."""
+    cells = [(mesh.element.meshio_name, mesh.elements)]
+    meshio.Mesh(mesh.nodes, cells, point_sets=mesh.node_sets).write(path)
+
+
+def ours(dofs: int, modes: int) -> dict[str, Any]:
+    """Static and clamped modes from matrices that are there, and their count."""
+    mesh = l_mesh(dofs)
+    mass, stiffness = assemble_solid(mesh, [SolidMaterial(2e11, 0.3, 7800.0)])
+    faces = [InterfaceFace(name, nodes, mesh.nodes[nodes].mean(axis=0)) for name, nodes in mesh.node_sets.items()]
+    coupled = couple_interfaces(mesh.nodes, faces)
+    model = FEModel(
+        "l",
+        coupled.nodes,
+        coupled.dof_map,
+        coupled.extended(mass),
+        coupled.extended(stiffness),
+        coupled.interface_nodes,
+        coupled.independent,
+        coupled.coupling,
+        kind="solid",
+    )
+    del mass, stiffness
+    before, begun, wall = peak_mb(), time.process_time(), time.perf_counter()
+    parts = fixed_interface.partition(model)
+    fixed_interface.constraint_modes(parts)
+    counting = Stages()
+    fe_import.sparse.negative_pivots = counting.wrap("count", fe_import.sparse.negative_pivots)
+    omega, _ = fe_import.sparse.lowest_modes(parts.inner_stiffness, parts.inner_mass, modes, "l", solve=parts.solve)
+    return {
+        "program": "erls",
+        "dofs": mesh.nodes.size,
+        "cpu_s": time.process_time() - begun,
+        "of_which_count_s": counting.seconds["count"],
+        "wall_s": time.perf_counter() - wall,
+        "peak_mb": peak_mb(),
+        "before_mb": before,
+        "frequencies_hz": (omega[:3] / (2 * np.pi)).tolist(),
+    }
+
+
+def exudyn(dofs: int, modes: int) -> dict[str, Any]:
+    """The same by Exudyn; its static modes are those of the second interface, the first is the reference."""
+    import scipy.sparse as sp
+    from exudyn.FEM import FEMinterface, HCBstaticModeSelection
+
+    mesh = l_mesh(dofs)
+    mass, stiffness = assemble_solid(mesh, [SolidMaterial(2e11, 0.3, 7800.0)])
+    fem = FEMinterface()
+    fem.nodes = {"Position": mesh.nodes}
+    fem.massMatrix, fem.stiffnessMatrix = (
+        sp.csr_matrix((m.data, m.indices, m.indptr), m.shape) for m in (mass, stiffness)
+    )
+    before, begun, wall = peak_mb(), time.process_time(), time.perf_counter()
+    fem.ComputeHurtyCraigBamptonModes(
+        list(mesh.node_sets.values()), modes, computationMode=HCBstaticModeSelection.RBE2, timerTreshold=10**9
+    )
+    return {
+        "program": "exudyn",
+        "dofs": mesh.nodes.size,
+        "cpu_s": time.process_time() - begun,
+        "wall_s": time.perf_counter() - wall,
+        "peak_mb": peak_mb(),
+        "before_mb": before,
+        "frequencies_hz": fem.GetEigenFrequenciesHz()[:3].tolist(),
+    }
+
+
+CASES: dict[str, Callable[[int, int], dict[str, Any]]] = {"reduce": reduce_case, "ours": ours, "exudyn": exudyn}
+
+
+def in_own_process(case: str, dofs: int, modes: int) -> dict[str, Any]:
+    """The result of a case that runs in a process of its own."""
+    command = [sys.executable, __file__, "--case", case, "--dofs", str(dofs), "--modes", str(modes)]
+    lines = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
+    return dict(json.loads(lines[-1]))
+
+
+def print_stages(results: list[dict[str, Any]]) -> None:
+    """One column per case: CPU seconds, peak memory so far."""
+    names = list(dict.fromkeys([*(stage for stage, *_ in STAGES), "other", "write"]))
+    print(f"{'':22s}" + "".join(f"{r['dofs']:>13d}/{r['modes']:<3d}" for r in results) + "   dofs/modes")
+    for name in names:
+        cells = [r["stages"].get(name) for r in results]
+        print(f"{name:22s}" + "".join(f"{c['cpu_s']:8.1f}{c['peak_mb']:9.0f}" if c else " " * 17 for c in cells))
+    print(f"{'all':22s}" + "".join(f"{r['cpu_s']:8.1f}{r['peak_mb']:9.0f}" for r in results) + "   s, MB")
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--dofs", default="")
+    parser.add_argument("--modes", default="")
+    parser.add_argument("--exudyn", action="store_true")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--case", choices=CASES, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    dofs = [int(d) for d in (given.dofs or ("136000" if given.exudyn else "10000,50000,150000,400000")).split(",")]
+    modes = [int(m) for m in (given.modes or ("12" if given.exudyn else "12,40")).split(",")]
+    if given.case:
+        print(json.dumps(CASES[given.case](dofs[0], modes[0])))
+        return
+    if given.exudyn:
+        results = [in_own_process(case, d, m) for d in dofs for m in modes for case in ("ours", "exudyn")]
+        print("           dofs  CPU [s]  wall [s]  peak [MB]  of these for the matrices  first frequencies [Hz]")
+        for r in results:
+            frequencies = "  ".join(f"{f:.3f}" for f in r["frequencies_hz"])
+            print(
+                f"{r['program']:8s}{r['dofs']:7d}{r['cpu_s']:9.1f}{r['wall_s']:10.1f}{r['peak_mb']:11.0f}"
+                f"{r['before_mb']:27.0f}  {frequencies}"
+            )
+    else:
+        results = [in_own_process("reduce", d, m) for d in dofs for m in modes]
+        for r in results:
+            if "refused" in r:
+                print(f"{r['asked_dofs']} dofs, {r['modes']} modes: {r['refused']}")
+        print_stages([r for r in results if "refused" not in r])
+    if given.json:
+        given.json.write_text(json.dumps(results, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
