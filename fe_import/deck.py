@@ -7,30 +7,20 @@ the matrices. Upper and lower case make no difference, as in these programs.
 
 from __future__ import annotations
 
-import math
-import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from fe_import.deck_elements import ElementType, element_type
+from fe_import.deck_lines import DeckReader
 from fe_import.deck_sets import Item, NodesOf, SetTable, set_items
-from fe_import.errors import Cause, FEImportError, shortened
+from fe_import.errors import Cause, shortened
 from fe_import.text_file import TextFile
 
-_FLAT = "write the mesh as one flat deck with *NODE, *ELEMENT, *NSET, *ELSET and *SURFACE"
 _ELSEWHERE = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")  # make or move nodes and elements
 _ENDED = ("STEP", "PART", "ASSEMBLY", "INSTANCE")
-_INTEGER = re.compile(r"[+-]?\d{1,18}\Z")
-_PARAMETERS = {
-    "NODE": ("NSET", "SYSTEM", "INPUT"),
-    "ELEMENT": ("TYPE", "ELSET", "INPUT", "OFFSET", "SOLIDELEMENTNUMBERING"),
-    "NSET": ("NSET", "ELSET", "GENERATE", "INSTANCE", "INTERNAL", "SORTED", "UNSORTED"),
-    "ELSET": ("ELSET", "GENERATE", "INSTANCE", "INTERNAL", "SORTED", "UNSORTED"),
-}
 _LARGEST_LABEL = 999_999_999
-_SHORTEST = 3  # letters of a parameter that is cut short, as in GEN
 
 
 @dataclass
@@ -90,7 +80,7 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
     """
     deck = Deck()
     with TextFile(path, where, cause) as file:
-        reader = _Reader(file)
+        reader = DeckReader(file)
         while (keyword := reader.keyword()) is not None:
             name, options = keyword
             deck.keywords[name] += 1
@@ -110,89 +100,13 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
     return deck
 
 
-class _Reader:
-    """Keyword lines and data lines of a deck; comments (``**``) and blank lines left out."""
-
-    def __init__(self, file: TextFile) -> None:
-        self.file, self._line = file, 0
-        self._waiting, self._at = self._next()
-
-    def _next(self) -> tuple[str | None, int]:
-        while (line := self.file.line()) is not None:
-            line = line.strip()
-            if line and not line.startswith("**"):
-                return line, self.file.number
-        return None, self.file.number
-
-    def _take(self) -> str:
-        line, self._line = self._waiting or "", self._at
-        self._waiting, self._at = self._next()
-        return line
-
-    def data(self) -> list[str] | None:
-        """Fields of the next data line, None before the next keyword or at the end."""
-        if self._waiting is None or self._waiting.startswith("*"):
-            return None
-        fields = [f.strip() for f in self._take().split(",")]
-        return fields[:-1] if len(fields) > 1 and not fields[-1] else fields
-
-    def keyword(self) -> tuple[str, dict[str, str]] | None:
-        """Name and parameters of the next keyword, names in capitals; data lines before it are skipped."""
-        while self.data() is not None:
-            pass
-        if self._waiting is None:
-            return None
-        line = self._take()
-        while line.endswith(",") and self._waiting is not None and not self._waiting.startswith("*"):
-            line += self._take()
-        name, *fields = line[1:].split(",")
-        pairs = (given.partition("=") for given in fields if given.strip())
-        options = {"".join(key.split()).upper(): value.strip().strip('"') for key, _, value in pairs}
-        return " ".join(name.split()).upper(), options
-
-    def known(self, keyword: str, options: dict[str, str]) -> dict[str, str]:
-        """The parameters of a keyword that is read, those cut short in full."""
-        if keyword not in _PARAMETERS:
-            return options
-        result = {}
-        for name, value in options.items():
-            full = [p for p in _PARAMETERS[keyword] if p == name or (p.startswith(name) and len(name) >= _SHORTEST)]
-            if len(full) != 1:
-                known = ", ".join(_PARAMETERS[keyword])
-                raise self.fault(f"*{keyword} has no such parameter", shortened(name), f"known: {known}")
-            result[full[0]] = value
-        if "INPUT" in result:
-            raise self.fault(f"*{keyword}, INPUT is not followed", result["INPUT"], "join the files into one")
-        return result
-
-    def fault(self, message: str, value: str | None = None, remedy: str = _FLAT) -> FEImportError:
-        """An error at the line that was read last."""
-        return self.file.failure(message, line=self._line, value=value, remedy=remedy)
-
-    def integer(self, text: str) -> int:
-        """A whole number."""
-        if not _INTEGER.match(text):
-            raise self.fault("expected a whole number", shortened(text))
-        return int(text)
-
-    def real(self, text: str) -> float:
-        """A finite number, 0 for an empty field."""
-        try:
-            value = float(text.upper().replace("D", "E") or 0.0)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value) or "_" in text:
-            raise self.fault("expected a finite number", shortened(text))
-        return value
-
-
 def _named(options: dict[str, str], name: str) -> str:
     if not options.get(name):
         raise ValueError(f"lacks {name}")
     return options[name]
 
 
-def _nodes(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
+def _nodes(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     if options.get("SYSTEM", "R").upper() != "R":
         raise ValueError("nodes in cylindrical or spherical coordinates")
     labels: list[int] = []
@@ -210,7 +124,7 @@ def _nodes(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
         deck.node_sets.add(options["NSET"], labels)
 
 
-def _elements(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
+def _elements(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     kind = _named(options, "TYPE").upper()
     deck.types[kind] = known = element_type(kind)
     cells = deck.elements.setdefault(kind, {})
@@ -233,32 +147,32 @@ def _elements(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
         deck.element_sets.add(options["ELSET"], labels)
 
 
-def _node_set(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
+def _node_set(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     items = _items(reader, "GENERATE" in options)
     if "ELSET" in options:
         items.append(NodesOf(_named(options, "ELSET")))
     deck.node_sets.add(_named(options, "NSET"), items)
 
 
-def _element_set(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
+def _element_set(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     deck.element_sets.add(_named(options, "ELSET"), _items(reader, "GENERATE" in options))
 
 
-def _items(reader: _Reader, generate: bool) -> list[Item]:
+def _items(reader: DeckReader, generate: bool) -> list[Item]:
     items: list[Item] = []
     while (fields := reader.data()) is not None:
         items += set_items(fields, generate)
     return items
 
 
-def _surface(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
+def _surface(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     rows = []
     while (fields := reader.data()) is not None:
         rows.append(fields)
     deck.surfaces[_named(options, "NAME")] = (options.get("TYPE", "ELEMENT").upper() == "NODE", rows)
 
 
-def _instance(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
+def _instance(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     if deck.keywords["INSTANCE"] > 1:
         raise ValueError("several instances; a link is one part")
     while (fields := reader.data()) is not None:
@@ -266,7 +180,7 @@ def _instance(reader: _Reader, options: dict[str, str], deck: Deck) -> None:
             raise ValueError("the instance is moved; write the mesh where it belongs")
 
 
-_KEYWORDS: dict[str, Callable[[_Reader, dict[str, str], Deck], None]] = {
+_KEYWORDS: dict[str, Callable[[DeckReader, dict[str, str], Deck], None]] = {
     "NODE": _nodes,
     "ELEMENT": _elements,
     "NSET": _node_set,

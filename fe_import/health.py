@@ -146,8 +146,8 @@ def check_basis(
         least = float(carried.sum(axis=0)[:3].min())
         checks.append(HealthCheck("share of mass in fixed-interface modes, least direction", least, NO_LIMIT))
     remedy = (
-        "look for loose parts, hinges, supports and matrices of another model; a slender or very stiff part of "
-        "many small elements loses the digits too"
+        "look for loose parts, hinges, supports, matrices of another model, and for many small elements in a slender "
+        "or very stiff part"
     )
     _refuse(((check, remedy) for check in checks), where)
     return (*checks, *_missing_modes(model, omega), HealthCheck("condition of the basis", _condition(mass), NO_LIMIT))

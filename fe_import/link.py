@@ -327,19 +327,16 @@ def check_damping(d: Damping, where: str, error: type[ReportedError] = FEImportE
     """
     given = [n for n in ("ratio", "ratios", "rayleigh") if getattr(d, n) is not None]
     if len(given) > 1:
-        message, value = "more than one kind of damping", " and ".join(given)
-        raise error(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one")
+        kinds = " and ".join(given)
+        raise error(Cause.BAD_FIELD, "more than one kind of damping", where=where, value=kinds, remedy="keep one")
     for field, value in _damping_numbers(d):
         place = f"{where}.{field}"
         if not (math.isfinite(value) and value >= 0):
-            raise error(
-                Cause.BAD_FIELD, "damping cannot be negative", where=place, value=value, remedy="give 0 or more"
-            )
+            message = "damping cannot be negative"
+            raise error(Cause.BAD_FIELD, message, where=place, value=value, remedy="give 0 or more")
         if value > 1 and "rayleigh" not in field:
-            message = "a damping ratio above 1 is more than critical"
-            raise error(
-                Cause.BAD_FIELD, message, where=place, value=value, limit=1, remedy="ratios are no percentages: give 0.02"
-            )
+            message, remedy = "a damping ratio above 1 is more than critical", "for 2 percent give 0.02"
+            raise error(Cause.BAD_FIELD, message, where=place, value=value, limit=1, remedy=remedy)
 
 
 def _damping_numbers(d: Damping) -> Iterator[tuple[str, float]]:

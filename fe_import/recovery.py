@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg as la
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.inertia import turned
@@ -11,7 +10,8 @@ from fe_import.link import Recovery
 from fe_import.modal_model import ModalModel
 from fe_import.model import Array, FEModel, IntArray, StressSource
 from fe_import.recovery_maps import SPIN_PAIRS, RecoveryMaps
-from fe_import.sparse import factorize
+from fe_import.reduction.base import expanded
+from fe_import.reduction.free_body import free_body
 from fe_import.toml_file import choose
 
 
@@ -42,11 +42,10 @@ def recovery_maps(model: FEModel, shapes: Array, wanted: Recovery, where: str) -
             remedy="remove the table, or give the link as 'frame' or 'solid'",
         )
     sites = chosen_sites(model, source, wanted, where)
-    rigid = shapes[:, :6]
     loads = np.zeros((len(shapes), len(model.interface_dofs)))
     loads[model.interface_dofs, np.arange(loads.shape[1])] = 1.0
     modal = model.mass @ shapes[:, 6:]
-    static = inertia_relief(model, rigid, np.hstack([modal, loads, _centrifugal_loads(model)]))
+    static = inertia_relief(model, np.hstack([modal, loads, _centrifugal_loads(model)]))
     found = source.evaluate(np.hstack([shapes[:, 6:], static]), model.dof_map, sites)
     count = shapes.shape[1] - 6
     elastic, inertia, forces, spin = np.split(found, np.cumsum([count, count, loads.shape[1]]), axis=2)
@@ -85,14 +84,12 @@ def chosen_sites(model: FEModel, source: StressSource, wanted: Recovery, where: 
     return np.flatnonzero(asked)
 
 
-def inertia_relief(model: FEModel, rigid: Array, loads: Array) -> Array:
+def inertia_relief(model: FEModel, loads: Array) -> Array:
     """Elastic displacement of the free link under constant loads, in the frame that the rigid-body modes follow.
 
     Parameters
     ----------
     model : FEModel
-    rigid : (d, 6) array
-        Mass-orthonormal rigid-body modes.
     loads : (d, k) array
         On all nodal components; what is out of balance accelerates the link as a rigid body.
 
@@ -101,20 +98,8 @@ def inertia_relief(model: FEModel, rigid: Array, loads: Array) -> Array:
     (d, k) array
         Pᵀ K⁺ P of the loads, P = 1 - M R Rᵀ; no mode of the link is left out.
     """
-    mass, stiffness = model.reduced_matrices()
-    c = model.coupling
-    moving = rigid[model.independent]
-    force = loads.copy() if c is None else np.asarray(c.T @ loads)
-    force -= (mass @ moving) @ (moving.T @ force)
-    held = la.qr(moving.T, mode="r", pivoting=True)[-1][:6]  # six dofs that hold the link without strain
-    free = np.setdiff1d(np.arange(len(moving)), held)
-    inner = stiffness[free][:, free].tocsc()
-    solve = factorize(inner, "stiffness of the held link", model.dof_positions()[free])
-    result = np.zeros_like(force)
-    result[free] = solve(force[free])
-    result[free] += solve(force[free] - inner @ result[free])
-    result -= moving @ (moving.T @ (mass @ result))
-    return result if c is None else np.asarray(c @ result)
+    forces = loads if model.coupling is None else np.asarray(model.coupling.T @ loads)
+    return expanded(model, free_body(model, model.source).static(forces))
 
 
 def _centrifugal_loads(model: FEModel) -> Array:

@@ -7,7 +7,7 @@ A reader may refuse a damaged file with an error of the package. What it accepts
   two blocks some of them), which no reader can tell from an intended one; nothing else about the file changed;
 - told: a set of a mesh cannot be followed any more, and the mesh says so;
 - lines: of a text format that states no counts, whole lines are gone or moved (its other lines are as they were, but
-  for one of the same syntax or cut short), or what was read is part of what was there.
+  for one: broken in two, cut short, of labels only, or of the same syntax), or what was read is part of what was there.
 
 Anything else is a silent acceptance: entries lost by a cut, shifted fields, garbage read as numbers, numbers that are
 not finite. Another exception than the package's own, and a case that takes longer than its time limit, are faults too.
@@ -29,146 +29,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fuzzing_damage import Damage, damaged
 
 from fe_import.errors import ReportedError
 
 Facts = frozenset[Any]
-_NUMBER = re.compile(rb"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?(?![\w.])")
 _FORTRAN = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))([-+]\d+)")  # Nastran's 1.5+3
 _FIELDS = tuple(re.compile(rf"[\s,;{more}]+") for more in ("", r"=\"'<>\[\]{}"))  # of tables, of keywords and records
-_NUMBERS = (b"nan", b"inf", b"1e400", b"1e30", b"-1", b"0", b"7.5", b"2147483648", b"123456789012345678901234567890")
-_MARKS = [*b', * ** % $ = " - . 1_0 \xff \0 #'.split(b" "), b" ", b"\n", b"\r\n"]
-
-
-@dataclass(frozen=True)
-class Damage:
-    """One mutated file: how it was made, and its bytes."""
-
-    kind: str
-    content: bytes
-
-
-def _flip(data: bytes, rng: np.random.Generator) -> bytes:
-    at = int(rng.integers(len(data)))
-    return data[:at] + bytes([data[at] ^ (1 << int(rng.integers(8)))]) + data[at + 1 :]
-
-
-def _byte(data: bytes, rng: np.random.Generator) -> bytes:
-    at = int(rng.integers(len(data)))
-    return data[:at] + bytes([int(rng.integers(256))]) + data[at + 1 :]
-
-
-def _letter(data: bytes, rng: np.random.Generator) -> bytes:
-    at = int(rng.integers(len(data)))
-    return data[:at] + bytes(rng.choice(list(b"0123456789-+eEDxX. ,;\n*$#")) for _ in "x") + data[at + 1 :]
-
-
-def _cut(data: bytes, rng: np.random.Generator) -> bytes:
-    return data[: int(rng.integers(len(data)))]
-
-
-def _cut_behind_a_line(data: bytes, rng: np.random.Generator) -> bytes:
-    ends = [k + 1 for k, byte in enumerate(data[:-1]) if byte == 10]
-    return data[: int(rng.choice(ends))] if ends else data[: len(data) // 2]
-
-
-def _span(data: bytes, rng: np.random.Generator, most: int = 64) -> slice:
-    begin = int(rng.integers(len(data)))
-    return slice(begin, min(len(data), begin + int(rng.integers(1, most))))
-
-
-def _lines(data: bytes, rng: np.random.Generator) -> tuple[list[bytes], slice]:
-    lines = data.splitlines(keepends=True)
-    begin = int(rng.integers(len(lines)))
-    return lines, slice(begin, begin + int(rng.integers(1, 4)))
-
-
-def _delete(data: bytes, rng: np.random.Generator) -> bytes:
-    span = _span(data, rng)
-    return data[: span.start] + data[span.stop :]
-
-
-def _repeat(data: bytes, rng: np.random.Generator) -> bytes:
-    span = _span(data, rng)
-    return data[: span.stop] + data[span] + data[span.stop :]
-
-
-def _swap(data: bytes, rng: np.random.Generator) -> bytes:
-    length = int(rng.integers(1, 1 + min(64, len(data) // 2)))
-    a, b = sorted(int(k) for k in rng.integers(0, len(data) - length + 1, 2))
-    if b < a + length:
-        return data
-    return data[:a] + data[b : b + length] + data[a + length : b] + data[a : a + length] + data[b + length :]
-
-
-def _delete_lines(data: bytes, rng: np.random.Generator) -> bytes:
-    lines, span = _lines(data, rng)
-    return b"".join(lines[: span.start] + lines[span.stop :])
-
-
-def _repeat_lines(data: bytes, rng: np.random.Generator) -> bytes:
-    lines, span = _lines(data, rng)
-    return b"".join(lines[: span.stop] + lines[span] + lines[span.stop :])
-
-
-def _swap_lines(data: bytes, rng: np.random.Generator) -> bytes:
-    lines = data.splitlines(keepends=True)
-    a, b = (int(k) for k in rng.integers(0, len(lines), 2))
-    lines[a], lines[b] = lines[b], lines[a]
-    return b"".join(lines)
-
-
-def _insert(data: bytes, rng: np.random.Generator) -> bytes:
-    at = int(rng.integers(len(data) + 1))
-    return data[:at] + rng.bytes(int(rng.integers(1, 17))) + data[at:]
-
-
-def _insert_token(data: bytes, rng: np.random.Generator) -> bytes:
-    at = int(rng.integers(len(data) + 1))
-    return data[:at] + _MARKS[int(rng.integers(len(_MARKS)))] + data[at:]
-
-
-def _number(data: bytes, rng: np.random.Generator) -> bytes:
-    found = list(_NUMBER.finditer(data))
-    if not found:
-        return _byte(data, rng)
-    chosen = found[int(rng.integers(len(found)))]
-    return data[: chosen.start()] + _NUMBERS[int(rng.integers(len(_NUMBERS)))] + data[chosen.end() :]
-
-
-def _overwrite(data: bytes, rng: np.random.Generator) -> bytes:
-    span = _span(data, rng, 17)
-    block = rng.choice([0, 127, 128, 240, 255], span.stop - span.start).astype(np.uint8).tobytes()
-    return data[: span.start] + block + data[span.stop :]
-
-
-_EVERYWHERE = {
-    "flip a bit": _flip,
-    "change a byte": _byte,
-    "cut": _cut,
-    "delete a block": _delete,
-    "repeat a block": _repeat,
-    "swap two blocks": _swap,
-    "insert random bytes": _insert,
-}
-IN_BINARY: Mapping[str, Callable[[bytes, np.random.Generator], bytes]] = {**_EVERYWHERE, "overwrite": _overwrite}
-IN_TEXT: Mapping[str, Callable[[bytes, np.random.Generator], bytes]] = {
-    **_EVERYWHERE,
-    "change a character": _letter,
-    "cut behind a line": _cut_behind_a_line,
-    "delete lines": _delete_lines,
-    "repeat lines": _repeat_lines,
-    "swap two lines": _swap_lines,
-    "insert a mark": _insert_token,
-    "replace a number": _number,
-}
-
-
-def damaged(data: bytes, rng: np.random.Generator, *, binary: bool) -> Damage:
-    """One mutation of a file."""
-    kinds = IN_BINARY if binary else IN_TEXT
-    name = list(kinds)[int(rng.integers(len(kinds)))]
-    return Damage(name, kinds[name](data, rng))
 
 
 def _kind(word: str) -> str:
@@ -192,7 +59,7 @@ def same_syntax(before: str, after: str) -> bool:
         return True
     number = {"integer", "real"}
     for fields in _FIELDS:
-        old, new = (fields.split(line.strip()) for line in (before, after))
+        old, new = (fields.split(line.strip(" \t\r,;")) for line in (before, after))
         pairs = [(_kind(a), _kind(b)) for a, b in zip(old, new, strict=False)]
         if len(old) == len(new) and all(a == b or {a, b} <= number for a, b in pairs):
             return True
@@ -213,14 +80,15 @@ def replaces_a_value(before: bytes, after: bytes, *, binary: bool) -> bool:
 
 
 def keeps_lines(before: bytes, after: bytes) -> bool:
-    """Whether the file has lines of the sound one only, but for one of the same syntax, cut short, or of labels."""
+    """Whether the file has lines of the sound one only, but for one: broken in two, cut short, with other values."""
     old = _texts(before)
     known = set(old)
     new = [line for line in _texts(after) if line not in known]
-    if len(new) > 1:
-        return False
-    one = new[0] if new else ""
-    return not re.search(r"[^\d,;\s]", one) or any(line.startswith(one) or same_syntax(line, one) for line in old)
+    if len(new) == 2:
+        return "".join(new) in known
+    one = new[0].partition("#")[0] if new else ""
+    labels_only = not re.search(r"[^\d,;\s]", one)
+    return len(new) < 2 and (labels_only or any(line.startswith(one) or same_syntax(line, one) for line in old))
 
 
 @dataclass(frozen=True)

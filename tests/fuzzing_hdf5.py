@@ -8,7 +8,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from fuzzing import Damage
+from fuzzing_damage import Damage
 
 _VALUES = (np.nan, np.inf, -np.inf, -1.0, 1e300, 0.0)
 

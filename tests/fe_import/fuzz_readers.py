@@ -44,8 +44,10 @@ def mesh_facts(mesh: SolidMesh) -> Facts:
 
 def model_facts(model: FEModel) -> Facts:
     """Entries of the matrices, nodes, rows, named nodes, nodes of the interfaces."""
-    found: set[Any] = {("node", k, *p) for k, p in enumerate(model.nodes.tolist())}
+    made = {i.node for i in model.interface_nodes if i.coupling != "node"}  # they follow from the faces
+    found: set[Any] = {("node", k, *p) for k, p in enumerate(model.nodes.tolist()) if k not in made}
     found |= {("row", k, *rows) for k, rows in enumerate(model.dof_map.tolist())}
+    found |= {("cell", *cell) for cells in (model.lines, model.triangles) for cell in cells.tolist()}
     for name, matrix in (("mass", model.mass), ("stiffness", model.stiffness)):
         entries = sp.coo_array(matrix)
         found |= {(name, *e) for e in zip(*(c.tolist() for c in entries.coords), entries.data.tolist(), strict=True)}
@@ -184,7 +186,8 @@ def _meshes() -> Iterator[Reader]:
             path = Path(folder) / f"box{suffix}"
             meshio.write(path, data)
             sound[suffix] = path.read_bytes()
-    hexes = meshio.Mesh(mesh.nodes, part.cells[:1])
+    tags = {key: [np.array([1, 1])] for key in ("gmsh:physical", "gmsh:geometrical")}
+    hexes = meshio.Mesh(mesh.nodes, part.cells[:1], cell_data=tags)
     for suffix, form, binary in (("-2.msh", "gmsh22", False), ("-binary.msh", "gmsh", True)):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"box{suffix}"

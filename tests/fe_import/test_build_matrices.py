@@ -229,6 +229,8 @@ FAULTS = [
           "no position"),
     fault("named number", {"matrices": {"nodes": {"p": 11}}}, REFERENCE, "matrices.nodes.p: no node of this number"),
     fault("named position", {"matrices": {"nodes": {"p": [9.0, 0.0, 0.0]}}}, REFERENCE, "near this position"),
+    fault("a material", {"materials": {"m": {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2700.0}}}, BAD,
+          "hold stiffness and mass already"),
     fault("named not a number", {"matrices": {"nodes": {"p": [float("nan"), 0.0, 0.0]}}}, BAD, "finite"),
     fault("orphan in a set", {}, INTERFACE, "1 nodes of this set have no rows",
           raw("k.inp", lambda c: c.replace(b"*NODE, NSET=Nall", b"*NODE, NSET=X0\n999,1,1,1\n*NODE"))),

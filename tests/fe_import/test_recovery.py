@@ -235,13 +235,9 @@ def test_mode_acceleration_is_exact_at_rest_with_any_modes(tmp_path: Path) -> No
 def test_gravity_and_rigid_acceleration_need_no_column(tmp_path: Path) -> None:
     """The loads M R of a rigid-body acceleration leave the free link without strain."""
     model = build_model(frame_link(tmp_path))
-    rigid = np.linalg.solve(
-        np.linalg.cholesky(model.rigid_body_modes().T @ (model.mass @ model.rigid_body_modes())),
-        model.rigid_body_modes().T,
-    ).T
     weight = np.asarray(model.mass @ model.rigid_body_modes())
-    unit_loads = inertia_relief(model, rigid, np.eye(len(weight)))
-    assert np.abs(inertia_relief(model, rigid, weight)).max() < 1e-12 * np.abs(unit_loads).max()
+    unit_loads = inertia_relief(model, np.eye(len(weight)))
+    assert np.abs(inertia_relief(model, weight)).max() < 1e-12 * np.abs(unit_loads).max()
 
 
 @pytest.mark.parametrize("make", [frame_link, solid_link])
