@@ -279,12 +279,12 @@ def main() -> None:
         return
     if given.exudyn:
         results = [in_own_process(case, d, m) for d in dofs for m in modes for case in ("ours", "exudyn")]
-        print("           dofs  CPU [s]  wall [s]  peak [MB]  of these for the matrices  first frequencies [Hz]")
+        print("           dofs  CPU [s]  (count)  wall [s]  peak [MB]  (before)  first frequencies [Hz]")
         for r in results:
             frequencies = "  ".join(f"{f:.3f}" for f in r["frequencies_hz"])
             print(
-                f"{r['program']:8s}{r['dofs']:7d}{r['cpu_s']:9.1f}{r['wall_s']:10.1f}{r['peak_mb']:11.0f}"
-                f"{r['before_mb']:27.0f}  {frequencies}"
+                f"{r['program']:8s}{r['dofs']:7d}{r['cpu_s']:9.1f}{r.get('of_which_count_s', 0):9.1f}"
+                f"{r['wall_s']:10.1f}{r['peak_mb']:11.0f}{r['before_mb']:10.0f}  {frequencies}"
             )
     else:
         results = [in_own_process("reduce", d, m) for d in dofs for m in modes]

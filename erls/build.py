@@ -20,14 +20,14 @@ from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.dh import DHRow, split
 from erls.mechanism.drives import build_drive
 from erls.mechanism.joints import JOINT_TYPES, Joint, JointForces
-from erls.mechanism.links import Link, payload_invariants, rigid_model, truncated
+from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model, truncated
 from erls.mechanism.place import Place
 from erls.scene import Joint as JointRecord
 from erls.scene import Link as LinkRecord
 from erls.scene import Scene
 from fe_import.build import inertia_matrix
 from fe_import.errors import FEImportError, ReportedError
-from fe_import.link import load_link
+from fe_import.link import LinkDescription, load_link
 from fe_import.modal_file import ModalModel, read_modal_file
 from fe_import.model import InterfaceNode
 from fe_import.modes import damping_ratios
@@ -56,7 +56,10 @@ def cache_folder() -> Path:
 
 
 def build_mechanism(
-    scene: Scene, tell: Message = lambda text: None, models: Sequence[ModalModel] | None = None
+    scene: Scene,
+    tell: Message = lambda text: None,
+    models: Sequence[ModalModel] | None = None,
+    descriptions: Sequence[LinkDescription | None] = (),
 ) -> Built:
     """Read or reduce the links and put the mechanism together.
 
@@ -67,6 +70,8 @@ def build_mechanism(
         Told about each step that takes time.
     models : sequence of ModalModel, optional
         Modal models of the links, instead of the ones that the scene names (a run file holds its own).
+    descriptions : sequence of LinkDescription or None
+        With ``models``: descriptions of the links that are made of beams, as far as they are known.
 
     Raises
     ------
@@ -76,10 +81,12 @@ def build_mechanism(
     record, file = scene.record, str(scene.path)
     joints = _joints(scene)  # first: a faulty one is found before time goes into reductions
     if models is None:
-        models = link_models(scene, tell)
+        models, descriptions = link_models(scene, tell), _beam_descriptions(scene)
     links = [
-        _link(link, model, k, len(models), file)
-        for k, (link, model) in enumerate(zip(record.links, models, strict=True))
+        replace(_link(link, model, k, len(models), file), description=description)
+        for k, (link, model, description) in enumerate(
+            zip(record.links, models, descriptions or [None] * len(models), strict=True)
+        )
     ]
     warnings = [w for joint, link in zip(joints, links, strict=True) for w in _arm_warnings(joint, link)]
     points = [_point(scene, k, links) for k in range(len(record.points))]
@@ -128,6 +135,12 @@ def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
             made[key] = _modal_model(scene, k, link, tell)
         result.append(made[key])
     return result
+
+
+def _beam_descriptions(scene: Scene) -> list[LinkDescription | None]:
+    """Descriptions of the links that are made of beams."""
+    found = [load_link(scene.folder / link.model).description if link.model else None for link in scene.record.links]
+    return [d if d is not None and d.frame is not None else None for d in found]
 
 
 def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> ModalModel:
@@ -334,7 +347,8 @@ def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list
                 remedy="put the payload on an interface, or give mass only",
             )
         extra = payload_invariants(link.model, node, offset, mass, inertia)
-        result[number] = replace(link, invariants=link.invariants + extra)
+        payloads = (*link.payloads, Payload(node, offset, mass, inertia))
+        result[number] = replace(link, invariants=link.invariants + extra, payloads=payloads)
 
     for k, payload in enumerate(scene.record.payloads):
         place = f"{scene.path}: payloads[{k}]"

@@ -35,7 +35,7 @@ def compare(
     scene
         Scene (TOML).
     formulations
-        Separated by commas; all unless given. Besides the formulations: erls-minimum-norm (five rows per joint),
+        Separated by commas; erls,ffr unless given. Besides them: nodal (beam elements, for large deflections), erls-minimum-norm (five rows per joint),
         erls-fem (links not reduced).
     output
         Report to write: .html a self-contained page with plots, .csv the histories, .json the JSON object.

@@ -260,5 +260,8 @@ def node_positions(
         Of the elastic and rigid-body displacement against the Equivalent Rigid Link System; 1 is true.
     """
     model, frame = run.formulation.mechanism.links[link].model, state.poses[link]
+    if state.nodes is not None:
+        undeformed = model.nodes[nodes] @ frame[:3, :3].T + frame[:3, 3]
+        return np.asarray(undeformed + magnification * (state.nodes[link][nodes] - undeformed))
     local = model.nodes[nodes] + magnification * (model.translation_shapes[nodes] @ state.modal[link])
     return np.asarray(local @ frame[:3, :3].T + frame[:3, 3])

@@ -23,6 +23,7 @@ from erls.scene import Scene, SceneRecord
 from erls.scene_check import check_scene
 from fe_import.errors import ReportedError
 from fe_import.hdf5 import open_for_reading, write_array, write_atomically, write_attribute, write_strings
+from fe_import.link import LinkDescription
 from fe_import.modal_file import ModalModel, read_modal_group, write_modal_group
 from fe_import.toml_file import choose, convert
 
@@ -85,6 +86,10 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
     write_array(
         group, "model_of_link", np.array(numbers, dtype=np.int64), "1", "group of models/ of each link"
     )
+    links = run.formulation.mechanism.links
+    if run.scene.record.simulation.formulation == "nodal":
+        texts = [link.description and msgspec.json.encode(link.description).decode() for link in links]
+        write_strings(group, "descriptions", tuple(t or "" for t in texts), "links made of beams as JSON, or empty")
     _fill_output(group, run)
 
 
@@ -152,6 +157,7 @@ def load_run(path: Path | str) -> Run:
             raise file.fail("scene", f"not JSON: {problem}") from None
         record = convert(data, SceneRecord, f"{path}: /scene", SceneError)
         check_scene(record, f"{path}: /scene")
+        choose(record.simulation.formulation, FORMULATIONS, f"{path}: /scene simulation.formulation", SceneError)
         scene = Scene(Path(file.attribute("scene_file", str) or path.name), record)
         count = len(record.links)
         numbers = file.integers("model_of_link", (count,), 1, count + 1)
@@ -160,14 +166,15 @@ def load_run(path: Path | str) -> Run:
             int(n): read_modal_group(models.subgroup(f"{n:04d}").group, str(path))
             for n in sorted(set(numbers.tolist()))
         }
+        descriptions: list[LinkDescription | None] = []
+        if record.simulation.formulation == "nodal":
+            descriptions = [_description(text, f"{path}: /descriptions") for text in file.names("descriptions", count)]
         try:
-            built = build_mechanism(scene, models=[read[int(n)] for n in numbers])
+            built = build_mechanism(scene, models=[read[int(n)] for n in numbers], descriptions=descriptions)
+            formulation = formulate(built.mechanism, record.simulation)
         except ReportedError as problem:
             problem.where = f"{path}: /scene: {problem.where}"
             raise
-        settings = record.simulation
-        choose(settings.formulation, FORMULATIONS, f"{path}: /scene simulation.formulation", SceneError)
-        formulation = formulate(built.mechanism, settings)
         knots = file.subgroup("knots")
         t = knots.array("time", (None,))
         shape = (len(t), formulation.size)
@@ -185,3 +192,14 @@ def load_run(path: Path | str) -> Run:
         )  # fmt: skip
         warnings = file.names("warnings")
         return Run(scene, formulation, solution, file.attribute("wall_s", float), warnings)
+
+
+def _description(text: str, where: str) -> LinkDescription | None:
+    """A link description that was embedded."""
+    if not text:
+        return None
+    try:
+        data = msgspec.json.decode(text)
+    except (msgspec.DecodeError, RecursionError) as problem:
+        raise SceneError(Cause.RUN_FILE, f"not JSON: {problem}", where=where, remedy="make the run again") from None
+    return convert(data, LinkDescription, where)

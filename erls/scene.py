@@ -33,7 +33,8 @@ class Simulation(_Record, frozen=True):
     duration : float
         [s]
     formulation : str
-        ``erls``, or ``ffr``: floating frames of reference.
+        ``erls``; ``ffr``: floating frames of reference; or ``nodal``: finite elements with a frame per node, for links
+        made of beams.
     gauge : str
         Of ``erls``: ``joint-angle`` (θ is the joint angle) or ``minimum-norm`` (five rows per joint, as in the paper).
     body_frame : str
@@ -41,6 +42,8 @@ class Simulation(_Record, frozen=True):
     coordinates : str
         ``independent`` (joint angles), or, of ``ffr``, ``absolute``: the frames themselves, tied by joints with
         multipliers, index 3.
+    elements_per_member : int, optional
+        Of ``nodal``: elements of each member of a link, instead of the number in its description.
     integrator : str
         ``generalized_alpha`` or one of SciPy's: ``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``.
     step : float, optional
@@ -56,6 +59,7 @@ class Simulation(_Record, frozen=True):
     gauge: str = "joint-angle"
     body_frame: str = "tangent"
     coordinates: str = "independent"
+    elements_per_member: int | None = None
     integrator: str = DEFAULT_INTEGRATOR
     step: float | None = None
     rtol: float = 1e-8

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +18,60 @@ from fe_import.sections import section_constants
 from fe_import.toml_file import choose
 
 MOST_ELEMENTS = 100_000  # per member; a larger number is a slip
+
+
+@dataclass(frozen=True)
+class FrameMesh:
+    """The nodes and elements that the members of a frame are divided into.
+
+    Attributes
+    ----------
+    nodes : (n, 3) array
+    names : dict of int
+        Numbers of the nodes by name; every node has one.
+    elements : list of FrameElement
+        Member by member.
+    members : list of range
+        Elements of each member, from its start to its end.
+    """
+
+    nodes: Array
+    names: dict[str, int]
+    elements: list[FrameElement]
+    members: list[range]
+
+
+def frame_mesh(link: LinkDescription, frame: Frame, where: str) -> FrameMesh:
+    """Divide the members of a frame.
+
+    Parameters
+    ----------
+    link : LinkDescription
+    frame : Frame
+        Its table ``frame``.
+    where : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    FEImportError
+        A faulty member, section or node.
+    """
+    names = {name: k for k, name in enumerate(frame.nodes)}
+    positions = [np.asarray(p, dtype=float) for p in frame.nodes.values()]
+    elements: list[FrameElement] = []
+    members: list[range] = []
+    if not frame.members:
+        raise FEImportError(
+            Cause.BAD_FIELD, "a frame needs at least one member", where=f"{where}: frame.members", remedy="add one"
+        )
+    for k, member in enumerate(frame.members):
+        place = f"{where}: frame.members[{k}]"
+        chain = _subdivide(member, names, positions, place)
+        members.append(range(len(elements), len(elements) + len(chain) - 1))
+        elements += [_element(link, frame, member, pair, positions, where, place) for pair in pairwise(chain)]
+    _check_connected(np.array([e.nodes for e in elements]), names, where)
+    return FrameMesh(np.stack(positions), names, elements, members)
 
 
 def frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
@@ -35,47 +90,31 @@ def frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
     FEImportError
         A faulty member, section, node or interface.
     """
-    names = {name: k for k, name in enumerate(frame.nodes)}
-    positions = [np.asarray(p, dtype=float) for p in frame.nodes.values()]
-    elements: list[FrameElement] = []
-    lines: list[tuple[int, int]] = []
-    members: list[tuple[str, range]] = []
-    if not frame.members:
-        raise FEImportError(
-            Cause.BAD_FIELD, "a frame needs at least one member", where=f"{where}: frame.members", remedy="add one"
-        )
-    for k, member in enumerate(frame.members):
-        place = f"{where}: frame.members[{k}]"
-        chain = _subdivide(member, names, positions, place)
-        members.append((f"{member.start}-{member.end}", range(len(elements), len(elements) + len(chain) - 1)))
-        for a, b in pairwise(chain):
-            elements.append(_element(link, frame, member, (a, b), positions, where, place))
-            lines.append((a, b))
-    nodes = np.stack(positions)
-    _check_connected(np.asarray(lines), names, where)
+    mesh = frame_mesh(link, frame, where)
     shear = frame.theory == "timoshenko"
     mass, stiffness, parts = assemble_frame(
-        len(nodes),
-        elements,
+        len(mesh.nodes),
+        mesh.elements,
         shear=shear,
         mass=frame.mass,
         rotary_inertia=frame.rotary_inertia,
     )
-    dof_map = np.arange(6 * len(nodes), dtype=np.int64).reshape(-1, 6)
+    dof_map = np.arange(6 * len(mesh.nodes), dtype=np.int64).reshape(-1, 6)
+    members = [(f"{m.start}-{m.end}", own) for m, own in zip(frame.members, mesh.members, strict=True)]
     return FEModel(
         name=link.name,
-        nodes=nodes,
+        nodes=mesh.nodes,
         dof_map=dof_map,
         mass=mass,
         stiffness=stiffness,
-        interface_nodes=_frame_interfaces(link.interfaces, names, nodes, where),
-        independent=np.arange(6 * len(nodes), dtype=np.int64),
-        node_names=names,
-        lines=np.asarray(lines, dtype=np.int64),
+        interface_nodes=_frame_interfaces(link.interfaces, mesh.names, mesh.nodes, where),
+        independent=np.arange(6 * len(mesh.nodes), dtype=np.int64),
+        node_names=mesh.names,
+        lines=np.array([e.nodes for e in mesh.elements], dtype=np.int64),
         stiffness_parts=parts,
         kind="frame",
         source=where,
-        stress=frame_sections(elements, members, shear),
+        stress=frame_sections(mesh.elements, members, shear),
     )
 
 

@@ -62,6 +62,7 @@ class SetTable:
     items: dict[str, list[Item]] = field(default_factory=dict)
     generated: int = 0
     followed: int = 0
+    _found: dict[str, IntArray] = field(default_factory=dict)
 
     def add(self, name: str, items: Sequence[Item]) -> None:
         """Add members to a set.
@@ -72,6 +73,7 @@ class SetTable:
             Generated sets with more members than memory should hold.
         """
         key = name.upper()
+        self._found.clear()
         self.names.setdefault(key, name)
         self.items.setdefault(key, []).extend(items)
         self.generated += sum(len(i) for i in items if isinstance(i, range))
@@ -86,20 +88,30 @@ class SetTable:
         LostSet
             A set that does not exist, that holds itself, or that has too many members together with others.
         """
-        found: set[int] = set()
         for key in self._within(name):
-            for item in self.items[key]:
-                if isinstance(item, NodesOf):
-                    found |= self.nodes_of(item.element_set) if self.nodes_of else set()
-                elif not isinstance(item, str):
-                    found.update([item] if isinstance(item, int) else item)
+            self._found[key] = self._joined(key)
+        return set(self._found[name.upper()].tolist())
+
+    def _joined(self, key: str) -> IntArray:
+        """Members of a set, rising; the sets that it is made of are known."""
+        items = self.items[key]
+        parts = [self._found[k] for k in {i.upper() for i in items if isinstance(i, str)}]
+        parts += [np.arange(i.start, i.stop, i.step, dtype=np.int64) for i in items if isinstance(i, range)]
+        if self.nodes_of is not None:
+            asked = [i.element_set for i in items if isinstance(i, NodesOf)]
+            parts += [np.array([*self.nodes_of(name)], dtype=np.int64) for name in asked]
+        parts.append(np.array([i for i in items if isinstance(i, int)], dtype=np.int64))
+        found = np.unique(np.concatenate(parts))
         self.followed += len(found)
         if self.followed > _MOST_FOLLOWED:
             raise LostSet(f"all sets together have more than {_MOST_FOLLOWED} members")
         return found
 
     def _within(self, name: str) -> list[str]:
-        """The set and all that it is made of, each once; without recursion, as decks may nest them deeply."""
+        """The set and all that it is made of, each once, parts first, without those found already.
+
+        Without recursion, as decks may nest them deeply.
+        """
         done: list[str] = []
         known: set[str] = set()
         open_: list[tuple[str, Iterator[str]]] = []
@@ -113,7 +125,7 @@ class SetTable:
                     raise LostSet(f"set {asked!r} holds itself")
                 if key not in self.items:
                     raise LostSet(f"it needs set {asked!r}, which the deck does not define")
-                if key not in known:
+                if key not in known and key not in self._found:
                     known.add(key)
                     above.add(key)
                     open_.append((key, iter([i for i in self.items[key] if isinstance(i, str)])))

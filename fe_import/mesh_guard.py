@@ -13,6 +13,8 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from fe_import.errors import Cause, FEImportError
 
 MOST_BYTES = 4_000_000_000  # of an unpacked mesh; one of a million nodes has 2e8
@@ -78,7 +80,8 @@ def check_declared(path: Path, name: str) -> None:
     Raises
     ------
     FEImportError
-        ``MESH``: a count of a .msh or .vtu file that is no number, or more than it can hold; Nastran without GRID.
+        ``MESH``: a count of a .msh or .vtu file that is no number, or more than it can hold; Nastran without GRID;
+        ``NOT_READABLE``: a section of a .msh file without end.
     """
     size = path.stat().st_size
     if size == 0:
@@ -137,14 +140,34 @@ def _check_sections(text: mmap.mmap, name: str) -> None:
             most = 1 + int(sum(_msh_counts(text, b"$Elements")))
             if _is_text(text) and (lines := text[begin:end].count(b"\n") - 1) > most:
                 raise _damaged(f"$Elements has {lines} lines, {most} are declared", name)
+        if section == b"Nodes" and begin >= 0 and _is_text(text):
+            _check_node_fields(text[begin:end], _msh_counts(text, b"$Nodes"), _msh_format(text)[1], name)
         if section == b"PhysicalNames" and begin >= 0:
             count, *names = text[begin:end].decode("utf-8", "replace").splitlines()[1:] or [""]
             if count.strip() != str(len(names)):
                 raise _damaged(f"$PhysicalNames declares another count than its {len(names)} lines", name)
 
 
+def _check_node_fields(section: bytes, counts: list[float], version: bytes, name: str) -> None:
+    """As many numbers as the nodes have; one more or less would shift all behind it."""
+    blank = np.frombuffer(section, dtype=np.uint8) <= ord(" ")
+    found = int((blank[:-1] & ~blank[1:]).sum())
+    expected = found
+    if version in (b"4", b"4.1"):
+        expected = int(4 * (1 + sum(counts)))
+    elif version.startswith(b"2"):
+        expected = int(1 + 4 * sum(counts))
+    if found != expected:
+        raise _damaged(f"$Nodes has {found} numbers, {expected} are declared", name)
+
+
 def _damaged(message: str, name: str) -> FEImportError:
-    return FEImportError(Cause.MESH, message, where=name, remedy="the file is damaged or cut off; write the mesh again")
+    return FEImportError(
+        Cause.NOT_READABLE,
+        f"cannot be read as a mesh: {message}",
+        where=name,
+        remedy="the file is damaged or cut off; write the mesh again",
+    )
 
 
 def check_found(path: Path, name: str, points: int, cells: int) -> None:
@@ -153,7 +176,7 @@ def check_found(path: Path, name: str, points: int, cells: int) -> None:
     Raises
     ------
     FEImportError
-        ``MESH``.
+        ``NOT_READABLE``.
     """
     if path.suffix.lower() != ".msh":
         return

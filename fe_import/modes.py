@@ -21,7 +21,8 @@ from fe_import.static_span import completed, static_span
 class OrthonormalModes:
     """Coordinates of the modes in the basis (k, m), circular frequencies (m,) [rad/s], rigid motions (m, 6).
 
-    ``flexibility`` (b, b), with static correction: of the whole basis between the interfaces, inertia-relieved.
+    ``flexibility`` (b, b), where fewer modes are kept than the basis has, or static correction is asked for: of the
+    whole basis between the interfaces, inertia-relieved.
     """
 
     coordinates: Array
@@ -95,7 +96,8 @@ def orthonormal_modes(
             remedy="ask for fewer, keep more modes in the basis (fixed_interface_modes, free_modes), or give the mass "
             "matrix rotary inertia",
         )
-    flexibility = _flexibility(scaled, whole) if options.static_correction else None
+    lost = len(interfaces) > 0 and wanted < whole.shape[1]
+    flexibility = _flexibility(scaled, whole) if lost or options.static_correction else None
     coordinates = scale[:, None] * np.hstack([rigid, complement @ elastic[:, :wanted]])
     motions = np.zeros((6 + wanted, 6))
     motions[:6] = rigid_coordinates
@@ -136,7 +138,7 @@ class _Scaled:
 def _flexibility(link: _Scaled, complement: Array) -> Array:
     """(b, b) displacements of the interfaces under unit loads there, balanced by inertia."""
     moved = link.interfaces @ complement
-    return np.asarray(moved @ la.solve(complement.T @ link.stiffness @ complement, moved.T, assume_a="pos"))
+    return np.asarray(moved @ la.cho_solve(la.cho_factor(complement.T @ link.stiffness @ complement), moved.T))
 
 
 def _kept_span(link: _Scaled, complement: Array, inboard: int, options: Reduction, where: str) -> Array:

@@ -10,28 +10,40 @@ from erls.formulations.closed_run import loop_integrator
 from erls.formulations.erls import Erls
 from erls.formulations.ffr import Ffr
 from erls.formulations.ffr.absolute import absolute_generalized_alpha
+from erls.formulations.nodal import Nodal, nodal_generalized_alpha
 from erls.integrators import INTEGRATORS
-from erls.integrators.base import Integrator
+from erls.integrators.base import Solution
 from erls.mechanism.chain import Mechanism
 from erls.scene import Simulation
 
-FORMULATIONS: dict[str, Callable[[Mechanism, Simulation], TreeFormulation]] = {
+TREES: dict[str, Callable[[Mechanism, Simulation], TreeFormulation]] = {
     "erls": lambda mechanism, settings: Erls(mechanism, settings.gauge),
     "ffr": lambda mechanism, settings: Ffr(mechanism, settings.body_frame),
+}
+"""In independent coordinates, on modal models."""
+
+FORMULATIONS: dict[str, Callable[[Mechanism, Simulation], Formulation]] = {
+    **TREES,
+    "nodal": lambda mechanism, settings: Nodal(mechanism, settings.elements_per_member),
 }
 
 
 def formulate(mechanism: Mechanism, settings: Simulation) -> Formulation:
     """Equations of motion of a mechanism; of its chain, tied by its loops."""
-    tree = FORMULATIONS[settings.formulation](mechanism, settings)
-    return ClosedChain(tree) if mechanism.loops else tree
+    if mechanism.loops and settings.formulation in TREES:
+        return ClosedChain(TREES[settings.formulation](mechanism, settings))
+    return FORMULATIONS[settings.formulation](mechanism, settings)
 
 
-def integrator(mechanism: Mechanism, settings: Simulation) -> Integrator:
-    """The integrator that the settings name, for chains, for loops, or for absolute coordinates."""
+def integrator(mechanism: Mechanism, settings: Simulation) -> Callable[..., Solution]:
+    """The integrator that the settings name, for what `formulate` makes of the same: chains, loops, or frames tied by
+    joints.
+    """
+    if settings.formulation == "nodal":
+        return nodal_generalized_alpha
     if settings.coordinates == "absolute":
         return absolute_generalized_alpha
     return loop_integrator(settings.integrator) if mechanism.loops else INTEGRATORS[settings.integrator]
 
 
-__all__ = ["FORMULATIONS", "Formulation", "formulate", "integrator"]
+__all__ = ["FORMULATIONS", "TREES", "Formulation", "formulate", "integrator"]

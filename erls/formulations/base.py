@@ -4,8 +4,10 @@ Rules for adding a formulation:
 
 1. One file (more beside it if it needs them) and one line in the registry of ``erls/formulations/__init__.py``.
 2. It imports no other formulation; it shares the mechanism, the modal models, the drives and nothing else.
-3. It is a `erls.integrators.base.SecondOrderSystem` in independent coordinates; prescribed motions are eliminated.
-4. It is a `TreeFormulation`, so that `erls.formulations.closed_chain` can close loops over it.
+3. A `TreeFormulation` is a `erls.integrators.base.SecondOrderSystem` in independent coordinates, prescribed motions
+   eliminated, over which `erls.formulations.closed_chain` can close loops.
+4. Any other `Formulation` brings its own integrator, whose `Solution` holds what its ``state`` takes: y with its
+   derivatives, smooth enough for Hermite interpolation.
 5. Everything that a run reports goes through `State`: whoever samples a run never asks which formulation made it.
 """
 
@@ -65,6 +67,8 @@ class State:
         Modal coordinates of each link (6 rigid-body, then elastic).
     coordinates, angles, rates : (n,) arrays
         Joint coordinates θ, physical joint angles and their rates [rad or m].
+    nodes : list of (n, 3) arrays, or None
+        World positions of the nodes of each link's modal model, where ``poses`` and ``modal`` only approximate them.
     """
 
     time: float
@@ -73,15 +77,23 @@ class State:
     coordinates: Array
     angles: Array
     rates: Array
+    nodes: list[Array] | None = None
 
 
-class Formulation(SecondOrderSystem, Protocol):
+class Formulation(Protocol):
     """Equations of motion of a mechanism with what is asked of its states."""
 
     mechanism: Mechanism
 
+    @property
+    def size(self) -> int:
+        """Number of entries of y, and of v."""
+
     def initial_state(self) -> tuple[Array, Array]:
         """(y, v) at time 0."""
+
+    def acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """(n,) ÿ from the equations of motion."""
 
     def state(self, t: float, y: Array, v: Array) -> State:
         """Poses, modal coordinates and joint angles."""
@@ -96,7 +108,7 @@ class Formulation(SecondOrderSystem, Protocol):
         """Names and sizes for reports."""
 
 
-class TreeFormulation(Formulation, Protocol):
+class TreeFormulation(Formulation, SecondOrderSystem, Protocol):
     """A formulation whose coordinates can be tied by loops: (θ, elastic), of which ``free`` are independent.
 
     Attributes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from erls.errors import Cause, SimulationError
-from erls.formulations.base import Formulation
+from erls.formulations.base import TreeFormulation
 from erls.lie.so3 import Array
 from fe_import.model import IntArray
 
@@ -13,7 +13,7 @@ _ITERATIONS = 20
 _TOLERANCE = 1e-10  # of the deflection; one more step of quadratic convergence would reach rounding
 
 
-def held_equilibrium(equations: Formulation, y: Array, held_joints: IntArray) -> Array:
+def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray) -> Array:
     """Elastic coordinates in equilibrium under gravity while every physical joint angle keeps its initial value.
 
     Parameters

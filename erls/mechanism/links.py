@@ -11,8 +11,21 @@ import scipy.linalg as la
 from erls.lie.se3 import pose, twist_transform
 from erls.lie.so3 import Array, skew
 from fe_import.inertia import InertiaInvariants, MassProperties, mass_properties
+from fe_import.link import LinkDescription
 from fe_import.modal_file import FixedInterfaceModes, ModalModel
 from fe_import.model import InterfaceNode
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A rigid body on a node of a link: centre of mass from the node (3,) [m], mass [kg], and inertia (3, 3) about the
+    centre [kg m²], all in mesh axes.
+    """
+
+    node: int
+    offset: Array
+    mass: float
+    inertia: Array
 
 
 @dataclass(frozen=True)
@@ -32,6 +45,10 @@ class Link:
         Squared frequencies of the elastic modes [1/s²].
     damping : (n,) array
         Coefficients of the elastic modes [1/s].
+    payloads : tuple of Payload
+        Already within ``invariants``.
+    description : LinkDescription or None
+        Of a link made of beams, for formulations with elements of their own.
     """
 
     name: str
@@ -41,6 +58,8 @@ class Link:
     outboard: InterfaceNode | None
     stiffness: Array
     damping: Array
+    payloads: tuple[Payload, ...] = ()
+    description: LinkDescription | None = None
 
     @property
     def elastic_modes(self) -> int:

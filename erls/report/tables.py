@@ -94,10 +94,14 @@ def run_report(run: Run, times: Sequence[float] = ()) -> str:
     """Summary of a run, and joints and points at given times (its end unless given)."""
     s = run.summary(times or [run.end])
     drift = s["energy"]["max_drift"]
-    variant = next(f"{name.replace('_', ' ')} {s[name]}" for name in ("gauge", "body_frame") if name in s)
+    if "nodes" in s:
+        model = f"{s['elements']} beam elements, {s['nodes']} nodes, {s['formulation']}"
+    else:
+        variant = next(f"{name.replace('_', ' ')} {s[name]}" for name in ("gauge", "body_frame") if name in s)
+        model = f"{s['elastic_coordinates']} elastic coordinates "
+        model += f"(highest {s['highest_frequency_hz']:.4g} Hz), {s['formulation']}, {variant}"
     lines = [
-        f"{s['scene']}: {s['joints']} joints, {s['elastic_coordinates']} elastic coordinates "
-        f"(highest {s['highest_frequency_hz']:.4g} Hz), {s['formulation']}, {variant}",
+        f"{s['scene']}: {s['joints']} joints, {model}",
         f"{s['integrator']}: {s['duration']:.6g} s in {s['steps']} steps, {s['rhs_calls']} evaluations, "
         f"{s['newton_iterations']} iterations, {s['factorizations']} factorizations, {s['wall_s']:.2f} s",
         f"energy: {s['energy']['initial']:.6g} J at the start, {s['energy']['final']:.6g} J at the end"

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from erls.errors import Cause, SceneError
-from erls.formulations import FORMULATIONS
+from erls.formulations import FORMULATIONS, TREES
 from erls.lie.so3 import Array
 from erls.scene import Scene, load_scene
 from erls.simulation import simulate
@@ -123,7 +123,7 @@ def compare(
     ----------
     scene : Scene, Path or str
     columns : sequence of str
-        Of `COLUMNS`; every formulation unless given.
+        Of `COLUMNS`; the modal formulations unless given.
     overrides : sequence of str
         ``KEY=VALUE`` applied to the scene, for all columns.
     progress : callable
@@ -138,7 +138,7 @@ def compare(
     """
     path = scene.path if isinstance(scene, Scene) else Path(scene)
     loaded = load_scene(path, overrides)
-    names = list(dict.fromkeys(columns)) or list(FORMULATIONS)
+    names = list(dict.fromkeys(columns)) or list(TREES)
     for name in names:
         choose(name, COLUMNS, "formulations", SceneError)
     if len(names) < 2:

@@ -239,7 +239,7 @@ def test_scenes_run_in_absolute_coordinates(tmp_path: Path) -> None:
     ("changes", "words"),
     [
         (["simulation.coordinates=absolute"], "formulation"),
-        (["simulation.coordinates=absolute", "simulation.formulation=ffr", "simulation.integrator=radau"], "integrator"),
+        (["simulation.coordinates=absolute", "simulation.formulation=ffr", "simulation.integrator=bdf"], "integrator"),
         (["simulation.coordinates=polar"], "polar"),
     ],
 )

@@ -233,9 +233,8 @@ def test_published_figures_stand_beside_ours(l_scene: Path, tmp_path: Path) -> N
     assert header == ("elastic modes", *(f"{c} {kind}" for c in columns for kind in ("printed", "here")))
     outputs = study.points[0].outputs
     assert outputs is not None
-    assert rows[0] == (
-        "2", "1.5", f"{np.degrees(outputs.coordinates['shoulder'][-1]):.4f}", "-0.25", f"{outputs.points['tip'][-1, 2]:.6f}",
-    )  # fmt: skip
+    angle, height = np.degrees(outputs.coordinates["shoulder"][-1]), outputs.points["tip"][-1, 2]
+    assert rows[0] == ("2", "1.5", f"{angle:.4f}", "-0.25", f"{height:.6f}")
     assert rows[1] == ("9", "1.6", "", "-0.26", "")
     assert "From a paper" in mode_study_page(study, printed)
 

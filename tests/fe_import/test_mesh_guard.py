@@ -75,6 +75,8 @@ def bar(**lines: str) -> str:
 DAMAGED = {
     "elements cut off": ({"2 2 5 3 4\n$EndElements\n": ""}, "$Elements does not end"),
     "nodes do not end": ({"$EndNodes\n": ""}, "$Nodes does not end"),
+    "a number less": ({"0 0 1\n1 1 1\n": "0 0\n1 1 1\n"}, "$Nodes has 27 numbers, 28 are declared"),
+    "a number more": ({"1 1 1\n$EndNodes": "1 1 1 1\n$EndNodes"}, "$Nodes has 29 numbers"),
     "an element less": ({"2 2 5 3 4\n": ""}, ""),
     "an element more": ({"2 2 5 3 4\n": "2 2 5 3 4\n3 1 2 3 5\n"}, "$Elements has 5 lines, 4 are declared"),
     "a name more": ({'3 1 "body"\n': '3 1 "body"\n3 2 "more"\n'}, "$PhysicalNames declares another count"),

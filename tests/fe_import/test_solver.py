@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import tracemalloc
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ import fe_import.solver
 import fe_import.sparse
 from fe_import.dense import dense_modes
 from fe_import.errors import Cause, FEImportError
+from fe_import.reduce import reduce_link, reduction_summary
 from fe_import.solid import SolidMaterial, assemble_solid
 from fe_import.solver import SOLVERS, SingularMatrix, analyse, memory, multifrontal, watch
 from fe_import.solver.lanczos import block_size
@@ -318,17 +321,21 @@ def test_few_masses(massive: int) -> None:
 # ----- memory and messages
 
 
-@pytest.mark.parametrize("job", ["factorize", "modes", "count"])
+@pytest.mark.parametrize("job", ["factorize", "modes", "more modes", "all modes", "count"])
 def test_too_large_jobs_are_refused_before_they_start(job: str, monkeypatch: pytest.MonkeyPatch) -> None:
     model = clamped(*MESHES["cube of hex20"])
+    solve = factorize(model.stiffness, "cube", model.positions)
     monkeypatch.setattr(memory, "SMALL", 0)
     monkeypatch.setattr(memory, "available_memory", lambda: 1_000_000)
     unstarted = replace(SOLVERS["multifrontal"], factorize=lambda *_: pytest.fail("started"))
     monkeypatch.setitem(SOLVERS, "multifrontal", unstarted)
-    monkeypatch.setattr(fe_import.sparse, "negative_pivots", lambda *_: pytest.fail("started"))
+    for name in ("negative_pivots", "lowest_eigenpairs", "dense_modes"):
+        monkeypatch.setattr(fe_import.sparse, name, lambda *_: pytest.fail("started"))
     jobs = {
         "factorize": lambda: factorize(model.stiffness, "cube", model.positions),
         "modes": lambda: lowest_modes(model.stiffness, model.mass, 4, "cube", positions=model.positions),
+        "more modes": lambda: lowest_modes(model.stiffness, model.mass, 4, "cube", solve=solve),
+        "all modes": lambda: lowest_modes(model.stiffness, model.mass, 3000, "cube"),
         "count": lambda: modes_below(model.stiffness, model.mass, 1.0, positions=model.positions),
     }
     with pytest.raises(FEImportError, match="needs more memory than there is") as caught:
@@ -340,6 +347,22 @@ def test_too_large_jobs_are_refused_before_they_start(job: str, monkeypatch: pyt
     assert error.limit == "0.001 GB available"
     assert "coarser mesh" in error.remedy
     assert str(model.stiffness.shape[0]) in error.message
+
+
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_an_untrusted_count_is_taken_elsewhere(wrong: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second shift is tried where the first met a small pivot, and the modes are judged there."""
+    model = clamped(*MESHES["beam of tet10"])
+    count, shifts = fe_import.sparse.modes_below, []
+
+    def doubtful(stiffness: sp.csc_array, mass: sp.csc_array, shift: float, **options: Any) -> int | None:
+        shifts.append(shift)
+        return None if len(shifts) == 1 else count(stiffness, mass, shift, **options) + wrong
+
+    monkeypatch.setattr(fe_import.sparse, "modes_below", doubtful)
+    with pytest.raises(FEImportError, match="were missed") if wrong else contextlib.nullcontext():
+        lowest_modes(model.stiffness, model.mass, 10, "beam", positions=model.positions)
+    assert len(set(shifts)) == 2
 
 
 def test_modes_reserve_memory_for_their_vectors(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -392,3 +415,18 @@ def test_long_jobs_are_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     said = len(heard)
     factorize(model.stiffness, "stiffness of the cube", model.positions)
     assert len(heard) == said
+
+
+def test_a_reduction_says_so_at_the_door(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through `reduce_link`: the solver in the provenance, messages to the caller, refusal of what does not fit."""
+    link = Path(__file__).parents[2] / "data/l_shape/links/solid.toml"
+    monkeypatch.setattr(fe_import.sparse, "_ANNOUNCED", 0.0)
+    heard: list[str] = []
+    model = reduce_link(link, heard.append)
+    assert model.provenance["solver"] == reduction_summary(model)["solver"] == "multifrontal"
+    assert {line.split(":")[0] for line in heard} >= {"factorizing the stiffness of the inner nodes", "counting modes"}
+    monkeypatch.setattr(memory, "SMALL", 0)
+    monkeypatch.setattr(memory, "available_memory", lambda: 1_000_000)
+    with pytest.raises(FEImportError) as caught:
+        reduce_link(link)
+    assert caught.value.cause is Cause.TOO_LARGE

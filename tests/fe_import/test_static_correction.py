@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg as la
-from link_files import SOLID, Array, boundary, dense, frame_link, straight_link
+from link_files import SOLID, Array, boundary, dense, frame_link, interface_shapes, straight_link
 from link_table import LINKS, held_flexibility, modal_flexibility, nodal_fields, relative
 
 from fe_import.build import build_model
@@ -16,7 +16,8 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.link import LinkFile
 from fe_import.modal_file import ModalModel, read_modal_file, write_modal_file
 from fe_import.model import FEModel
-from fe_import.reduce import reduce_model
+from fe_import.reduce import reduce_link, reduce_model
+from fe_import.reduction.free_body import free_body
 
 METHODS: list[dict[str, Any]] = [
     {"method": "craig-bampton", "fixed_interface_modes": 9},
@@ -145,6 +146,40 @@ def test_rotations_without_mass_are_reported(tmp_path: Path) -> None:
     assert relative(modal_flexibility(modal), held_flexibility(model)) > 0.1
     sound = frame_link(tmp_path, frame={"mass": "lumped"}, reduction={"static_correction": True})
     assert all(c.ok for c in reduce_model(build_model(sound), sound).health)
+
+
+@pytest.mark.parametrize("truncation", ["free-free", "clamped"])
+@pytest.mark.parametrize("method", ["craig-bampton", "guyan", "none"])
+def test_what_truncation_loses_is_reported(tmp_path: Path, method: str, truncation: str) -> None:
+    """The flexibility of all modes of the basis less that of the modes kept; of ``none`` that is the full model's."""
+    link = frame_link(tmp_path, reduction={"method": method, "truncation": truncation, "elastic_modes": 5})
+    model = build_model(link)
+    modal, every = (reduce_model(model, x) for x in (link, frame_link(tmp_path, reduction={"method": method})))
+    exact = kept_flexibility(every)
+    if method == "none":
+        body = free_body(model, "x")
+        assert relative(exact, body.static(body.interface_loads())[body.interfaces]) < 1e-9
+    check = next(c for c in modal.health if c.name == "static flexibility between the interfaces")
+    assert not any(c.name == check.name for c in every.health)
+    lost = np.abs(kept_flexibility(modal) - exact) / np.sqrt(np.outer(np.diag(exact), np.diag(exact)))
+    assert check.value == pytest.approx(lost.max(), rel=1e-6)
+    assert check.ok
+    assert not check.judged
+
+
+def kept_flexibility(modal: ModalModel) -> Array:
+    """(12, 12) static flexibility between the interfaces that the elastic modes hold."""
+    elastic = interface_shapes(modal)[:, 6:] / (2 * np.pi * modal.frequencies_hz[6:])
+    return np.asarray(elastic @ elastic.T)
+
+
+def test_component_without_flexibility(tmp_path: Path) -> None:
+    """All inertia about the line of a straight link sits on the hand: under balanced moments that does not turn."""
+    frame = {"mass": "lumped", "rotary_inertia": False}
+    ends = [{"node": "tip", "inertia": [1e-5, 1e-5, 1e-5]}]
+    modal = reduce_link(straight_link(tmp_path, 1.0, 8, frame=frame, masses=ends))
+    check = next(c for c in modal.health if c.name == "static flexibility between the interfaces")
+    assert check.value == pytest.approx(1.0, rel=1e-9)  # the root turns without mass, which no mode holds
 
 
 def test_mass_on_the_interfaces_only(tmp_path: Path) -> None:
