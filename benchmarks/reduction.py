@@ -94,7 +94,9 @@ def l_mesh(dofs: int) -> SolidMesh:
     keys = np.stack(places, axis=1) @ np.array([base * base, base, 1])
     used, elements = np.unique(keys, return_inverse=True)
     lattice = np.stack([used // base**2, used // base % base, used % base], axis=1)
-    nodes = lattice / 2 * [LEG / along, LEG / along, HEIGHT / up]
+    x = np.interp(lattice[:, 0], [0, 2 * along, 2 * (along + across)], [0.0, LEG, LEG + WIDTH])
+    y = np.interp(lattice[:, 1], [0, 2 * across, 2 * (along + across)], [0.0, WIDTH, LEG + WIDTH])
+    nodes = np.stack([x, y, lattice[:, 2] * HEIGHT / (2 * up)], axis=1)
     sets = {"root": np.flatnonzero(lattice[:, 0] == 0), "tip": np.flatnonzero(lattice[:, 1] == lattice[:, 1].max())}
     return SolidMesh(nodes, elements.reshape(keys.shape), "hex20", node_sets=sets, source="benchmark")
 

@@ -119,7 +119,7 @@ def simulate(
     output
         Run file to write (HDF5); none unless given.
     formulation
-        Formulation instead of the one in the scene: erls.
+        Formulation instead of the one in the scene: erls, ffr or nodal.
     set_
         Change a field of the scene, KEY=VALUE; may be repeated. For example simulation.step=1e-4,
         links.arm.elastic_modes=8, joints.0.initial.position_deg=30.

@@ -35,8 +35,8 @@ def compare(
     scene
         Scene (TOML).
     formulations
-        Separated by commas; erls,ffr unless given. Besides them: nodal (beam elements, for large deflections), erls-minimum-norm (five rows per joint),
-        erls-fem (links not reduced).
+        Separated by commas; erls,ffr unless given. Besides them: nodal (beam elements, for any deflection),
+        erls-minimum-norm (five rows per joint), erls-fem (links not reduced).
     output
         Report to write: .html a self-contained page with plots, .csv the histories, .json the JSON object.
     set_

@@ -125,8 +125,9 @@ class Beams:
         sections = poses @ self._frames
         relative = motions.inverse(sections[:, 0]) @ sections[:, 1]
         d = motions.log(relative) if before is None else motions.log_near(relative, before.d)
-        first = -motions.tangent_inverse(-d) @ self._carry[0]
-        rows = np.concatenate([first, motions.tangent_inverse(d) @ self._carry[1]], axis=2)
+        second = motions.tangent_inverse(d)
+        first = motions.bracket(d) - second  # -T⁻¹(-d)
+        rows = np.concatenate([first @ self._carry[0], second @ self._carry[1]], axis=2)
         turn, tangent = motions.exp(_POINTS * d), _POINTS[..., None] * motions.tangent(_POINTS * d)
         shape = tangent @ rows
         shape[..., :6] += motions.adjoint_inverse(turn) @ self._carry[0]
@@ -140,6 +141,16 @@ class Beams:
     def section_forces(self, memory: Bent) -> Array:
         """(e, 6) forces [N] and moments [N m] in the section's axes."""
         return _times(self._stiffness, memory.d - self._built)
+
+    def elastic_energy(self, memory: Bent) -> float:
+        """Of all elements [J]."""
+        return float((self.section_forces(memory) * (memory.d - self._built)).sum()) / 2
+
+    def sections_at(self, poses: Array, memory: Bent, elements: IntArray, fractions: Array) -> Array:
+        """(p, 4, 4) sections of elements (p,), at these fractions (p,) of their lengths, at node poses (e, 2, 4, 4)."""
+        ahead = motions.exp(fractions[:, None] * memory.d[elements])
+        result: Array = poses[elements, 0] @ self._frames[elements, 0] @ ahead
+        return result
 
     def mass(self, poses: Array, memory: Bent) -> Array:
         """(e, 12, 12) Σ w Qᵀ M Q."""
@@ -179,7 +190,7 @@ class Beams:
 
     def energy(self, t: float, poses: Array, memory: Bent, v: Array) -> tuple[float, float]:
         """Kinetic; elastic and that of gravity."""
-        elastic = float((self.section_forces(memory) * (memory.d - self._built)).sum()) / 2
+        elastic = self.elastic_energy(memory)
         twist = _times(memory.shape, v)
         kinetic = float((_WEIGHTS * twist * _times(self._inertia, twist)).sum()) / 2
         places = (poses[:, 0] @ self._frames[:, 0] @ memory.turn)[..., :3, 3]
@@ -188,23 +199,23 @@ class Beams:
 
     def _geometric(self, memory: Bent) -> Array:
         """(e, 12, 6) derivative of Pᵀ σ by d at fixed σ."""
-        force, d, ends = self.section_forces(memory), memory.d, []
-        for sign, carry in ((-1.0, self._carry[0]), (1.0, self._carry[1])):
-            # P's blocks are ±T⁻¹(±d): the signs of the argument and of the block cancel
-            change = motions.tangent_inverse_derivative(sign * d, np.broadcast_to(_UNITS, (6, *d.shape)))
-            ends.append(_turned(carry) @ np.einsum("keij,ei->ejk", change, force))
+        force, ends = self.section_forces(memory), []
+        units = np.broadcast_to(_UNITS, (6, *memory.d.shape))
+        change = motions.tangent_inverse_derivative(memory.d, units)
+        for carry, of_block in ((self._carry[0], motions.bracket(units) - change), (self._carry[1], change)):
+            ends.append(_turned(carry) @ np.einsum("keij,ei->ejk", of_block, force))
         return np.concatenate(ends, axis=1)
 
     def _bias(self, memory: Bent, v: Array) -> Array:
         """(3, e, 6) Q̇ ν."""
         d, rate = memory.d, _times(memory.rows, v)
         first, second = _times(self._carry[0], v[:, :6]), _times(self._carry[1], v[:, 6:])
-        bend = _times(motions.tangent_inverse_derivative(d, rate), second)  # d̈ without accelerations
-        bend += _times(motions.tangent_inverse_derivative(-d, rate), first)
+        change = motions.tangent_inverse_derivative(d, rate)
+        bend = _times(change, second - first) + _times(motions.bracket(rate), first)  # d̈ without accelerations
         carried = _times(motions.adjoint_inverse(memory.turn), first)
-        change = _POINTS * _times(motions.tangent_derivative(_POINTS * d, _POINTS * rate), rate)
+        curve = _POINTS * _times(motions.tangent_derivative(_POINTS * d, _POINTS * rate), rate)
         swing = _times(motions.bracket(_times(memory.tangent, rate)), carried)
-        return change + _times(memory.tangent, bend) - swing
+        return curve + _times(memory.tangent, bend) - swing
 
     def _weight(self, poses: Array, memory: Bent) -> Array:
         """(3, e, 3) gravity in the axes of the sections."""

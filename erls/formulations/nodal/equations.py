@@ -1,0 +1,179 @@
+"""The nodal formulation: geometrically exact beams and rigid bodies on SE(3), tied by joints with multipliers.
+
+V. Sonneville, A. Cardona, O. Brüls, Comput. Methods Appl. Mech. Eng. 268 (2014) 451–474. It holds for any deflection
+and knows nothing of modes. y holds position and rotation matrix of every node, then the joint coordinates.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from erls.errors import Cause, SceneError, SimulationError
+from erls.formulations.base import Energy, Reaction, State
+from erls.formulations.nodal.chain import Chain, build_chain
+from erls.formulations.nodal.link_state import LinkView
+from erls.formulations.nodal.parts import link_parts
+from erls.integrators.consistency import consistent_acceleration
+from erls.lie import motion_maps as motions
+from erls.lie.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.nodal.assembly import Nodes
+from erls.nodal.joints import GROUND
+from erls.nodal.statics import solve_statics
+
+
+class Nodal:
+    """Equations of motion of a serial chain; a `Formulation`.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    elements_per_member : int, optional
+        Instead of the numbers in the descriptions of the links.
+
+    Raises
+    ------
+    SceneError
+        A loop, or a link that is neither rigid nor made of beams; it is named.
+    """
+
+    def __init__(self, mechanism: Mechanism, elements_per_member: int | None = None) -> None:
+        if mechanism.loops:
+            loop = mechanism.loops[0]
+            carried = next(end.link for end in (loop.outer, loop.inner) if end.link is not None)
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "the nodal formulation closes no loops",
+                where=f"loop {loop.name!r} on link {mechanism.links[carried].name!r}",
+                value="nodal",
+                remedy="use formulation erls or ffr",
+            )
+        self.mechanism = mechanism
+        parts = [link_parts(link, elements_per_member) for link in mechanism.links]
+        self.chain: Chain = build_chain(mechanism, parts)
+        self.system = self.chain.system
+        self.views = [
+            LinkView(link, part, nodes, first)
+            for link, part, nodes, first in zip(
+                mechanism.links, parts, self.chain.nodes, self.chain.elements, strict=True
+            )
+        ]
+        self._known: tuple[float, Array, Array, tuple[Array, Array]] | None = None
+
+    @property
+    def size(self) -> int:
+        """Twelve numbers for each node, one for each joint."""
+        return 12 * self.system.count + len(self.mechanism.joints)
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """Frames and joint coordinates at time 0; links turn with the joints as they are.
+
+        Raises
+        ------
+        SimulationError
+            NO_EQUILIBRIUM, when the start is to be static.
+        """
+        q = self._equilibrium() if self.mechanism.static_start else self.system.start
+        v = np.zeros((self.system.count, 6))
+        moving = np.zeros(6)  # of the link in the world's axes, about its origin
+        for joint, seat, nodes in zip(self.mechanism.joints, self.chain.seats, self.chain.nodes, strict=True):
+            carrier = np.eye(4) if seat.inner == GROUND else q.poses[seat.inner]
+            moving = moving + motions.adjoint(carrier @ seat.inner_frame) @ joint.type.screw * joint.rate
+            v[nodes] = motions.adjoint_inverse(q.poses[nodes]) @ moving
+        y, rates, _ = self.system.stored(0.0, q, v.ravel(), np.zeros(self.system.size))
+        return y, rates
+
+    def _equilibrium(self) -> Nodes:
+        """At rest under gravity with the joints held."""
+        held = self.chain.held(np.array([j.position for j in self.mechanism.joints]))
+        failure: SimulationError | None = None
+        for tangent in ("full", "material"):  # the second converges from farther away
+            found = solve_statics(held, held.start, tangent=tangent)
+            if found.failure is None:
+                return self.system.at(found.path[-1].q.poses)
+            failure = found.failure
+        assert failure is not None
+        raise failure
+
+    def state(self, t: float, y: Array, v: Array) -> State:
+        """Positions of all nodes; link frames at the inboard nodes, modal coordinates as near as modes come."""
+        q, velocity = self.system.from_stored(y, v)
+        bent = q.memory[0] if self.chain.beams is not None else None
+        found = [view.at(q.poses, self.chain.beams, bent) for view in self.views]
+        _, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
+        angles = y[12 * self.system.count :]
+        return State(
+            t, [x.frame for x in found], [x.modal for x in found], angles, angles, rates, [x.nodes for x in found]
+        )
+
+    def energy(self, t: float, y: Array, v: Array) -> Energy:
+        """Energies of a state."""
+        q, velocity = self.system.from_stored(y, v)
+        kinetic, potential = self.system.energy(t, q, velocity)
+        elastic = 0.0 if self.chain.beams is None else self.chain.beams.elastic_energy(q.memory[0])
+        angles = y[12 * self.system.count :]
+        springs = 0.5 * sum(
+            j.forces.stiffness * (angle - j.forces.rest) ** 2
+            for j, angle in zip(self.mechanism.joints, angles.tolist(), strict=True)
+        )
+        return Energy(kinetic, elastic, potential - elastic - springs, springs)
+
+    def acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """(n,) ÿ."""
+        q, velocity = self.system.from_stored(y, v)
+        return self.system.stored(t, q, velocity, self._solved(t, y, v)[0])[2]
+
+    def _solved(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """Accelerations and multipliers; those of the last state asked for are at hand."""
+        known = self._known
+        if known is None or known[0] != t or not (np.array_equal(known[1], y) and np.array_equal(known[2], v)):
+            known = t, y.copy(), v.copy(), consistent_acceleration(self.system, t, *self.system.from_stored(y, v))
+            self._known = known
+        return known[3]
+
+    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
+        """Joint reactions from the multipliers and what acts along the joints."""
+        q, velocity = self.system.from_stored(y, v)
+        a, multipliers = self._solved(t, y, v)
+        along = self._along(t, q, velocity, a)
+        rows = self.system.constraint_matrix(t, q)
+        result = []
+        for k, (joint, seat) in enumerate(zip(self.mechanism.joints, self.chain.seats, strict=True)):
+            place = slice(6 * seat.outer, 6 * seat.outer + 6)
+            own = np.flatnonzero(self.system.rows.joint_of_row == k)
+            wrench = -np.asarray(rows[own][:, place].T @ multipliers[own]).ravel()
+            effort, push = along[k]
+            if joint.drive.prescribed:
+                axis = motions.adjoint(seat.outer_frame) @ joint.type.screw
+                effort = float(axis @ wrench)
+            wrench = wrench + push
+            turn = q.poses[seat.outer, :3, :3]
+            result.append(Reaction(turn @ wrench[:3], turn @ wrench[3:], effort))
+        return result
+
+    def _along(self, t: float, q: Nodes, v: Array, a: Array) -> list[tuple[float, Array]]:
+        """Of each joint: force of drive, spring, damper and friction; wrench on the outer node, rotor included."""
+        groups = self.system.actuators
+        result = []
+        twist, rate = v.reshape(-1, 6), a.reshape(-1, 6)
+        for group, turned in zip(groups, q.memory[-len(groups) :], strict=True):
+            poses = q.poses[group.nodes]
+            ends = [x[group.nodes].reshape(len(group.nodes), -1) for x in (twist, rate)]
+            rates, _ = group.motion(poses, turned, *ends)
+            pushes = -group.forces(t, poses, turned, *ends)[:, -6:]
+            result += list(zip(group.efforts(t, turned.angles, rates).tolist(), pushes, strict=True))
+        return result
+
+    def describe(self) -> dict[str, Any]:
+        """Names and sizes for reports."""
+        beams = self.chain.beams
+        return {
+            "formulation": "nodal",
+            "joints": len(self.mechanism.joints),
+            "elements": 0 if beams is None else len(beams.nodes),
+            "nodes": self.system.count,
+            "velocities": self.system.size,
+            "conditions": self.system.constraints,
+        }
