@@ -28,19 +28,19 @@ from typing import Any
 import meshio
 import numpy as np
 
-import fe_import.build_solid
+import fe_import.build.solid
 import fe_import.reduce
 import fe_import.solver
 import fe_import.sparse
-from fe_import.coupling import couple_interfaces
+from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.errors import FEImportError
-from fe_import.interface import InterfaceFace
-from fe_import.modal_file import write_modal_file
+from fe_import.interfaces.coupling import couple_interfaces
+from fe_import.interfaces.faces import InterfaceFace
+from fe_import.mesh.solid_mesh import SolidMesh
+from fe_import.modal.file import write_modal_file
 from fe_import.model import FEModel
 from fe_import.reduction import fixed_interface
-from fe_import.solid import SolidMaterial, assemble_solid
-from fe_import.solid_elements import SOLID_ELEMENTS
-from fe_import.solid_mesh import SolidMesh
 
 LEG, WIDTH, HEIGHT = 0.5, 0.01, 0.03
 LINK = """
@@ -62,8 +62,8 @@ face = "tip"
 fixed_interface_modes = {modes}
 """
 STAGES = [  # name, module, function; a stage within a stage counts for itself only
-    ("read mesh", fe_import.build_solid, "read_mesh"),
-    ("assembly", fe_import.build_solid, "assemble_solid"),
+    ("read mesh", fe_import.build.solid, "read_mesh"),
+    ("assembly", fe_import.build.solid, "assemble_solid"),
     ("order of elimination", fe_import.sparse, "analyse"),
     ("factorization", fixed_interface, "factorize"),
     ("constraint modes", sys.modules["fe_import.reduction.craig_bampton"], "constraint_modes"),

@@ -25,10 +25,10 @@ from erls.mechanism.place import Place
 from erls.scene import Joint as JointRecord
 from erls.scene import Link as LinkRecord
 from erls.scene import Scene
-from fe_import.build import inertia_matrix
+from fe_import.build.model import inertia_matrix
 from fe_import.errors import FEImportError, ReportedError
 from fe_import.link import LinkDescription, load_link
-from fe_import.modal_file import ModalModel, read_modal_file
+from fe_import.modal.file import ModalModel, read_modal_file
 from fe_import.model import InterfaceNode
 from fe_import.modes import damping_ratios
 from fe_import.reduce import reduce_cached

@@ -74,7 +74,7 @@ def reduce(
         Print one JSON object.
     """
     from fe_import.link import load_link
-    from fe_import.modal_file import write_modal_file
+    from fe_import.modal.file import write_modal_file
     from fe_import.reduce import reduce_link, reduction_summary
 
     changes = {k: v for k, v in (("method", method), ("elastic_modes", modes)) if v is not None}

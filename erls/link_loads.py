@@ -11,7 +11,7 @@ from erls.lie.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
 from erls.mechanism.loops import LoopEnd
 from erls.run import Run
-from fe_import.build import inertia_matrix
+from fe_import.build.model import inertia_matrix
 
 _STEP = 1e-5  # s, of central differences: 1e-6 m/s² of rounding, and below 1 kHz 3e-4 of the acceleration
 

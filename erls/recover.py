@@ -2,7 +2,7 @@
 
 They need a modal file with recovery maps (table ``[recovery]`` of the link description). What the modes of the scene
 carry is corrected by the static answer of all others to the loads of the run (mode acceleration): see
-`fe_import.recovery_maps`.
+`fe_import.recovery.maps`.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from erls.link_loads import link_loads
 from erls.mechanism.links import Link
 from erls.output_file import replacing
 from erls.run import Run
-from fe_import.recovery import mode_acceleration, required_maps
-from fe_import.recovery_maps import UNITS, RecoveryMaps, spin_products
+from fe_import.recovery.maps import UNITS, RecoveryMaps, spin_products
+from fe_import.recovery.recover import mode_acceleration, required_maps
 from fe_import.toml_file import choose
 
 

@@ -22,9 +22,9 @@ from erls.run import Run
 from erls.scene import Scene, SceneRecord
 from erls.scene_check import check_scene
 from fe_import.errors import ReportedError
-from fe_import.hdf5 import open_for_reading, write_array, write_atomically, write_attribute, write_strings
+from fe_import.hdf5.files import open_for_reading, write_array, write_atomically, write_attribute, write_strings
 from fe_import.link import LinkDescription
-from fe_import.modal_file import ModalModel, read_modal_group, write_modal_group
+from fe_import.modal.file import ModalModel, read_modal_group, write_modal_group
 from fe_import.toml_file import choose, convert
 
 SCHEMA = "erls run"

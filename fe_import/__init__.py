@@ -7,8 +7,8 @@ __all__ = ["load_link", "read_modal_file", "reduce_link", "write_modal_file"]
 _HOME = {
     "load_link": "fe_import.link",
     "reduce_link": "fe_import.reduce",
-    "read_modal_file": "fe_import.modal_file",
-    "write_modal_file": "fe_import.modal_file",
+    "read_modal_file": "fe_import.modal.file",
+    "write_modal_file": "fe_import.modal.file",
 }
 
 

@@ -15,9 +15,9 @@ from typing import Any
 
 import msgspec
 
+from fe_import.elements.sections import Section, check_section
 from fe_import.errors import Cause, FEImportError, ReportedError
 from fe_import.link_reduction import Reduction, check_reduction_options
-from fe_import.sections import Section, check_section
 from fe_import.toml_file import choose, convert, read_toml
 
 COUPLINGS = ("rigid", "averaged")

@@ -13,21 +13,21 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from fe_import.build import build_model, unit_factors
+from fe_import.build.model import build_model, unit_factors
 from fe_import.errors import FEImportError
-from fe_import.health import check_basis, check_model, check_reduction, mode_residuals
+from fe_import.health.plausibility import plausible_link, plausible_materials
+from fe_import.health.report import check_basis, check_model, check_reduction, mode_residuals
+from fe_import.health.static_flexibility import check_static
 from fe_import.inertia import inertia_invariants, mass_properties
 from fe_import.link import LinkFile, load_link
-from fe_import.modal_file import SCHEMA_VERSION, ModalModel, read_modal_file, write_modal_file
-from fe_import.modal_model import HealthCheck
+from fe_import.modal.file import SCHEMA_VERSION, ModalModel, read_modal_file, write_modal_file
+from fe_import.modal.model import HealthCheck
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
-from fe_import.plausibility import plausible_link, plausible_materials
-from fe_import.recovery import recovery_maps
+from fe_import.recovery.recover import recovery_maps
 from fe_import.reduction import REDUCTIONS, Basis
 from fe_import.solver import chosen_solver
 from fe_import.solver.watch import telling
-from fe_import.static_check import check_static
 from fe_import.toml_file import choose
 
 

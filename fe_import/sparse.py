@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.dense import dense_modes, polishing, singular_matrix
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array
 from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chosen_solver
+from fe_import.solver.dense import dense_modes, polishing, singular_matrix
 from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
 from fe_import.solver.memory import gigabytes, refuse_too_large
 from fe_import.solver.multifrontal import OutsidePattern, negative_pivots

@@ -12,7 +12,7 @@ from erls.lie.se3 import pose, twist_transform
 from erls.lie.so3 import Array, skew
 from fe_import.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.link import LinkDescription
-from fe_import.modal_file import FixedInterfaceModes, ModalModel
+from fe_import.modal.file import FixedInterfaceModes, ModalModel
 from fe_import.model import InterfaceNode
 
 

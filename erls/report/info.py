@@ -12,10 +12,10 @@ from erls.report.tables import modal_report, run_report, table
 from erls.run_file import SCHEMA as RUN_SCHEMA
 from erls.run_file import load_run
 from erls.scene import Scene, load_scene
-from fe_import.hdf5 import open_for_reading
+from fe_import.hdf5.files import open_for_reading
 from fe_import.link import LinkFile, load_link
-from fe_import.modal_file import SCHEMA as MODAL_SCHEMA
-from fe_import.modal_file import ModalModel, read_modal_file
+from fe_import.modal.file import SCHEMA as MODAL_SCHEMA
+from fe_import.modal.file import ModalModel, read_modal_file
 from fe_import.toml_file import read_toml
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -106,7 +106,7 @@ def _source(link: Any) -> str:
 
 
 def _link_info(link: LinkFile) -> tuple[dict[str, Any], str]:
-    from fe_import.build import build_model
+    from fe_import.build.model import build_model
     from fe_import.inertia import mass_properties
 
     model = build_model(link)

@@ -8,7 +8,7 @@ import numpy as np
 
 from erls.run import Run
 from fe_import.inertia import MassProperties
-from fe_import.modal_file import HealthCheck, ModalModel
+from fe_import.modal.file import HealthCheck, ModalModel
 
 _SHOWN_MODES = 40
 

@@ -18,7 +18,7 @@ from erls.mechanism.links import link_mass_properties
 from erls.scene import load_scene
 from fe_import.errors import Cause as FECause
 from fe_import.errors import FEImportError
-from fe_import.modal_file import write_modal_file
+from fe_import.modal.file import write_modal_file
 from fe_import.reduce import reduce_link
 
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"

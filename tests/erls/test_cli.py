@@ -17,7 +17,7 @@ import scenes
 
 from erls.cli import main
 from erls.errors import Cause
-from fe_import.modal_file import read_modal_file
+from fe_import.modal.file import read_modal_file
 
 SIMULATE = {
     "scene", "formulation", "duration", "steps", "rhs_calls", "newton_iterations", "wall_s", "energy", "samples",

@@ -17,7 +17,7 @@ from erls.cli import main
 from erls.errors import Cause
 from fe_import.errors import Cause as FECause
 from fe_import.link import load_link
-from fe_import.modal_file import write_modal_file
+from fe_import.modal.file import write_modal_file
 from fe_import.reduce import reduce_link
 
 NAN, INF = math.nan, math.inf

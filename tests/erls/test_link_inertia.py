@@ -12,9 +12,9 @@ import scenes
 from erls.formulations.link_inertia import LinkInertia, moment_about
 from erls.lie.so3 import skew
 from erls.mechanism.links import payload_invariants, rigid_model
-from fe_import.build import build_model
+from fe_import.build.model import build_model
 from fe_import.link import load_link
-from fe_import.modal_file import ModalModel
+from fe_import.modal.file import ModalModel
 from fe_import.model import FEModel
 from fe_import.reduce import reduce_model
 

@@ -282,7 +282,7 @@ def test_a_damaged_description_in_a_run_file(tmp_path: Path) -> None:
     """It is reported as such."""
     import h5py
 
-    from fe_import.hdf5 import write_strings
+    from fe_import.hdf5.files import write_strings
 
     scenes.l_link(tmp_path)
     write_run(tmp_path / "run.h5", _run(scenes.l_scene(tmp_path, **_simulation(2e-3, 1e-3))))

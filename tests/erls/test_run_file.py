@@ -19,7 +19,7 @@ from erls.run import Run
 from erls.run_file import load_run, write_run
 from erls.scene import load_scene
 from fe_import.errors import ReportedError
-from fe_import.hdf5 import write_strings
+from fe_import.hdf5.files import write_strings
 
 TIMES = np.linspace(0.0, 0.02, 11)
 BODY = {"mass": 0.5, "centre_of_mass": [0.2, 0, 0], "inertia": [1e-3, 2e-3, 2e-3]}

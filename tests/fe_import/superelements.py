@@ -12,7 +12,7 @@ import scipy.linalg as la
 from link_files import FRAME, merged, write_toml
 from numpy.typing import NDArray
 
-from fe_import.build import build_model
+from fe_import.build.model import build_model
 from fe_import.link import LinkFile, load_link
 from fe_import.model import FEModel
 

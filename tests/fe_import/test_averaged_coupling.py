@@ -12,19 +12,19 @@ import scipy.sparse.linalg as spla
 from link_files import clamped_flexibility, frame_link, solid_link, write_box
 from solid_meshes import box, quarter_ring
 
-from fe_import import coupling_averaged
-from fe_import.coupling import Coupling, couple_interfaces
-from fe_import.dependence import arm
+from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
-from fe_import.face_weights import area_weights, nodal_areas
-from fe_import.interface import InterfaceFace, interface_face
-from fe_import.modal_model import ModalModel
+from fe_import.interfaces import averaged as coupling_averaged
+from fe_import.interfaces.coupling import Coupling, couple_interfaces
+from fe_import.interfaces.dependence import arm
+from fe_import.interfaces.faces import InterfaceFace, interface_face
+from fe_import.interfaces.weights import area_weights, nodal_areas
+from fe_import.mesh.solid_mesh import SolidMesh
+from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 from fe_import.reduce import reduce_link
 from fe_import.reduction import REDUCTIONS
-from fe_import.solid import SolidMaterial, assemble_solid
-from fe_import.solid_mesh import SolidMesh
-from fe_import.solid_stress import solid_stress
 
 E, NU, L, B = 2.1e11, 0.3, 1.0, 0.1
 STEEL = SolidMaterial(E, NU, 7850.0)

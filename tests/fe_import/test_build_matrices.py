@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from exported_files import MARKET, Fault, check_fault, link_matrices, market, raw, written
 from link_files import FRAME, frame_link, merged, solid_link, write_toml
 
-from fe_import.build import build_model
+from fe_import.build.model import build_model
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.dofs import COMPONENTS
 from fe_import.exports.row_files import node_frames

@@ -29,7 +29,7 @@ from exported_files import (
     written,
 )
 
-from fe_import.build import build_model
+from fe_import.build.model import build_model
 from fe_import.errors import Cause
 from fe_import.exports.row_files import node_frames
 

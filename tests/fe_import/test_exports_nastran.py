@@ -27,7 +27,7 @@ from fe_import.exports.nastran_dmig import DmigOptions, read_dmig
 from fe_import.exports.nastran_grid import CARDS, grid_points
 from fe_import.exports.nastran_op4 import Op4Options, read_op4
 from fe_import.link import load_link
-from fe_import.modal_model import ModalModel
+from fe_import.modal.model import ModalModel
 from fe_import.reduce import reduce_link
 
 ROOT = Path(__file__).parents[2]

@@ -13,10 +13,17 @@ import scipy.linalg as la
 from link_files import Array, frequencies, random_rotation
 from numpy.polynomial import Polynomial
 
-from fe_import.frame import STIFFNESS_PARTS, FrameElement, assemble_frame, element_mass, element_stiffness, local_axes
+from fe_import.elements.frame import (
+    STIFFNESS_PARTS,
+    FrameElement,
+    assemble_frame,
+    element_mass,
+    element_stiffness,
+    local_axes,
+)
+from fe_import.elements.sections import Circular, Rectangular, SectionConstants, section_constants
 from fe_import.inertia import mass_properties
 from fe_import.model import FEModel
-from fe_import.sections import Circular, Rectangular, SectionConstants, section_constants
 
 E, NU, RHO = 2.1e11, 0.3, 7850.0
 G = E / (2 * (1 + NU))

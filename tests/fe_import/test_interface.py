@@ -10,12 +10,12 @@ import pytest
 import scipy.linalg
 from solid_meshes import box, quarter_ring
 
-from fe_import.coupling import Coupling, couple_interfaces
+from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.errors import Cause, FEImportError
-from fe_import.interface import InterfaceFace, interface_face
-from fe_import.mesh import SolidMesh, read_mesh
+from fe_import.interfaces.coupling import Coupling, couple_interfaces
+from fe_import.interfaces.faces import InterfaceFace, interface_face
+from fe_import.mesh.read import SolidMesh, read_mesh
 from fe_import.model import FEModel
-from fe_import.solid import SolidMaterial, assemble_solid
 
 L_MESH = Path(__file__).parents[2] / "data" / "l_shape" / "meshes" / "l_hex20.msh"
 STEEL = SolidMaterial(2.1e11, 0.3, 7850.0)

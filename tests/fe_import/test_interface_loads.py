@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from benchmarks.interface_loads import Case, errors, first_frequency, frame_case, full_history, oscillations, peaks
-from fe_import.build import build_model
+from fe_import.build.model import build_model
 from fe_import.link import LinkFile
 
 STRESS = 2

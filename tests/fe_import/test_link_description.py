@@ -24,7 +24,7 @@ from link_files import (
     write_toml,
 )
 
-from fe_import.build import build_model
+from fe_import.build.model import build_model
 from fe_import.errors import FEImportError
 from fe_import.inertia import MassProperties, mass_properties
 from fe_import.link import Reduction, load_link

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from solid_meshes import box
 
-from fe_import import mesh_guard
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh import read_mesh
+from fe_import.mesh import guard as mesh_guard
+from fe_import.mesh.read import read_mesh
 
 MSH4 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
 MSH2 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"

@@ -11,11 +11,11 @@ import pytest
 from link_files import solid_link
 from solid_meshes import box
 
-from fe_import.build import build_model
+from fe_import.build.model import build_model
+from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh import read_mesh
-from fe_import.solid_elements import SOLID_ELEMENTS
-from fe_import.solid_mesh import SolidMesh
+from fe_import.mesh.read import read_mesh
+from fe_import.mesh.solid_mesh import SolidMesh
 
 TYPES = sorted(SOLID_ELEMENTS)
 ABAQUS = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8R", "hex20": "C3D20"}
@@ -241,7 +241,7 @@ def test_integer_arrays_of_vtu(tmp_path):
     np.testing.assert_array_equal(found.node_sets["end:1"], END)
     assert not any("stress" in name for name in found.element_sets)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fe_import.mesh_meshio.MOST_GROUPS", 1)
+        patch.setattr("fe_import.mesh.meshio_files.MOST_GROUPS", 1)
         found = read_mesh(path)
     assert "labels and not groups" in found.lost_sets["medium"]
 

@@ -15,8 +15,8 @@ import pytest
 from modal_models import same, synthetic_model
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.hdf5 import open_for_reading, write_atomically
-from fe_import.modal_file import (
+from fe_import.hdf5.files import open_for_reading, write_atomically
+from fe_import.modal.file import (
     ModalModel,
     read_modal_file,
     read_modal_group,
@@ -120,7 +120,7 @@ def test_interrupted_write_keeps_the_old_file(path: Path, monkeypatch: pytest.Mo
         write_modal_group(group, model)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fe_import.modal_file.write_modal_group", interrupted)
+    monkeypatch.setattr("fe_import.modal.file.write_modal_group", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write_modal_file(path, synthetic_model(seed=1))
     assert path.read_bytes() == before

@@ -16,11 +16,11 @@ from link_files import Array, dense, frame_link, free_frequencies, straight_link
 from link_table import LINKS, every_mode, held_flexibility, modal_flexibility, nodal_fields, relative
 
 import fe_import.reduction.free_body
-from fe_import.build import build_model
+from fe_import.build.model import build_model
 from fe_import.errors import Cause, FEImportError
 from fe_import.link import load_link
 from fe_import.link_reduction import Reduction
-from fe_import.modal_file import ModalModel, read_modal_file, write_modal_file
+from fe_import.modal.file import ModalModel, read_modal_file, write_modal_file
 from fe_import.model import FEModel
 from fe_import.reduce import reduce_link, reduce_model
 from fe_import.reduction import REDUCTIONS

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fe_import.errors import Cause, FEImportError
-from fe_import.sections import (
+from fe_import.elements.sections import (
     Circular,
     Constants,
     Rectangular,
@@ -22,6 +21,7 @@ from fe_import.sections import (
     rectangle_torsion_constant,
     section_constants,
 )
+from fe_import.errors import Cause, FEImportError
 
 SIZES = st.floats(1e-3, 1e2)
 

@@ -14,12 +14,12 @@ from skfem.helpers import ddot, dot, sym_grad, trace
 from skfem.mapping import MappingIsoparametric
 from solid_meshes import box, quarter_ring
 
+from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.errors import Cause, FEImportError
 from fe_import.inertia import mass_properties
-from fe_import.mesh_checks import check_mesh
-from fe_import.solid import SolidMaterial, assemble_solid
-from fe_import.solid_elements import SOLID_ELEMENTS
-from fe_import.solid_mesh import SolidMesh
+from fe_import.mesh.checks import check_mesh
+from fe_import.mesh.solid_mesh import SolidMesh
 
 STEEL = SolidMaterial(2.1e11, 0.3, 7850.0)
 TYPES = sorted(SOLID_ELEMENTS)
@@ -220,7 +220,7 @@ def test_chunks_do_not_matter(monkeypatch):
     """Assembly element by element gives the matrices of one go, to rounding."""
     mesh = box("tet10", (2, 1, 1))
     reference = assemble_solid(mesh, [STEEL])
-    monkeypatch.setattr("fe_import.solid_assembly._CHUNK_VALUES", 1)
+    monkeypatch.setattr("fe_import.elements.solid_assembly._CHUNK_VALUES", 1)
     for one_go, chunked in zip(reference, assemble_solid(mesh, [STEEL]), strict=True):
         assert abs(one_go - chunked).max() < 1e-14 * abs(one_go).max()
 

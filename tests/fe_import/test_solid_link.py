@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fe_import.mesh import read_mesh
-from fe_import.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.mesh.read import read_mesh
 
 ROOT = Path(__file__).parents[2]
 STEEL = SolidMaterial(2.1e11, 0.3, 7850.0)

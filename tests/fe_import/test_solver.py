@@ -20,11 +20,11 @@ from solid_meshes import box
 
 import fe_import.solver
 import fe_import.sparse
-from fe_import.dense import dense_modes
+from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.errors import Cause, FEImportError
 from fe_import.reduce import reduce_link, reduction_summary
-from fe_import.solid import SolidMaterial, assemble_solid
 from fe_import.solver import SOLVERS, SingularMatrix, analyse, memory, multifrontal, watch
+from fe_import.solver.dense import dense_modes
 from fe_import.solver.lanczos import block_size
 from fe_import.sparse import factorize, lowest_modes, modes_below
 

@@ -13,12 +13,12 @@ from link_files import frame_link, solid_link, write_toml
 from superelements import Reduced, condensed, description, frame_model, punch
 
 import erls
-from fe_import.build import build_model
+from fe_import.build.model import build_model
+from fe_import.health.rotation_terms import rotation_departure
 from fe_import.link import LinkFile, load_link
-from fe_import.modal_file import read_modal_file, write_modal_file
-from fe_import.modal_model import ModalModel
+from fe_import.modal.file import read_modal_file, write_modal_file
+from fe_import.modal.model import ModalModel
 from fe_import.reduce import reduce_link
-from fe_import.rotation_terms import rotation_departure
 
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "data" / "calculix" / "l_pendulum.toml"

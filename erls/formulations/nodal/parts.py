@@ -19,9 +19,9 @@ from erls.nodal.beam import Beam, lumped
 from erls.nodal.rigid_body import RigidBody
 from erls.nodal.scatter import IntArray
 from erls.nodal.section import BeamSection, beam_section
-from fe_import.build_frame import FrameMesh
-from fe_import.frame import FrameElement
-from fe_import.frame_parts import FrameParts, frame_parts
+from fe_import.build.frame import FrameMesh
+from fe_import.build.frame_parts import FrameParts, frame_parts
+from fe_import.elements.frame import FrameElement
 from fe_import.link import Frame
 
 STIFF_SHEAR = 1e4  # shear then counts 1e-7 of the bending of a slender member

@@ -1,0 +1,1 @@
+"""Finite elements: spatial frames with their sections, solids."""

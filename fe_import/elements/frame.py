@@ -1,0 +1,199 @@
+"""Spatial frame elements with two nodes and 6 dofs per node, Euler-Bernoulli or Timoshenko.
+
+The interpolation is the exact static one of the Timoshenko beam (Przemieniecki, Theory of Matrix Structural
+Analysis, 1968, ch. 5 and 11; Friedman & Kosmatka, 1993); Euler-Bernoulli is its limit Φ = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_import.elements.sections import SectionConstants
+from fe_import.model import Array, IntArray
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the sixth-degree products of the shape functions
+_POINTS, _WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
+
+STIFFNESS_PARTS = ("axial", "torsion", "bending about y", "bending about z")
+
+
+@dataclass(frozen=True)
+class FrameElement:
+    """One straight element.
+
+    Attributes
+    ----------
+    nodes : (int, int)
+    axes : (3, 3) array
+        Rows are the local x, y, z axes in the mesh frame.
+    length : float
+        [m]
+    section : SectionConstants
+    youngs_modulus, shear_modulus : float
+        [Pa]
+    density : float
+        [kg/m³]
+    """
+
+    nodes: tuple[int, int]
+    axes: Array
+    length: float
+    section: SectionConstants
+    youngs_modulus: float
+    shear_modulus: float
+    density: float
+
+
+def local_axes(start: Array, end: Array, local_z: Array) -> Array:
+    """(3, 3) rows: unit x from ``start`` to ``end``, z as near ``local_z`` as possible, y = z × x."""
+    x = (end - start) / np.linalg.norm(end - start)
+    y = np.cross(local_z, x)
+    y /= np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)])
+
+
+def shear_flexibility(element: FrameElement, shear: bool) -> tuple[float, float]:
+    """Φ_y = 12 E I_z / (κ_y G A L²) for bending about z (deflection along y), and Φ_z likewise; 0 without shear."""
+    if not shear:
+        return 0.0, 0.0
+    s, g = element.section, element.shear_modulus * element.section.area * element.length**2
+    e = 12 * element.youngs_modulus
+    return e * s.inertia_z / (s.shear_factor_y * g), e * s.inertia_y / (s.shear_factor_z * g)
+
+
+def bending_shapes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:
+    """Deflection and rotation of the cross section at ξ = x/L per unit (v₁, θ₁, v₂, θ₂), each (points, 4)."""
+    x2, x3 = xi**2, xi**3
+    bubble = phi / 2 * (xi - x2)
+    deflection = np.stack(
+        [
+            1 - 3 * x2 + 2 * x3 + phi * (1 - xi),
+            length * (xi - 2 * x2 + x3 + bubble),
+            3 * x2 - 2 * x3 + phi * xi,
+            length * (x3 - x2 - bubble),
+        ],
+        axis=-1,
+    )
+    slope = np.stack(
+        [
+            6 / length * (x2 - xi),
+            1 - 4 * xi + 3 * x2 + phi * (1 - xi),
+            6 / length * (xi - x2),
+            3 * x2 - 2 * xi + phi * xi,
+        ],
+        axis=-1,
+    )
+    return deflection / (1 + phi), slope / (1 + phi)
+
+
+# local dofs of bending in the x-y plane (v, θ_z) and in the x-z plane (w, -θ_y): index and sign
+_PLANES = (
+    (np.array([1, 5, 7, 11]), np.array([1.0, 1.0, 1.0, 1.0])),
+    (np.array([2, 4, 8, 10]), np.array([1.0, -1.0, 1.0, -1.0])),
+)
+
+
+def element_stiffness(element: FrameElement, shear: bool) -> dict[str, Array]:
+    """(12, 12) stiffness in local axes, split into axial, torsion and the two bendings."""
+    s, length, e = element.section, element.length, element.youngs_modulus
+    parts = {name: np.zeros((12, 12)) for name in STIFFNESS_PARTS}
+    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    parts["axial"][np.ix_([0, 6], [0, 6])] = e * s.area / length * pair
+    parts["torsion"][np.ix_([3, 9], [3, 9])] = element.shear_modulus * s.torsion_constant / length * pair
+    phis = shear_flexibility(element, shear)
+    for name, inertia, phi, (dofs, signs) in zip(
+        ("bending about z", "bending about y"), (s.inertia_z, s.inertia_y), phis, _PLANES, strict=True
+    ):
+        a, b = 6 * length, length**2
+        block = np.array(
+            [
+                [12, a, -12, a],
+                [a, (4 + phi) * b, -a, (2 - phi) * b],
+                [-12, -a, 12, -a],
+                [a, (2 - phi) * b, -a, (4 + phi) * b],
+            ]
+        )
+        block *= e * inertia / ((1 + phi) * length**3)
+        parts[name][np.ix_(dofs, dofs)] = block * np.outer(signs, signs)
+    return parts
+
+
+def element_mass(element: FrameElement, shear: bool, mass: str, rotary_inertia: bool) -> Array:
+    """(12, 12) mass matrix in local axes.
+
+    Parameters
+    ----------
+    mass : str
+        ``"consistent"`` or ``"lumped"`` (half of the element at either node).
+    rotary_inertia : bool
+        Whether cross sections resist turning, ρ diag(I_y + I_z, I_y, I_z) per length. Without it the consistent
+        mass keeps the torsional part, the lumped one is made of point masses.
+    """
+    s, length, rho = element.section, element.length, element.density
+    polar = s.inertia_y + s.inertia_z
+    result = np.zeros((12, 12))
+    if mass == "lumped":
+        node = np.zeros(6)
+        node[:3] = s.area
+        if rotary_inertia:
+            node[3:] = polar, s.inertia_y, s.inertia_z
+        np.fill_diagonal(result, np.tile(node * rho * length / 2, 2))
+        return result
+    line = np.array([[2.0, 1.0], [1.0, 2.0]]) * rho * length / 6
+    result[np.ix_([0, 6], [0, 6])] = s.area * line
+    result[np.ix_([3, 9], [3, 9])] = polar * line
+    for inertia, phi, (dofs, signs) in zip(
+        (s.inertia_z, s.inertia_y), shear_flexibility(element, shear), _PLANES, strict=True
+    ):
+        deflection, slope = bending_shapes(_POINTS, length, phi)
+        block = s.area * np.einsum("p,pi,pj->ij", _WEIGHTS, deflection, deflection)
+        if rotary_inertia:
+            block += inertia * np.einsum("p,pi,pj->ij", _WEIGHTS, slope, slope)
+        result[np.ix_(dofs, dofs)] += rho * length * block * np.outer(signs, signs)
+    return result
+
+
+def assemble_frame(
+    node_count: int, elements: Sequence[FrameElement], *, shear: bool, mass: str, rotary_inertia: bool
+) -> tuple[sp.csc_array, sp.csc_array, dict[str, sp.csc_array]]:
+    """Mass, stiffness and the parts of the stiffness of a frame, 6 dofs per node in the mesh frame.
+
+    Parameters
+    ----------
+    node_count : int
+    elements : sequence of FrameElement
+    shear : bool
+        Timoshenko (True) or Euler-Bernoulli.
+    mass, rotary_inertia
+        See `element_mass`.
+
+    Returns
+    -------
+    mass, stiffness : (6 n, 6 n) sparse CSC
+    parts : dict of sparse CSC
+        The stiffness split by `STIFFNESS_PARTS`.
+    """
+    rows: list[IntArray] = []
+    masses: list[Array] = []
+    parts: dict[str, list[Array]] = {name: [] for name in STIFFNESS_PARTS}
+    for element in elements:
+        turn = np.kron(np.eye(4), element.axes)
+        masses.append(turn.T @ element_mass(element, shear, mass, rotary_inertia) @ turn)
+        for name, block in element_stiffness(element, shear).items():
+            parts[name].append(turn.T @ block @ turn)
+        rows.append(np.concatenate([6 * n + np.arange(6) for n in element.nodes]))
+    dofs = np.stack(rows)
+    i, j = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
+    size = 6 * node_count
+
+    def assemble(blocks: list[Array]) -> sp.csc_array:
+        matrix = sp.coo_array((np.stack(blocks).ravel(), (i, j)), shape=(size, size)).tocsc()
+        return ((matrix + matrix.T) / 2).tocsc()
+
+    assembled = {name: assemble(blocks) for name, blocks in parts.items()}
+    stiffness = sum(assembled.values(), start=sp.csc_array((size, size)))
+    return assemble(masses), stiffness.tocsc(), assembled

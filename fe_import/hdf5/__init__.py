@@ -1,0 +1,1 @@
+"""Hostile-safe HDF5: what is opened, audited, read and written."""

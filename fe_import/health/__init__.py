@@ -1,0 +1,1 @@
+"""Checks of models and reductions, and the report of them."""

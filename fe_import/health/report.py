@@ -1,0 +1,255 @@
+"""The check report of a reduction: what a careful engineer verifies before trusting a modal file.
+
+All limits are relative. A model that fails is refused with the cause; there is no way around it, because a grounded
+or indefinite link gives motions that look plausible and are wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_import.errors import Cause, FEImportError
+from fe_import.health.rigid_motion import rigid_motion_as_eigenmodes, rigid_motion_by_stiffness
+from fe_import.health.rotation_terms import rotation_departure
+from fe_import.inertia import InertiaInvariants, mass_properties
+from fe_import.modal.model import NO_LIMIT, HealthCheck
+from fe_import.model import Array, FEModel
+from fe_import.reduction import Basis
+from fe_import.sparse import modes_below
+
+_ROUNDING = 1e-9  # symmetry, mass properties: sums of many terms of one sign in double precision
+GROUNDING = 1e-7  # exported matrices carry 6 to 14 digits; a real ground spring is far above
+_RIGID = 1e-5  # rounding times the condition of a slender link's stiffness; a loose or grounded part gives 1
+_RIGID_PRINTED = 1e-4  # the same with the 14 digits of exported text, which leave 1.2e-5 on the L of 100 hexahedra
+_EIGEN = 1e-6
+_CAUSES = {
+    "mass matrix": Cause.NOT_DEFINITE,
+    "stiffness matrix": Cause.NOT_DEFINITE,
+    "grounding": Cause.GROUNDED,
+    "rigid-body": Cause.NOT_DEFINITE,
+}
+
+
+def _norm(matrix: sp.csc_array) -> float:
+    return float(np.sqrt(matrix.multiply(matrix).sum()))
+
+
+def asymmetry(matrix: sp.csc_array) -> float:
+    """‖A - Aᵀ‖ / ‖A‖."""
+    total = _norm(matrix)
+    return _norm((matrix - matrix.T).tocsc()) / total if total else 0.0
+
+
+def grounding(model: FEModel) -> float:
+    """Largest force that a rigid-body motion causes, relative to the forces of its terms |K| |r|."""
+    rigid = model.rigid_body_modes()
+    force = np.abs(model.stiffness @ rigid).max(axis=0)
+    terms = (abs(model.stiffness) @ np.abs(rigid)).max(axis=0)
+    return float((force / np.where(terms > 0, terms, 1)).max())
+
+
+def negative_diagonal(matrix: sp.csc_array) -> float:
+    """Most negative diagonal entry, per the largest."""
+    diagonal = matrix.diagonal()
+    largest = np.abs(diagonal).max(initial=0.0)
+    return float(max(0.0, -diagonal.min()) / largest) if largest else 0.0
+
+
+def check_model(model: FEModel, where: str) -> tuple[HealthCheck, ...]:
+    """Checks of the full matrices.
+
+    Raises
+    ------
+    FEImportError
+        NOT_DEFINITE: asymmetric, or negative on the diagonal, or a mass matrix that gives some motion negative
+        kinetic energy; GROUNDED: rigid-body motions cause forces.
+    """
+    symmetric = "export both triangles, or state that one is given"
+    negative = "look at the signs, and at the units of masses and inertias"
+    free = "a link must be free: remove supports, springs to ground and penalty stiffness from the export"
+    checks = [
+        (HealthCheck("mass matrix: asymmetry", asymmetry(model.mass), _ROUNDING), symmetric),
+        (HealthCheck("stiffness matrix: asymmetry", asymmetry(model.stiffness), _ROUNDING), symmetric),
+        (HealthCheck("mass matrix: negative diagonal", negative_diagonal(model.mass), 0.0), negative),
+        (HealthCheck("stiffness matrix: negative diagonal", negative_diagonal(model.stiffness), 0.0), negative),
+        (HealthCheck("grounding force of rigid-body motions", grounding(model), GROUNDING), free),
+    ]
+    _refuse(checks, where)
+    if model.kind == "matrices":  # our own elements cannot give an indefinite mass
+        count = HealthCheck("mass matrix: motions of negative kinetic energy", _negative_masses(model), 0.0)
+        checks.append((count, negative))
+        _refuse(checks[-1:], where)
+    return tuple(check for check, _ in checks)
+
+
+def _negative_masses(model: FEModel) -> float:
+    """Number of negative eigenvalues of the mass matrix beyond rounding; singular is legal."""
+    mass, _ = model.reduced_matrices()
+    diagonal = mass.diagonal()
+    size = np.where(diagonal > 0, diagonal, diagonal.max(initial=0.0) or 1.0)
+    return float(modes_below(mass, sp.diags_array(size).tocsc(), -1e-7) or 0)
+
+
+def _refuse(checks: Iterable[tuple[HealthCheck, str]], where: str) -> None:
+    """The first failed check, as an error with its cause and remedy."""
+    for check, remedy in checks:
+        if not check.ok:
+            cause = next((c for start, c in _CAUSES.items() if check.name.startswith(start)), Cause.EIGENSOLVER)
+            raise FEImportError(
+                cause,
+                f"{check.name} is not zero",
+                where=where,
+                value=check.value,
+                limit=check.limit,
+                remedy=remedy,
+            )
+
+
+def check_basis(
+    model: FEModel, basis: Basis, mass: Array, stiffness: Array, omega: Array, where: str
+) -> tuple[HealthCheck, ...]:
+    """Checks of the reduction basis: rigid-body motions in three ways, effective mass, completeness, conditioning.
+
+    Parameters
+    ----------
+    model : FEModel
+    basis : Basis
+    mass, stiffness : (k, k) arrays
+        Over the basis.
+    omega : (m,) array
+        Circular frequencies of the orthonormal modes [rad/s].
+    where : str
+
+    Raises
+    ------
+    FEImportError
+        NOT_DEFINITE: a part of the link moves without strain, or something holds it.
+    """
+    checks = [
+        HealthCheck(
+            "rigid-body motion by stiffness against geometry",
+            rigid_motion_by_stiffness(model, basis, stiffness),
+            _RIGID_PRINTED if model.kind == "matrices" else _RIGID,
+        )
+    ]
+    if len(omega) > 6:
+        frequency, departure = rigid_motion_as_eigenmodes(mass, stiffness, basis.rigid, float(omega[6]))
+        checks += [
+            HealthCheck("rigid-body eigenvalues, per first elastic one", frequency, _EIGEN),
+            HealthCheck("rigid-body eigenmodes against geometry", departure, _EIGEN),
+        ]
+    carried = basis.fixed_interface.effective_mass
+    if len(carried):
+        least = float(carried.sum(axis=0)[:3].min())
+        checks.append(HealthCheck("share of mass in fixed-interface modes, least direction", least, NO_LIMIT))
+    remedy = (
+        "look for loose parts, hinges, supports, matrices of another model, and for many small elements in a slender "
+        "or very stiff part"
+    )
+    _refuse(((check, remedy) for check in checks), where)
+    return (*checks, *_missing_modes(model, omega), HealthCheck("condition of the basis", _condition(mass), NO_LIMIT))
+
+
+def _missing_modes(model: FEModel, omega: Array) -> tuple[HealthCheck, ...]:
+    """How many free-free modes of the full model the basis lacks, up to a gap in the second quarter of its spectrum.
+
+    Frequencies of a basis are upper bounds, so a mode that it lacks shows in the count of the full model.
+    """
+    elastic = omega[6:]
+    half = len(elastic) // 2
+    if half < 1:
+        return ()
+    first = half // 2
+    last = first + int(np.diff(np.log(elastic[first : half + 1])).argmax())
+    limit = float(np.sqrt(elastic[last] * elastic[last + 1]))
+    mass, stiffness = model.reduced_matrices()
+    below = modes_below(stiffness, mass, limit**2, positions=model.dof_positions())
+    if below is None:
+        return ()
+    name = f"free-free modes below {limit / (2 * np.pi):.5g} Hz that the basis lacks"
+    return (HealthCheck(name, float(below - 6 - (last + 1)), NO_LIMIT),)
+
+
+def _condition(mass: Array) -> float:
+    """Of the mass matrix over the basis, its columns brought to one size; massless columns left out."""
+    diagonal = np.diag(mass)
+    massive = diagonal > _EIGEN**2 * diagonal.max()
+    scale = 1 / np.sqrt(diagonal[massive])
+    values = np.linalg.eigvalsh(mass[np.ix_(massive, massive)] * np.outer(scale, scale))
+    return float(values[-1] / max(values[0], np.finfo(float).eps * values[-1]))
+
+
+def mode_residuals(model: FEModel, shapes: Array, omega: Array) -> Array:
+    """(m,) ‖Kφ - ω²Mφ‖ / ‖Kφ‖ of elastic modes over the independent dofs, each row scaled by its stiffness.
+
+    0 for rigid-body modes; the scale makes forces and moments comparable.
+    """
+    result = np.zeros(len(omega))
+    scale = 1 / np.sqrt(np.where((d := _independent_diagonal(model)) > 0, d, d.max()))
+    for k in range(6, len(omega)):  # one at a time: fields of a large model are long
+        force = _independent(model, model.stiffness @ shapes[:, k]) * scale
+        inertia = _independent(model, model.mass @ shapes[:, k]) * scale * omega[k] ** 2
+        result[k] = np.linalg.norm(force - inertia) / np.linalg.norm(force)
+    return result
+
+
+def _independent(model: FEModel, forces: Array) -> Array:
+    return forces if model.coupling is None else np.asarray(model.coupling.T @ forces)
+
+
+def _independent_diagonal(model: FEModel) -> Array:
+    if model.coupling is None:
+        return np.asarray(model.stiffness.diagonal())
+    return np.asarray(model.coupling.multiply(model.stiffness @ model.coupling).sum(axis=0)).ravel()
+
+
+def check_reduction(
+    model: FEModel, shapes: Array, stiffness: Array, omega: Array, invariants: InertiaInvariants, where: str
+) -> tuple[HealthCheck, ...]:
+    """Checks of the reduced link against the full model.
+
+    Raises
+    ------
+    FEImportError
+        EIGENSOLVER: rounding or a solver spoiled the modes.
+    """
+    rigid = model.rigid_body_modes()
+    scale = np.abs(rigid).max(axis=0)
+    reproduced = np.abs(shapes @ invariants.rigid - rigid).max(axis=0) / scale
+    full = mass_properties(rigid.T @ (model.mass @ rigid))
+    reduced = mass_properties(invariants.rigid_mass_matrix)
+    size = np.linalg.norm(np.ptp(model.nodes, axis=0))
+    distance = full.centre_of_mass @ full.centre_of_mass  # both inertias were moved here from the mesh origin
+    inertia_scale = np.abs(full.inertia).max() + full.mass * distance
+    elastic = omega[6:] ** 2
+    identity = np.eye(len(omega))
+    checks = [
+        HealthCheck("modes: rigid-body motion of geometry reproduced", float(reproduced.max()), _ROUNDING),
+        HealthCheck("mass against the full model", abs(reduced.mass / full.mass - 1), _ROUNDING),
+        HealthCheck(
+            "centre of mass against the full model, per size",
+            float(np.abs(reduced.centre_of_mass - full.centre_of_mass).max() / size),
+            _ROUNDING,
+        ),
+        HealthCheck(
+            "inertia against the full model",
+            float(np.abs(reduced.inertia - full.inertia).max() / inertia_scale),
+            _ROUNDING,
+        ),
+        HealthCheck("orthonormality of the modes", float(np.abs(invariants.m - identity).max()), _ROUNDING),
+    ]
+    if len(elastic):
+        strain = np.abs(np.diag(stiffness)[:6]).max() / elastic[0]
+        spread = np.abs(np.diag(stiffness)[6:] / elastic - 1).max()
+        checks += [
+            HealthCheck("strain energy of rigid-body modes, per first elastic mode", float(strain), _EIGEN),
+            HealthCheck("Rayleigh quotients against squared frequencies", float(spread), _EIGEN),
+        ]
+    if model.kind == "matrices":  # of a superelement only the kept nodes are known
+        name = "centrifugal terms against those of a rigid body"
+        checks.append(HealthCheck(name, rotation_departure(invariants), NO_LIMIT))
+    _refuse(((check, "ask for fewer modes, or look for very stiff or very light parts") for check in checks), where)
+    return tuple(checks)

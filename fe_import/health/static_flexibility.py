@@ -1,0 +1,39 @@
+"""How much of the answer to static loads at the interfaces the modes kept lack; nothing, where that was promised."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fe_import.modal.model import NO_LIMIT, HealthCheck
+from fe_import.model import Array
+
+_EXACT = 1e-6  # rounding leaves 1e-9 on a slender solid
+_FLEXIBLE = 1e-4  # of the softest displacement or rotation; a component that all its inertia sits on has 0
+
+
+def check_static(
+    reference: Array | None, interface_shapes: Array, omega: Array, promised: bool
+) -> tuple[HealthCheck, ...]:
+    """Static flexibility between the interfaces, inertia-relieved, against a reference.
+
+    Not to be met by ``mode-displacement``: what fails there says why not to use it.
+
+    Parameters
+    ----------
+    reference : (b, b) array or None
+        Nothing is checked without one.
+    interface_shapes : (b, m) array
+        Interface displacements and rotations of the orthonormal modes.
+    omega : (m,) array
+        Circular frequencies, 0 for the first six [rad/s].
+    promised : bool
+        Whether it has to be exact; otherwise it is reported only.
+    """
+    if reference is None:
+        return ()
+    elastic = interface_shapes[:, 6:] / omega[6:]
+    size = np.sqrt(np.diag(reference)).reshape(-1, 2, 3)
+    size = np.maximum(size, _FLEXIBLE * size.max(axis=(0, 2), keepdims=True)).ravel()
+    error = np.abs(elastic @ elastic.T - reference) / np.outer(size, size)
+    limit = _EXACT if promised else NO_LIMIT
+    return (HealthCheck("static flexibility between the interfaces", float(error.max()), limit),)

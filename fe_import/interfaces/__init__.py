@@ -1,0 +1,1 @@
+"""Interface nodes: where joints sit, and how faces follow them."""

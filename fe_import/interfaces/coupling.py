@@ -1,0 +1,128 @@
+"""Interface nodes added to a model's nodes: any set of nodes, of a mesh or of exported matrices, gets a joint's node.
+
+``couple_interfaces(nodes, faces, source, dof_map, rows) -> Coupling`` takes positions (n, 3) and, unless the nodes
+are a solid's with rows 3 * node + component, the (n, 6) dof map and the number of rows of the matrices.
+
+Rules for adding a coupling: one file with a function that makes dofs of a `Dependence` follow, a branch in
+`couple_interfaces`, and its name in `fe_import.link` and `fe_import.modal.check`. Interface dofs stay independent;
+rigid-body motion passes exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_import.errors import Cause, FEImportError
+from fe_import.interfaces.averaged import Items, Patch, divided, follow_average
+from fe_import.interfaces.dependence import Dependence
+from fe_import.interfaces.faces import InterfaceFace, checked_faces
+from fe_import.interfaces.rigid import follow_rigidly
+from fe_import.model import Array, IntArray, InterfaceNode
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A model's nodes and dofs extended by its interface nodes.
+
+    Attributes
+    ----------
+    nodes : (n + i + a, 3) array
+        The model's nodes, then one per interface, then auxiliary nodes of large averaged faces [m].
+    dof_map : (n + i + a, 6) int array
+        Row of each nodal component, -1 where a node lacks it.
+    coupling : (d, f) sparse CSC
+        All nodal components = ``coupling`` @ independent dofs.
+    independent : (f,) int array
+        Rows that are the independent dofs, six of every interface among them.
+    interface_nodes : tuple of InterfaceNode
+    """
+
+    nodes: Array
+    dof_map: IntArray
+    coupling: sp.csc_array
+    independent: IntArray
+    interface_nodes: tuple[InterfaceNode, ...]
+
+    def extended(self, matrix: sp.csc_array) -> sp.csc_array:
+        """A matrix of the model over all d nodal components; interface nodes add nothing."""
+        d = self.coupling.shape[0]
+        coo = sp.coo_array(matrix)
+        return sp.csc_array((coo.data, coo.coords), shape=(d, d))
+
+
+def couple_interfaces(
+    nodes: Array,
+    faces: Sequence[InterfaceFace],
+    source: str = "",
+    dof_map: IntArray | None = None,
+    rows: int | None = None,
+) -> Coupling:
+    """Add an interface node to each face and couple the face to it.
+
+    Parameters
+    ----------
+    nodes : (n, 3) array
+    faces : sequence of InterfaceFace
+    source : str
+        File to name in messages.
+    dof_map : (n, 6) int array or None
+        Row of each nodal component; None for a solid's nodes, row 3 * node + component.
+    rows : int or None
+        Rows of the matrices; those of ``dof_map`` unless there are others (modal coordinates).
+
+    Raises
+    ------
+    FEImportError
+        ``INTERFACE``: nodes that do not exist, too few, collinear or too close ones, a position far from the face,
+        rigid faces that share a node, averaged ones with none left of their own, too many nodes to average, faulty
+        weights, or two interfaces of one name.
+    """
+    faces = checked_faces(nodes, faces, source)
+    n, i = len(nodes), len(faces)
+    if dof_map is None:
+        dof_map = np.full((n, 6), -1, dtype=np.int64)
+        dof_map[:, :3] = np.arange(3 * n).reshape(n, 3)
+    start = int(dof_map.max(initial=-1)) + 1 if rows is None else rows
+    patches = [_patches(face, faces, nodes, source) for face in faces]
+    auxiliary = [[patch.position for level in levels for patch in level] for levels in patches]
+    added = start + np.arange(6 * (i + sum(map(len, auxiliary)))).reshape(-1, 6)
+    interface_rows, patch_rows = added[:i], np.split(added[i:], np.cumsum([len(a) for a in auxiliary])[:-1])
+
+    state = Dependence.free(start + added.size)
+    for k in sorted(range(i), key=lambda k: faces[k].coupling != "rigid"):  # what is rigid follows its own node only
+        face, points = faces[k], nodes[faces[k].nodes]
+        if face.coupling == "rigid":
+            offsets = points - face.position
+            state = follow_rigidly(state, dof_map[face.nodes], offsets, interface_rows[k])
+        else:
+            members = Items.of_nodes(dof_map[face.nodes, :3], points, face.shares)
+            averaged = follow_average(state, members, face.position, interface_rows[k], patches[k], patch_rows[k])
+            if averaged is None:
+                raise FEImportError(
+                    Cause.INTERFACE,
+                    f"the nodes of interface {face.name!r} already move with other interfaces",
+                    where=source,
+                    remedy="let each interface have nodes of its own",
+                )
+            state = averaged
+    return Coupling(
+        nodes=np.vstack([nodes, *(face.position for face in faces), *(a for some in auxiliary for a in some)]),
+        dof_map=np.vstack([dof_map, added]),
+        coupling=state.matrix.tocsc(),
+        independent=state.independent,
+        interface_nodes=tuple(
+            InterfaceNode(f.name, n + k, f.position, f.nodes, f.shares, f.coupling) for k, f in enumerate(faces)
+        ),
+    )
+
+
+def _patches(face: InterfaceFace, faces: Sequence[InterfaceFace], nodes: Array, source: str) -> list[list[Patch]]:
+    """Patches of an averaged face that shares no node with another interface."""
+    if face.coupling == "rigid":
+        return []
+    shared = any(np.intersect1d(face.nodes, other.nodes).size for other in faces if other is not face)
+    return divided(nodes[face.nodes], face.shares, shared, face.name, source)

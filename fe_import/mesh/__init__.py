@@ -1,0 +1,1 @@
+"""Meshes: readers behind one door, sets, checks."""

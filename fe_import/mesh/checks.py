@@ -1,0 +1,184 @@
+"""Faults of a solid mesh that would give wrong matrices or a wrong mechanism without a word."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from fe_import.errors import Cause, FEImportError
+from fe_import.mesh.solid_mesh import SolidMesh, element_faces
+from fe_import.model import Array, IntArray
+
+COINCIDENT = 1e-9  # of the mesh's size
+FARTHEST = 1e12  # coordinate in any unit of length; squares of larger ones overflow
+FLAT = 1e-9  # Jacobian determinant over the product of the edge vectors' lengths
+_CHUNK = 20_000  # elements whose Jacobians are held at a time
+
+
+def check_mesh(mesh: SolidMesh) -> None:
+    """Check coordinates, connectivity and shape of every element.
+
+    Raises
+    ------
+    FEImportError
+        ``MESH``: coordinates not finite, elements that use a node twice, coincident nodes, inverted or flat
+        elements, neighbours that do not fit together, overlapping elements. ``DISCONNECTED``: parts that no
+        element face joins.
+    """
+    _check_coordinates(mesh)
+    _check_repeated_nodes(mesh)
+    _check_coincident_nodes(mesh)
+    _check_shapes(mesh)
+    _check_mid_nodes(mesh)
+    _check_connections(mesh)
+
+
+def _faulty(
+    mesh: SolidMesh, message: str, remedy: str, cause: Cause = Cause.MESH, **details: Any
+) -> FEImportError:
+    return FEImportError(cause, message, where=mesh.source, remedy=remedy, **details)
+
+
+def _place(point: Array) -> str:
+    return "({:.6g}, {:.6g}, {:.6g})".format(*point)
+
+
+def _element(mesh: SolidMesh, index: int) -> str:
+    return f"element {index} (centre {_place(mesh.nodes[mesh.elements[index]].mean(axis=0))})"
+
+
+def _check_coordinates(mesh: SolidMesh) -> None:
+    bad = np.flatnonzero(~(np.abs(mesh.nodes) <= FARTHEST).all(axis=1))
+    if bad.size:
+        raise _faulty(
+            mesh,
+            f"{bad.size} nodes have coordinates that are not finite or absurd, the first is node {bad[0]}",
+            "write the mesh again; node numbers count from 0 in the file's order",
+            value=_place(mesh.nodes[bad[0]]),
+        )
+
+
+def _check_repeated_nodes(mesh: SolidMesh) -> None:
+    bad = np.flatnonzero((np.diff(np.sort(mesh.elements, axis=1), axis=1) == 0).any(axis=1))
+    if bad.size:
+        raise _faulty(
+            mesh,
+            f"{bad.size} elements use a node twice, the first is {_element(mesh, int(bad[0]))}",
+            "replace collapsed elements; mesh with tetrahedra or with hexahedra only",
+        )
+
+
+def _check_coincident_nodes(mesh: SolidMesh) -> None:
+    limit = COINCIDENT * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    pairs = cKDTree(mesh.nodes).query_pairs(limit, output_type="ndarray")
+    if len(pairs):
+        a, b = sorted(pairs[np.lexsort(pairs.T[::-1])[0]].tolist())
+        raise _faulty(
+            mesh,
+            f"{len(pairs)} pairs of nodes coincide, the first {a} and {b} at {_place(mesh.nodes[a])}",
+            "merge coincident nodes in the mesher",
+            limit=f"distance {limit:.3g}",
+        )
+
+
+def scaled_jacobians(mesh: SolidMesh) -> Array:
+    """(m,) smallest Jacobian determinant of each element over the product of its columns' lengths.
+
+    Taken at the element's nodes and at the stiffness's quadrature points; 1 for a brick, 0 for a flat
+    element, negative for an inverted one.
+    """
+    element = mesh.element
+    points = np.hstack([element.reference_nodes.T, element.quadrature(element.stiffness_order)[0]])
+    gradients = element.shape_gradients(points)
+    result = np.empty(len(mesh.elements))
+    for start in range(0, len(result), _CHUNK):
+        chunk = mesh.elements[start : start + _CHUNK]
+        columns = np.einsum("mkc,kdq->mqdc", mesh.nodes[chunk], gradients)
+        scale = np.linalg.norm(columns, axis=3).prod(axis=2)
+        ratio = np.linalg.det(columns) / np.where(scale > 0, scale, 1.0)
+        result[start : start + _CHUNK] = ratio.min(axis=1)
+    return result
+
+
+def _check_shapes(mesh: SolidMesh) -> None:
+    jacobians = scaled_jacobians(mesh)
+    bad = np.flatnonzero(jacobians <= FLAT)
+    if bad.size:
+        first = int(bad[0])
+        kind = "inverted" if jacobians[first] < -FLAT else "flat"
+        everywhere = bad.size == len(jacobians)
+        raise _faulty(
+            mesh,
+            f"{bad.size} of {len(jacobians)} elements are inverted or flat, "
+            f"the first is {_element(mesh, first)}: {kind}",
+            "the node order is mirrored or not VTK's" if everywhere else "refine or repair the mesh there",
+            value=float(f"{jacobians[first]:.3g}"),
+            limit=f"scaled Jacobian above {FLAT:g}",
+        )
+
+
+def _check_mid_nodes(mesh: SolidMesh) -> None:
+    """Neighbours must share the mid-side nodes of a shared edge or face, and nobody else may use them."""
+    element = mesh.element
+    corners = np.unique(mesh.elements[:, : element.corners])
+    for count in sorted({len(between) for between in element.midpoints}):
+        here = [i for i, between in enumerate(element.midpoints) if len(between) == count]
+        keys = np.concatenate([np.sort(mesh.elements[:, element.midpoints[i]], axis=1) for i in here])
+        values = np.concatenate([mesh.elements[:, element.corners + i] for i in here])
+        label = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+        pairs = np.unique(np.column_stack([label, values]), axis=0)
+        bad = np.isin(label, _repeated(pairs[:, 0])) | np.isin(values, _repeated(pairs[:, 1]))
+        bad |= np.isin(values, corners)
+        if bad.any():
+            first = int(np.flatnonzero(bad)[0])
+            raise _faulty(
+                mesh,
+                f"{_element(mesh, first % len(mesh.elements))} does not fit its neighbours at mid-side node "
+                f"{values[first]} at {_place(mesh.nodes[values[first]])}",
+                "neighbours must share the corners and the mid-side nodes of a common face",
+            )
+
+
+def _repeated(values: IntArray) -> IntArray:
+    found, counts = np.unique(values, return_counts=True)
+    return found[counts > 1]
+
+
+def _check_connections(mesh: SolidMesh) -> None:
+    _, label = element_faces(mesh)
+    owner = np.repeat(np.arange(len(mesh.elements)), len(mesh.element.faces))
+    crowded = np.flatnonzero(np.bincount(label)[label] > 2)
+    if crowded.size:
+        raise _faulty(
+            mesh,
+            f"more than two elements share a face of {_element(mesh, int(owner[crowded[0]]))}",
+            "remove doubled or overlapping elements",
+        )
+    incidence = sp.csr_array((np.ones(len(label)), (owner, label)))
+    shared = (incidence @ incidence.T).tocoo()
+    twins = (shared.row != shared.col) & (shared.data == len(mesh.element.faces))
+    if twins.any():
+        raise _faulty(
+            mesh,
+            f"two elements have the same corners, one is {_element(mesh, int(shared.row[twins.argmax()]))}",
+            "remove doubled elements",
+        )
+    parts, part = connected_components(shared, directed=False)
+    if parts > 1:
+        sizes = np.bincount(part)
+        smallest = _element(mesh, int((part == sizes.argmin()).argmax()))
+        touching = np.intersect1d(mesh.elements[part == 0], mesh.elements[part != 0]).size > 0
+        raise _faulty(
+            mesh,
+            f"the mesh has {parts} parts that no element face joins"
+            + (" (they touch at nodes or edges only)" if touching else "")
+            + f", the smallest of {sizes.min()} elements, with {smallest}",
+            "fuse the parts before meshing, or mesh each link alone",
+            cause=Cause.DISCONNECTED,
+            value=parts,
+            limit=1,
+        )

@@ -1,0 +1,188 @@
+"""Mesh files: everything that meshio reads -> a checked mesh of one solid element type with its named sets.
+
+meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX are read by `fe_import.mesh.abaqus`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.errors import Cause, FEImportError
+from fe_import.mesh.checks import check_mesh, scaled_jacobians
+from fe_import.mesh.guard import unpacked
+from fe_import.mesh.raw import RawMesh
+from fe_import.mesh.solid_mesh import SolidMesh, surface_triangles
+from fe_import.model import IntArray
+
+__all__ = ["SolidMesh", "read_mesh", "surface_triangles"]
+
+_BY_MESHIO_NAME = {element.meshio_name: name for name, element in SOLID_ELEMENTS.items()}
+
+
+def read_mesh(path: Path) -> SolidMesh:
+    """Read and check a mesh file, or a ``.gz`` of one; its format follows from the suffix.
+
+    Named cell sets (gmsh's physical groups, Abaqus' element sets, families of MED) of solid elements become element
+    sets; named cell sets of faces, lines or points, surfaces and named point sets become node sets. Numbers per cell
+    (Nastran's properties, integer arrays of VTU) become sets ``ARRAY:NUMBER``. Nodes outside of all solid elements
+    are dropped. A set that cannot be followed is left out; `SolidMesh.lost_sets` says why.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    SolidMesh
+        In the file's unit of length.
+
+    Raises
+    ------
+    FEImportError
+        ``FILE_NOT_FOUND``, ``NOT_READABLE``; ``UNSUPPORTED_ELEMENT``: solid elements of another type than
+        tet4/10 and hex8/20/27; ``MESH``: declared sizes that the file cannot hold, no or mixed solid elements, and
+        what ``check_mesh`` finds; ``DISCONNECTED``.
+    """
+    if not path.exists():
+        raise FEImportError(Cause.FILE_NOT_FOUND, "no such mesh file", where=str(path), remedy="check the path")
+    raw = _read(path)
+    element_type, blocks = _solid_blocks(raw, str(path))
+    elements = np.concatenate([raw.blocks[b].cells for b in blocks]).astype(np.int64)
+    points = np.asarray(raw.points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3 or elements.min() < 0 or elements.max() >= len(points):
+        raise FEImportError(
+            Cause.MESH,
+            "elements refer to nodes that are not in the file",
+            where=str(path),
+            remedy="write the mesh again",
+        )
+    used = np.unique(elements)
+    dense = np.full(len(points), -1, dtype=np.int64)
+    dense[used] = np.arange(len(used))
+    element_sets, node_sets, lost = _sets(raw, blocks, dense)
+    mesh = SolidMesh(points[used], dense[elements], element_type, element_sets, node_sets, str(path), lost)
+    if raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
+        mesh = replace(mesh, elements=mesh.elements[:, mesh.element.mirrored_order])
+    check_mesh(mesh)
+    return mesh
+
+
+def _read(path: Path) -> RawMesh:
+    if not path.is_file():
+        raise FEImportError(
+            Cause.NOT_READABLE, "cannot be read as a mesh: not a file", where=str(path), remedy="check the path"
+        )
+    with unpacked(path) as plain:
+        if plain.suffix.lower() == ".inp":
+            from fe_import.mesh.abaqus import read_abaqus
+
+            return read_abaqus(plain, str(path))
+        from fe_import.mesh.meshio_files import read_with_meshio  # meshio is heavy
+
+        return read_with_meshio(plain, str(path))
+
+
+def _solid_blocks(raw: RawMesh, where: str) -> tuple[str, list[int]]:
+    blocks = [b for b, block in enumerate(raw.blocks) if block.dimension == 3 and len(block.cells)]
+    counts: Counter[str] = Counter()
+    for b in blocks:
+        counts[raw.blocks[b].type] += len(raw.blocks[b].cells)
+    unsupported = [name for name in counts if name not in _BY_MESHIO_NAME]
+    if unsupported:
+        raise FEImportError(
+            Cause.UNSUPPORTED_ELEMENT,
+            "solid elements that cannot be assembled: " + _listing((name, counts[name]) for name in unsupported),
+            where=where,
+            limit=", ".join(_BY_MESHIO_NAME),
+            remedy="mesh with one of the supported types",
+        )
+    if not counts:
+        found = _listing((block.type, len(block.cells)) for block in raw.blocks) or "no elements at all"
+        raise FEImportError(
+            Cause.MESH,
+            f"no solid elements, found {found}",
+            where=where,
+            remedy="export the volume mesh, not its surface",
+        )
+    if len(counts) > 1:
+        raise FEImportError(
+            Cause.MESH,
+            "mixed solid element types: " + _listing(counts.items()),
+            where=where,
+            remedy="mesh the link with one type",
+        )
+    return _BY_MESHIO_NAME[next(iter(counts))], blocks
+
+
+def _listing(counts: Iterable[tuple[str, int]]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in counts)
+
+
+def _sets(
+    raw: RawMesh, blocks: list[int], dense: IntArray
+) -> tuple[dict[str, IntArray], dict[str, IntArray], dict[str, str]]:
+    """Element sets and node sets in the numbering of the checked mesh, and why others are not among them."""
+    counts = [len(block.cells) for block in raw.blocks]
+    offset = {b: sum(counts[other] for other in blocks if other < b) for b in blocks}
+    element_sets: dict[str, IntArray] = {}
+    node_sets: dict[str, IntArray] = {}
+    lost = dict(raw.lost)
+    for name, per_block in raw.cell_sets.items():
+        elements, nodes = [], []
+        try:
+            for b, cells in enumerate(per_block):
+                index = _indices([] if cells is None else cells, counts[b] if b < len(counts) else 0)
+                if b in offset:
+                    elements.append(offset[b] + index)
+                elif len(index):
+                    nodes.append(raw.blocks[b].cells[index].ravel())
+            if any(map(len, elements)):
+                element_sets[name] = np.unique(np.concatenate(elements))
+            if nodes:
+                node_sets[name] = _dense_nodes(np.concatenate(nodes), dense)
+            if name not in element_sets and name not in node_sets:
+                lost[name] = "it holds nothing"
+        except _Lost as reason:
+            lost[name] = str(reason)
+    for name, points in raw.point_sets.items():
+        try:
+            found = _dense_nodes(points, dense)
+        except _Lost as reason:
+            lost[name] = str(reason)
+            continue
+        if not np.array_equal(node_sets.setdefault(name, found), found):
+            lost[name] = "two different node sets have this name"
+            del node_sets[name]
+    return element_sets, node_sets, lost
+
+
+class _Lost(Exception):
+    """Why a set cannot be followed."""
+
+
+def _indices(values: Any, count: int) -> IntArray:
+    try:
+        index = np.asarray(values)
+    except ValueError:
+        index = np.zeros(1)
+    if index.size == 0:
+        return np.zeros(0, dtype=np.int64)
+    if index.ndim != 1 or index.dtype.kind not in "iu" or index.min() < 0 or index.max() >= count:
+        raise _Lost("it refers to what is not in the file")
+    return index.astype(np.int64)
+
+
+def _dense_nodes(points: Any, dense: IntArray) -> IntArray:
+    index = dense[np.unique(_indices(points, len(dense)))]
+    if (index < 0).any():
+        raise _Lost(
+            f"it holds {(index < 0).sum()} nodes that belong to no solid element; interface nodes are made here"
+        )
+    return index

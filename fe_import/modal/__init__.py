@@ -1,0 +1,1 @@
+"""The modal model of a link, its file and its identities."""

@@ -1,0 +1,1 @@
+"""Stresses and section forces from modal coordinates."""
