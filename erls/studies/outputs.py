@@ -80,7 +80,8 @@ def run_outputs(run: Run, times: Sequence[float] | Array) -> Outputs:
     states, accelerated, reactions, energies = [], [], [], []
     for at, q, rate in zip(t.tolist(), y, v, strict=True):
         a = formulation.acceleration(at, q, rate)
-        parabola = [formulation.state(at, q + h * rate + h**2 / 2 * a, rate + h * a) for h in (-_NUDGE, 0.0, _NUDGE)]
+        nudges = (-_NUDGE, 0.0, _NUDGE)  # of the time, too: prescribed joints follow it
+        parabola = [formulation.state(at + h, q + h * rate + h**2 / 2 * a, rate + h * a) for h in nudges]
         places = np.array([_points(run, state) for state in parabola])
         states.append(parabola[1])
         accelerated.append((places[0] - 2 * places[1] + places[2]) / _NUDGE**2)

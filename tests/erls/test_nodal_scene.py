@@ -18,6 +18,7 @@ from erls.run import Run
 from erls.run_file import load_run, write_run
 from erls.scene import load_scene
 from erls.simulation import simulate
+from erls.studies.outputs import run_outputs
 from fe_import.errors import ReportedError
 
 ROBOT = scenes.ROOT / "data" / "robot" / "two_link.toml"
@@ -109,11 +110,13 @@ def test_energy_and_its_parts(tmp_path: Path) -> None:
 
 
 def test_torques_of_the_robot(tmp_path: Path) -> None:
-    """Motors' torques of the first 0.1 s from static equilibrium, which ERLS gives within a second-order share."""
+    """Motors' torques of the first 0.1 s from static equilibrium, which ERLS gives within a second-order share, and
+    accelerations; between knots as at knots.
+    """
     changes = ("simulation.duration=0.1", "simulation.step=1e-3", 'initial.deformation="static"')
     nodal = _run(ROBOT, "nodal", "simulation.elements_per_member=4", *changes)
     modal = _run(ROBOT, "erls", *changes)
-    times = np.linspace(0.0, 0.1, 21)
+    times = np.linspace(0.0, 0.1, 38)
     for joint in nodal.joint_names:
         one, other = nodal.joint_effort(joint, times), modal.joint_effort(joint, times)
         assert np.abs(one - other).max() < 0.02 * max(np.abs(other).max(), 0.1), joint
@@ -124,6 +127,8 @@ def test_torques_of_the_robot(tmp_path: Path) -> None:
     for point in nodal.point_names:
         assert _farthest(nodal, modal, point, times) < 1e-4
     np.testing.assert_allclose(nodal.joint_angle("shoulder", times), modal.joint_angle("shoulder", times), atol=1e-9)
+    found, wanted = (run_outputs(run, times).accelerations["end2"] for run in (nodal, modal))
+    assert np.abs(found - wanted).max() < 0.05 * np.abs(wanted).max()
 
 
 def _rigid_chain(folder: Path) -> Path:
@@ -176,21 +181,21 @@ def test_rigid_links_and_everything_in_joints(tmp_path: Path) -> None:
 
 
 def test_rigid_torques_of_a_prescribed_motion(tmp_path: Path) -> None:
-    """Efforts come out as by the recursive Newton-Euler method, with an error of second order in the step: that of the
-    velocities, which keep to the joints within the accuracy of the method only.
+    """Efforts come out as by the recursive Newton-Euler method, with an error of second order in the step, once the
+    start, where multipliers are of first order, has decayed (as 0.8 to the number of steps).
     """
     data = scenes.read_toml(_rigid_chain(tmp_path))
     drive = {"type": "motion", "motion": {"shape": "sine", "amplitude": 0.3, "frequency_hz": 2.0}}
     joints = [{k: j[k] for k in ("name", "type", "dh", "motor") if k in j} | {"drive": drive} for j in data["joints"]]
     path = scenes.write_toml(tmp_path / "driven.toml", {**data, "joints": joints})
     errors = []
-    for step in (1e-3, 5e-4):
-        run = _run(path, "nodal", "simulation.duration=0.05", f"simulation.step={step}")
+    for step in (4e-3, 2e-3):
+        run = _run(path, "nodal", "simulation.duration=0.4", f"simulation.step={step}")
         mechanism: Mechanism = run.formulation.mechanism
-        wanted = np.array([j.drive.reference(0.03) for j in mechanism.joints])
-        efforts = [run.joint_effort(name, 0.03) for name in run.joint_names]
+        wanted = np.array([j.drive.reference(0.4) for j in mechanism.joints])
+        efforts = [run.joint_effort(name, 0.4) for name in run.joint_names]
         errors.append(np.abs(np.divide(efforts, inverse_dynamics(mechanism, *wanted.T)) - 1).max())
-    assert errors[0] < 1e-4
+    assert errors[0] < 1e-3
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
 
 

@@ -1,7 +1,8 @@
 """The nodal formulation: geometrically exact beams and rigid bodies on SE(3), tied by joints with multipliers.
 
 V. Sonneville, A. Cardona, O. Brüls, Comput. Methods Appl. Mech. Eng. 268 (2014) 451–474. It holds for any deflection
-and knows nothing of modes. y holds position and rotation matrix of every node, then the joint coordinates.
+and knows nothing of modes. y holds position and rotation matrix of every node and the joint coordinates, then what the
+integrator found with them: the rates of the nodes' twists and the multipliers.
 """
 
 from __future__ import annotations
@@ -60,12 +61,21 @@ class Nodal:
                 mechanism.links, parts, self.chain.nodes, self.chain.elements, strict=True
             )
         ]
-        self._known: tuple[float, Array, Array, tuple[Array, Array]] | None = None
+        self._frames = 12 * self.system.count  # entries of y that hold them
+        self._kept = self._frames + len(mechanism.joints)
 
     @property
     def size(self) -> int:
-        """Twelve numbers for each node, one for each joint."""
-        return 12 * self.system.count + len(self.mechanism.joints)
+        """18 numbers for each node, one for each joint and each of its conditions."""
+        return self._kept + self.system.size + self.system.constraints
+
+    def configuration(self, y: Array, v: Array) -> tuple[Nodes, Array]:
+        """Configuration and twists of the nodes (n,)."""
+        return self.system.from_stored(y[: self._kept], v[: self._kept])
+
+    def _found(self, y: Array) -> tuple[Array, Array]:
+        """Rates of twists and multipliers."""
+        return y[self._kept : self._kept + self.system.size], y[self._kept + self.system.size :]
 
     def initial_state(self) -> tuple[Array, Array]:
         """Frames and joint coordinates at time 0; links turn with the joints as they are.
@@ -82,8 +92,9 @@ class Nodal:
             carrier = np.eye(4) if seat.inner == GROUND else q.poses[seat.inner]
             moving = moving + motions.adjoint(carrier @ seat.inner_frame) @ joint.type.screw * joint.rate
             v[nodes] = motions.adjoint_inverse(q.poses[nodes]) @ moving
-        y, rates, _ = self.system.stored(0.0, q, v.ravel(), np.zeros(self.system.size))
-        return y, rates
+        a, multipliers = consistent_acceleration(self.system, 0.0, q, v.ravel())
+        y, rates, _ = self.system.stored(0.0, q, v.ravel(), a)
+        return np.concatenate([y, a, multipliers]), np.concatenate([rates, 0 * a, 0 * multipliers])
 
     def _equilibrium(self) -> Nodes:
         """At rest under gravity with the joints held."""
@@ -99,21 +110,21 @@ class Nodal:
 
     def state(self, t: float, y: Array, v: Array) -> State:
         """Positions of all nodes; link frames at the inboard nodes, modal coordinates as near as modes come."""
-        q, velocity = self.system.from_stored(y, v)
+        q, velocity = self.configuration(y, v)
         bent = q.memory[0] if self.chain.beams is not None else None
         found = [view.at(q.poses, self.chain.beams, bent) for view in self.views]
         _, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
-        angles = y[12 * self.system.count :]
+        angles = y[self._frames : self._kept]
         return State(
             t, [x.frame for x in found], [x.modal for x in found], angles, angles, rates, [x.nodes for x in found]
         )
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""
-        q, velocity = self.system.from_stored(y, v)
+        q, velocity = self.configuration(y, v)
         kinetic, potential = self.system.energy(t, q, velocity)
         elastic = 0.0 if self.chain.beams is None else self.chain.beams.elastic_energy(q.memory[0])
-        angles = y[12 * self.system.count :]
+        angles = y[self._frames : self._kept]
         springs = 0.5 * sum(
             j.forces.stiffness * (angle - j.forces.rest) ** 2
             for j, angle in zip(self.mechanism.joints, angles.tolist(), strict=True)
@@ -121,22 +132,16 @@ class Nodal:
         return Energy(kinetic, elastic, potential - elastic - springs, springs)
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
-        """(n,) ÿ."""
-        q, velocity = self.system.from_stored(y, v)
-        return self.system.stored(t, q, velocity, self._solved(t, y, v)[0])[2]
-
-    def _solved(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
-        """Accelerations and multipliers; those of the last state asked for are at hand."""
-        known = self._known
-        if known is None or known[0] != t or not (np.array_equal(known[1], y) and np.array_equal(known[2], v)):
-            known = t, y.copy(), v.copy(), consistent_acceleration(self.system, t, *self.system.from_stored(y, v))
-            self._known = known
-        return known[3]
+        """(n,) ÿ of frames and joint coordinates; 0 for the rest."""
+        q, velocity = self.configuration(y, v)
+        result = np.zeros(self.size)
+        result[: self._kept] = self.system.stored(t, q, velocity, self._found(y)[0])[2]
+        return result
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions from the multipliers and what acts along the joints."""
-        q, velocity = self.system.from_stored(y, v)
-        a, multipliers = self._solved(t, y, v)
+        q, velocity = self.configuration(y, v)
+        a, multipliers = self._found(y)
         along = self._along(t, q, velocity, a)
         rows = self.system.constraint_matrix(t, q)
         result = []
