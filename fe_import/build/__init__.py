@@ -1,0 +1,1 @@
+"""From a link description to its finite-element model."""
