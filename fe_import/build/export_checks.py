@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.errors import Cause, FEImportError
 from fe_import.build.export_rigid import listed
+from fe_import.errors import Cause, FEImportError
 from fe_import.exports import Export
 from fe_import.health.report import asymmetry
 

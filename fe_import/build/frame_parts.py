@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from fe_import.build.model import inertia_matrix, unit_factors
 from fe_import.build.frame import FrameMesh, frame_mesh, node_number
+from fe_import.build.model import inertia_matrix, unit_factors
 from fe_import.elements.frame import FrameElement
+from fe_import.elements.sections import SectionConstants
 from fe_import.link import Frame, LinkDescription
 from fe_import.model import Array
-from fe_import.elements.sections import SectionConstants
 
 
 @dataclass(frozen=True)

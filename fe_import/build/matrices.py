@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.interfaces.coupling import couple_interfaces
-from fe_import.errors import Cause, FEImportError
 from fe_import.build.export_checks import check_export
 from fe_import.build.export_rigid import free_of_ground
-from fe_import.exports import EXPORTS, Export, ExportFormat
-from fe_import.link import LinkFile, Matrices
 from fe_import.build.matrix_interfaces import matrices_interfaces, named_nodes
+from fe_import.errors import Cause, FEImportError
+from fe_import.exports import EXPORTS, Export, ExportFormat
+from fe_import.interfaces.coupling import couple_interfaces
+from fe_import.link import LinkFile, Matrices
 from fe_import.model import FEModel, IntArray
 from fe_import.toml_file import choose, convert
 

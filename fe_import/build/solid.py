@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fe_import.interfaces.coupling import couple_interfaces
+from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
+from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.link import LinkDescription, LinkFile, Solid
 from fe_import.mesh.read import read_mesh
-from fe_import.model import FEModel
-from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.mesh.solid_mesh import SolidMesh, surface_triangles
-from fe_import.elements.solid_stress import solid_stress
+from fe_import.model import FEModel
 from fe_import.toml_file import choose
 
 
