@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from erls.effects import ALL
 from erls.lie.se3 import joint_pose, twist_cross, twist_transform
 from erls.lie.so3 import Array
 from erls.mechanism.joints import Joint
@@ -42,6 +43,8 @@ class Mechanism:
         Whether the motion starts from static equilibrium with the joints held, instead of undeformed.
     loops : tuple of Loop
         Joints that close the chain.
+    effects : frozenset of str
+        Names from `erls.effects` that the equations of motion take into account.
     """
 
     name: str
@@ -51,6 +54,7 @@ class Mechanism:
     gravity: Array
     static_start: bool = False
     loops: tuple[Loop, ...] = ()
+    effects: frozenset[str] = ALL
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,10 @@ from fe_import.errors import Cause, FEImportError, shortened
 from fe_import.exports.base import Export, ExportFormat
 from fe_import.exports.dofs import COMPONENTS, dof_map_of_rows
 from fe_import.exports.entries import matrix_of_entries
+from fe_import.exports.frd_mesh import is_frd, read_frd
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import InpMesh, read_inp
+from fe_import.exports.row_files import read_sets
 from fe_import.model import IntArray
 from fe_import.text_file import TextFile
 
@@ -34,14 +37,14 @@ class CalculixOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def read_calculix(files: Mapping[str, Path], options: Any, where: str) -> Export:
-    """Read stiffness, mass, dofs and the deck with nodes, elements and sets.
+    """Read stiffness, mass, dofs and the deck with nodes, elements and sets (or the results, and sets beside them).
 
     Raises
     ------
     FEImportError
         ``EXPORT``, ``NOT_READABLE``: faulty files, or files of different runs; ``GROUNDED``: nodes without rows.
     """
-    mesh = read_inp(files["mesh"])
+    mesh = _read_mesh(files, where)
     nodes, components = _read_dofs(files["dofs"])
     dof_map = dof_map_of_rows(nodes, components, mesh.labels, str(files["dofs"]))
     _refuse_held(mesh, dof_map, files)
@@ -73,6 +76,23 @@ def read_calculix(files: Mapping[str, Path], options: Any, where: str) -> Export
         triangles=triangles,
         notes=notes,
     )
+
+
+def _read_mesh(files: Mapping[str, Path], where: str) -> InpMesh:
+    """The deck, or nodes and elements of results with sets from a file."""
+    if not is_frd(files["mesh"]):
+        if "sets" in files:
+            raise FEImportError(
+                Cause.BAD_FIELD,
+                "a deck holds its own sets",
+                where=f"{where}: matrices.files.sets",
+                value=files["sets"].name,
+                remedy="remove it, or give an .frd file as 'mesh'",
+            )
+        return read_inp(files["mesh"])
+    mesh = read_frd(files["mesh"])
+    sets = read_sets(files["sets"], mesh.labels) if "sets" in files else {}
+    return replace(mesh, node_sets=sets)
 
 
 def _read_dofs(path: Path) -> tuple[IntArray, IntArray]:
@@ -137,5 +157,5 @@ def _refuse_held(mesh: InpMesh, dof_map: IntArray, files: Mapping[str, Path]) ->
 
 
 CALCULIX = ExportFormat(
-    required=("stiffness", "mass", "dofs", "mesh"), optional=(), options=CalculixOptions, read=read_calculix
+    required=("stiffness", "mass", "dofs", "mesh"), optional=("sets",), options=CalculixOptions, read=read_calculix
 )

@@ -149,7 +149,7 @@ def read_place(files: Mapping[str, Path], where: str) -> Place:
     else:
         place = _read_nodes(files["nodes"])
     if "sets" in files:
-        place.node_sets.update(_read_sets(files["sets"], place.labels))
+        place.node_sets.update(read_sets(files["sets"], place.labels))
     return place
 
 
@@ -207,7 +207,14 @@ def node_frames(angles: Array) -> Array:
     return np.asarray(about_z @ about_x @ about_y)
 
 
-def _read_sets(path: Path, labels: IntArray) -> dict[str, IntArray]:
+def read_sets(path: Path, labels: IntArray) -> dict[str, IntArray]:
+    """Node sets, a line ``NAME node node ...`` each; indices into ``labels``.
+
+    Raises
+    ------
+    FEImportError
+        ``EXPORT``, ``NOT_READABLE``: not such a file, or a set of what is no node.
+    """
     place = {int(label): k for k, label in enumerate(labels)}
     sets: dict[str, set[int]] = {}
     with TextFile(path) as file:

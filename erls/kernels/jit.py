@@ -1,0 +1,58 @@
+"""Compilation by Numba, kept on disk; with ``ERLS_JIT=0`` the same functions run as plain Python."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import platformdirs
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
+
+
+@cache
+def folder(subpackage: str) -> Path:
+    """Folder for the compiled code of this very source: Numba does not notice changes in what a function calls."""
+    import numba
+
+    here = Path(__file__).parent
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
+    for path in [*sorted(here.glob("*.py")), *sorted((here / subpackage).rglob("*.py"))]:
+        digest.update(path.read_bytes())
+    given = os.environ.get("ERLS_CACHE")
+    base = Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
+    return base / f"kernels-{subpackage}-{digest.hexdigest()[:16]}"
+
+
+def compiled_before(subpackage: str) -> bool:
+    """Whether code for this source lies on disk; otherwise the first use compiles for some seconds."""
+    return not ENABLED or folder(subpackage).is_dir()
+
+
+def helper(function: F) -> F:
+    """A function that kernels call; compiled within them."""
+    return _njit(function) if ENABLED else function
+
+
+def kernel(signature: Any) -> Callable[[F], F]:
+    """A function with a fixed signature (of `erls.kernels.contract`), compiled when its module is imported."""
+    return lambda function: _njit(function, signature) if ENABLED else function
+
+
+def _njit(function: Any, *signature: Any) -> Any:
+    import numba
+
+    before = numba.config.CACHE_DIR
+    subpackage = function.__module__.removeprefix(f"{__package__}.").partition(".")[0]
+    numba.config.CACHE_DIR = str(folder(subpackage))
+    try:
+        return numba.njit(*signature, cache=True, error_model="numpy", nogil=True)(function)
+    finally:
+        numba.config.CACHE_DIR = before
