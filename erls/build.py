@@ -13,12 +13,14 @@ import numpy as np
 import platformdirs
 
 from erls.build_loops import build_loops
+from erls.effects import ALL, inconsistencies, named_effects
 from erls.errors import Cause, SceneError
 from erls.lie.se3 import inverse, pose
 from erls.lie.so3 import Array, fixed_axes
 from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.dh import DHRow, split
 from erls.mechanism.drives import build_drive
+from erls.mechanism.effects import without
 from erls.mechanism.joints import JOINT_TYPES, Joint, JointForces
 from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model, truncated
 from erls.mechanism.place import Place
@@ -99,7 +101,9 @@ def build_mechanism(
         gravity=np.array(record.gravity),
         static_start=record.initial.deformation == "static",
     )
-    return Built(replace(chain, loops=build_loops(scene, chain)), tuple(warnings))
+    effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
+    chain = without(replace(chain, loops=build_loops(scene, chain)), ALL - effects)
+    return Built(chain, (*warnings, *inconsistencies(effects, record.simulation.formulation)))
 
 
 def _joints(scene: Scene) -> list[Joint]:
@@ -335,7 +339,9 @@ def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list
     result = list(links)
     names = {p.name: p for p in points}
 
-    def add(number: int, node: int, offset: Array, mass: float, inertia: Array, place: str) -> None:
+    def add(
+        number: int, node: int, offset: Array, mass: float, inertia: Array, place: str, motor: bool = False
+    ) -> None:
         link = result[number]
         turning = node in link.model.rotation_nodes
         if not turning and (inertia.any() or offset.any()):
@@ -347,7 +353,7 @@ def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list
                 remedy="put the payload on an interface, or give mass only",
             )
         extra = payload_invariants(link.model, node, offset, mass, inertia)
-        payloads = (*link.payloads, Payload(node, offset, mass, inertia))
+        payloads = (*link.payloads, Payload(node, offset, mass, inertia, motor))
         result[number] = replace(link, invariants=link.invariants + extra, payloads=payloads)
 
     for k, payload in enumerate(scene.record.payloads):
@@ -362,5 +368,5 @@ def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list
         inertia = inertia_matrix(joint.motor.inertia, f"{place}.inertia", SceneError)
         outboard = links[k - 1].outboard if k else None
         if outboard is not None and (mass or inertia.any()):  # the first motor stands on the ground
-            add(k - 1, outboard.node, np.zeros(3), mass, inertia, place)
+            add(k - 1, outboard.node, np.zeros(3), mass, inertia, place, motor=True)
     return result

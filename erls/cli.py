@@ -128,10 +128,16 @@ def simulate(
     json
         Print one JSON object.
     """
-    from erls.errors import Cause, SimulationError
+    from erls.errors import Cause, SceneError, SimulationError
+    from erls.scene import is_body_scene, load_scene
+    from fe_import.toml_file import read_toml
+
+    if is_body_scene(read_toml(scene, SceneError)):
+        from erls.cli_bodies import simulate_bodies
+
+        return simulate_bodies(scene, output, formulation, set_ or (), at, json)
     from erls.report.tables import run_report
     from erls.run_file import write_run
-    from erls.scene import load_scene
     from erls.simulation import simulate as run_simulation
 
     changes = list(set_ or [])
@@ -220,9 +226,11 @@ def view(
     json
         Print one JSON object.
     """
+    from erls.body_scenes.result_file import refuse_result
     from erls.run_file import load_run
     from erls.view import show, write_view
 
+    refuse_result(run, "pictures are of chains of joints and links")
     loaded = load_run(run)
     if output is None:
         show(loaded)

@@ -140,6 +140,103 @@ def modes(
     return _exit_code(result.complete, failed) or (0 if result.converged is not None else 4)
 
 
+@study.command
+def cost(
+    scene: Path,
+    /,
+    *,
+    output: Output = None,
+    tolerance: float = 1e-4,
+    formulations: str = "",
+    modes: str = "",
+    integrators: str = "",
+    effects: str = "",
+    points: str = "",
+    norm: str = "max",
+    reference: str = "",
+    budget: float = 240.0,
+    apply: Path | None = None,
+    set_: Set = None,
+    workers: Workers = None,
+    json: Json = False,
+) -> int:
+    """What accuracy costs in time: error against time over many settings, and the cheapest that is good enough.
+
+    Ends with exit code 4 when no setting meets the tolerance.
+
+    Parameters
+    ----------
+    scene
+        Scene (TOML).
+    output
+        Report to write: .html a self-contained page with a plot, .csv one row per run, .json the JSON object.
+    tolerance
+        Distance of named points that does not matter [m].
+    formulations
+        Separated by commas; erls,ffr unless given.
+    modes
+        Numbers of elastic modes of every link; all, half and a quarter of them unless given.
+    integrators
+        Ours and dop853 unless given.
+    effects
+        Values of simulation.effects, separated by commas; all,auto unless given.
+    points
+        Named points that the error is taken over; all unless given.
+    norm
+        max or rms over time; the worst point counts.
+    reference
+        nodal, or tight: all modes and effects at a tight tolerance. Nodal where links are beams unless given.
+    budget
+        Time after which no further run starts [s]; a single run may take a tenth of it.
+    apply
+        Write a copy of the scene with the recommended setting, beside the scene.
+    set_
+        Change a field of the scene, KEY=VALUE; may be repeated.
+    workers
+        Runs at a time; as many as cores unless given.
+    json
+        Print one JSON object.
+    """
+    from erls.report.cost_page import cost_csv, cost_page, cost_text
+    from erls.studies.apply import check_copy, write_copy
+    from erls.studies.cost import Grid, cost_summary, study_cost
+
+    _check_output(output, scene, (".html", ".csv", ".json"))
+    if apply is not None:
+        check_copy(apply, scene)
+    grid = Grid(_names(formulations), _names(integrators), _names(effects), tuple(_counts(modes, "--modes") or ()))
+    with Progress("cost study") as advance:
+        result = study_cost(
+            scene,
+            tolerance,
+            grid=grid,
+            points=_names(points),
+            norm=norm,  # type: ignore[arg-type]
+            reference=reference,
+            overrides=set_ or (),
+            budget=budget,
+            progress=advance,
+            workers=workers,
+        )
+    summary = cost_summary(result)
+    if output is not None:
+        makers = {".html": cost_page, ".csv": cost_csv}
+        _write(output, makers[output.suffix](result) if output.suffix in makers else _dumped(summary))
+    if apply is not None and result.chosen is not None:
+        write_copy(apply, scene, (*(set_ or ()), *result.chosen_overrides), summary["recommendation"])
+    if json:
+        print_json({**summary, "output": None if output is None else str(output)})
+    else:
+        print(cost_text(result))
+        _tell_written(output)
+        _tell_written(apply if result.chosen is not None else None)
+    return _exit_code(result.complete, []) or (0 if result.chosen is not None else 4)
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
 def _exit_code(complete: bool, failed: list[int]) -> int:
     """130 after an interrupt, else the worst of the runs that failed."""
     return 130 if not complete else max(failed, default=0)
@@ -154,11 +251,11 @@ def _check_output(output: Path | None, scene: Path, suffixes: tuple[str, ...]) -
     refuse_unwritable(output, scene)
 
 
-def _counts(text: str) -> list[int] | None:
+def _counts(text: str, option: str = "--counts") -> list[int] | None:
     try:
         return [int(part) for part in text.split(",") if part.strip()] or None
     except ValueError:
-        raise _bad("not whole numbers", "--counts", text, "separate them by commas, e.g. 1,2,6,12") from None
+        raise _bad("not whole numbers", option, text, "separate them by commas, e.g. 1,2,6,12") from None
 
 
 def _bad(message: str, where: str, value: object, remedy: str) -> SceneError:

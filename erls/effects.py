@@ -3,12 +3,17 @@
 With q the modal coordinates of a link, ν = [v; ω] the twist of its frame, s = q̇ + ρ ν and the inertia invariants m, X,
 Z (`fe_import.inertia`), the inertia forces fall into what always acts (m with itself) and five parts that may be left
 out; their formulas are those of `erls.formulations.link_inertia`. Adding an effect means one line here and one block
-where it acts: in `erls.formulations` for what enters the equations, in `erls.build` for what is data of the mechanism.
+where it acts: in `erls.formulations` for what enters the equations, in `erls.mechanism.effects` for what is data of the
+mechanism.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
+
+from erls.errors import Cause, SceneError
+from fe_import.toml_file import choose
 
 
 @dataclass(frozen=True)
@@ -22,31 +27,119 @@ class Effect:
         What it is, in one line.
     in_equations : bool
         Whether formulations ask for it; otherwise leaving it out changes the data of the mechanism.
+    of_links : bool
+        Whether it acts on the deformation of links, so that it is nothing while they are rigid.
+    energy : str
+        Term of the energy that its forces come from; energy is conserved when all forces of a term are there, or none.
+    needs : tuple of (str, str)
+        Effects without which it is worse than nothing, and why.
+    saves : bool
+        Whether leaving it out saves operations; ``auto`` leaves out nothing else.
     """
 
     name: str
     summary: str
     in_equations: bool
+    of_links: bool = False
+    energy: str = ""
+    needs: tuple[tuple[str, str], ...] = ()
+    saves: bool = False
 
+
+def _inertia(name: str, summary: str, term: str, *needs: tuple[str, str]) -> Effect:
+    return Effect(name, summary, in_equations=True, of_links=True, energy=term, needs=needs, saves=True)
+
+
+_LINEAR, _SQUARE = "linear in the deformation", "quadratic in the deformation"
 
 EFFECTS: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         Effect("gravity", "weight of links and payloads", False),
-        Effect("centrifugal_load", "what the rotation of the undeformed link does to its modes: -X_ωᵀ ρν", True),
-        Effect("coriolis", "forces on the modes from their own rates: ω·X q̇ - X_ωᵀ q̇", True),
-        Effect("inertia_first_order", "mass matrix and frame forces linear in the deformation: X q", True),
-        Effect("inertia_second_order", "frame forces quadratic in the deformation: qᵀ Z q", True),
-        Effect("spin_softening", "centrifugal force on the modes, linear in the deformation: -ωᵀ Z ω q", True),
-        Effect("modal_damping", "damping of the elastic modes", False),
+        _inertia("centrifugal_load", "what the turning undeformed link does to its modes: -X_ωᵀ ρν", _LINEAR),
+        _inertia("coriolis", "forces on the modes from their own rates: X_ω q̇ - X_ωᵀ q̇", _LINEAR),
+        _inertia("inertia_first_order", "mass matrix and frame forces linear in the deformation: X q", _LINEAR),
+        _inertia("inertia_second_order", "frame forces quadratic in the deformation: qᵀ Z q", _SQUARE),
+        _inertia("spin_softening", "centrifugal force on the modes, linear in the deformation: -ωᵀ Z ω q", _SQUARE),
+        Effect("modal_damping", "damping of the elastic modes", False, of_links=True),
         Effect("joint_stiffness", "springs in joints", False),
         Effect("joint_damping", "viscous damping in joints", False),
         Effect("joint_friction", "Coulomb friction in joints", False),
         Effect("motor_inertia", "rotor inertia reflected to joints", False),
         Effect("payload", "payloads on named points", False),
-        Effect("flexibility", "elastic modes of the links", False),
+        Effect("flexibility", "elastic modes of the links", False, saves=True),
     )
 }
 
 ALL = frozenset(EFFECTS)
 """Every effect there is."""
+
+
+def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:
+    """Effects that a scene asks for; all of them for ``auto``, which chooses later.
+
+    Parameters
+    ----------
+    value : str or sequence of str
+        ``all``, ``auto``, or names, in a list or separated by commas; names with a minus in front are left out of all.
+    where : str
+        Field, for messages.
+
+    Raises
+    ------
+    SceneError
+        BAD_REFERENCE: unknown name, with a suggestion; BAD_FIELD: names with and without a minus.
+    """
+    if value in ("all", "auto"):
+        return ALL
+    given = [name.strip() for name in value.split(",")] if isinstance(value, str) else list(value)
+    for name in given:
+        choose(name.removeprefix("-"), EFFECTS if len(given) > 1 else ("all", "auto", *EFFECTS), where, SceneError)
+    left_out = {name[1:] for name in given if name.startswith("-")}
+    if not left_out:
+        return frozenset(given)
+    if len(left_out) < len(set(given)):
+        message = "either names of what is on, or, with a minus, of what is off"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one kind")
+    return ALL - left_out
+
+
+def inconsistencies(effects: Set[str], formulation: str = "erls") -> tuple[str, ...]:
+    """Why a set of effects can be expected to mislead; empty for one that can be meant."""
+    result = []
+    on = in_order(effects)
+    if formulation == "nodal":
+        kept = [e.name for e in EFFECTS.values() if e.in_equations and e.name not in effects]
+        return (f"effects: beam elements have no part that is {_list(kept)}; it stays in",) if kept else ()
+    if "flexibility" not in effects:
+        idle = [name for name in on if EFFECTS[name].of_links]
+        return (f"effects: links are rigid without 'flexibility', so that {_list(idle)} cannot act",) if idle else ()
+    for term in dict.fromkeys(e.energy for e in EFFECTS.values() if e.energy):
+        members = [e.name for e in EFFECTS.values() if e.energy == term]
+        missing = [name for name in members if name not in effects]
+        if missing and len(missing) < len(members):
+            result.append(
+                f"effects: {_list(n for n in members if n in effects)} without {_list(missing)}: all of them come "
+                f"from the kinetic energy {term}, and energy is not conserved with a part of them"
+            )
+    for name in on:
+        for other, why in EFFECTS[name].needs:
+            if other not in effects:
+                result.append(f"effects: {name!r} without {other!r}: {why}")
+    return tuple(result)
+
+
+def conserves_energy(effects: Set[str]) -> bool:
+    """Whether every energy is there with all its forces, or with none."""
+    present = {(e.energy, e.name in effects) for e in EFFECTS.values() if e.energy}
+    return len(present) == len({term for term, _ in present})
+
+
+def in_order(effects: Iterable[str]) -> list[str]:
+    """Names in the order of the registry."""
+    wanted = set(effects)
+    return [name for name in EFFECTS if name in wanted]
+
+
+def _list(names: Iterable[str]) -> str:
+    return ", ".join(repr(name) for name in names)

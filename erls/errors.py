@@ -32,6 +32,7 @@ class Cause(enum.StrEnum):
     NO_PICTURE = "picture could not be made"
     OUT_OF_MEMORY = "out of memory"
     INTERRUPTED = "interrupted"
+    BUDGET = "time budget used up"
 
 
 _NUMERICAL = {

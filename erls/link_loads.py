@@ -120,7 +120,7 @@ def _carried(run: Run, number: int) -> list[_Carried]:
     nodes = [i.node for i in link.model.interface_nodes]
     points = {p.name: p for p in mechanism.points}
     result = []
-    for payload in record.payloads:
+    for payload in record.payloads if "payload" in mechanism.effects else ():
         point = points[payload.point]
         if point.link == number and point.node in nodes:
             inertia = inertia_matrix(payload.inertia, "payloads")

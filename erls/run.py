@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from erls.effects import conserves_energy, in_order
 from erls.errors import Cause, SceneError, SimulationError
 from erls.formulations.base import Energy, Formulation, State
 from erls.formulations.closed_chain import ClosedChain
@@ -207,7 +208,8 @@ class Run:
             j.drive.kind == "free" and not j.forces.damping and not j.forces.friction
             for j in mechanism.joints
         )
-        return passive and not any(link.damping.any() for link in mechanism.links)
+        damped = any(link.damping.any() for link in mechanism.links)
+        return passive and not damped and conserves_energy(mechanism.effects)
 
     def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
         """Joints and points at given times, as in the JSON of ``erls simulate``."""
@@ -228,6 +230,7 @@ class Run:
         return {
             "scene": self.scene.name,
             **self.formulation.describe(),
+            "effects": in_order(self.formulation.mechanism.effects),
             "integrator": self.scene.record.simulation.integrator,
             "duration": self.end,
             "steps": work.steps,

@@ -20,6 +20,8 @@ from erls.scene_check import check_scene
 from fe_import.link import Damping, Inertia, Vector
 from fe_import.toml_file import convert, read_toml
 
+_SHORT = {"effects": "simulation.effects"}
+
 
 class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     pass
@@ -52,6 +54,10 @@ class Simulation(_Record, frozen=True):
         Tolerances of SciPy's integrators, ``atol`` in metres.
     spectral_radius : float
         ρ∞ of generalized-α: 1 no numerical damping, 0 the most.
+    effects : str or list of str
+        Physical effects (`erls.effects`) that are on: ``all``, ``auto`` (those that matter), or their names.
+    effects_tolerance, effects_effort_tolerance : float
+        Of ``auto``: error of the named points [m], and error of drive forces relative to their peak.
     """
 
     duration: float
@@ -65,6 +71,9 @@ class Simulation(_Record, frozen=True):
     rtol: float = 1e-8
     atol: float = 1e-12
     spectral_radius: float = 0.8
+    effects: str | list[str] = "all"
+    effects_tolerance: float = 1e-4
+    effects_effort_tolerance: float = 1e-2
 
 
 class Base(_Record, frozen=True):
@@ -274,17 +283,32 @@ def load_scene(path: Path | str, overrides: Iterable[str] = ()) -> Scene:
     path = Path(path)
     data = read_toml(path, SceneError)
     for text in overrides:
-        _override(data, text)
+        apply_override(data, text)
+    if is_body_scene(data):
+        message = "a scene of bodies, beams and connections, which is no chain of joints and links"
+        remedy = "use erls simulate, or erls.body_scenes.solve"
+        raise SceneError(Cause.BAD_FIELD, message, where=str(path), remedy=remedy)
     record = convert(data, SceneRecord, str(path), SceneError)
     check_scene(record, str(path))
     return Scene(path, record)
 
 
-def _override(data: dict[str, Any], text: str) -> None:
-    """Set one KEY=VALUE in parsed TOML."""
+def is_body_scene(data: dict[str, Any]) -> bool:
+    """Whether the tables of a scene file are those of `erls.body_scenes`."""
+    return not {"bodies", "beams"}.isdisjoint(data) and {"joints", "links"}.isdisjoint(data)
+
+
+def apply_override(data: dict[str, Any], text: str) -> None:
+    """Set one KEY=VALUE in parsed TOML, as `load_scene` does.
+
+    Raises
+    ------
+    SceneError
+        No such place, or not of this form.
+    """
     key, equals, value = text.partition("=")
     where = f"--set {text}"
-    steps = key.strip().split(".")
+    steps = _SHORT.get(key.strip(), key.strip()).split(".")
     if not equals or not all(steps):
         raise SceneError(
             Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from erls.effects import named_effects
 from erls.errors import Cause, SceneError
 from erls.integrators import DEFAULT, INTEGRATORS
 from erls.mechanism.dh import CONVENTIONS
@@ -42,7 +43,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     SceneError
         BAD_FIELD, BAD_REFERENCE: naming file, field, value and remedy.
     """
-    for path, value in _numbers(msgspec.to_builtins(scene)):
+    for path, value in every_number(msgspec.to_builtins(scene)):
         if not abs(value) <= LARGEST:
             remedy = f"give a number between {-LARGEST:g} and {LARGEST:g}"
             raise _bad(f"{file}: {path}", "not a finite number of plausible size", value, remedy)
@@ -58,7 +59,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         raise _bad(f"{file}: links", message, counts, "add or remove one")
     for kind in ("joints", "links", "points", "loops"):
         named = [(f"{file}: {kind}[{k}].name", item.name) for k, item in enumerate(getattr(scene, kind))]
-        _check_names(named)
+        check_names(named)
     for k, joint in enumerate(scene.joints):
         choose(joint.type, JOINT_TYPES, f"{file}: joints[{k}].type", SceneError)
         choose(joint.dh.convention, CONVENTIONS, f"{file}: joints[{k}].dh.convention", SceneError)
@@ -83,14 +84,14 @@ def check_scene(scene: SceneRecord, file: str) -> None:
                 raise _bad(f"{file}: joints[{k}].drive.feed_forward", message, True, "set it to false")
 
 
-def _numbers(value: Any, path: str = "") -> Iterable[tuple[str, float]]:
+def every_number(value: Any, path: str = "") -> Iterable[tuple[str, float]]:
     """All numbers of nested tables and lists with their places."""
     if isinstance(value, dict):
         for key, item in value.items():
-            yield from _numbers(item, f"{path}.{key}" if path else key)
+            yield from every_number(item, f"{path}.{key}" if path else key)
     elif isinstance(value, (list, tuple)):
         for k, item in enumerate(value):
-            yield from _numbers(item, f"{path}[{k}]")
+            yield from every_number(item, f"{path}[{k}]")
     elif isinstance(value, (int, float)):
         yield path, value
 
@@ -111,7 +112,7 @@ def _check_simulation(s: Simulation, place: str) -> None:
     if s.elements_per_member is not None and s.elements_per_member < 1:
         message = "a member needs at least one element"
         raise _bad(f"{place}.elements_per_member", message, s.elements_per_member, "give 1 or more")
-    for name in ("duration", "step", "atol"):
+    for name in ("duration", "step", "atol", "effects_tolerance", "effects_effort_tolerance"):
         value = getattr(s, name)
         if value is not None and not value > 0:
             raise _bad(f"{place}.{name}", f"{name} must be positive", value, "give a number above 0")
@@ -124,11 +125,12 @@ def _check_simulation(s: Simulation, place: str) -> None:
     if not SMALLEST_RTOL <= s.rtol < 1:
         remedy = f"give {SMALLEST_RTOL:g} (rounding) to 1"
         raise _bad(f"{place}.rtol", "not a relative tolerance", s.rtol, remedy)
+    named_effects(s.effects, f"{place}.effects")
     if not 0 <= s.spectral_radius <= 1:
         raise _bad(f"{place}.spectral_radius", "out of range", s.spectral_radius, "give 0 to 1")
 
 
-def _check_names(places: Iterable[tuple[str, str]]) -> None:
+def check_names(places: Iterable[tuple[str, str]]) -> None:
     """Names, each behind its place, differ and can stand in tables and, as keys, in files."""
     seen: set[str] = set()
     for place, name in places:
@@ -163,7 +165,7 @@ def _check_link(link: Link, place: str) -> None:
     if not link.rigid.points:
         remedy = "give the inboard one at least, points = { root = [0, 0, 0] }"
         raise _bad(f"{place}.rigid.points", "a rigid link needs named points", None, remedy)
-    _check_names((f"{place}.rigid.points", name) for name in link.rigid.points)
+    check_names((f"{place}.rigid.points", name) for name in link.rigid.points)
 
 
 def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:

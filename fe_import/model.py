@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from fe_import.second_order.beams import BeamLines
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -109,6 +112,10 @@ class FEModel:
         None for bare matrices, which have no elements.
     notes : dict of str
         What the provenance should say about the source.
+    beams : BeamLines or None
+        Elements of a frame, for its second-order kinematics.
+    added_mass : (d, d) sparse CSC or None
+        What ``mass`` holds of point masses.
     """
 
     name: str
@@ -127,6 +134,8 @@ class FEModel:
     source: str = ""
     stress: StressSource | None = None
     notes: dict[str, str] = field(default_factory=dict)
+    beams: BeamLines | None = None
+    added_mass: sp.csc_array | None = None
 
     @property
     def interface_dofs(self) -> IntArray:

@@ -26,6 +26,7 @@ from fe_import.model import Array, FEModel, IntArray
 from fe_import.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
 from fe_import.recovery.recover import recovery_maps
 from fe_import.reduction import REDUCTIONS, Basis
+from fe_import.second_order.compute import second_order
 from fe_import.solver import chosen_solver
 from fe_import.solver.watch import telling
 from fe_import.toml_file import choose
@@ -87,6 +88,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     checks += _unit_checks(model, modes.omega, where)
     residuals = mode_residuals(model, shapes, modes.omega)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
+    field, statement = None, "not available in physical form"
     if options.form == "physical":
         shapes, reduced_stiffness = basis.vectors, stiffness
         invariants = inertia_invariants(model.mass, shapes, model.dof_map, basis.rigid)
@@ -96,6 +98,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
         omega = modes.omega
         reduced_stiffness = np.diag(omega**2)
         damping = damping_ratios(link.description.damping, omega, where)
+        field, statement = second_order(model, shapes, inboard)
     rigid = model.rigid_body_modes()
     turning = np.flatnonzero(model.dof_map[:, 3] >= 0)
     return ModalModel(
@@ -118,7 +121,8 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
         health=checks,
         lines=model.lines,
         triangles=model.triangles,
-        provenance=provenance(link, model, basis.selection),
+        provenance={**provenance(link, model, basis.selection), "second_order": statement},
+        second_order=field,
         recovery=None if wanted is None else recovery_maps(model, shapes, wanted, where),
     )
 

@@ -134,11 +134,14 @@ def test_drive_examples_are_valid() -> None:
 def test_shipped_files_have_a_header_and_are_valid(path: Path) -> None:
     """Each link and scene says what it shows, and loads."""
     from erls import load_scene
+    from erls.body_scenes import is_body_scene, load_body_scene
     from fe_import import load_link
 
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# ")
-    if "[simulation]" in text:
+    if is_body_scene(tomllib.loads(text)):
+        load_body_scene(path)
+    elif "[simulation]" in text:
         load_scene(path)
     else:
         load_link(path)

@@ -56,7 +56,7 @@ class Erls:
         self.mechanism = mechanism
         self.gauge = gauge
         self.compatibility = Compatibility(mechanism, gauge)
-        self.inertia = [LinkInertia(link.invariants) for link in mechanism.links]
+        self.inertia = [LinkInertia(link.invariants, mechanism.effects) for link in mechanism.links]
         self.screws = [joint.screw for joint in mechanism.joints]
         self.joints = len(mechanism.joints)
         self.elastic = sum(link.elastic_modes for link in mechanism.links)

@@ -19,13 +19,14 @@ from fe_import.model import InterfaceNode
 @dataclass(frozen=True)
 class Payload:
     """A rigid body on a node of a link: centre of mass from the node (3,) [m], mass [kg], and inertia (3, 3) about the
-    centre [kg m²], all in mesh axes.
+    centre [kg m²], all in mesh axes; ``motor``: it is the motor of the joint that sits there.
     """
 
     node: int
     offset: Array
     mass: float
     inertia: Array
+    motor: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,7 @@ def truncated(model: ModalModel, elastic_modes: int) -> ModalModel:
         damping_ratios=model.damping_ratios[keep],
         residuals=model.residuals[keep],
         recovery=None if model.recovery is None else model.recovery.truncated(keep),
+        second_order=None if model.second_order is None else model.second_order.truncated(keep),
     )
 
 

@@ -32,13 +32,14 @@ figcaption { padding-bottom: .3rem; font-weight: 600; }
 
 @dataclass(frozen=True)
 class Curve:
-    """One line of a plot."""
+    """One line of a plot; ``marked`` with its points shown, ``points`` nothing but these."""
 
     label: str
     x: Array
     y: Array
     dashed: bool = False
     marked: bool = False
+    points: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ def figure(plot: Plot) -> str:
     canvas = Figure(figsize=(7.2, 3.4), layout="constrained")
     axes = canvas.subplots()
     for curve in plot.curves:
-        line, marker = "--" if curve.dashed else "-", "o" if curve.marked else ""
+        line = "" if curve.points else "--" if curve.dashed else "-"
+        marker = "." if curve.points else "o" if curve.marked else ""
         axes.plot(curve.x, curve.y, label=curve.label, linewidth=1.2, linestyle=line, marker=marker, markersize=4)
     if plot.limit is not None:
         axes.axhline(plot.limit, color="0.4", linewidth=0.8, linestyle=":")

@@ -7,11 +7,15 @@ from typing import Any
 
 import msgspec
 
+from erls.body_scenes import BodyScene, load_body_scene
+from erls.body_scenes.result_file import SCHEMA as RESULT_SCHEMA
+from erls.body_scenes.result_file import read_summary
 from erls.errors import Cause, SceneError
+from erls.report.body_page import result_report
 from erls.report.tables import modal_report, run_report, table
 from erls.run_file import SCHEMA as RUN_SCHEMA
 from erls.run_file import load_run
-from erls.scene import Scene, load_scene
+from erls.scene import Scene, is_body_scene, load_scene
 from fe_import.hdf5.files import open_for_reading
 from fe_import.link import LinkFile, load_link
 from fe_import.modal.file import SCHEMA as MODAL_SCHEMA
@@ -42,6 +46,9 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
             failure = None if run.failure is None else run.failure.as_dict()
             text = "\n".join([run_report(run), *(f"warning: {w}" for w in run.warnings)])
             return {"file": "run", **run.summary(), "failure": failure}, text
+        if schema == RESULT_SCHEMA:
+            found = read_summary(path)
+            return {"file": "result of bodies", **found}, f"{result_report(found)}\n\nstatus: {found['status']}"
         if schema != MODAL_SCHEMA:
             raise SceneError(
                 Cause.NOT_READABLE,
@@ -52,6 +59,8 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
             )
         return _modal_info(read_modal_file(path))
     data = read_toml(path, SceneError)
+    if is_body_scene(data):
+        return _body_scene_info(load_body_scene(path))
     if "joints" in data or "simulation" in data or "links" in data:
         return _scene_info(load_scene(path))
     return _link_info(load_link(path))
@@ -99,6 +108,17 @@ def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
         text += "\nloops: " + ", ".join(joined)
     text += "\nsimulation: " + ", ".join(f"{k} = {v}" for k, v in simulation.items() if v is not None)
     return {"file": "scene", "scene": scene.name, **msgspec.to_builtins(record)}, text
+
+
+def _body_scene_info(scene: BodyScene) -> tuple[dict[str, Any], str]:
+    record = scene.record
+    rows = [(b.name, "rigid body", f"{b.mass:g} kg") for b in record.bodies]
+    rows += [(b.name, "beam", f"{b.start} to {b.end}, {b.elements} elements") for b in record.beams]
+    rows += [(c.name, c.type, f"{c.node} to {c.to}") for c in record.connections]
+    simulation = msgspec.to_builtins(record.simulation)
+    text = f"{scene.name}: scene of bodies and beams\n\n" + table(("name", "kind", ""), rows)
+    text += "\n\nsimulation: " + ", ".join(f"{k} = {v}" for k, v in simulation.items() if v is not None)
+    return {"file": "scene of bodies", "scene": scene.name, **msgspec.to_builtins(record)}, text
 
 
 def _source(link: Any) -> str:

@@ -13,12 +13,11 @@ from erls.errors import Cause, SceneError
 from erls.lie.so3 import Array
 from erls.scene import Scene, load_scene
 from erls.simulation import simulate
+from erls.studies.mode_overrides import available_modes, count_field, default_counts
 from erls.studies.outputs import Outputs, run_outputs
 from erls.studies.pool import run_all
 from erls.studies.spectrum import amplitude_spectrum, peaks
 from fe_import.errors import ReportedError
-from fe_import.link import load_link
-from fe_import.link_reduction import Reduction
 from fe_import.toml_file import choose
 
 SUCCESSIVE = 3  # changes below the tolerance, one after the other, before a study says "converged"
@@ -154,7 +153,7 @@ def study_modes(
     """
     path = scene.path if isinstance(scene, Scene) else Path(scene)
     loaded = load_scene(path, overrides)
-    limits = _available(loaded)
+    limits = available_modes(loaded)
     if link:
         choose(link, limits, "link", SceneError)
         limits = {link: limits[link]}
@@ -177,7 +176,7 @@ def study_modes(
                 limit=most,
                 remedy="give counts from 0 to the limit, or reduce the links with more modes",
             )
-    fields = [_count_field(loaded, name) for name in limits]
+    fields = [count_field(loaded, name) for name in limits]
     tasks = [(str(path), (*overrides, *(f"{field}={count}" for field in fields))) for count in chosen]
     finished, complete = run_all(_run, tasks, progress, workers)
     limit = tolerances or Tolerances()
@@ -187,36 +186,6 @@ def study_modes(
         changes = () if one.result is None or before is None else changed(before, one.result, limit)
         points.append(Point(chosen[one.number], one.result, one.error, changes))
     return ModeStudy(loaded.name, link, tuple(points), limit, _converged(points), _remaining(points), complete)
-
-
-def default_counts(most: int) -> list[int]:
-    """0, 1, 2, 3, 4, 6, 8, 12 and so on: each about a third more than the last, up to ``most``."""
-    result = [0, 1, 2, 3, 4]
-    while result[-1] < most:
-        result.append(max(result[-1] + 2, 2 * round(0.7 * result[-1])))
-    return [n for n in result if n < most] + [most]
-
-
-def _available(scene: Scene) -> dict[str, int]:
-    """Elastic modes of each elastic link; reduces what is not in the cache, before workers would do so at once."""
-    from erls.build import link_models
-
-    models = link_models(scene, lambda text: None)
-    return {
-        link.name: model.elastic_modes
-        for link, model in zip(scene.record.links, models, strict=True)
-        if model.elastic_modes
-    }
-
-
-def _count_field(scene: Scene, name: str) -> str:
-    """Where the count goes: to the reduction, where that keeps other modes than the lowest free-free ones."""
-    link = next(one for one in scene.record.links if one.name == name)
-    if link.model:
-        options = load_link(scene.folder / link.model, link.reduction).description.reduction
-        if options.truncation != Reduction().truncation or options.static_correction:
-            return f"links.{name}.reduction.elastic_modes"
-    return f"links.{name}.elastic_modes"
 
 
 def _run(task: tuple[str, tuple[str, ...]]) -> Outputs:

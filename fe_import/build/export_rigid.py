@@ -107,11 +107,14 @@ def _reason(model: FEModel, rigid: Array, labels: IntArray) -> tuple[str, str]:
     force = np.abs(model.stiffness @ rigid)
     terms = (abs(model.stiffness) @ np.abs(rigid)).max(axis=0)
     if (force[:, :3].max(axis=0) <= GROUNDING * terms[:3]).all():
-        return (
+        message = (
             "the stiffness resists rotations of the link, not its translations: the nodes are not where the matrices "
-            "have them",
-            "check the unit of length, the mesh, the order of the dofs and the frames of the nodes",
+            "have them"
         )
+        if "positions" in model.notes:
+            message += f" (positions have {model.notes['positions']})"
+            return message, "name the deck as 'mesh', which has all digits"
+        return message, "check the unit of length, the mesh, the order of the dofs and the frames of the nodes"
     size = force[rows, :3].max(axis=(1, 2))
     held = size > _NOTICED * size.max()
     if held.mean() <= _LOCAL:

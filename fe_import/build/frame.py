@@ -15,6 +15,7 @@ from fe_import.elements.sections import section_constants
 from fe_import.errors import Cause, FEImportError
 from fe_import.link import Frame, Interface, LinkDescription, Material, Member
 from fe_import.model import Array, FEModel, IntArray, InterfaceNode
+from fe_import.second_order.beams import beam_lines
 from fe_import.toml_file import choose
 
 MOST_ELEMENTS = 100_000  # per member; a larger number is a slip
@@ -115,6 +116,7 @@ def frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
         kind="frame",
         source=where,
         stress=frame_sections(mesh.elements, members, shear),
+        beams=beam_lines(mesh.elements, shear, frame.mass, frame.rotary_inertia),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.build.export_checks import check_export
+from fe_import.build.export_positions import mended_positions
 from fe_import.build.export_rigid import free_of_ground
 from fe_import.build.matrix_interfaces import matrices_interfaces, named_nodes
 from fe_import.errors import Cause, FEImportError
@@ -34,6 +35,8 @@ def matrices_model(link: LinkFile) -> FEModel:
     export = read_export(link, description.matrices)
     check_export(export, f"{where}: matrices")
     export = along_mesh_axes(export)
+    if "positions" in export.notes:
+        export = mended_positions(export)
     names = named_nodes(description.matrices, export, where)
     kept, dense = _nodes_with_rows(export)
     faces, seats = matrices_interfaces(description, export, names, dense, where)

@@ -93,8 +93,8 @@ def add_masses(model: FEModel, masses: list[PointMass], where: str) -> FEModel:
         blocks.append(block[np.ix_(keep, keep)])
     i = np.concatenate([np.repeat(r, len(r)) for r in rows])
     j = np.concatenate([np.tile(r, len(r)) for r in rows])
-    added = sp.coo_array((np.concatenate([b.ravel() for b in blocks]), (i, j)), shape=model.mass.shape)
-    return replace(model, mass=(model.mass + added).tocsc())
+    added = sp.coo_array((np.concatenate([b.ravel() for b in blocks]), (i, j)), shape=model.mass.shape).tocsc()
+    return replace(model, mass=(model.mass + added).tocsc(), added_mass=added)
 
 
 def inertia_matrix(given: Inertia, where: str, error: type[ReportedError] = FEImportError) -> Array:
@@ -169,4 +169,6 @@ def to_si(model: FEModel, link: LinkDescription, where: str) -> FEModel:
         interface_nodes=tuple(replace(i, position=i.position * length) for i in model.interface_nodes),
         coupling=coupling,
         stress=None if model.stress is None else model.stress.converted(length, mass / (length * time**2)),
+        beams=None if model.beams is None else model.beams.converted(length, mass),
+        added_mass=None if model.added_mass is None else convert(model.added_mass, mass),
     )

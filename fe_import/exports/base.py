@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import scipy.sparse as sp
 
@@ -63,6 +64,10 @@ class Export:
     lines: IntArray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     triangles: IntArray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
     notes: dict[str, str] = field(default_factory=dict)
+
+
+class NoOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Options of a format whose files say everything."""
 
 
 @dataclass(frozen=True)

@@ -13,15 +13,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError, shortened
-from fe_import.exports.base import Export, ExportFormat
+from fe_import.exports.base import Export, ExportFormat, NoOptions
 from fe_import.exports.dofs import COMPONENTS, dof_map_of_rows
 from fe_import.exports.entries import matrix_of_entries
-from fe_import.exports.frd_mesh import is_frd, read_frd
+from fe_import.exports.frd_mesh import POSITIONS, is_frd, read_frd
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import InpMesh, read_inp
 from fe_import.exports.row_files import read_sets
@@ -30,10 +29,6 @@ from fe_import.text_file import TextFile
 
 _ROW = re.compile(r"(\d{1,15})\.(\d{1,4})")  # as text: 4.10 is not 4.1
 _EQUATIONS = ("EQUATION", "MPC", "RIGID BODY", "TIE", "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTING COUPLING")
-
-
-class CalculixOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """None: the files say everything."""
 
 
 def read_calculix(files: Mapping[str, Path], options: Any, where: str) -> Export:
@@ -61,6 +56,8 @@ def read_calculix(files: Mapping[str, Path], options: Any, where: str) -> Export
         )
     lines, triangles = picture(mesh.elements)
     notes = {"program": "CalculiX, SOLVER=MATRIXSTORAGE"}
+    if is_frd(files["mesh"]):
+        notes["positions"] = POSITIONS
     if mesh.keywords["TRANSFORM"]:
         notes["frames"] = "*TRANSFORM does not turn the rows of these matrices"
     if mesh.unread:
@@ -157,5 +154,5 @@ def _refuse_held(mesh: InpMesh, dof_map: IntArray, files: Mapping[str, Path]) ->
 
 
 CALCULIX = ExportFormat(
-    required=("stiffness", "mass", "dofs", "mesh"), optional=("sets",), options=CalculixOptions, read=read_calculix
+    required=("stiffness", "mass", "dofs", "mesh"), optional=("sets",), options=NoOptions, read=read_calculix
 )

@@ -1,11 +1,11 @@
 """Nodes and elements of CalculiX results (``.frd``), for matrices whose deck is not at hand; sets come from a file.
 
-Positions have six digits there. That is enough for meshes with round coordinates; of others the check that a turned
-link feels no force says what they lack.
+Positions have six digits there; `fe_import.build.export_positions` finds the others.
 """
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from fe_import.errors import shortened
 from fe_import.exports.inp_mesh import InpMesh
 from fe_import.model import IntArray
 from fe_import.text_file import TextFile
+
+POSITIONS = "six digits, of an .frd file"  # note of an export
 
 # number of the type -> name and places of its nodes in the order of decks
 _TYPES: dict[int, tuple[str, tuple[int, ...]]] = {
@@ -29,6 +31,10 @@ _TYPES: dict[int, tuple[str, tuple[int, ...]]] = {
     9: ("S4", tuple(range(4))),
     10: ("S8", tuple(range(8))),
 }
+_HEAD = re.compile(r" +[23]C +(\d{1,12}) +([01]) *", re.ASCII)
+_LABEL = re.compile(r" *\d+", re.ASCII)
+_POSITION = re.compile(3 * r" *([+-]?\d\.\d{5}E[+-]\d{2,3})", re.ASCII)  # exponents of 3 digits leave no blank between
+_INTEGERS = re.compile(r"( +\d{1,12})+", re.ASCII)
 _REMEDY = "write the results again as text (*NODE FILE), or name the deck as 'mesh'"
 
 
@@ -38,7 +44,7 @@ def is_frd(path: Path) -> bool:
 
 
 def read_frd(path: Path) -> InpMesh:
-    """Read nodes and elements, plain or gzip.
+    """Read nodes and elements, plain or gzip, up to the results.
 
     Raises
     ------
@@ -48,16 +54,8 @@ def read_frd(path: Path) -> InpMesh:
     points: dict[int, tuple[float, ...]] = {}
     cells: list[tuple[int, list[int]]] = []
     with TextFile(path) as file:
-        while (line := file.line()) is not None:
-            block = line[:6].strip()
-            if block in ("2C", "3C"):
-                count = _count(file, line)
-                if block == "2C":
-                    _read_nodes(file, count, points)
-                else:
-                    _read_elements(file, count, cells)
-        if not points:
-            raise file.failure("no nodes in this file", remedy=_REMEDY)
+        _read_nodes(file, points)
+        _read_elements(file, cells)
         labels = np.sort(np.fromiter(points, dtype=np.int64))
         place = {int(label): k for k, label in enumerate(labels)}
         lost = next((n for _, nodes in cells for n in nodes if n not in place), None)
@@ -74,54 +72,52 @@ def read_frd(path: Path) -> InpMesh:
     )
 
 
-def _count(file: TextFile, line: str) -> int:
-    fields = line[6:].split()
-    if len(fields) != 2 or not fields[0].isdecimal() or fields[1] not in ("0", "1"):
-        raise file.failure("not the head of a block in text form", line=file.number, value=line.strip(), remedy=_REMEDY)
-    return int(fields[0])
+def _head(file: TextFile, block: str, what: str) -> tuple[int, int]:
+    """Go to a block; the number of its entries, and the digits of a node's number."""
+    while (line := file.line()) is not None:
+        if line[:6].strip() == block:
+            if not (match := _HEAD.fullmatch(line)):
+                message = "not the head of a block in text form"
+                raise file.failure(message, line=file.number, value=shortened(line.strip()), remedy=_REMEDY)
+            return int(match[1]), 10 if match[2] == "1" else 5
+    raise file.failure(f"no {what} in this file", remedy=_REMEDY)
 
 
-def _read_nodes(file: TextFile, count: int, points: dict[int, tuple[float, ...]]) -> None:
-    before = len(points)
+def _read_nodes(file: TextFile, points: dict[int, tuple[float, ...]]) -> None:
+    count, width = _head(file, "2C", "nodes")
     while (line := file.line()) is not None and line[:3] != " -3":
-        try:
-            if line[:3] != " -1":
-                raise ValueError
-            label = int(line[3:-36])
-            position = tuple(float(line[k : k + 12]) for k in range(len(line) - 36, len(line), 12))
-            if label in points or not np.isfinite(position).all():
-                raise ValueError
-        except ValueError:
-            message = "not a node, or one that stands twice"
-            raise file.failure(message, line=file.number, value=shortened(line.strip()), remedy=_REMEDY) from None
-        points[label] = position
-    _refuse_cut(file, line, len(points) - before, count)
+        label, position = line[3 : 3 + width], _POSITION.fullmatch(line[3 + width :].rstrip())
+        if line[:3] != " -1" or not _LABEL.fullmatch(label) or not position:
+            message = "not a node with three coordinates"
+            raise file.failure(message, line=file.number, value=shortened(line.strip()), remedy=_REMEDY)
+        if int(label) in points:
+            raise file.failure("this node stands twice", line=file.number, value=int(label), remedy=_REMEDY)
+        points[int(label)] = tuple(map(float, position.groups()))
+    _refuse_cut(file, line, len(points), count)
 
 
-def _read_elements(file: TextFile, count: int, cells: list[tuple[int, list[int]]]) -> None:
-    before = len(cells)
+def _read_elements(file: TextFile, cells: list[tuple[int, list[int]]]) -> None:
+    count, _ = _head(file, "3C", "elements")
     while (line := file.line()) is not None and line[:3] != " -3":
-        try:
-            numbers = [int(field) for field in line[3:].split()]
-            if line[:3] == " -1" and len(numbers) == 4:
-                cells.append((numbers[1], []))
-            elif line[:3] == " -2" and len(cells) > before:
-                cells[-1][1].extend(numbers)
-            else:
-                raise ValueError
-        except ValueError:
-            message = "not an element"
-            raise file.failure(message, line=file.number, value=shortened(line.strip()), remedy=_REMEDY) from None
-    for kind, nodes in cells[before:]:
+        numbers = [int(field) for field in line[3:].split()] if _INTEGERS.fullmatch(line[3:].rstrip()) else []
+        if line[:3] == " -1" and len(numbers) == 4:
+            cells.append((numbers[1], []))
+        elif line[:3] == " -2" and numbers and cells:
+            cells[-1][1].extend(numbers)
+        else:
+            message = "neither an element nor its nodes"
+            raise file.failure(message, line=file.number, value=shortened(line.strip()), remedy=_REMEDY)
+    for kind, nodes in cells:
         if kind in _TYPES and len(nodes) != len(_TYPES[kind][1]):
             message = f"an element of type {kind} with another number of nodes"
             raise file.failure(message, line=file.number, value=len(nodes), limit=len(_TYPES[kind][1]), remedy=_REMEDY)
-    _refuse_cut(file, line, len(cells) - before, count)
+    _refuse_cut(file, line, len(cells), count)
 
 
 def _refuse_cut(file: TextFile, line: str | None, found: int, count: int) -> None:
     if line is None or found != count:
-        raise file.failure("the file is cut off", line=file.number, value=found, limit=count, remedy=_REMEDY)
+        message = "the file is cut off" if line is None else "another number of entries than the block's head says"
+        raise file.failure(message, line=file.number, value=found, limit=count, remedy=_REMEDY)
 
 
 def _elements(cells: list[tuple[int, list[int]]], place: dict[int, int]) -> dict[str, IntArray]:

@@ -10,21 +10,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.exports.base import Export, ExportFormat
+from fe_import.exports.base import Export, ExportFormat, NoOptions
 from fe_import.exports.entries import matrix_of_entries
-from fe_import.exports.row_files import place_rows
+from fe_import.exports.row_files import export_of_rows
 from fe_import.text_file import Rows, TextFile
 
 _CHOICES = (("matrix",), ("coordinate", "array"), ("real", "integer", "double"), ("general", "symmetric"))
 _REMEDY = "write a real matrix, coordinate or array, general or symmetric"
-
-
-class MatrixMarketOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """None: the files say everything."""
 
 
 def read_matrix_market(files: Mapping[str, Path], options: Any, where: str) -> Export:
@@ -35,21 +30,7 @@ def read_matrix_market(files: Mapping[str, Path], options: Any, where: str) -> E
     FEImportError
         ``EXPORT``, ``NOT_READABLE``: faulty files, or files that do not belong together; ``BAD_FIELD``: no nodes.
     """
-    place, dof_map, modal_rows = place_rows(files, where)
-    size = int((dof_map >= 0).sum()) + len(modal_rows)
-    return Export(
-        read_matrix(files["mass"], size),
-        read_matrix(files["stiffness"], size),
-        place.nodes,
-        place.labels,
-        dof_map,
-        modal_rows,
-        place.orientations,
-        place.node_sets,
-        place.lines,
-        place.triangles,
-        {"program": "Matrix Market"},
-    )
+    return export_of_rows(files, where, read_matrix, "Matrix Market")
 
 
 def read_matrix(path: Path, size: int) -> sp.csc_array:
@@ -121,6 +102,6 @@ def _refuse_more(file: TextFile) -> None:
 MATRIX_MARKET = ExportFormat(
     required=("stiffness", "mass", "dofs"),
     optional=("nodes", "mesh", "sets"),
-    options=MatrixMarketOptions,
+    options=NoOptions,
     read=read_matrix_market,
 )

@@ -168,9 +168,7 @@ def _export(stiffness: _Dmig, mass: _Dmig, points: Points) -> Export:
 def _matrix(entries: _Dmig, codes: IntArray) -> sp.csc_array:
     rows, columns = (np.searchsorted(codes, np.array(k, dtype=np.int64)) for k in (entries.rows, entries.columns))
     values, places = np.array(entries.values), entries.places
-    return matrix_of_entries(
-        rows, columns, values, len(codes), places.__getitem__, triangle=entries.form == _SYMMETRIC
-    )
+    return matrix_of_entries(rows, columns, values, len(codes), places.__getitem__, triangle=entries.form == _SYMMETRIC)
 
 
 NASTRAN_DMIG = ExportFormat(

@@ -14,24 +14,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError, shortened
-from fe_import.exports.base import Export, ExportFormat
+from fe_import.exports.base import Export, ExportFormat, NoOptions
 from fe_import.exports.entries import matrix_of_entries
-from fe_import.exports.row_files import place_rows
+from fe_import.exports.row_files import export_of_rows
 
 _MOST_RATIO = 1000  # an entry over its compressed size; mass matrices are full of zeros
 _FREE_BYTES = 50_000_000
 _MOST_BYTES = 20_000_000_000
 _FAULTS = (OSError, ValueError, KeyError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error, tokenize.TokenError)
 _FORMATS = {"csc": ("indices", "indptr"), "csr": ("indices", "indptr"), "coo": ("row", "col")}
-
-
-class NpzOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """None: the files say everything."""
 
 
 def read_npz(files: Mapping[str, Path], options: Any, where: str) -> Export:
@@ -42,21 +37,7 @@ def read_npz(files: Mapping[str, Path], options: Any, where: str) -> Export:
     FEImportError
         ``EXPORT``, ``NOT_READABLE``: faulty files, or files that do not belong together; ``BAD_FIELD``: no nodes.
     """
-    place, dof_map, modal_rows = place_rows(files, where)
-    size = int((dof_map >= 0).sum()) + len(modal_rows)
-    return Export(
-        read_sparse(files["mass"], size),
-        read_sparse(files["stiffness"], size),
-        place.nodes,
-        place.labels,
-        dof_map,
-        modal_rows,
-        place.orientations,
-        place.node_sets,
-        place.lines,
-        place.triangles,
-        {"program": "scipy.sparse.save_npz"},
-    )
+    return export_of_rows(files, where, read_sparse, "scipy.sparse.save_npz")
 
 
 def read_sparse(path: Path, size: int) -> sp.csc_array:
@@ -131,5 +112,5 @@ def _fault(message: str, where: str, value: Any, remedy: str, limit: Any = None)
 
 
 NPZ = ExportFormat(
-    required=("stiffness", "mass", "dofs"), optional=("nodes", "mesh", "sets"), options=NpzOptions, read=read_npz
+    required=("stiffness", "mass", "dofs"), optional=("nodes", "mesh", "sets"), options=NoOptions, read=read_npz
 )

@@ -14,13 +14,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError, shortened
+from fe_import.exports.base import Export
 from fe_import.exports.dofs import COMPONENTS, MODAL, dof_map_of_rows
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import read_inp
@@ -153,12 +155,38 @@ def read_place(files: Mapping[str, Path], where: str) -> Place:
     return place
 
 
-def place_rows(files: Mapping[str, Path], where: str) -> tuple[Place, IntArray, IntArray]:
-    """Nodes, dof map (n, 6) and modal rows from the files ``dofs`` and ``nodes`` or ``mesh``."""
+def export_of_rows(
+    files: Mapping[str, Path], where: str, read_matrix: Callable[[Path, int], sp.csc_array], program: str
+) -> Export:
+    """Matrices that hold numbers only, with rows and nodes from the files ``dofs`` and ``nodes`` or ``mesh``.
+
+    Parameters
+    ----------
+    files : mapping of Path
+        By role.
+    where : str
+        Name of the link description.
+    read_matrix : callable
+        Reads the square matrix of a path and a number of rows.
+    program : str
+        Note of who wrote the matrices.
+    """
     nodes, components = read_dofs(files["dofs"])
     place = read_place(files, where)
     dof_map = dof_map_of_rows(nodes, components, place.labels, str(files["dofs"]))
-    return place, dof_map, np.flatnonzero(components == MODAL)
+    return Export(
+        mass=read_matrix(files["mass"], len(nodes)),
+        stiffness=read_matrix(files["stiffness"], len(nodes)),
+        nodes=place.nodes,
+        labels=place.labels,
+        dof_map=dof_map,
+        modal_rows=np.flatnonzero(components == MODAL),
+        orientations=place.orientations,
+        node_sets=place.node_sets,
+        lines=place.lines,
+        triangles=place.triangles,
+        notes={"program": program},
+    )
 
 
 def _read_nodes(path: Path) -> Place:

@@ -10,6 +10,7 @@ import numpy as np
 from fe_import.modal.identities import Check, check_matrices, check_orthonormal, check_rigid_motion
 from fe_import.modal.model import ModalModel
 from fe_import.recovery.file import check_recovery
+from fe_import.second_order.file import check_second_order
 
 FORMS = ("orthonormal", "physical")
 COUPLINGS = ("node", "rigid", "averaged")
@@ -44,6 +45,8 @@ def validate(model: ModalModel, where: str, root: str = "") -> None:
         check_rigid_motion(model, check)
         if model.recovery is not None:
             check_recovery(model, model.recovery, check)
+        if model.second_order is not None:
+            check_second_order(model, model.second_order, check)
 
 
 def _check_shapes(model: ModalModel, check: Check) -> None:

@@ -25,6 +25,7 @@ from fe_import.modal.check import validate
 from fe_import.modal.model import FixedInterfaceModes, HealthCheck, ModalModel
 from fe_import.model import IntArray, InterfaceNode
 from fe_import.recovery.file import read_recovery, write_recovery
+from fe_import.second_order.file import read_second_order, write_second_order
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -114,6 +115,8 @@ def write_modal_group(group: h5py.Group, model: ModalModel) -> None:
         _write_interface(interfaces.create_group(f"{number:04d}"), interface)
     if model.recovery is not None:
         write_recovery(group.create_group("recovery"), model.recovery)
+    if model.second_order is not None:
+        write_second_order(group.create_group("second_order"), model.second_order)
     provenance = group.create_group("provenance")
     for key, text in sorted(model.provenance.items()):
         write_attribute(provenance, key, text)
@@ -154,6 +157,8 @@ def read_modal_group(group: h5py.Group, where: str) -> ModalModel:
     fixed_frequencies = file.array("fixed_interface/frequencies_hz", (None,))
     n, m, k = len(nodes), len(frequencies), len(rotation_nodes)
     provenance = file.subgroup("provenance")
+    interface_nodes = _read_interfaces(file.subgroup("interfaces"), n)
+    inside = file.names_inside()
     model = ModalModel(
         name=file.attribute("name", str),
         form=file.attribute("form", str),
@@ -162,7 +167,7 @@ def read_modal_group(group: h5py.Group, where: str) -> ModalModel:
         translation_shapes=file.array("mode_shapes/translation", (n, 3, m)),
         rotation_nodes=rotation_nodes,
         rotation_shapes=file.array("mode_shapes/rotation", (k, 3, m)),
-        interface_nodes=_read_interfaces(file.subgroup("interfaces"), n),
+        interface_nodes=interface_nodes,
         stiffness=file.array("reduced/stiffness", (m, m)),
         invariants=InertiaInvariants(
             m=file.array("reduced/mass", (m, m)),
@@ -186,7 +191,10 @@ def read_modal_group(group: h5py.Group, where: str) -> ModalModel:
         lines=file.integers("pictures/lines", (None, 2), 0, n),
         triangles=file.integers("pictures/triangles", (None, 3), 0, n),
         provenance={key: provenance.attribute(key, str) for key in provenance.attribute_names()},
-        recovery=read_recovery(file.subgroup("recovery"), n, m) if "recovery" in file.names_inside() else None,
+        recovery=read_recovery(file.subgroup("recovery"), n, m) if "recovery" in inside else None,
+        second_order=read_second_order(file.subgroup("second_order"), len(interface_nodes), n, m)
+        if "second_order" in inside
+        else None,
     )
     validate(model, where, (group.name or "").rstrip("/"))
     return model

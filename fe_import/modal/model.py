@@ -9,6 +9,7 @@ import numpy as np
 from fe_import.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.model import Array, IntArray, InterfaceNode
 from fe_import.recovery.maps import RecoveryMaps
+from fe_import.second_order.data import SecondOrder
 
 NO_LIMIT = float(np.finfo(np.float64).max)  # a figure that is reported, not judged; finite, as all in a file
 
@@ -87,6 +88,8 @@ class ModalModel:
         Source file, SHA-256, tool versions, method, options.
     recovery : RecoveryMaps or None
         Stress or section forces, when the link description asks for them.
+    second_order : SecondOrder or None
+        Second-order kinematics; the provenance says why there are none.
     """
 
     name: str
@@ -110,6 +113,7 @@ class ModalModel:
     triangles: IntArray
     provenance: dict[str, str] = field(default_factory=dict)
     recovery: RecoveryMaps | None = None
+    second_order: SecondOrder | None = None
 
     @property
     def modes(self) -> int:

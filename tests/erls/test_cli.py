@@ -33,6 +33,8 @@ OPTIONS = {
     "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--json"],
     "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
                     "--beside", "--set", "--workers", "--json"],
+    "study cost": ["--output", "-o", "--tolerance", "--formulations", "--modes", "--integrators", "--effects",
+                   "--points", "--norm", "--reference", "--budget", "--apply", "--set", "--workers", "--json"],
     "info": ["--json"],
     "view": ["--output", "-o", "--at", "--magnify", "--fps", "--speed", "--json"],
 }

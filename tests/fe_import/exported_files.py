@@ -38,6 +38,7 @@ MARKET = {
     },
     "interfaces": INTERFACES,
 }
+FRD = merged(CALCULIX, {"matrices": {"files": {"mesh": "k.frd", "sets": "sets.txt"}}})
 NPZ = merged(MARKET, {"matrices": {"format": "npz", "files": {"stiffness": "k.npz", "mass": "m.npz"}}})
 
 
@@ -58,6 +59,20 @@ def deck(mesh: SolidMesh) -> str:
     for name in ("x0", "x1"):
         lines += [f"*NSET, NSET={name}", *(f"{10 * (n + 1)}," for n in mesh.node_sets[name])]
     return "\n".join(lines) + "\n"
+
+
+@cache
+def frd_files() -> Files:
+    """Nodes and elements as CalculiX writes them with its results, and the sets beside them."""
+    mesh = link_matrices()[0]
+    lines = ["    1C", f"    2C{len(mesh.nodes):30d}{1:38d}"]
+    for k, position in enumerate(mesh.nodes.tolist(), start=1):
+        lines.append(f" -1{10 * k:10d}" + "".join(f"{x:12.5E}" for x in position))
+    lines += [" -3", f"    3C{len(mesh.elements):30d}{1:38d}"]
+    for k, nodes in enumerate(mesh.elements.tolist(), start=1):
+        lines += [f" -1{k:10d}    1    0    1", " -2" + "".join(f"{10 * (n + 1):10d}" for n in nodes)]
+    sets = [f"{name.upper()} {' '.join(str(10 * (n + 1)) for n in mesh.node_sets[name])}\n" for name in ("x0", "x1")]
+    return {"k.frd": ("\n".join([*lines, " -3", ""])).encode(), "sets.txt": "".join(sets).encode()}
 
 
 def calculix_files(mesh: SolidMesh, mass: sp.csc_array, stiffness: sp.csc_array) -> Files:

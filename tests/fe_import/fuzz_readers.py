@@ -13,7 +13,7 @@ import h5py
 import meshio
 import numpy as np
 import scipy.sparse as sp
-from exported_files import CALCULIX, MARKET, NPZ, files
+from exported_files import CALCULIX, FRD, MARKET, NPZ, files, frd_files
 from fuzzing import Facts, Reader
 from fuzzing_facts import content, taken
 from fuzzing_hdf5 import edited
@@ -98,12 +98,13 @@ def _solid_exports() -> Iterator[Reader]:
     for name, table, targets, options in (
         ("calculix: matrices, dofs", CALCULIX, ("k.sti", "k.mas", "k.dof"), {}),
         ("calculix: deck", CALCULIX, ("k.inp",), countless),
+        ("calculix: results", FRD, ("k.frd",), {}),
         ("matrix market", MARKET, ("k.mtx", "m.mtx", "rows.csv"), {}),
         ("nodes, sets", flat, ("nodes.txt", "sets.txt"), countless),
         ("npz", NPZ, ("k.npz", "m.npz"), {"binary": True, "exact": True}),
     ):
         used = {*table["matrices"]["files"].values()}
-        held = {n: c for n, c in {**sound, **text}.items() if n in used}
+        held = {n: c for n, c in {**sound, **frd_files(), **text}.items() if n in used}
         yield Reader(name, {**held, "link.toml": description(table)}, targets, built, model_facts, **options)
     packed = {n: gzip.compress(sound[n], mtime=0) for n in ("k.sti", "k.mas", "k.dof", "k.inp")}
     held = {**packed, "link.toml": description(CALCULIX)}

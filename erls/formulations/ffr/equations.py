@@ -66,7 +66,8 @@ class Ffr:
         self.mechanism, self.body_frame = mechanism, body_frame
         self.bases = [elastic_basis(link, body_frame) for link in mechanism.links]
         self.data = [
-            StandardData(link.invariants, basis) for link, basis in zip(mechanism.links, self.bases, strict=True)
+            StandardData(link.invariants, basis, mechanism.effects)
+            for link, basis in zip(mechanism.links, self.bases, strict=True)
         ]
         self.recursion = Recursion(mechanism, self.bases, body_frame)
         self.efforts = JointEfforts(mechanism)

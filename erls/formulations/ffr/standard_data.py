@@ -8,13 +8,22 @@ the nodal velocities give, for any mass matrix,
 
 (O. Wallrapp, Mech. Struct. & Mach. 22 (1994) 283-304: mdCM, J, Ct, Cr, Me; A. A. Shabana, Dynamics of Multibody
 Systems, ch. 5). M₁ fills the rows and columns of ω, M₂ its block, C₁ its rows. The forces are the Boltzmann-Hamel
-equations of T.
+equations of T. Of these forces five parts may be left out (`erls.effects`):
+
+- ``centrifugal_load``: -½ νᵀ M₁ ν on η;
+- ``coriolis``: what C₁ does on η by η̇ and ω;
+- ``inertia_first_order``: what C₁ does on η by ω̇, and all of M₁ and C₁ in the frame's wrench;
+- ``inertia_second_order``: all of M₂ in the frame's wrench;
+- ``spin_softening``: -ωᵀ M₂ η ω on η.
 """
 
 from __future__ import annotations
 
+from collections.abc import Set
+
 import numpy as np
 
+from erls.effects import ALL
 from erls.lie.so3 import Array, cross
 from fe_import.inertia import InertiaInvariants
 
@@ -28,6 +37,8 @@ class StandardData:
         Of the link, in the modes of its modal file, payloads included.
     basis : (m, n) array
         B: modal coordinates of the field of each elastic coordinate.
+    effects : set of str
+        Those that are on; what is off is not computed.
 
     Attributes
     ----------
@@ -39,9 +50,12 @@ class StandardData:
         M_e.
     """
 
-    def __init__(self, invariants: InertiaInvariants, basis: Array) -> None:
+    def __init__(self, invariants: InertiaInvariants, basis: Array, effects: Set[str] = ALL) -> None:
         n = basis.shape[1]
         self.size = n
+        self.centrifugal, self.coriolis = "centrifugal_load" in effects, "coriolis" in effects
+        self.first_order, self.second_order = "inertia_first_order" in effects, "inertia_second_order" in effects
+        self.softening = "spin_softening" in effects
         fields = invariants.rigid
         self.rigid = fields.T @ invariants.m @ fields
         self.coupling = fields.T @ invariants.m @ basis
@@ -60,20 +74,24 @@ class StandardData:
 
     def frame_mass(self, eta: Array) -> Array:
         """(6, 6) M(η)."""
-        half = (self._half @ eta).reshape(3, 6)
-        return self._frame_mass(half, (self._square @ eta).reshape(3, 3, self.size) @ eta)
+        half = (self._half @ eta).reshape(3, 6) if self.first_order else None
+        square = (self._square @ eta).reshape(3, 3, self.size) @ eta if self.second_order else None
+        return self._frame_mass(half, square)
 
-    def _frame_mass(self, half: Array, square: Array) -> Array:
+    def _frame_mass(self, half: Array | None, square: Array | None) -> Array:
         result = self.rigid.copy()
-        result[3:] += half
-        result[:, 3:] += half.T
-        result[3:, 3:] += square
+        if half is not None:
+            result[3:] += half
+            result[:, 3:] += half.T
+        if square is not None:
+            result[3:, 3:] += square
         return result
 
     def frame_coupling(self, eta: Array) -> Array:
         """(6, n) C(η)."""
         result = self.coupling.copy()
-        result[3:] += (self._linear[18:] @ eta).reshape(3, self.size)
+        if self.first_order:
+            result[3:] += (self._linear[18:] @ eta).reshape(3, self.size)
         return result
 
     def forces(
@@ -96,25 +114,36 @@ class StandardData:
             d/dt ∂T/∂η̇ - ∂T/∂η.
         """
         n, omega = self.size, twist[3:]
-        linear = self._linear @ np.stack((eta, rate), axis=1)
-        half, half_rate = linear[:18, 0].reshape(3, 6), linear[:18, 1].reshape(3, 6)
-        turned, turned_rate = linear[18:, 0].reshape(3, n), linear[18:, 1].reshape(3, n)
-        square = (self._square @ eta).reshape(3, 3, n)
-        mass = self._frame_mass(half, square @ eta)
-        coupling = self.coupling.copy()
-        coupling[3:] += turned
+        coupling, half, square = self.coupling, None, None
+        if self.first_order or self.coriolis:
+            linear = self._linear @ np.stack((eta, rate), axis=1)
+            turned, turned_rate = linear[18:, 0].reshape(3, n), linear[18:, 1].reshape(3, n)
+        if self.first_order:
+            half, half_rate = linear[:18, 0].reshape(3, 6), linear[:18, 1].reshape(3, 6)
+            coupling = coupling.copy()
+            coupling[3:] += turned
+        if self.second_order or self.softening:
+            square = (self._square @ eta).reshape(3, 3, n)
+        mass = self._frame_mass(half, square @ eta if square is not None and self.second_order else None)
 
         momentum = mass @ twist + coupling @ rate
         wrench = mass @ twist_rate + coupling @ acceleration
-        wrench += half_rate.T @ omega  # Ṁ ν and Ċ η̇
-        wrench[3:] += half_rate @ twist + 2 * ((square @ rate) @ omega) + turned_rate @ rate
+        if self.first_order:
+            wrench += half_rate.T @ omega  # Ṁ ν and Ċ η̇
+            wrench[3:] += half_rate @ twist + turned_rate @ rate
+        if square is not None and self.second_order:
+            wrench[3:] += 2 * ((square @ rate) @ omega)
         wrench[:3] += cross(omega, momentum[:3])
         wrench[3:] += cross(omega, momentum[3:]) + cross(twist[:3], momentum[:3])
 
-        slope = np.multiply.outer(omega, twist).ravel() @ self._half  # ∂T/∂η
-        slope += rate @ (omega @ self._turned).reshape(n, n)
-        slope += np.multiply.outer(omega, omega).ravel() @ square.reshape(9, n)
-        return wrench, coupling.T @ twist_rate + self.elastic @ acceleration + omega @ turned_rate - slope
+        elastic = coupling.T @ twist_rate + self.elastic @ acceleration
+        if self.coriolis:
+            elastic += omega @ turned_rate - rate @ (omega @ self._turned).reshape(n, n)
+        if self.centrifugal:
+            elastic -= np.multiply.outer(omega, twist).ravel() @ self._half
+        if square is not None and self.softening:
+            elastic -= np.multiply.outer(omega, omega).ravel() @ square.reshape(9, n)
+        return wrench, elastic
 
     def mass_matrix(self, eta: Array) -> Array:
         """(6 + n, 6 + n) mass matrix of (ν, η̇)."""

@@ -1,0 +1,199 @@
+"""The modal links of a scene as bodies of exudyn (FFRF reduced order): the same nodes, masses, shapes and stiffness.
+
+exudyn's bodies have translations only, so the links compared here carry their mass lumped at the nodes, without rotary
+inertia. Interfaces get four massless nodes around them, which follow their rotation, since a frame is made of points there.
+Gravity acts on the mean of all nodes, weighted with their masses: exudyn's own option for gravity leaves out the
+deformation. Iterations are modified Newton, its best setting.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import exudyn as exu
+import exudyn.itemInterface as items
+import numpy as np
+from exudyn.FEM import ObjectFFRFreducedOrderInterface
+from exudyn.rigidBodyUtilities import ComputeSkewMatrix
+from exudyn.utilities import SensorNode, SensorSuperElement
+
+from erls.formulations.ffr.body_frame import elastic_basis
+from erls.mechanism.chain import Mechanism, poses
+from erls.mechanism.links import Link
+
+Array = np.ndarray
+EULER = True
+_ARM = 0.01  # m; distance of the massless nodes from their interface
+
+
+@dataclass(frozen=True)
+class Body:
+    """A link for exudyn: positions (n, 3), masses (n,), shapes (n, 3, m), stiffness (m,); nodes around interfaces."""
+
+    positions: Array
+    masses: Array
+    shapes: Array
+    stiffness: Array
+    around: dict[int, list[int]]
+
+
+def body_of(link: Link, masses: Array) -> Body:
+    """The link in its tangent frame; ``masses`` (n,) of its nodes."""
+    basis = elastic_basis(link, "tangent")
+    model = link.model
+    positions, shapes = [*model.nodes], [*(model.translation_shapes @ basis)]
+    around: dict[int, list[int]] = {}
+    for interface in (link.inboard, link.outboard):
+        if interface is None:
+            continue
+        shape, turn = (s @ basis for s in model.node_shape(interface.node))
+        around[interface.node] = []
+        for offset in _ARM * np.array([[0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1.0]]):
+            around[interface.node].append(len(positions))
+            positions.append(model.nodes[interface.node] + offset)
+            shapes.append(shape + np.cross(turn.T, offset).T)
+    weights = np.concatenate([masses, np.zeros(len(positions) - len(masses))])
+    return Body(np.array(positions), weights, np.array(shapes), np.asarray(link.stiffness), around)
+
+
+def _interface(body: Body, euler: bool) -> ObjectFFRFreducedOrderInterface:
+    """Constant matrices, as exudyn's own pre-processing forms them from a mesh."""
+    cms = ObjectFFRFreducedOrderInterface(None)
+    count = len(body.positions)
+    cms.modeBasis = body.shapes.reshape(3 * count, -1)
+    cms.trigList, cms.postProcessingModes = [], {}
+    cms.nModes, cms.nNodes, cms.dim3D = cms.modeBasis.shape[1], count, 3
+    cms.rigidBodyNodeType = exu.NodeType.RotationEulerParameters if euler else exu.NodeType.RotationRxyz
+    cms.nODE2rot = 4 if euler else 3
+    cms.nODE2rigid = 3 + cms.nODE2rot
+    cms.nODE2FFRFreduced = cms.nODE2rigid + cms.nModes
+    mass = np.repeat(body.masses, 3)[:, None]
+    phi = np.kron(np.ones(count), np.eye(3)).T
+    cms.xRef = body.positions.ravel()
+    tilde, turned = ComputeSkewMatrix(cms.xRef), ComputeSkewMatrix(cms.modeBasis)
+    cms.massMatrixReduced = cms.modeBasis.T @ (mass * cms.modeBasis)
+    cms.stiffnessMatrixReduced = np.diag(body.stiffness)
+    cms.inertiaLocal = tilde.T @ (mass * tilde)
+    cms.Mtt = phi.T @ (mass * phi)
+    cms.totalMass = cms.Mtt[0, 0]
+    cms.PsiTilde = turned
+    cms.chiU = phi.T @ (mass[:, 0] * cms.xRef) / cms.totalMass
+    cms.chiUtilde = ComputeSkewMatrix(cms.chiU)
+    cms.mPsiTildePsi = turned.T @ (mass * cms.modeBasis)
+    cms.mPsiTildePsiTilde = turned.T @ (mass * turned)
+    cms.mPhitTPsi = phi.T @ (mass * cms.modeBasis)
+    cms.mPhitTPsiTilde = phi.T @ (mass * turned)
+    cms.mXRefTildePsi = tilde.T @ (mass * cms.modeBasis)
+    cms.mXRefTildePsiTilde = tilde.T @ (mass * turned)
+    return cms
+
+
+@dataclass
+class Model:
+    """A system of exudyn and the sensor of the point that is compared."""
+
+    container: exu.SystemContainer  # must live as long as its system
+    mbs: exu.MainSystem
+    sensor: int
+    duration: float
+
+
+def build(mechanism: Mechanism, masses: Sequence[Array], point: int, duration: float) -> Model:
+    """All links of a mechanism at its initial angles; prescribed joints follow their motion."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    theta = np.array([joint.position for joint in mechanism.joints])
+    ground = mbs.AddObject(items.ObjectGround())
+    previous, objects = None, []
+    for k, (link, frame) in enumerate(zip(mechanism.links, poses(mechanism, theta), strict=True)):
+        body = body_of(link, masses[k])
+        cms = _interface(body, EULER)
+        made = cms.AddObjectFFRFreducedOrderWithUserFunctions(
+            exu, mbs, positionRef=frame[:3, 3], rotationMatrixRef=frame[:3, :3], gravity=[0, 0, 0]
+        )
+        number = made["oFFRFreducedOrder"]
+        everywhere = mbs.AddMarker(
+            items.MarkerSuperElementPosition(
+                bodyNumber=number,
+                meshNodeNumbers=list(range(len(body.positions))),
+                weightingFactors=body.masses / body.masses.sum(),
+            )
+        )
+        weight = body.masses.sum() * mechanism.gravity
+        mbs.AddLoad(items.LoadForceVector(markerNumber=everywhere, loadVector=list(weight)))
+        joint = mechanism.joints[k]
+        # axes of the joint in the frames of both sides at the start; z turns
+        axes = (frame @ np.linalg.inv(joint.after))[:3, :3]
+        own = mbs.AddMarker(items.MarkerNodeRigid(nodeNumber=made["nRigidBody"]))
+        if previous is None:
+            other = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=ground, localPosition=list(frame[:3, 3])))
+            other_frame = np.eye(3)
+        else:
+            before, number_before, frame_before = previous
+            nodes = before.around[mechanism.links[k - 1].outboard.node]
+            other = mbs.AddMarker(
+                items.MarkerSuperElementRigid(
+                    bodyNumber=number_before, meshNodeNumbers=nodes, weightingFactors=[0.25] * 4
+                )
+            )
+            other_frame = frame_before[:3, :3]
+        rotations = {"rotationMarker0": other_frame.T @ axes, "rotationMarker1": frame[:3, :3].T @ axes}
+        if joint.drive.prescribed:
+            mbs.AddObject(
+                items.GenericJoint(
+                    markerNumbers=[other, own],
+                    constrainedAxes=[1, 1, 1, 1, 1, 1],
+                    offsetUserFunction=_offset(joint.drive, joint.position),
+                    **rotations,
+                )
+            )
+        else:
+            mbs.AddObject(
+                items.GenericJoint(markerNumbers=[other, own], constrainedAxes=[1, 1, 1, 1, 1, 0], **rotations)
+            )
+        previous = (body, number, frame)
+        objects.append((number, made["nRigidBody"]))
+    at = mechanism.points[point]
+    sensor = mbs.AddSensor(
+        SensorSuperElement(
+            bodyNumber=objects[at.link][0],
+            meshNodeNumber=at.node,
+            storeInternal=True,
+            outputVariableType=exu.OutputVariableType.Position,
+        )
+    )
+    mbs.Assemble()
+    return Model(container, mbs, sensor, duration)
+
+
+def _offset(drive, start: float):
+    def offset(mbs, t, number, parameters):
+        return [0, 0, 0, 0, 0, drive.reference(t)[0] - start]
+
+    return offset
+
+
+def run(model: Model, step: float, times: Array, radius: float = 0.8, tolerance: float = 1e-8) -> tuple[Array, float]:
+    """Positions (k, 3) of the point at ``times`` (multiples of the step) and CPU time."""
+    settings = exu.SimulationSettings()
+    integration = settings.timeIntegration
+    integration.numberOfSteps = round(model.duration / step)
+    integration.endTime = model.duration
+    integration.verboseMode = 0
+    integration.newton.useModifiedNewton = True
+    integration.newton.relativeTolerance = tolerance
+    integration.generalizedAlpha.spectralRadius = radius
+    settings.parallel.numberOfThreads = 1
+    settings.solutionSettings.writeSolutionToFile = False
+    settings.solutionSettings.sensorsWritePeriod = float(times[1] - times[0])
+    settings.linearSolverType = exu.LinearSolverType.EXUdense
+    settings.displayStatistics = settings.displayComputationTime = False
+    begun = time.process_time()
+    model.mbs.SolveDynamic(settings)
+    spent = time.process_time() - begun
+    stored = model.mbs.GetSensorStoredData(model.sensor)
+    rows = np.searchsorted(stored[:, 0], times - 1e-9)
+    assert np.allclose(stored[rows, 0], times, atol=1e-6)
+    return stored[rows, 1:4], spent

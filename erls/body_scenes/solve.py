@@ -1,0 +1,90 @@
+"""A scene of bodies in, its result out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from erls.body_scenes.analyses import AtRest, Dynamics, StaticSteps
+from erls.body_scenes.build import Assembly, assemble
+from erls.body_scenes.result import Motion, Rest, work
+from erls.body_scenes.scene import BodyScene, load_body_scene
+from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
+from erls.nodal.statics import TANGENTS, solve_statics
+
+Progress = Callable[[float, float], None]
+
+
+def solve(scene: BodyScene | Path | str, progress: Progress = lambda done, total: None) -> Motion | Rest:
+    """Find what a scene of bodies asks for.
+
+    Parameters
+    ----------
+    scene : BodyScene, Path or str
+    progress : callable
+        Called with (time, duration) after each step of a motion.
+
+    Returns
+    -------
+    Motion or Rest
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Bad input: names file, field, value and remedy.
+    SimulationError
+        A failure or an interrupt; what was computed is in its attribute ``run``.
+
+    Examples
+    --------
+    >>> from erls.body_scenes import solve
+    >>> solve("data/statics/roll_up.toml").position("tip").round(9).tolist()
+    [0.0, 0.0, 0.0]
+    """
+    if not isinstance(scene, BodyScene):
+        scene = load_body_scene(scene)
+    assembly = assemble(scene)
+    analysis = scene.record.simulation
+    if isinstance(analysis, Dynamics):
+        result: Motion | Rest = _motion(scene, assembly, analysis, progress)
+    else:
+        result = _rest(scene, assembly, analysis)
+    if result.failure is not None:
+        result.failure.run = result
+        raise result.failure
+    return result
+
+
+def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, progress: Progress) -> Motion:
+    options = ConstrainedOptions(
+        step=analysis.step,
+        spectral_radius=analysis.spectral_radius,
+        newton_tolerance=analysis.newton_tolerance,
+        iteration_matrix=analysis.iteration_matrix,
+        residual_tolerance=analysis.residual_tolerance,
+    )
+
+    def observe(t: float, knots: Callable[[], ConstrainedSolution]) -> None:
+        progress(t, analysis.duration)
+
+    begun = time.perf_counter()
+    times = (0.0, analysis.duration)
+    system = assembly.system
+    found = lie_generalized_alpha(system, times, system.start, assembly.velocity, options, observe)  # type: ignore[arg-type]
+    return Motion(scene, assembly, time.perf_counter() - begun, found.warnings, found)
+
+
+def _rest(scene: BodyScene, assembly: Assembly, analysis: AtRest) -> Rest:
+    system, tangents = assembly.system, {}
+    begun = time.perf_counter()
+    found = solve_statics(system, system.start, analysis.load_steps, analysis.tangent)
+    wall = time.perf_counter() - begun
+    if isinstance(analysis, StaticSteps) and analysis.compare_tangents:
+        for name in TANGENTS:
+            other = (
+                found if name == analysis.tangent else solve_statics(system, system.start, analysis.load_steps, name)
+            )
+            tangents[name] = work(other)
+    return Rest(scene, assembly, wall, (), found, (), tangents)

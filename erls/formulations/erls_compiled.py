@@ -1,0 +1,226 @@
+"""The constants of a chain in the joint-angle gauge, packed for `erls.kernels.chain`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from erls.kernels.chain import equations, layout
+from erls.kernels.chain.curves import HARMONIC, PIECEWISE
+from erls.kernels.contract import CompiledSystem
+from erls.lie.se3 import inverse, twist_transform
+from erls.lie.so3 import Array
+from erls.mechanism.curves import Curve, Harmonic, Piecewise, Sum
+from erls.mechanism.joints import Joint
+
+if TYPE_CHECKING:
+    from erls.formulations.erls import Erls
+
+_SAME = 1e-9  # relative: rigid-body modes are what they should be
+_PARALLEL = 1e-13  # sine of the angle between axes that count as one
+
+_EFFECTS = {
+    layout.FIRST_ORDER: "inertia_first_order",
+    layout.SECOND_ORDER: "inertia_second_order",
+    layout.CORIOLIS: "coriolis",
+    layout.CENTRIFUGAL: "centrifugal_load",
+    layout.SOFTENING: "spin_softening",
+}
+
+
+class _Packer:
+    """Two flat arrays that grow."""
+
+    def __init__(self, links: int) -> None:
+        self.integers = [0] * (layout.HEADER + links * layout.RECORD)
+        self._reals: list[Array] = []
+        self._size = 0
+
+    @property
+    def reals(self) -> Array:
+        """What was put there."""
+        return np.concatenate(self._reals)
+
+    def put(self, values: Array) -> int:
+        """Store numbers; where they start."""
+        flat = np.asarray(values, dtype=float).ravel()
+        self._reals.append(flat)
+        self._size += len(flat)
+        return self._size - len(flat)
+
+    def put_columns(self, *matrices: Array) -> int:
+        """Store matrices, column after column."""
+        return self.put(np.concatenate([np.zeros(0), *(matrix.T.ravel() for matrix in matrices)]))
+
+    def put_curve(self, curve: Curve | None) -> int:
+        """Store a curve as `erls.kernels.chain.curves` reads it; -1 for None."""
+        if curve is None:
+            return -1
+        parts = _parts(curve)
+        start = len(self.integers)
+        self.integers.append(len(parts))
+        for part in parts:
+            if isinstance(part, Piecewise):
+                place = self.put(np.concatenate([part.knots, part.coefficients.ravel()]))
+                self.integers += [PIECEWISE, place, len(part.knots), part.coefficients.shape[1]]
+            else:
+                form = [part.amplitude, part.omega, part.phase, part.offset, part.before, part.after]
+                place = self.put(np.array([*part.breakpoints, *form]))
+                self.integers += [HARMONIC, place, len(part.breakpoints), len(form)]
+        return start
+
+
+def _parts(curve: Curve) -> list[Piecewise | Harmonic]:
+    """The curves of a sum, of sums of sums too."""
+    if isinstance(curve, Sum):
+        return [part for some in curve.parts for part in _parts(some)]
+    if isinstance(curve, Piecewise | Harmonic):
+        return [curve]
+    raise TypeError(f"no compiled form of the curve {type(curve).__name__}")
+
+
+def _rotation_axes(joints: tuple[Joint, ...]) -> list[Array]:
+    """(axes, 3) for each link: the one axis about which it can turn, in its own frame, or all three; none for a link
+    that only slides.
+    """
+    result: list[Array] = []
+    axes = np.zeros((0, 3))
+    for joint in joints:
+        if joint.type.revolute:
+            along = joint.before[:3, 2]
+            if len(axes) == 1 and np.linalg.norm(np.cross(axes[0], along)) > _PARALLEL:
+                axes = np.eye(3)
+            elif len(axes) < 3:
+                axes = joint.screw[None, 3:]
+        elif len(axes) == 1:
+            axes = axes @ joint.before[:3, :3] @ joint.after[:3, :3]
+        result.append(axes)
+    return result
+
+
+def _step_parts(joint: Joint) -> Array:
+    """(3, 12) constant, cosine and sine part of a link's pose in the frame before; constant and rising at a slide."""
+
+    def part(middle: Array, shift: Array) -> Array:
+        rotation = joint.before[:3, :3] @ middle
+        place = rotation @ joint.after[:3, 3] + joint.before[:3, :3] @ shift
+        return np.concatenate([(rotation @ joint.after[:3, :3]).ravel(), place])
+
+    axis, none = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    if joint.type.revolute:
+        parts = [part(np.outer(axis, axis), none), part(-turn @ turn, none), part(turn, none)]
+    else:
+        parts = [part(np.eye(3), none), part(np.zeros((3, 3)), axis), np.zeros(12)]
+    parts[0][9:] += joint.before[:3, 3]
+    return np.stack(parts)
+
+
+def _joint_numbers(joint: Joint) -> Array:
+    """Constants of a joint's forces, in the order of `layout`."""
+    forces, drive = joint.forces, joint.drive
+    result = np.zeros(layout.JOINT_REALS)
+    result[layout.SPRING], result[layout.REST] = forces.stiffness, forces.rest
+    result[layout.DAMPER], result[layout.FRICTION] = forces.damping, forces.friction
+    result[layout.TRANSITION], result[layout.ROTOR] = forces.transition_rate, joint.rotor_inertia
+    result[layout.GAIN], result[layout.RATE_GAIN] = drive.gains
+    result[layout.LIMIT], result[layout.HELD] = drive.torque_limit, joint.position
+    return result
+
+
+def _close(found: Array, expected: Array) -> bool:
+    return bool(np.abs(found - expected).max(initial=0.0) <= _SAME * max(1.0, float(np.abs(expected).max(initial=0.0))))
+
+
+def compile_chain(chain: Erls) -> CompiledSystem | None:
+    """The compiled form of a chain in the joint-angle gauge.
+
+    Parameters
+    ----------
+    chain : Erls
+
+    Returns
+    -------
+    CompiledSystem or None
+        None when a link's modes hold no exact rigid-body motions.
+    """
+    mechanism, places = chain.mechanism, chain.compatibility.layout
+    links = len(mechanism.links)
+    pack = _Packer(links)
+    pack.put(mechanism.gravity)
+    header = pack.integers
+    header[layout.LINKS] = links
+    for place, name in _EFFECTS.items():
+        header[place] = int(name in mechanism.effects)
+    header[layout.WEIGHT] = int(bool(np.any(mechanism.gravity)))
+    axes_of = _rotation_axes(mechanism.joints)
+    free = {int(k): i for i, k in enumerate(chain.free_joints)}
+    memory = 0
+    for k, (link, joint, rows) in enumerate(
+        zip(mechanism.links, mechanism.joints, chain.compatibility.rows, strict=True)
+    ):
+        e, rho = link.elastic_modes, link.invariants.rigid
+        stay = -np.linalg.solve(rows.own[:, :6], rows.own[:, 6:])
+        if not (_close(rho[6:], np.zeros((e, 6))) and _close(rows.own @ rho, twist_transform(inverse(joint.after)))):
+            return None
+        modes = np.hstack([rho, np.vstack([stay, np.eye(e)])])
+        mass = modes.T @ link.invariants.m @ modes
+        axes = axes_of[k]
+        x = np.einsum("ca,aij->cij", axes, link.invariants.X)
+        x = modes.T @ x @ modes
+        z = np.einsum("ca,db,abij->cdij", axes, axes, link.invariants.Z)
+        pairs = [(i, i) for i in range(len(axes))] + ([(0, 1), (0, 2), (1, 2)] if len(axes) == 3 else [])
+        z_pairs = [modes.T @ ((z[i, j] + z[j, i]) / 2) @ modes for i, j in pairs]
+        out = np.zeros((6, e))
+        if k + 1 < links:
+            following = chain.compatibility.rows[k + 1].previous
+            assert following is not None  # only the first joint sits on the ground
+            out = twist_transform(inverse(mechanism.joints[k + 1].before)) @ following @ modes[:, 6:]
+        elastic_inverse = np.linalg.inv(mass[6:, 6:])
+        elastic_inverse = (elastic_inverse + elastic_inverse.T) / 2
+        towards, out_towards = mass[:6, 6:] @ elastic_inverse, out @ elastic_inverse
+        drive = joint.drive
+        record = {
+            layout.MODES: e,
+            layout.FIRST_MODE: len(free) + places.elastic_of[k].start,
+            layout.JOINT: free.get(k, -1),
+            layout.AXES: len(axes),
+            layout.SLIDES: int(not joint.type.revolute),
+            layout.MOTION: pack.put_curve(drive.motion),
+            layout.LOAD: pack.put_curve(drive.load),
+            layout.FEED: int(drive.feed_forward),
+            layout.EFFORT: int(k in chain.active_joints),
+            layout.MEMORY: memory,
+            layout.STEP: pack.put(_step_parts(joint)),
+            layout.SCREW: pack.put(joint.screw),
+            layout.AXIS: pack.put(axes),
+            layout.MASS: pack.put_columns(mass),
+            layout.X: pack.put_columns(*x),
+            layout.X_BACK: pack.put(x),
+            layout.Z: pack.put_columns(*z_pairs),
+            layout.OUT: pack.put_columns(out),
+            layout.STIFFNESS: pack.put(link.stiffness),
+            layout.DAMPING: pack.put(link.damping),
+            layout.INVERSE: pack.put(elastic_inverse),
+            layout.TOWARDS: pack.put(towards),
+            layout.OUT_TOWARDS: pack.put(out_towards),
+            layout.RIGID_SHARE: pack.put(towards @ mass[6:, :6]),
+            layout.CROSS_SHARE: pack.put(out_towards @ mass[6:, :6]),
+            layout.OUT_SHARE: pack.put(out_towards @ out.T),
+            layout.FORCES: pack.put(_joint_numbers(joint)),
+        }
+        for place, value in record.items():
+            pack.integers[layout.HEADER + k * layout.RECORD + place] = value
+        memory += layout.memory_size(e)
+    header[layout.FEED_FORWARD] = int(chain.needs_feed_forward)
+    return CompiledSystem(
+        size=chain.size,
+        reals=pack.reals,
+        integers=np.array(pack.integers, dtype=np.int64),
+        scratch=np.zeros(memory),
+        residual=equations.residual,
+        mass_matrix=equations.mass_matrix,
+        stiffness_and_damping=equations.stiffness_and_damping,
+        acceleration=equations.acceleration,
+    )

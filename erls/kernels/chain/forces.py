@@ -1,0 +1,160 @@
+"""Inertia forces and weight of one link in the modes [ρ Ψ], with the effects that are on.
+
+The formulas are those of `erls.formulations.link_inertia`. With one axis of rotation, the wrench holds the moment about
+that axis only: no joint feels the others.
+"""
+
+from __future__ import annotations
+
+from erls.kernels.chain import layout as at
+from erls.kernels.chain.linear import add_columns, add_transport, dot
+from erls.kernels.contract import Array, IntArray
+from erls.kernels.jit import helper
+
+
+@helper
+def vector(scratch: Array, memory: int, n: int, number: int) -> Array:
+    """Vector (n,) of a link's memory, by its number in `layout`."""
+    start = memory + at.VECTORS + number * n
+    return scratch[start : start + n]
+
+
+@helper
+def along(reals: Array, axis: int, x: Array, place: int) -> float:
+    """Component of a vector (3,) along an axis."""
+    return reals[axis] * x[place] + reals[axis + 1] * x[place + 1] + reals[axis + 2] * x[place + 2]
+
+
+@helper
+def pair_of(axes: int, i: int, j: int) -> int:
+    """Number of a pair of axes i, j."""
+    return i if i == j or axes == 1 else i + j + 2
+
+
+@helper
+def deform_inertia(reals: Array, integers: IntArray, scratch: Array, record: int) -> None:
+    """X q and Z q of a link for its axes, as far as an effect needs them."""
+    n = 6 + integers[record + at.MODES]
+    memory, axes = integers[record + at.MEMORY], integers[record + at.AXES]
+    skip = 6 if record == at.HEADER else 0  # u = 0 on the ground
+    q = vector(scratch, memory, n, at.Q)[skip:]
+    if integers[at.FIRST_ORDER]:
+        for i in range(axes):
+            xq = vector(scratch, memory, n, at.X_Q + i)
+            xq[:] = 0.0
+            add_columns(reals, integers[record + at.X] + (i * n + skip) * n, n, q, n - skip, 1.0, xq)
+    if integers[at.SECOND_ORDER] or integers[at.SOFTENING]:
+        link = scratch[memory : memory + at.VECTORS]
+        for pair in range(1 if axes == 1 else 6):
+            zq = vector(scratch, memory, n, at.Z_Q + pair)
+            zq[:] = 0.0
+            add_columns(reals, integers[record + at.Z] + (pair * n + skip) * n, n, q, n - skip, 1.0, zq)
+            if integers[at.SECOND_ORDER]:
+                link[at.TURN_MOMENTS + pair] = dot(zq[skip:], q, 0, n - skip)
+
+
+@helper
+def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, accelerated: bool) -> None:
+    """WRENCH, FORCE and the elastic part of MODAL of a link that moves as its memory says.
+
+    Without ``accelerated`` q̈_d is zero.
+    """
+    e = integers[record + at.MODES]
+    n = 6 + e
+    memory, axes = integers[record + at.MEMORY], integers[record + at.AXES]
+    ground = record == at.HEADER
+    skip = 6 if ground else 0
+    link = scratch[memory : memory + at.VECTORS]
+    first, second = integers[at.FIRST_ORDER], integers[at.SECOND_ORDER]
+    coriolis, centrifugal = integers[at.CORIOLIS], integers[at.CENTRIFUGAL]
+    mass, axis = integers[record + at.MASS], integers[record + at.AXIS]
+    q, qd, qdd = vector(scratch, memory, n, 0), vector(scratch, memory, n, 1), vector(scratch, memory, n, 2)
+    modal, wrench, spare = vector(scratch, memory, n, at.MODAL), link[at.WRENCH : at.WRENCH + 6], link[at.POINT :]
+
+    # m ṡ, with the weight as an acceleration of the frame
+    for i in range(6):
+        qdd[i] = link[at.W_RATE + i]
+    for i in range(3):
+        qdd[i] -= link[at.DOWN + i]
+    modal[:] = 0.0
+    add_columns(reals, mass, n, qdd, n if accelerated else 6, 1.0, modal)
+    for i in range(6):
+        wrench[i] = modal[i]
+        qdd[i] = link[at.W_RATE + i]
+    if integers[at.WEIGHT]:  # moment of the displaced mass
+        for i in range(3):
+            spare[i] = 0.0
+        for j in range(skip, n):
+            for i in range(3):
+                spare[i] += reals[mass + j * n + i] * q[j]
+        g0, g1, g2 = link[at.DOWN], link[at.DOWN + 1], link[at.DOWN + 2]
+        wrench[3] -= spare[1] * g2 - spare[2] * g1
+        wrench[4] -= spare[2] * g0 - spare[0] * g2
+        wrench[5] -= spare[0] * g1 - spare[1] * g0
+
+    # momentum of the frame, in spare
+    for i in range(6):
+        spare[i] = 0.0
+    if not ground:
+        for j in range(n):
+            s = qd[j] if j >= 6 else link[at.W + j]
+            for i in range(6):
+                spare[i] += reals[mass + j * n + i] * s
+
+    deform_inertia(reals, integers, scratch, record)
+    for a in range(axes):
+        omega = along(reals, axis + 3 * a, link, at.TWIST + 3)
+        alpha = along(reals, axis + 3 * a, link, at.TWIST_RATE + 3)
+        x = integers[record + at.X] + a * n * n
+        xq, xqd = vector(scratch, memory, n, at.X_Q + a), vector(scratch, memory, n, at.X_RATE + a)
+        if first or coriolis:
+            xqd[:] = 0.0
+            add_columns(reals, x + skip * n, n, qd[skip:], n - skip, 1.0, xqd)
+        if first:
+            for i in range(6):
+                wrench[i] += alpha * xq[i] + omega * xqd[i]
+                spare[i] += omega * xq[i]
+            for i in range(n):
+                modal[i] += alpha * xq[i]
+            # X q · s and its derivative, about the axis
+            spin = spin_rate = 0.0
+            for i in range(6):
+                spin += xq[i] * link[at.W + i]
+                spin_rate += xq[i] * link[at.W_RATE + i] + xqd[i] * link[at.W + i]
+            spin += dot(xq, qd, 6, n)
+            spin_rate += dot(xqd, qd, 6, n)
+            if accelerated:
+                spin_rate += dot(xq, qdd, 6, n)
+            for i in range(3):
+                spare[3 + i] += spin * reals[axis + 3 * a + i]
+                wrench[3 + i] += spin_rate * reals[axis + 3 * a + i]
+        if coriolis:
+            for i in range(n):
+                modal[i] += omega * xqd[i]
+        back = integers[record + at.X_BACK] + a * n * n
+        if coriolis and centrifugal:  # both at once: X_ωᵀ s
+            add_columns(reals, back, n, link[at.W : at.W + 6], 6, -omega, modal)
+            add_columns(reals, back + 6 * n, n, qd[6:], e, -omega, modal)
+        elif coriolis:
+            add_columns(reals, back + skip * n, n, qd[skip:], n - skip, -omega, modal)
+        elif centrifugal:
+            add_columns(reals, back, n, link[at.TWIST : at.TWIST + 6], 6, -omega, modal)
+        if second or integers[at.SOFTENING]:
+            for b in range(axes):
+                pair = pair_of(axes, a, b)
+                zq = vector(scratch, memory, n, at.Z_Q + pair)
+                other = along(reals, axis + 3 * b, link, at.TWIST + 3)
+                if second:
+                    moment = link[at.TURN_MOMENTS + pair]
+                    rate = moment * along(reals, axis + 3 * b, link, at.TWIST_RATE + 3)
+                    rate += 2 * other * dot(zq, qd, skip, n)
+                    for i in range(3):
+                        spare[3 + i] += moment * other * reals[axis + 3 * a + i]
+                        wrench[3 + i] += rate * reals[axis + 3 * a + i]
+                if integers[at.SOFTENING]:
+                    for i in range(n):
+                        modal[i] -= omega * other * zq[i]
+    if not ground:  # on the ground the frame moves along the joint, which does not feel this
+        add_transport(link, at.TWIST, spare, 0, link, at.WRENCH)
+        for i in range(6):
+            link[at.FORCE + i] = modal[i]

@@ -1,0 +1,147 @@
+"""Second-order kinematics of a link in a mechanism: relative to its inboard interface, payloads included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from erls.lie.so3 import Array, skew
+from fe_import.inertia import mass_properties
+from fe_import.modal.model import ModalModel
+from fe_import.model import IntArray
+from fe_import.second_order.composition import composed, composed_rotation, twice_turned
+from fe_import.second_order.data import SecondOrder, pair_numbers
+from fe_import.second_order.moments import of_inertia, of_masses, of_moments
+
+if TYPE_CHECKING:
+    from erls.mechanism.links import Link
+
+
+@dataclass(frozen=True)
+class LinkSecondOrder:
+    """What of second order the equations of motion need of a link with m modal coordinates.
+
+    Displacement and rotation of the inboard interface are linear in the coordinates.
+
+    Attributes
+    ----------
+    momentum, spin : (6, m, m), (3, 3, m, m) arrays
+        See `fe_import.second_order.data.SecondOrder`.
+    model : ModalModel
+    field : SecondOrder
+    inboard : int
+        Its node.
+    """
+
+    momentum: Array
+    spin: Array
+    model: ModalModel
+    field: SecondOrder
+    inboard: int
+
+    def node(self, node: int) -> Array:
+        """(6, m, m) second-order displacement and rotation vector of a node."""
+        found = _node(self.model, self.field, node)
+        arm = self.model.nodes[node] - self.model.nodes[self.inboard]
+        lift = self._inboard
+        found[:3] -= lift[:3] - np.einsum("ij,jab->iab", skew(arm), lift[3:])
+        found[3:] -= lift[3:]
+        return found
+
+    @cached_property
+    def _inboard(self) -> Array:
+        """(6, m, m) of the inboard node, when the reference of the field is elsewhere."""
+        return _node(self.model, self.field, self.inboard)
+
+    def displacements(self, nodes: IntArray, q: Array) -> Array:
+        """(k, 3) second-order displacement of nodes at modal coordinates (m,).
+
+        Nodes without a stored field (inside solids) follow the rigid-body part only.
+        """
+        model, field = self.model, self.field
+        start = model.interface_nodes[field.reference].node
+        first, second = np.triu_indices(len(q) - 6)
+        pairs = q[6:][first] * q[6:][second] * np.where(first == second, 0.5, 1.0)
+        place = np.searchsorted(field.nodes, nodes).clip(0, max(len(field.nodes) - 1, 0))
+        result = np.zeros((len(nodes), 3))
+        known = field.nodes[place] == nodes
+        result[known] = field.translation[place[known]] @ pairs
+        u0, phi = (shape @ q for shape in _rigid_shape(model, start))
+        arm = model.nodes[nodes] - model.nodes[start]
+        moved = model.translation_shapes[nodes] @ q - u0 - np.cross(phi, arm)
+        result += np.cross(phi, moved + np.cross(phi, arm) / 2)
+        if self.inboard != start:
+            lift = 0.5 * self._inboard @ q @ q
+            result -= lift[:3] + np.cross(lift[3:], model.nodes[nodes] - model.nodes[self.inboard])
+        return result
+
+
+def link_second_order(link: Link) -> LinkSecondOrder | None:
+    """Second-order kinematics of a link; None where its modal model holds none."""
+    model = link.model
+    field = model.second_order or (_rigid(model) if model.elastic_modes == 0 else None)
+    if field is None:
+        return None
+    found = LinkSecondOrder(field.momentum, field.spin, model, field, link.inboard.node)
+    momentum, spin = field.momentum.copy(), field.spin.copy()
+    if link.inboard.node != model.interface_nodes[field.reference].node:
+        # what moves linearly is another interface: all points less its second-order rigid motion
+        lift, rigid = found._inboard, model.invariants.rigid_mass_matrix
+        slide = lift[:3] + np.einsum("ij,jab->iab", skew(link.inboard.position), lift[3:])
+        momentum -= np.einsum("ij,jab->iab", rigid, np.concatenate([slide, lift[3:]]))
+        first = np.array([rigid[5, 1], rigid[3, 2], rigid[4, 0]])
+        spin -= of_moments(slide, np.einsum("c,dab->cdab", first, slide))[1]
+        spin -= of_inertia(rigid[3:, 3:], np.zeros((3, model.modes)), lift[3:])[1]
+    for payload in link.payloads:
+        _, phi = _rigid_shape(model, payload.node)
+        motion = found.node(payload.node)
+        centre = motion[:3] - np.einsum("ij,jab->iab", skew(payload.offset), motion[3:])
+        centre = centre + twice_turned(phi, payload.offset)
+        place = model.nodes[payload.node] + payload.offset
+        for terms in (
+            of_masses(np.array([payload.mass]), place[None], centre[None]),
+            of_inertia(payload.inertia, phi, motion[3:]),
+        ):
+            momentum += terms[0]
+            spin += terms[1]
+    return LinkSecondOrder(momentum, spin, model, field, link.inboard.node)
+
+
+def _rigid_shape(model: ModalModel, node: int) -> tuple[Array, Array]:
+    translation, rotation = model.node_shape(node)
+    return translation, np.zeros_like(translation) if rotation is None else rotation
+
+
+def _node(model: ModalModel, field: SecondOrder, node: int) -> Array:
+    """(6, m, m) of a node, relative to the reference of the field."""
+    start = model.interface_nodes[field.reference].node
+    u0, phi = _rigid_shape(model, start)
+    u, theta = _rigid_shape(model, node)
+    arm = model.nodes[node] - model.nodes[start]
+    moved, turned = u - u0 + skew(arm) @ phi, theta - phi
+    moved[:, :6] = turned[:, :6] = 0.0
+    n = model.elastic_modes
+    relative = np.zeros((2, 3, n, n))
+    place = np.flatnonzero(field.nodes == node)
+    if len(place):
+        pairs = pair_numbers(n)
+        relative[0], relative[1] = field.translation[place[0]][:, pairs], field.rotation[place[0]][:, pairs]
+    return np.concatenate(
+        [composed(relative[0], moved, phi, arm), composed_rotation(relative[1], turned, phi)]
+    )
+
+
+def _rigid(model: ModalModel) -> SecondOrder:
+    """Of a rigid link, relative to its first interface."""
+    properties = mass_properties(model.invariants.rigid_mass_matrix)
+    start = model.interface_nodes[0]
+    _, phi = _rigid_shape(model, start.node)
+    centre = properties.centre_of_mass
+    full = twice_turned(phi, centre - start.position)
+    momentum, spin = of_masses(np.array([properties.mass]), centre[None], full[None])
+    turning = of_inertia(properties.inertia, phi, np.zeros_like(full))
+    none = np.zeros((0, 3, 0))
+    return SecondOrder(0, momentum + turning[0], spin + turning[1], np.zeros(0, dtype=np.int64), none, none)

@@ -1,0 +1,48 @@
+"""The second-order field of a reduced link, or why there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fe_import.model import Array, FEModel, IntArray
+from fe_import.second_order.data import SecondOrder
+from fe_import.second_order.frame import frame_second_order
+
+MOST_MODES = 64  # elastic; the field has as many columns as pairs of them
+_STORED_VALUES = 1_000_000  # of the fields of nodes: 8 MB
+
+
+def second_order(model: FEModel, shapes: Array, reference: int) -> tuple[SecondOrder | None, str]:
+    """Second-order field, and what the provenance says about it.
+
+    Parameters
+    ----------
+    model : FEModel
+        In SI.
+    shapes : (d, m) array
+        Mass-orthonormal modes over all nodal components, six rigid-body ones first.
+    reference : int
+        Interface that counts as inboard; fields relative to another follow from it.
+    """
+    count = shapes.shape[1] - 6
+    if count > MOST_MODES:
+        return None, f"not available: more than {MOST_MODES} elastic modes; keep fewer (reduction.elastic_modes)"
+    if model.beams is not None:
+        if not model.beams.is_tree:
+            return None, (
+                "not available: members form a ring; cut it into links joined by loops, or give the link as 'solid'"
+            )
+        return frame_second_order(model, model.beams, shapes, reference, _stored_nodes(model, count)), "from its beams"
+    return None, (
+        "not available: bare matrices have no elements; give the link as 'frame' or 'solid', or split it into "
+        "several links"
+    )
+
+
+def _stored_nodes(model: FEModel, elastic_modes: int) -> IntArray:
+    """Nodes whose fields are kept: all of a small model, else interfaces and nodes with a name of their own."""
+    per_node = 3 * elastic_modes * (elastic_modes + 1)
+    if per_node * len(model.nodes) <= _STORED_VALUES:
+        return np.arange(len(model.nodes), dtype=np.int64)
+    named = [node for name, node in model.node_names.items() if "/" not in name]
+    return np.unique(np.array([*(i.node for i in model.interface_nodes), *named], dtype=np.int64))

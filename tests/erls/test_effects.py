@@ -1,0 +1,292 @@
+"""Selectable physics: the parts of the inertia forces against their formulas, leaving out as if it had never been."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scenes
+
+import erls
+from erls.build import build_mechanism
+from erls.effects import ALL, EFFECTS, conserves_energy, in_order, inconsistencies, named_effects
+from erls.errors import Cause, SceneError
+from erls.formulations.erls import Erls
+from erls.formulations.ffr import Ffr
+from erls.formulations.ffr.body_frame import elastic_basis
+from erls.formulations.ffr.standard_data import StandardData
+from erls.formulations.link_inertia import LinkInertia
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.effects import present, without
+from erls.mechanism.links import Link
+from erls.scene import load_scene
+from fe_import.inertia import InertiaInvariants
+
+INERTIA = tuple(e.name for e in EFFECTS.values() if e.in_equations)
+LINEAR = frozenset({"centrifugal_load", "coriolis", "inertia_first_order"})
+SQUARE = frozenset({"inertia_second_order", "spin_softening"})
+SUBSETS = [frozenset(s) for count in range(len(INERTIA) + 1) for s in combinations(INERTIA, count)]
+ROUNDING = 1e-12  # of the largest force; sums of a few hundred products
+
+
+@pytest.fixture(scope="module")
+def chain(tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
+    """Three flexible links with everything that can be left out."""
+    folder = tmp_path_factory.mktemp("chain")
+    path = scenes.three_links(folder, payloads=[{"point": "end", "mass": 0.3, "offset": [0.02, 0.0, 0.01]}])
+    data = scenes.read_toml(path)
+    data["joints"][0].update(stiffness=3.0, motor={"rotor_inertia": 1e-5, "gear_ratio": 50.0})
+    data["joints"][1].update(damping=0.02, motor={"mass": 0.2})
+    data["joints"][2].update(friction={"force": 0.05})
+    data["links"][1]["damping"] = {"ratio": 0.02}
+    return scenes.mechanism(scenes.write_toml(path, data))
+
+
+def _state(modes: int, seed: int = 3) -> tuple[np.ndarray, ...]:
+    rng = np.random.default_rng(seed)
+    return tuple(rng.standard_normal(n) for n in (6, 6, modes, modes, modes))
+
+
+def _close(found: np.ndarray, expected: np.ndarray, scale: float) -> None:
+    assert np.abs(found - expected).max() <= ROUNDING * scale
+
+
+def _parts(i: InertiaInvariants, state: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
+    """(6 + m,) force of each effect on (frame, modes), from its definition, sums written out."""
+    twist, rate, q, qd, qdd = state
+    v, w, alpha = twist[:3], twist[3:], rate[3:]
+    s0, s, sd = i.rigid @ twist, qd + i.rigid @ twist, qdd + i.rigid @ rate
+    x_w = np.einsum("a,amn->mn", w, i.X)
+    x_alpha = np.einsum("a,amn->mn", alpha, i.X)
+    z = np.einsum("m,abmn,n->ab", q, i.Z, q)
+    z_rate = np.einsum("m,abmn,n->ab", qd, i.Z, q) + np.einsum("m,abmn,n->ab", q, i.Z, qd)
+    nothing = np.zeros(6)
+
+    def frame(momentum: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """d/dt p + ad*(ν) p."""
+        turned = [np.cross(w, momentum[:3]), np.cross(w, momentum[3:]) + np.cross(v, momentum[:3])]
+        return change + np.concatenate(turned)
+
+    first = i.rigid.T @ (x_w @ q), i.rigid.T @ (x_alpha @ q + x_w @ qd)
+    first[0][3:] += np.einsum("m,amn,n->a", s, i.X, q)
+    first[1][3:] += np.einsum("m,amn,n->a", sd, i.X, q) + np.einsum("m,amn,n->a", s, i.X, qd)
+    still = np.zeros(3)
+    second = np.concatenate([still, z @ w]), np.concatenate([still, z @ alpha + z_rate @ w])
+    softening = -np.einsum("a,b,abmn,n->m", w, w, (i.Z + i.Z.transpose(0, 1, 3, 2)) / 2, q)
+    return {
+        "centrifugal_load": np.concatenate([nothing, -x_w.T @ s0]),
+        "coriolis": np.concatenate([nothing, x_w @ qd - x_w.T @ qd]),
+        "inertia_first_order": np.concatenate([frame(*first), x_alpha @ q]),
+        "inertia_second_order": np.concatenate([frame(*second), 0 * q]),
+        "spin_softening": np.concatenate([nothing, softening]),
+    }
+
+
+@pytest.mark.parametrize("on", SUBSETS, ids="+".join)
+def test_inertia_forces_are_the_sum_of_the_effects_that_are_on(chain: Mechanism, on: frozenset[str]) -> None:
+    """The rest is m with itself; the mass matrix is what the forces take of accelerations."""
+    link = chain.links[2]
+    state = _state(len(link.invariants.m))
+    parts = _parts(link.invariants, state)
+    inertia, bare = LinkInertia(link.invariants, on), LinkInertia(link.invariants, frozenset())
+    forces = np.concatenate(inertia.forces(*state))
+    scale = np.abs(forces).max()
+    _close(forces, np.concatenate(bare.forces(*state)) + sum(parts[name] for name in on), scale)
+    _, rate, q, _, qdd = state
+    resting = np.concatenate(inertia.forces(state[0], 0 * rate, q, state[3], 0 * qdd))
+    _close(inertia.mass_matrix(q) @ np.concatenate([rate, qdd]), forces - resting, scale)
+    together = np.concatenate([state[0], state[3]])
+    energy = inertia.kinetic_energy(state[0], q, state[3])
+    assert energy == pytest.approx(0.5 * together @ inertia.mass_matrix(q) @ together, rel=1e-12)
+
+
+@pytest.mark.parametrize("on", SUBSETS, ids="+".join)
+def test_standard_data_hold_the_same_effects(chain: Mechanism, on: frozenset[str]) -> None:
+    """A link whose field is q = B η has the same forces, those on the modes projected by Bᵀ."""
+    link = chain.links[1]
+    for body_frame in ("tangent", "mean-axis"):
+        basis = elastic_basis(link, body_frame)
+        inertia, data = LinkInertia(link.invariants, on), StandardData(link.invariants, basis, on)
+        twist, rate, *fields = _state(basis.shape[1])
+        wrench, modal = inertia.forces(twist, rate, *(basis @ x for x in fields))
+        expected = np.concatenate([wrench, basis.T @ modal])
+        _close(np.concatenate(data.forces(twist, rate, *fields)), expected, np.abs(expected).max())
+        shape = np.block([[np.eye(6), np.zeros((6, basis.shape[1]))], [np.zeros((len(basis), 6)), basis]])
+        mass = shape.T @ inertia.mass_matrix(basis @ fields[0]) @ shape
+        _close(data.mass_matrix(fields[0]), mass, np.abs(mass).max())
+
+
+@pytest.mark.parametrize(("off", "spoilt"), [(LINEAR, "X"), (SQUARE, "Z")])
+def test_what_is_off_is_not_computed(chain: Mechanism, off: frozenset[str], spoilt: str) -> None:
+    """Invariants that nothing asks for may hold anything."""
+    link = chain.links[0]
+    values = {name: getattr(link.invariants, name) for name in ("m", "X", "Z", "rigid")}
+    bad = InertiaInvariants(**{**values, spoilt: np.full_like(values[spoilt], np.nan)})
+    on = frozenset(INERTIA) - off
+    state = _state(len(link.invariants.m))
+    for inertia in (LinkInertia(bad, on), StandardData(bad, np.eye(len(values["m"])), on)):
+        assert all(np.isfinite(part).all() for part in inertia.forces(*state))
+        assert np.isfinite(inertia.mass_matrix(state[2])).all()
+        assert np.isfinite(inertia.kinetic_energy(state[0], *state[2:4]))
+
+
+@pytest.mark.parametrize("kind", [Erls, Ffr])
+def test_equations_keep_mass_matrix_and_forces_together(chain: Mechanism, kind: type) -> None:
+    """M is what the residual takes of accelerations, whatever is left out."""
+    rng = np.random.default_rng(0)
+    for off in (set(), {"inertia_first_order"}, {"inertia_second_order", "coriolis"}, set(INERTIA), {"flexibility"}):
+        equations = kind(without(chain, off))
+        y, v, a = 0.1 * rng.standard_normal((3, equations.size))
+        inertia = equations.residual(0.1, y, v, a) - equations.residual(0.1, y, v, 0 * a)
+        _close(equations.mass_matrix(0.1, y) @ a, inertia, np.abs(inertia).max())
+
+
+def _drift(folder: Path, effects: list[str], formulation: str) -> float:
+    settings = [f"effects={effects}", f"simulation.formulation={formulation}", "simulation.rtol=1e-10"]
+    scene = load_scene(folder / "scene.toml", [*settings, "simulation.integrator=dop853", "simulation.duration=0.1"])
+    run = erls.simulate(scene)
+    assert run.conservative == conserves_energy(set(effects))
+    return float(np.ptp(run.energy(np.linspace(0, run.end, 21)).total))
+
+
+def test_energy_needs_whole_terms(tmp_path: Path) -> None:
+    """With all forces of a term of the kinetic energy, or none, energy is conserved; with a part of them it is not."""
+    scenes.l_link(tmp_path, reduction={"elastic_modes": 3})
+    scenes.l_scene(tmp_path, joints=[{**scenes.L_SCENE["joints"][0], "initial": {"rate_deg": 600.0}}])
+    base = ["gravity", "flexibility"]
+    for formulation in ("erls", "ffr"):
+        for whole in (LINEAR, SQUARE, frozenset()):
+            assert _drift(tmp_path, [*base, *sorted(whole)], formulation) < 1e-7  # of 15 J; tolerance of the integrator
+    assert _drift(tmp_path, [*base, *sorted(SQUARE), "coriolis", "inertia_first_order"], "erls") > 1e-4
+
+
+CHANGED: dict[str, tuple[str, ...]] = {
+    "gravity": ("gravity=[0.0, 0.0, 0.0]",),
+    "modal_damping": ("links.b.damping.ratio=0.0",),
+    "joint_stiffness": ("joints.j1.stiffness=0.0",),
+    "joint_damping": ("joints.j2.damping=0.0",),
+    "joint_friction": ("joints.j3.friction.force=0.0",),
+    "motor_inertia": ("joints.j1.motor.rotor_inertia=0.0",),
+    "payload": ("payloads=[]",),
+    "flexibility": ("links.a.flexible=false", "links.b.flexible=false", "links.c.flexible=false"),
+}
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The scene of ``chain``."""
+    folder = tmp_path_factory.mktemp("scene")
+    path = scenes.three_links(folder, payloads=[{"point": "end", "mass": 0.3, "offset": [0.02, 0.0, 0.01]}])
+    data = scenes.read_toml(path)
+    data["joints"][0].update(stiffness=3.0, motor={"rotor_inertia": 1e-5, "gear_ratio": 50.0})
+    data["joints"][1].update(damping=0.02, motor={"mass": 0.2})
+    data["joints"][2].update(friction={"force": 0.05})
+    data["links"][1]["damping"] = {"ratio": 0.02}
+    return scenes.write_toml(path, data)
+
+
+@pytest.mark.parametrize("name", [e.name for e in EFFECTS.values() if not e.in_equations])
+def test_leaving_out_is_like_a_scene_without(scene_file: Path, name: str) -> None:
+    """The same forces, to the last digit, as those of the scene from which the thing itself was taken out."""
+    less = build_mechanism(load_scene(scene_file, [f"effects=-{name}"])).mechanism
+    never = build_mechanism(load_scene(scene_file, CHANGED[name])).mechanism
+    whole = build_mechanism(load_scene(scene_file)).mechanism
+    assert less.effects == ALL - {name}
+    assert name in present(whole)
+    assert name not in present(less)
+    assert present(never) == present(less)
+    rng = np.random.default_rng(1)
+    state = 0.1 * rng.standard_normal((3, Erls(less).size))
+    for kind in (Erls, Ffr):
+        assert np.array_equal(kind(less).residual(0.0, *state), kind(never).residual(0.0, *state))
+    if name != "flexibility":
+        assert not np.array_equal(Erls(less).residual(0.0, *state), Erls(whole).residual(0.0, *state))
+
+
+def test_payload_leaves_the_motor(scene_file: Path) -> None:
+    """Motors sit on links like payloads, and stay."""
+    mechanism = without(build_mechanism(load_scene(scene_file)).mechanism, {"payload"})
+
+    def bodies(link: Link) -> list[tuple[float, bool]]:
+        return [(p.mass, p.motor) for p in link.payloads]
+
+    assert [bodies(link) for link in mechanism.links] == [[(0.2, True)], [], []]
+
+
+GOOD: tuple[tuple[Any, frozenset[str]], ...] = (
+    ("all", ALL),
+    ("auto", ALL),
+    ("gravity", frozenset({"gravity"})),
+    ("gravity, flexibility", frozenset({"gravity", "flexibility"})),
+    (["gravity", "gravity"], frozenset({"gravity"})),
+    ([], frozenset()),
+    ("-coriolis,-gravity", ALL - {"coriolis", "gravity"}),
+)
+
+
+@pytest.mark.parametrize(("value", "expected"), GOOD, ids=str)
+def test_names(value: Any, expected: frozenset[str]) -> None:
+    """Lists, commas, and all but some."""
+    assert named_effects(value, "here") == expected
+    assert set(in_order(expected)) == expected
+
+
+BAD = [
+    ('"colioris"', Cause.BAD_REFERENCE, "did you mean 'coriolis'?"),
+    ('["gravity", "al"]', Cause.BAD_REFERENCE, "known: gravity"),
+    ('"al"', Cause.BAD_REFERENCE, "did you mean 'all'?"),
+    ('["gravity", "-coriolis"]', Cause.BAD_FIELD, "keep one kind"),
+    ("3", Cause.BAD_FIELD, ""),
+    ("[3]", Cause.BAD_FIELD, ""),
+]
+
+
+@pytest.mark.parametrize(("value", "cause", "remedy"), BAD)
+def test_bad_names(scene_file: Path, value: str, cause: Cause, remedy: str) -> None:
+    """One message with file, field and remedy."""
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file, [f"effects={value}"])
+    assert caught.value.cause == cause
+    assert "simulation.effects" in caught.value.where
+    assert remedy in caught.value.remedy
+
+
+def test_tolerances_are_positive(scene_file: Path) -> None:
+    """Like every other tolerance."""
+    for name in ("effects_tolerance", "effects_effort_tolerance"):
+        with pytest.raises(SceneError) as caught:
+            load_scene(scene_file, [f"simulation.{name}=0.0"])
+        assert caught.value.cause == Cause.BAD_FIELD
+
+
+WARNINGS = [
+    (ALL, "erls", ""),
+    (frozenset({"gravity", "flexibility"}), "erls", ""),
+    (ALL - LINEAR, "erls", ""),
+    (ALL - {"centrifugal_load"}, "erls", "'coriolis', 'inertia_first_order' without 'centrifugal_load'"),
+    (ALL - {"spin_softening"}, "erls", "'inertia_second_order' without 'spin_softening'"),
+    (ALL - {"flexibility"}, "erls", "links are rigid without 'flexibility'"),
+    (frozenset({"gravity"}), "erls", ""),
+    (ALL - {"coriolis"}, "nodal", "no part that is 'coriolis'"),
+    (ALL - {"gravity"}, "nodal", ""),
+]
+
+
+@pytest.mark.parametrize(("effects", "formulation", "text"), WARNINGS)
+def test_sets_that_mislead_are_named(effects: frozenset[str], formulation: str, text: str) -> None:
+    """With the reason; sets that can be meant pass."""
+    found = inconsistencies(effects, formulation)
+    assert len(found) == bool(text)
+    assert all(text in warning for warning in found)
+
+
+def test_warnings_reach_the_run(scene_file: Path) -> None:
+    """And what is on stands in its JSON, in the order of the registry."""
+    scene = load_scene(scene_file, ["effects=-centrifugal_load", "simulation.duration=0.002"])
+    run = erls.simulate(scene)
+    assert any("without 'centrifugal_load'" in w for w in run.warnings)
+    assert run.summary()["effects"] == [name for name in EFFECTS if name != "centrifugal_load"]
+    assert "certified_error" not in run.summary()
