@@ -13,6 +13,7 @@ import numpy as np
 import platformdirs
 
 from erls.build_loops import build_loops
+from erls.build_substructures import piece_links, piece_models, piece_warnings
 from erls.effects import ALL, inconsistencies, named_effects
 from erls.errors import Cause, SceneError
 from erls.lie.se3 import inverse, pose
@@ -62,6 +63,7 @@ def build_mechanism(
     tell: Message = lambda text: None,
     models: Sequence[ModalModel] | None = None,
     descriptions: Sequence[LinkDescription | None] = (),
+    pieces: Sequence[Sequence[ModalModel]] = (),
 ) -> Built:
     """Read or reduce the links and put the mechanism together.
 
@@ -74,6 +76,8 @@ def build_mechanism(
         Modal models of the links, instead of the ones that the scene names (a run file holds its own).
     descriptions : sequence of LinkDescription or None
         With ``models``: descriptions of the links that are made of beams, as far as they are known.
+    pieces : sequence of sequences of ModalModel
+        With ``models``: those of the substructures of each link; empty for a link in one piece.
 
     Raises
     ------
@@ -84,13 +88,19 @@ def build_mechanism(
     joints = _joints(scene)  # first: a faulty one is found before time goes into reductions
     if models is None:
         models, descriptions = link_models(scene, tell), _beam_descriptions(scene)
+        pieces = _pieces(scene, models, tell)
     links = [
         replace(_link(link, model, k, len(models), file), description=description)
         for k, (link, model, description) in enumerate(
             zip(record.links, models, descriptions or [None] * len(models), strict=True)
         )
     ]
+    links = [
+        replace(link, pieces=piece_links(given, link, own, f"{file}: links[{k}]")) if own else link
+        for k, (link, given, own) in enumerate(zip(links, record.links, pieces or [()] * len(links), strict=True))
+    ]
     warnings = [w for joint, link in zip(joints, links, strict=True) for w in _arm_warnings(joint, link)]
+    warnings += [w for link in links for w in piece_warnings(link)]
     points = [_point(scene, k, links) for k in range(len(record.points))]
     links = _with_payloads(scene, links, points)
     chain = Mechanism(
@@ -102,7 +112,7 @@ def build_mechanism(
         static_start=record.initial.deformation == "static",
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
-    chain = without(replace(chain, loops=build_loops(scene, chain)), ALL - effects)
+    chain = without(replace(chain, loops=build_loops(scene, chain), effects=effects), ALL - effects)
     return Built(chain, (*warnings, *inconsistencies(effects, record.simulation.formulation)))
 
 
@@ -138,6 +148,21 @@ def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
         if key not in made:
             made[key] = _modal_model(scene, k, link, tell)
         result.append(made[key])
+    return result
+
+
+def _pieces(scene: Scene, models: Sequence[ModalModel], tell: Message) -> list[tuple[ModalModel, ...]]:
+    """Modal models of the substructures of each link; none for a link in one piece."""
+    result: list[tuple[ModalModel, ...]] = []
+    solves_pieces = scene.record.simulation.formulation != "nodal"
+    for k, (link, model) in enumerate(zip(scene.record.links, models, strict=True)):
+        if link.substructures == 1 or not link.flexible or not solves_pieces:
+            result.append(())
+            continue
+        description = load_link(scene.folder / link.model, {**link.reduction, "form": "orthonormal"})
+        with telling(tell):
+            result.append(piece_models(link, description, model, cache_folder(), f"{scene.path}: links[{k}]"))
+        tell(f"{link.name}: {link.substructures} substructures")
     return result
 
 

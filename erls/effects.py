@@ -30,7 +30,7 @@ class Effect:
     of_links : bool
         Whether it acts on the deformation of links, so that it is nothing while they are rigid.
     energy : str
-        Term of the energy that its forces come from; energy is conserved when all forces of a term are there, or none.
+        Term of the energy that its work comes from; energy is conserved when all forces of a term are there, or none.
     needs : tuple of (str, str)
         Effects without which it is worse than nothing, and why.
     saves : bool
@@ -51,16 +51,17 @@ def _inertia(name: str, summary: str, term: str, *needs: tuple[str, str]) -> Eff
 
 
 _LINEAR, _SQUARE = "linear in the deformation", "quadratic in the deformation"
+_LARGER = ("centrifugal_load", "what turns a link loads it first, and then acts on the deformation")
 
 EFFECTS: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         Effect("gravity", "weight of links and payloads", False),
         _inertia("centrifugal_load", "what the turning undeformed link does to its modes: -X_ωᵀ ρν", _LINEAR),
-        _inertia("coriolis", "forces on the modes from their own rates: X_ω q̇ - X_ωᵀ q̇", _LINEAR),
+        _inertia("coriolis", "forces on the modes from their own rates: X_ω q̇ - X_ωᵀ q̇", "", _LARGER),
         _inertia("inertia_first_order", "mass matrix and frame forces linear in the deformation: X q", _LINEAR),
         _inertia("inertia_second_order", "frame forces quadratic in the deformation: qᵀ Z q", _SQUARE),
-        _inertia("spin_softening", "centrifugal force on the modes, linear in the deformation: -ωᵀ Z ω q", _SQUARE),
+        _inertia("spin_softening", "centrifugal force on the modes, linear in q: -ωᵀ Z ω q", _SQUARE, _LARGER),
         Effect("modal_damping", "damping of the elastic modes", False, of_links=True),
         Effect("joint_stiffness", "springs in joints", False),
         Effect("joint_damping", "viscous damping in joints", False),
@@ -68,20 +69,26 @@ EFFECTS: dict[str, Effect] = {
         Effect("motor_inertia", "rotor inertia reflected to joints", False),
         Effect("payload", "payloads on named points", False),
         Effect("flexibility", "elastic modes of the links", False, saves=True),
+        Effect("geometric_stiffening", "loads on the second-order displacement of links: ½ qᵀΨq", False, of_links=True),
+        Effect("foreshortening", "second-order displacement of reported points and nodes", False, of_links=True),
     )
 }
 
 ALL = frozenset(EFFECTS)
 """Every effect there is."""
 
+DEFAULT = ALL - {"geometric_stiffening", "foreshortening"}
+"""What acts unless a scene says otherwise: links are linear in their own frame."""
+
 
 def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:
-    """Effects that a scene asks for; all of them for ``auto``, which chooses later.
+    """Effects that a scene asks for; for ``auto`` those from which it chooses.
 
     Parameters
     ----------
     value : str or sequence of str
-        ``all``, ``auto``, or names, in a list or separated by commas; names with a minus in front are left out of all.
+        ``all`` (`DEFAULT`), ``auto``, or names in a list or separated by commas. Among names ``all`` stands for all of
+        these, and a minus in front leaves an effect out; names with a minus alone leave them out of all.
     where : str
         Field, for messages.
 
@@ -90,18 +97,19 @@ def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:
     SceneError
         BAD_REFERENCE: unknown name, with a suggestion; BAD_FIELD: names with and without a minus.
     """
-    if value in ("all", "auto"):
-        return ALL
+    if value == "auto":
+        return DEFAULT
     given = [name.strip() for name in value.split(",")] if isinstance(value, str) else list(value)
+    known = ("all", "auto", *EFFECTS) if given == [value] else ("all", *EFFECTS)
     for name in given:
-        choose(name.removeprefix("-"), EFFECTS if len(given) > 1 else ("all", "auto", *EFFECTS), where, SceneError)
-    left_out = {name[1:] for name in given if name.startswith("-")}
-    if not left_out:
-        return frozenset(given)
-    if len(left_out) < len(set(given)):
+        choose(name.removeprefix("-"), known, where, SceneError)
+    off = {name[1:] for name in given if name.startswith("-")}
+    on = {name for name in given if not name.startswith("-")}
+    if off and on and "all" not in on:
         message = "either names of what is on, or, with a minus, of what is off"
-        raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one kind")
-    return ALL - left_out
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one kind, or add 'all'")
+    every = DEFAULT if "all" in on or off else frozenset()
+    return frozenset((every | on) - off - {"all"})
 
 
 def inconsistencies(effects: Set[str], formulation: str = "erls") -> tuple[str, ...]:
@@ -143,3 +151,28 @@ def in_order(effects: Iterable[str]) -> list[str]:
 
 def _list(names: Iterable[str]) -> str:
     return ", ".join(repr(name) for name in names)
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What leaving out effects is estimated to have changed in a run.
+
+    Attributes
+    ----------
+    error : float
+        Of named points [m].
+    effort_error : float or None
+        Of drive forces, relative to their peak; None where no drive reacts.
+    tolerance, effort_tolerance : float
+        Those of the scene.
+    """
+
+    error: float
+    effort_error: float | None
+    tolerance: float
+    effort_tolerance: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether both are within tolerance."""
+        return self.error <= self.tolerance and (self.effort_error or 0.0) <= self.effort_tolerance

@@ -14,6 +14,7 @@ from erls.effects import conserves_energy, in_order
 from erls.errors import Cause, SceneError, SimulationError
 from erls.formulations.base import Energy, Formulation, State
 from erls.formulations.closed_chain import ClosedChain
+from erls.formulations.substructures import solved
 from erls.integrators.base import Solution, hermite
 from erls.lie.so3 import Array
 from erls.scene import Scene
@@ -195,8 +196,9 @@ class Run:
         choose(loop, self.loop_names, "loop", SceneError)
         number = self.loop_names.index(loop)
         _, flat, y, v = self._interpolated(t)
-        assert isinstance(self.formulation, ClosedChain)
-        found = [self.formulation.loop_forces(*at)[number] for at in zip(flat.tolist(), y, v, strict=True)]
+        chain = solved(self.formulation)
+        assert isinstance(chain, ClosedChain)
+        found = [chain.loop_forces(*at)[number] for at in zip(flat.tolist(), y, v, strict=True)]
         shape = (*np.shape(t), 3)
         return np.array([f.force for f in found]).reshape(shape), np.array([f.moment for f in found]).reshape(shape)
 
@@ -262,9 +264,14 @@ def node_positions(
     magnification : float
         Of the elastic and rigid-body displacement against the Equivalent Rigid Link System; 1 is true.
     """
-    model, frame = run.formulation.mechanism.links[link].model, state.poses[link]
+    mechanism = run.formulation.mechanism
+    model, frame = mechanism.links[link].model, state.poses[link]
     if state.nodes is not None:
         undeformed = model.nodes[nodes] @ frame[:3, :3].T + frame[:3, 3]
         return np.asarray(undeformed + magnification * (state.nodes[link][nodes] - undeformed))
-    local = model.nodes[nodes] + magnification * (model.translation_shapes[nodes] @ state.modal[link])
+    moved = model.translation_shapes[nodes] @ state.modal[link]
+    second_order = mechanism.links[link].second_order if "foreshortening" in mechanism.effects else None
+    if second_order is not None:
+        moved = moved + second_order.displacements(np.arange(len(model.nodes))[nodes], state.modal[link])
+    local = model.nodes[nodes] + magnification * moved
     return np.asarray(local @ frame[:3, :3].T + frame[:3, 3])

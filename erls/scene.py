@@ -164,7 +164,9 @@ class Link(_Record, frozen=True):
     ``elastic_modes`` keeps only the lowest ones; ``flexible = false`` none. ``reduction`` replaces fields of that table
     of the link description. ``inboard`` and ``outboard`` name the
     interfaces where the joints sit; the first and the second one unless given. ``damping`` replaces that of the
-    modal file.
+    modal file. ``substructures`` splits a link made of beams into so many rigidly joined pieces, each with a frame of
+    its own that turns with the deformation (formulation ``ffr``; ``nodal`` needs none); mode counts then hold for
+    every piece.
     """
 
     name: str
@@ -173,6 +175,7 @@ class Link(_Record, frozen=True):
     rigid: RigidBody | None = None
     flexible: bool = True
     elastic_modes: int | None = None
+    substructures: int = 1
     reduction: dict[str, Any] = {}
     inboard: str = ""
     outboard: str = ""

@@ -14,7 +14,7 @@ from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joints import JOINT_TYPES
 from erls.mechanism.loops import LOOP_TYPES
 from erls.mechanism.place import LARGEST, LATEST
-from fe_import.link import check_damping
+from fe_import.link_check import check_damping
 from fe_import.toml_file import choose
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         choose(joint.dh.convention, CONVENTIONS, f"{file}: joints[{k}].dh.convention", SceneError)
     for k, link in enumerate(scene.links):
         _check_link(link, f"{file}: links[{k}]")
+        _check_substructures(link, scene.simulation.formulation, f"{file}: links[{k}].substructures")
     for k, point in enumerate(scene.points):
         choose(point.link, [link.name for link in scene.links], f"{file}: points[{k}].link", SceneError)
         if bool(point.node) == (point.position is not None):
@@ -166,6 +167,22 @@ def _check_link(link: Link, place: str) -> None:
         remedy = "give the inboard one at least, points = { root = [0, 0, 0] }"
         raise _bad(f"{place}.rigid.points", "a rigid link needs named points", None, remedy)
     check_names((f"{place}.rigid.points", name) for name in link.rigid.points)
+
+
+def _check_substructures(link: Link, formulation: str, place: str) -> None:
+    if link.substructures < 1:
+        raise _bad(place, "a link has at least one piece", link.substructures, "give 1 or more")
+    if link.substructures == 1:
+        return
+    if not link.model:
+        message = "only a link made of beams can be split, from its description"
+        raise _bad(place, message, link.substructures, "give 'model' with a table [frame], or remove the field")
+    if formulation == "erls" and link.flexible:
+        message = (
+            "ERLS counts all displacements from its rigid links, to first order, so that pieces would change nothing"
+        )
+        remedy = "use formulation = 'ffr', where the frames of the pieces turn with the deformation"
+        raise _bad(place, message, link.substructures, remedy)
 
 
 def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:

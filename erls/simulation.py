@@ -13,6 +13,7 @@ from erls.build import Message, build_mechanism
 from erls.errors import SceneError, SimulationError
 from erls.formulations import FORMULATIONS, formulate, integrator
 from erls.formulations.closed_chain import ClosedChain
+from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
 from erls.mechanism.chain import Mechanism
 from erls.run import Run, node_positions
@@ -85,8 +86,8 @@ def simulate(
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
     formulation = formulate(built.mechanism, settings)
     y, v = formulation.initial_state()
-    if isinstance(formulation, ClosedChain):
-        warn(formulation.warnings)
+    if isinstance(chain := solved(formulation), ClosedChain):
+        warn(chain.warnings)
     options = Options(settings.step, settings.rtol, settings.atol, settings.spectral_radius)
     begun = saved = time.perf_counter()
 

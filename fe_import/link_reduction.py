@@ -60,7 +60,8 @@ class Reduction(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         Which modes are kept when there are more: the lowest ``free-free`` ones, or the span of the lowest with the
         inboard interface ``clamped`` (converges faster once a joint holds that interface).
     inboard : str
-        The interface that ``truncation = "clamped"`` clamps; the first unless given.
+        The interface that ``truncation = "clamped"`` clamps, and that displacements of second order are counted from;
+        the first unless given.
     form : str
         ``orthonormal``, or ``physical`` (interface displacements kept as coordinates; for other programs).
     static_correction : bool
@@ -135,9 +136,10 @@ def check_reduction_options(options: Reduction, interfaces: Collection[str], whe
 
 def _check_physical(options: Reduction, where: str) -> None:
     """The physical form keeps the basis as it is."""
-    for field in ("elastic_modes", "static_correction"):
+    defaults = Reduction()
+    for field in ("elastic_modes", "static_correction", "truncation", "inboard"):
         value = getattr(options, field)
-        if value is not None and value is not False:
+        if value != getattr(defaults, field):
             message = "the physical form keeps the interface displacements and all fixed-interface modes"
             raise _fail(f"{where}.{field}", message, value, "remove it, or use form = 'orthonormal'")
 

@@ -6,7 +6,9 @@ start when they do not fit into memory.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,7 +26,28 @@ __all__ = ["Factorization", "dense_modes", "factorize", "lowest_modes", "modes_b
 
 _DENSE = 600  # below this size LAPACK is faster than Lanczos and finds every mode
 _RESIDUAL = 1e-6  # relative residual of an accepted eigenpair; Lanczos to working precision gives below 1e-9
+_ROUNDING = 10 * np.finfo(float).eps  # of the terms of a product K φ: a slender link's are far larger than their sum
+_GAP = 1e-4  # between ω² of neighbours, per ω²: a narrower one, as within a pair, is no place to count
 _ANNOUNCED = 3.0  # seconds; shorter jobs are done before the message is read
+
+
+class MassMatrix(Protocol):
+    """What is asked of a symmetric positive semidefinite matrix: a sparse one, or one that is not held as such."""
+
+    def __matmul__(self, fields: Array) -> Array: ...
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of a square matrix."""
+
+    def diagonal(self) -> Array:
+        """Not zero where there is mass."""
+
+    def count_nonzero(self) -> int:
+        """Zero when there is no mass."""
+
+    def toarray(self) -> Array:
+        """Dense."""
 
 
 @dataclass(frozen=True)
@@ -97,12 +120,13 @@ def _canonical(matrix: sp.csc_array) -> sp.csc_array:
 
 def lowest_modes(
     stiffness: sp.csc_array,
-    mass: sp.csc_array,
+    mass: MassMatrix,
     count: int,
     what: str,
     *,
     positions: Array | None = None,
     solve: Factorization | None = None,
+    below: Callable[[float], int | None] | None = None,
 ) -> tuple[Array, Array]:
     """Lowest modes of K φ = ω² M φ with K positive definite and M positive semidefinite.
 
@@ -110,7 +134,8 @@ def lowest_modes(
 
     Parameters
     ----------
-    stiffness, mass : (d, d) sparse CSC
+    stiffness : (d, d) sparse CSC
+    mass : (d, d) sparse CSC or another `MassMatrix`
     count : int
     what : str
         Names the link in messages.
@@ -118,6 +143,8 @@ def lowest_modes(
         Where each dof sits, see `factorize`.
     solve : Factorization, optional
         Of the stiffness, if there is one already.
+    below : callable, optional
+        How many modes there are below some ω², or None where that cannot be told; by `modes_below` unless given.
 
     Returns
     -------
@@ -152,7 +179,9 @@ def lowest_modes(
         ) from None
     values = 1 / mu
     force = stiffness @ modes
-    residual = np.linalg.norm(force - mass @ modes * values, axis=0) / np.linalg.norm(force, axis=0)
+    size = np.linalg.norm(force, axis=0)
+    rounding = _ROUNDING * np.linalg.norm(abs(stiffness) @ np.abs(modes), axis=0) / size
+    residual = (np.linalg.norm(force - mass @ modes * values, axis=0) / size - rounding).clip(min=0)
     if residual.max() > _RESIDUAL:
         raise FEImportError(
             Cause.EIGENSOLVER,
@@ -161,23 +190,24 @@ def lowest_modes(
             limit=_RESIDUAL,
             remedy="ask for fewer modes",
         )
-    _check_complete(stiffness, mass, values, what, solve.elimination)
+    elimination = solve.elimination
+    _check_complete(values, what, below or (lambda shift: modes_below(stiffness, mass, shift, elimination=elimination)))
     omega, change = polishing(stiffness, mass, np.sqrt(values), modes)
     return omega, modes @ change
 
 
-def _check_complete(
-    stiffness: sp.csc_array, mass: sp.csc_array, values: Array, what: str, elimination: Elimination
-) -> None:
+def _check_complete(values: Array, what: str, count: Callable[[float], int | None]) -> None:
     """Refuse a spectrum with a gap: Lanczos may miss one of several modes of equal frequency.
 
-    K - λM is counted where the found spectrum leaves most room, above its middle; where there is the second most,
-    should a pivot be too small there.
+    Modes are counted where the found spectrum leaves most room, above its middle if there is any; where there is the
+    second most, should a pivot be too small there.
     """
-    first = len(values) // 2
-    for last in first + np.argsort(-np.diff(np.log(values[first:])), kind="stable")[:2]:
+    gaps, first = np.diff(np.log(values)), len(values) // 2
+    upper, lower = (np.argsort(-part, kind="stable") for part in (gaps[first:], gaps[:first]))
+    wide = [k for k in (*(first + upper), *lower) if gaps[k] > _GAP]
+    for last in wide[:2]:
         shift = float(np.sqrt(values[last] * values[last + 1]))
-        below = modes_below(stiffness, mass, shift, elimination=elimination)
+        below = count(shift)
         if below is None:
             continue
         if below != last + 1:

@@ -11,9 +11,11 @@ from erls.formulations.erls import Erls
 from erls.formulations.ffr import Ffr
 from erls.formulations.ffr.absolute import absolute_generalized_alpha
 from erls.formulations.nodal import Nodal, nodal_generalized_alpha
+from erls.formulations.substructures import Substructured, of_pieces
 from erls.integrators import INTEGRATORS
 from erls.integrators.base import Solution
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.substructures import is_split, split
 from erls.scene import Simulation
 
 TREES: dict[str, Callable[[Mechanism, Simulation], TreeFormulation]] = {
@@ -29,7 +31,10 @@ FORMULATIONS: dict[str, Callable[[Mechanism, Simulation], Formulation]] = {
 
 
 def formulate(mechanism: Mechanism, settings: Simulation) -> Formulation:
-    """Equations of motion of a mechanism; of its chain, tied by its loops."""
+    """Equations of motion of a mechanism; of its chain, tied by its loops; of the pieces of links that are split."""
+    if settings.formulation in TREES and is_split(mechanism):
+        parts = split(mechanism)
+        return Substructured(formulate(parts.pieces, settings), parts)
     if mechanism.loops and settings.formulation in TREES:
         return ClosedChain(TREES[settings.formulation](mechanism, settings))
     return FORMULATIONS[settings.formulation](mechanism, settings)
@@ -39,6 +44,8 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Callable[..., Solu
     """The integrator that the settings name, for what `formulate` makes of the same: chains, loops, or frames tied by
     joints.
     """
+    if settings.formulation in TREES and is_split(mechanism):
+        return of_pieces(integrator(split(mechanism).pieces, settings))
     if settings.formulation == "nodal":
         return nodal_generalized_alpha
     if settings.coordinates == "absolute":

@@ -14,7 +14,14 @@ from erls.lie.so3 import Array, cross, skew
 
 
 def displaced_frame(
-    position: Array, translation: Array, rotation: Array, q: Array, qd: Array, bias: Array, moves: Array
+    position: Array,
+    translation: Array,
+    rotation: Array,
+    q: Array,
+    qd: Array,
+    bias: Array,
+    moves: Array,
+    second_order: Array | None = None,
 ) -> FrameMotion:
     """A node relative to its link's frame.
 
@@ -28,8 +35,16 @@ def displaced_frame(
         Modal coordinates, their rates, and their accelerations when those of the mechanism's coordinates are zero.
     moves : (m, n) array
         Modal rates per rates of the mechanism's coordinates.
+    second_order : (6, m, m) array, optional
+        Ψ of u and φ, which gain ½ qᵀ Ψ q.
     """
-    phi, phi_rate = rotation @ q, rotation @ qd
+    u, phi, curved = translation @ q, rotation @ q, np.zeros(6)
+    if second_order is not None:
+        slope = second_order @ q
+        u, phi = u + slope[:3] @ q / 2, phi + slope[3:] @ q / 2
+        translation, rotation = translation + slope[:3], rotation + slope[3:]
+        curved = (second_order @ qd) @ qd
+    phi_rate = rotation @ qd
     size = 1 + float(phi @ phi) / 4
     tilde = skew(phi)
     turn = np.eye(3) + (tilde + tilde @ tilde / 2) / size
@@ -38,4 +53,6 @@ def displaced_frame(
     rate = jacobian @ bias
     rate[:3] += cross(twist[:3], twist[3:])
     rate[3:] -= twist[3:] * (float(phi @ phi_rate) / (2 * size))
-    return FrameMotion(pose(turn, position + translation @ q), jacobian @ moves, twist, rate)
+    rate[:3] += turn.T @ curved[:3]
+    rate[3:] += (curved[3:] - tilde @ curved[3:] / 2) / size
+    return FrameMotion(pose(turn, position + u), jacobian @ moves, twist, rate)

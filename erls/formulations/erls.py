@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg as la
@@ -26,11 +27,16 @@ from erls.formulations.equilibrium import held_equilibrium
 from erls.formulations.joint_frames import FrameMotion, attached, carried
 from erls.formulations.joint_turn import JointTurn, Motion, joint_turn
 from erls.formulations.link_inertia import LinkInertia, moment_about
+from erls.formulations.second_order import SecondOrderInertia
+from erls.formulations.second_order_compatibility import second_order_compatibility
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism, jacobians, kinematics, poses
-from erls.mechanism.links import node_shape6
+from erls.mechanism.links import Link, node_shape6
 from erls.mechanism.loops import LoopEnd
 from erls.mechanism.rigid_dynamics import inverse_dynamics
+
+if TYPE_CHECKING:
+    from erls.kernels.contract import CompiledSystem
 
 
 @dataclass(frozen=True)
@@ -55,8 +61,12 @@ class Erls:
     def __init__(self, mechanism: Mechanism, gauge: str = "joint-angle") -> None:
         self.mechanism = mechanism
         self.gauge = gauge
-        self.compatibility = Compatibility(mechanism, gauge)
-        self.inertia = [LinkInertia(link.invariants, mechanism.effects) for link in mechanism.links]
+        self.stiffened = "geometric_stiffening" in mechanism.effects and any(
+            link.second_order is not None and link.elastic_modes for link in mechanism.links
+        )
+        kinematics_of = second_order_compatibility if self.stiffened else Compatibility
+        self.compatibility = kinematics_of(mechanism, gauge)
+        self.inertia = [self._inertia(link) for link in mechanism.links]
         self.screws = [joint.screw for joint in mechanism.joints]
         self.joints = len(mechanism.joints)
         self.elastic = sum(link.elastic_modes for link in mechanism.links)
@@ -74,10 +84,25 @@ class Erls:
             if j.forces.active or j.rotor_inertia or j.drive.kind not in ("free", "motion")
         ]
 
+    def _inertia(self, link: Link) -> LinkInertia | SecondOrderInertia:
+        linear = LinkInertia(link.invariants, self.mechanism.effects)
+        if not self.stiffened or link.second_order is None:
+            return linear
+        return SecondOrderInertia(linear, link.invariants.rigid_mass_matrix, link.second_order)
+
     @property
     def size(self) -> int:
         """Number of independent coordinates."""
         return len(self.free)
+
+    @cached_property
+    def compiled(self) -> CompiledSystem | None:
+        """The same equations in compiled form; None in the minimum-norm gauge."""
+        if self.gauge != "joint-angle":
+            return None
+        from erls.formulations.erls_compiled import compile_chain  # here: it imports the compiler
+
+        return compile_chain(self)
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -340,8 +365,15 @@ class Erls:
             move[6:, self.joints + at.start : self.joints + at.stop] = np.eye(at.stop - at.start)
             model = self.mechanism.links[k].model
             shapes = node_shape6(model, node)
+            second = self.mechanism.links[k].second_order if self.stiffened else None
             local = displaced_frame(
-                model.nodes[node], *shapes, motion.q[modes], motion.qd[modes], bias[modes], move
+                model.nodes[node],
+                *shapes,
+                motion.q[modes],
+                motion.qd[modes],
+                bias[modes],
+                move,
+                None if second is None else second.node(node),
             )
             rows = np.hstack([turning[k], np.zeros((6, self.elastic))])
             link = FrameMotion(

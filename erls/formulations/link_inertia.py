@@ -14,8 +14,8 @@ s₀ = ρ ν, X_ω = Σ_a ω_a X_a and α = ω̇:
 - ``inertia_second_order``: all of Z in the frame's wrench;
 - ``spin_softening``: -Σ_ab ω_a ω_b Z_ab q on the modes.
 
-The first three come from the second term of T, the others from the third: energy is conserved when each term is there
-with all its forces or with none.
+The first three come from the second term of T, the others from the third. Energy is conserved when each term is there
+with all forces that do work, or with none; ``coriolis`` does none.
 """
 
 from __future__ import annotations

@@ -43,9 +43,20 @@ class Recorder:
         self._t[k] = t
         self._count = k + 1  # last, so that an interrupt never leaves half a knot
 
-    def accept(self, t: float) -> None:
-        """Count an accepted step, whose knots were added, and tell the observer."""
-        self.work.steps += 1
+    def extend(self, t: Array, knots: Array) -> None:
+        """Add knots (k, 3, n) of y, v, a at the ends ``t`` (k,) of accepted steps, and tell the observer."""
+        start, count = self._count, len(t)
+        while start + count > len(self._t):
+            self._t = np.concatenate([self._t, np.empty(len(self._t))])
+            self._knots = np.concatenate([self._knots, np.empty_like(self._knots)])
+        self._t[start : start + count], self._knots[start : start + count] = t, knots
+        self._count = start + count
+        if count:
+            self.accept(float(t[-1]), count)
+
+    def accept(self, t: float, steps: int = 1) -> None:
+        """Count accepted steps, whose knots were added, and tell the observer."""
+        self.work.steps += steps
         if self._observer is not None:
             self._observer(t, self.solution)
 

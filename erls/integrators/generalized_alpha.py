@@ -20,6 +20,7 @@ made when the iterations beyond those that a fresh one needed add up to that cos
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
@@ -36,11 +37,19 @@ from erls.integrators.base import (
 )
 from erls.integrators.driver import Recorder, integrate_legs, not_finite
 
+if TYPE_CHECKING:
+    from erls.kernels.contract import CompiledSystem
+
 MAX_HALVINGS = 12
 MAX_ITERATIONS = 10
 REFRESH_COST = 4  # of a fresh iteration matrix, in residuals
 _ROUNDING = 16 * np.finfo(float).eps
 _SLOWEST_KNOWN, _FASTEST_TRUSTED = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
+_SINGULAR = "the iteration matrix is singular"
+
+
+def _slow(before: float, size: float, goal: float) -> str:
+    return f"corrections of {before:.3g} m and {size:.3g} m do not shrink to {goal:.3g} m"
 
 
 def generalized_alpha(
@@ -60,7 +69,9 @@ def generalized_alpha(
     capacity = int(min((times[1] - times[0]) / step, 1e6)) + 2 if times[1] > times[0] else 2
     recorder = Recorder(system.size, observer, capacity + 2 * len(system.breakpoints))
     stepper = _Stepper(system, options, step, recorder)
-    return integrate_legs(system, times, y, v, recorder, stepper.advance)
+    compiled = getattr(system, "compiled", None) if system.size else None
+    advance = stepper.advance if compiled is None else _Compiled(stepper, compiled).advance
+    return integrate_legs(system, times, y, v, recorder, advance)
 
 
 class _Stepper:
@@ -147,7 +158,7 @@ class _Stepper:
         self.work.factorizations += 1
         self.factored = info == 0
         if not self.factored:
-            self.suspect, self.reason = np.zeros(len(y)), "the iteration matrix is singular"
+            self.suspect, self.reason = np.zeros(len(y)), _SINGULAR
             self.suspect[info - 1] = 1.0
         self.rate, self.usual, self.excess = _SLOWEST_KNOWN, MAX_ITERATIONS, 0
         return self.factored
@@ -208,7 +219,7 @@ class _Stepper:
                 break
             before = size
         self.suspect = correction
-        self.reason = f"corrections of {before:.3g} m and {size:.3g} m do not shrink to {goal:.3g} m"
+        self.reason = _slow(before, size, goal)
         return False
 
     def failure(self, t: float) -> SimulationError:
@@ -225,3 +236,45 @@ class _Stepper:
             remedy="check forces and stiffness that act on this coordinate, for jumps without breakpoint "
             "first; then try a smaller step or a larger Newton tolerance",
         )
+
+
+class _Compiled:
+    """The same steps, taken by the compiled loop (`erls.kernels.stepping.generalized_alpha`)."""
+
+    def __init__(self, stepper: _Stepper, system: CompiledSystem) -> None:
+        from erls.integrators.generalized_alpha_compiled import Chunks, loop  # here: it imports the compiler
+
+        self.stepper, self.loop = stepper, loop
+        known = {
+            loop.ALPHA_M: stepper.alpha_m,
+            loop.ALPHA_F: stepper.alpha_f,
+            loop.GAMMA: stepper.gamma,
+            loop.BETA: stepper.beta,
+            loop.ASKED: stepper.asked_tolerance,
+            loop.SLOWEST: _SLOWEST_KNOWN,
+            loop.FASTEST: _FASTEST_TRUSTED,
+            loop.ROUNDING: _ROUNDING,
+            loop.RATE: _SLOWEST_KNOWN,
+        }
+        counts = {
+            loop.MAX_HALVINGS: MAX_HALVINGS,
+            loop.MAX_ITERATIONS: MAX_ITERATIONS,
+            loop.REFRESH_COST: REFRESH_COST,
+            loop.USUAL: MAX_ITERATIONS,
+        }
+        self.chunks = Chunks(system, known, counts, stepper.metres)
+
+    def advance(self, leg: Leg, y: Array, v: Array, a: Array, recorder: Recorder) -> tuple[Array, Array]:
+        """See `_Stepper.advance`."""
+        loop, chunks, stepper = self.loop, self.chunks, self.stepper
+        count = max(1, math.ceil((leg.end - leg.start) / stepper.step * (1 - 1e-9)))
+        if chunks.advance(leg, count, y, v, a, recorder):
+            return chunks.state[loop.Y].copy(), chunks.state[loop.V].copy()
+        known, reason = chunks.known, chunks.counts[loop.REASON]
+        stepper.h, stepper.suspect = float(known[loop.H]), chunks.state[loop.CORRECTION]
+        stepper.reason = (
+            _SINGULAR
+            if reason == loop.SINGULAR
+            else _slow(float(known[loop.BEFORE]), float(known[loop.SIZE]), float(known[loop.GOAL]))
+        )
+        raise stepper.failure(float(known[loop.LAST]))

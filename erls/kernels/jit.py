@@ -41,18 +41,23 @@ def helper(function: F) -> F:
     return _njit(function) if ENABLED else function
 
 
+def part(function: F) -> F:
+    """A helper without a way in from Python, which would take a third of its compilation."""
+    return _njit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True) if ENABLED else function
+
+
 def kernel(signature: Any) -> Callable[[F], F]:
     """A function with a fixed signature (of `erls.kernels.contract`), compiled when its module is imported."""
     return lambda function: _njit(function, signature) if ENABLED else function
 
 
-def _njit(function: Any, *signature: Any) -> Any:
+def _njit(function: Any, *signature: Any, **options: bool) -> Any:
     import numba
 
     before = numba.config.CACHE_DIR
     subpackage = function.__module__.removeprefix(f"{__package__}.").partition(".")[0]
     numba.config.CACHE_DIR = str(folder(subpackage))
     try:
-        return numba.njit(*signature, cache=True, error_model="numpy", nogil=True)(function)
+        return numba.njit(*signature, cache=True, error_model="numpy", nogil=True, **options)(function)
     finally:
         numba.config.CACHE_DIR = before

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.effects import ALL
+from erls.effects import DEFAULT
 from erls.lie.se3 import joint_pose, twist_cross, twist_transform
 from erls.lie.so3 import Array
 from erls.mechanism.joints import Joint
@@ -54,7 +54,7 @@ class Mechanism:
     gravity: Array
     static_start: bool = False
     loops: tuple[Loop, ...] = ()
-    effects: frozenset[str] = ALL
+    effects: frozenset[str] = DEFAULT
 
 
 @dataclass(frozen=True)

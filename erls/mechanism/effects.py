@@ -66,7 +66,8 @@ def _link_without(link: Link, off: Set[str]) -> Link:
     if "modal_damping" in off:
         link = replace(link, damping=np.zeros_like(link.damping))
     if "flexibility" in off and link.elastic_modes:
-        link = replace(link, model=truncated(link.model, 0), stiffness=np.zeros(0), damping=np.zeros(0))
+        link = replace(link, model=truncated(link.model, 0), stiffness=np.zeros(0), damping=np.zeros(0), pieces=())
+    link = replace(link, pieces=tuple(_link_without(piece, off) for piece in link.pieces))
     if {"payload", "flexibility"}.isdisjoint(off):
         return link
     payloads = tuple(p for p in link.payloads if p.motor or "payload" not in off)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as la
 
 from erls.lie.se3 import pose, twist_transform
 from erls.lie.so3 import Array, skew
+from erls.mechanism.second_order import LinkSecondOrder, link_second_order
 from fe_import.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.link import LinkDescription
 from fe_import.modal.file import FixedInterfaceModes, ModalModel
@@ -50,6 +52,8 @@ class Link:
         Already within ``invariants``.
     description : LinkDescription or None
         Of a link made of beams, for formulations with elements of their own.
+    pieces : tuple of Link
+        Substructures that a modal formulation solves for instead, without payloads; empty for a link in one piece.
     """
 
     name: str
@@ -61,11 +65,17 @@ class Link:
     damping: Array
     payloads: tuple[Payload, ...] = ()
     description: LinkDescription | None = None
+    pieces: tuple[Link, ...] = ()
 
     @property
     def elastic_modes(self) -> int:
         """Number of elastic coordinates."""
         return len(self.stiffness)
+
+    @cached_property
+    def second_order(self) -> LinkSecondOrder | None:
+        """Second-order kinematics relative to the inboard interface; None where the modal model holds none."""
+        return link_second_order(self)
 
     def interface_shape(self, interface: InterfaceNode, frame: Array) -> Array:
         """(6, m) displacement and rotation of a frame that moves rigidly with an interface, per modal coordinate.

@@ -2,7 +2,8 @@
 
 Each shape is one record, which a scene selects by ``shape = "..."``, and its ``build``, which checks the
 numbers and returns a `Curve`. To add a shape: one record with ``build``, one name in `Motion`, one row in the
-table of ``tests/erls/test_profiles.py``. A motion is continuous, and its end values hold outside.
+table of ``tests/erls/test_profiles.py``. A motion is continuous, and its end values hold outside (after ``spin_up``
+the rate).
 Times in s; coordinates in rad, at a prismatic joint in m, where fields in degrees are refused.
 """
 
@@ -14,7 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from erls.mechanism.curves import Curve, Harmonic, Piecewise, piecewise, spline
+from erls.mechanism.curves import Curve, Harmonic, Piecewise, Sum, piecewise, spline
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import ProfileRecord
 from erls.mechanism.tables import samples
@@ -117,6 +118,53 @@ class Sine(ProfileRecord, frozen=True, tag="sine"):
         )
 
 
+class SpinUp(ProfileRecord, frozen=True, tag="spin_up"):
+    """From rest to a rate that then holds without end.
+
+    With x the share of the ramp that has passed, the rate is rate · s(x): ``polynomial`` takes the s of a motion from
+    rest to rest of that degree, ``sine`` x - sin(2πx)/2π, whose slope is a whole wave.
+
+    rate: rate that is reached, rad/s or m/s.
+    rate_deg: the same in degrees per second.
+    duration: how long it takes to reach it, s.
+    from: coordinate before, rad or m; 0 unless given.
+    from_deg: the same in degrees.
+    start: time at which it starts, s.
+    ramp: "polynomial" or "sine".
+    degree: of the polynomial, 3 (acceleration has kinks at the ends), 5 or 7.
+    """
+
+    duration: float
+    rate: float | None = None
+    rate_deg: float | None = None
+    from_: float | None = msgspec.field(name="from", default=None)
+    from_deg: float | None = None
+    start: float = 0.0
+    ramp: str = "polynomial"
+    degree: int | None = None
+
+    def build(self, place: Place) -> Curve:
+        """Check and build."""
+        start, span = place.time("start", self.start), place.span("duration", self.duration)
+        rate = place.quantity("rate", self.rate, self.rate_deg)
+        standing = self.from_ is None and self.from_deg is None
+        first = 0.0 if standing else place.quantity("from", self.from_, self.from_deg)
+        knots = [start, start + span]
+        if place.choice("ramp", self.ramp, ("polynomial", "sine")) == "sine":
+            if self.degree is not None:
+                raise place.error("degree", "a sine has none", self.degree, remedy="remove it")
+            swing, omega = rate * span / (2 * math.pi) ** 2, 2 * math.pi / span
+            low = first - swing
+            pieces = [[low], [low, 0.0, rate / (2 * span)], [low + rate * span / 2, rate]]
+            wave = Harmonic(tuple(knots), swing, omega, math.pi / 2, 0.0, before=swing, after=swing)
+            return Sum((piecewise(knots, pieces), wave))
+        degree = place.choice("degree", 7 if self.degree is None else self.degree, tuple(_REST_TO_REST))
+        shape = np.array(_REST_TO_REST[degree])
+        powers = np.arange(1, len(shape) + 1)
+        ramp = np.concatenate([[first], rate * shape / powers / span ** (powers - 1)])
+        return piecewise(knots, [[first], ramp, [first + rate * span / 2, rate]])
+
+
 class MotionTable(ProfileRecord, frozen=True, tag="table"):
     """A motion through at least 4 samples, by a cubic spline with continuous rate and acceleration.
 
@@ -153,7 +201,7 @@ class MotionTable(ProfileRecord, frozen=True, tag="table"):
         return spline(t, v * (math.pi / 180.0) if self.degrees else v, rates)
 
 
-Motion = Polynomial | Waypoints | Sine | MotionTable
+Motion = Polynomial | Waypoints | Sine | SpinUp | MotionTable
 """Shapes of a joint coordinate (rad or m), with two derivatives."""
 
 

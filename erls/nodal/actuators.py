@@ -54,16 +54,16 @@ class Actuators:
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
         self.joints = tuple(a.joint for a in actuators)
-        self._leads = tuple(a.lead for a in actuators)
+        self.leads = tuple(a.lead for a in actuators)
         self.nodes: IntArray = np.array([a.nodes for a in actuators], dtype=np.int64)
-        self._inner = np.array([a.inner_frame for a in actuators])
-        self._outer = np.array([a.outer_frame for a in actuators])
-        self._of_inner, self._of_outer = motions.adjoint_inverse(self._inner), motions.adjoint_inverse(self._outer)
+        self.inner_frames = np.array([a.inner_frame for a in actuators])
+        self.outer_frames = np.array([a.outer_frame for a in actuators])
+        self._of_inner, self._of_outer = motions.adjoint_inverse(self.inner_frames), motions.adjoint_inverse(self.outer_frames)
         self.along: IntArray = np.array([5 if j.type.revolute else 2 for j in self.joints], dtype=np.int64)
         self.start = Turned(np.array([j.position for j in self.joints]), np.zeros(0))
         self.rotors = np.array([j.rotor_inertia for j in self.joints])
         self._pick = np.eye(6)[self.along][:, None, :]
-        self._acting = [
+        self.acting = [
             k for k, j in enumerate(self.joints) if j.forces.active or j.drive.kind not in ("free", "motion")
         ]
 
@@ -98,9 +98,9 @@ class Actuators:
     def efforts(self, t: float, angles: Array, rates: Array) -> Array:
         """(e,) forces on the joint coordinates; zero for what a prescribed motion takes."""
         result = np.zeros(len(self.joints))
-        for k in self._acting:
+        for k in self.acting:
             joint, angle, rate = self.joints[k], float(angles[k]), float(rates[k])
-            torque = joint.drive.torque(t, angle, rate) + self._leads[k](t)
+            torque = joint.drive.torque(t, angle, rate) + self.leads[k](t)
             result[k] = joint.drive.limited(torque) + joint.forces.force(angle, rate)
         return result
 
@@ -120,7 +120,7 @@ class Actuators:
     ) -> tuple[Array, Array]:
         """(e, 6k, 6k) twice: springs and proportional gains; dampers, friction and derivative gains."""
         stiffness, damping = np.zeros((2, len(self.joints)))
-        for k in self._acting:
+        for k in self.acting:
             joint = self.joints[k]
             passive, active = joint.forces.gains(float(memory.rows[k] @ v[k])), joint.drive.gains
             stiffness[k], damping[k] = passive[0] + active[0], passive[1] + active[1]
@@ -136,8 +136,8 @@ class Actuators:
         return 0.5 * float(self.rotors @ rates**2), 0.5 * springs
 
     def _relative(self, poses: Array) -> Array:
-        inner = poses[:, 0] @ self._inner if self.nodes.shape[1] == 2 else self._inner
-        result: Array = motions.inverse(inner) @ poses[:, -1] @ self._outer
+        inner = poses[:, 0] @ self.inner_frames if self.nodes.shape[1] == 2 else self.inner_frames
+        result: Array = motions.inverse(inner) @ poses[:, -1] @ self.outer_frames
         return result
 
 

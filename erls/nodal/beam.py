@@ -110,19 +110,24 @@ class Beams:
 
     def __init__(self, beams: Sequence[Beam], poses: Array, gravity: Array) -> None:
         self.nodes: IntArray = np.array([b.nodes for b in beams], dtype=np.int64).reshape(-1, 2)
-        self._frames = motions.inverse(poses[self.nodes]) @ np.array([b.frames for b in beams]).reshape(-1, 2, 4, 4)
-        carried = motions.adjoint_inverse(self._frames)
+        self.frames = motions.inverse(poses[self.nodes]) @ np.array([b.frames for b in beams]).reshape(-1, 2, 4, 4)
+        carried = motions.adjoint_inverse(self.frames)
         self._carry = carried[:, 0], carried[:, 1]  # node twists to section twists
-        self._built = self.remember(poses[self.nodes], None).d
-        self.length: Array = np.linalg.norm(self._built[:, :3], axis=1)
-        self._stiffness = np.array([b.section.stiffness for b in beams]).reshape(-1, 6, 6) / self.length[:, None, None]
-        self._inertia = np.array([b.section.inertia for b in beams]).reshape(-1, 6, 6) * self.length[:, None, None]
+        self.built = self.remember(poses[self.nodes], None).d
+        self.length: Array = np.linalg.norm(self.built[:, :3], axis=1)
+        self.stiffness = np.array([b.section.stiffness for b in beams]).reshape(-1, 6, 6) / self.length[:, None, None]
+        self.inertia = np.array([b.section.inertia for b in beams]).reshape(-1, 6, 6) * self.length[:, None, None]
         self._gravity = np.asarray(gravity, dtype=float)
-        self._moving = bool(self._inertia.any())
+        self._moving = bool(self.inertia.any())
+
+    @property
+    def gravity(self) -> Array:
+        """(3,) [m/s²]"""
+        return self._gravity
 
     def remember(self, poses: Array, before: Bent | None) -> Bent:
         """Interpolation at node poses (e, 2, 4, 4)."""
-        sections = poses @ self._frames
+        sections = poses @ self.frames
         relative = motions.inverse(sections[:, 0]) @ sections[:, 1]
         d = motions.log(relative) if before is None else motions.log_near(relative, before.d)
         second = motions.tangent_inverse(d)
@@ -135,26 +140,26 @@ class Beams:
 
     def strains(self, memory: Bent) -> Array:
         """(e, 6) [γ; κ]."""
-        result: Array = (memory.d - self._built) / self.length[:, None]
+        result: Array = (memory.d - self.built) / self.length[:, None]
         return result
 
     def section_forces(self, memory: Bent) -> Array:
         """(e, 6) forces [N] and moments [N m] in the section's axes."""
-        return _times(self._stiffness, memory.d - self._built)
+        return _times(self.stiffness, memory.d - self.built)
 
     def elastic_energy(self, memory: Bent) -> float:
         """Of all elements [J]."""
-        return float((self.section_forces(memory) * (memory.d - self._built)).sum()) / 2
+        return float((self.section_forces(memory) * (memory.d - self.built)).sum()) / 2
 
     def sections_at(self, poses: Array, memory: Bent, elements: IntArray, fractions: Array) -> Array:
         """(p, 4, 4) sections of elements (p,), at these fractions (p,) of their lengths, at node poses (e, 2, 4, 4)."""
         ahead = motions.exp(fractions[:, None] * memory.d[elements])
-        result: Array = poses[elements, 0] @ self._frames[elements, 0] @ ahead
+        result: Array = poses[elements, 0] @ self.frames[elements, 0] @ ahead
         return result
 
     def mass(self, poses: Array, memory: Bent) -> Array:
         """(e, 12, 12) Σ w Qᵀ M Q."""
-        return _summed(_turned(memory.shape) @ self._inertia @ memory.shape)
+        return _summed(_turned(memory.shape) @ self.inertia @ memory.shape)
 
     def forces(self, t: float, poses: Array, memory: Bent, v: Array, a: Array) -> Array:
         """(e, 12) internal forces and inertia less weight."""
@@ -166,8 +171,8 @@ class Beams:
         if v.any():
             push += self._bias(memory, v)
         push[..., :3] -= self._weight(poses, memory)
-        turning = _times(_turned(motions.bracket(twist)), _times(self._inertia, twist))
-        inertia = _times(self._inertia, push) - turning
+        turning = _times(_turned(motions.bracket(twist)), _times(self.inertia, twist))
+        inertia = _times(self.inertia, push) - turning
         result: Array = internal + (_WEIGHTS * _times(_turned(memory.shape), inertia)).sum(axis=0)
         return result
 
@@ -175,7 +180,7 @@ class Beams:
         self, t: float, poses: Array, memory: Bent, v: Array, a: Array, material: bool = False
     ) -> tuple[Array, Array]:
         """(e, 12, 12) twice: internal forces, turning weight; gyroscopic forces."""
-        stiffness = _turned(memory.rows) @ self._stiffness @ memory.rows
+        stiffness = _turned(memory.rows) @ self.stiffness @ memory.rows
         if not material:
             stiffness += self._geometric(memory) @ memory.rows
         if not self._moving:
@@ -184,17 +189,17 @@ class Beams:
         twist = _times(shape, v)
         tilt = np.zeros((*twist.shape, 6))
         tilt[..., :3, 3:] = -skews(self._weight(poses, memory))
-        stiffness += _summed(_turned(shape) @ self._inertia @ tilt @ shape)
-        spin = _turned(motions.bracket(twist)) @ self._inertia + motions.cobracket(_times(self._inertia, twist))
+        stiffness += _summed(_turned(shape) @ self.inertia @ tilt @ shape)
+        spin = _turned(motions.bracket(twist)) @ self.inertia + motions.cobracket(_times(self.inertia, twist))
         return stiffness, -_summed(_turned(shape) @ spin @ shape)
 
     def energy(self, t: float, poses: Array, memory: Bent, v: Array) -> tuple[float, float]:
         """Kinetic; elastic and that of gravity."""
         elastic = self.elastic_energy(memory)
         twist = _times(memory.shape, v)
-        kinetic = float((_WEIGHTS * twist * _times(self._inertia, twist)).sum()) / 2
-        places = (poses[:, 0] @ self._frames[:, 0] @ memory.turn)[..., :3, 3]
-        gravity = -float((_WEIGHTS[..., 0] * self._inertia[:, 0, 0] * (places @ self._gravity)).sum())
+        kinetic = float((_WEIGHTS * twist * _times(self.inertia, twist)).sum()) / 2
+        places = (poses[:, 0] @ self.frames[:, 0] @ memory.turn)[..., :3, 3]
+        gravity = -float((_WEIGHTS[..., 0] * self.inertia[:, 0, 0] * (places @ self._gravity)).sum())
         return kinetic, elastic + gravity
 
     def _geometric(self, memory: Bent) -> Array:
@@ -219,7 +224,7 @@ class Beams:
 
     def _weight(self, poses: Array, memory: Bent) -> Array:
         """(3, e, 3) gravity in the axes of the sections."""
-        axes = poses[:, 0, :3, :3] @ self._frames[:, 0, :3, :3] @ memory.turn[..., :3, :3]
+        axes = poses[:, 0, :3, :3] @ self.frames[:, 0, :3, :3] @ memory.turn[..., :3, :3]
         result: Array = _turned(axes) @ self._gravity
         return result
 

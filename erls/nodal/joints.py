@@ -146,7 +146,7 @@ class JointRows:
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         self.joints = tuple(joints)
-        sides = [((j.inner, j.inner_frame), (j.outer, j.outer_frame))[:: self._sign(j)] for j in joints]
+        sides = [((j.inner, j.inner_frame), (j.outer, j.outer_frame))[:: self.sign(j)] for j in joints]
         self.nodes: IntArray = np.array([[i, o] for (i, _), (o, _) in sides], dtype=np.int64).reshape(-1, 2)
         self._inner = np.array([frame for (_, frame), _ in sides]).reshape(-1, 4, 4)
         self._outer = np.array([frame for _, (_, frame) in sides]).reshape(-1, 4, 4)
@@ -155,17 +155,28 @@ class JointRows:
         found = [(k, *condition) for k, joint in enumerate(joints) for condition in joint.conditions]
         self.joint_of_row: IntArray = np.array([k for k, *_ in found], dtype=np.int64)
         self.names = tuple(f"joint {joints[k].name!r}: {name}" for k, name, _, _ in found)
-        self._c = np.array([c for _, _, c, _ in found]).reshape(-1, 3)
-        self._entries = np.array([e for _, _, _, e in found]).reshape(-1, 3, 3)
-        turned = [j.type == "universal" and self._sign(j) < 0 for j in joints]  # its two axes differ
+        self.c = np.array([c for _, _, c, _ in found]).reshape(-1, 3)
+        self.entries = np.array([e for _, _, _, e in found]).reshape(-1, 3, 3)
+        turned = [j.type == "universal" and self.sign(j) < 0 for j in joints]  # its two axes differ
         for row, k in enumerate(self.joint_of_row):
             if turned[k]:
-                self._entries[row] = self._entries[row].T.copy()
+                self.entries[row] = self.entries[row].T.copy()
         self._driven = [k for k, joint in enumerate(joints) if joint.motion is not None]
 
     @staticmethod
-    def _sign(joint: Joint) -> int:
+    def sign(joint: Joint) -> int:
+        """-1 where the ground, as the inner frame, changes places with the outer one."""
         return -1 if joint.inner == GROUND else 1
+
+    @staticmethod
+    def driven_along(joint: Joint) -> int:
+        """Row of the relative twist that is prescribed, or -1."""
+        return -1 if joint.motion is None else _DRIVEN[joint.type]
+
+    @property
+    def frames(self) -> tuple[Array, Array]:
+        """(j, 4, 4) twice: poses of the inner and outer frames in their nodes, or in the world for the ground."""
+        return self._inner, self._outer
 
     def relative(self, t: float, inner: Array, outer: Array) -> Relative:
         """At node poses (j, 4, 4)."""
@@ -176,7 +187,7 @@ class JointRows:
             for k in self._driven:
                 motion, at = self.joints[k].motion, _DRIVEN[self.joints[k].type]
                 if motion is not None:
-                    coordinate = self._sign(self.joints[k]) * np.array(motion(t))
+                    coordinate = self.sign(self.joints[k]) * np.array(motion(t))
                     ahead[k, at], drive[k, at], rate[k, at] = coordinate
             moved = motions.exp(ahead)
             transform, frame = motions.adjoint_inverse(moved) @ transform, frame @ moved
@@ -184,8 +195,8 @@ class JointRows:
         back, of_row = motions.adjoint_inverse(pose), self.joint_of_row
         turn = np.swapaxes(pose[of_row, :3, :3], 1, 2)
         by_twist = np.empty((len(self.names), 6))
-        by_twist[:, :3] = (turn @ self._c[:, :, None])[:, :, 0]
-        by_twist[:, 3:] = _axial(turn @ self._entries)
+        by_twist[:, :3] = (turn @ self.c[:, :, None])[:, :, 0]
+        by_twist[:, 3:] = _axial(turn @ self.entries)
         gradient = np.empty((len(self.names), 12))
         gradient[:, :6] = -(by_twist[:, None, :] @ (back @ transform)[of_row])[:, 0]
         gradient[:, 6:] = (by_twist[:, None, :] @ self._of_outer[of_row])[:, 0]
@@ -194,8 +205,8 @@ class JointRows:
     def violation(self, relative: Relative) -> Array:
         """(m,) Φ."""
         d = relative.pose[self.joint_of_row]
-        shift = (self._c * d[:, :3, 3]).sum(axis=1)
-        result: Array = shift + (self._entries * d[:, :3, :3]).sum(axis=(1, 2))
+        shift = (self.c * d[:, :3, 3]).sum(axis=1)
+        result: Array = shift + (self.entries * d[:, :3, :3]).sum(axis=(1, 2))
         return result
 
     def rate(self, relative: Relative) -> Array:
@@ -217,7 +228,7 @@ class JointRows:
         turning = skews(twist[k, 3:])
         turn = relative.pose[k, :3, :3]
         swing = (turn @ turning @ twist[k, :3, None])[:, :, 0]
-        curve = (self._c * swing).sum(axis=1) + (self._entries * (turn @ turning @ turning)).sum(axis=(1, 2))
+        curve = (self.c * swing).sum(axis=1) + (self.entries * (turn @ turning @ turning)).sum(axis=(1, 2))
         result: Array = curve + (relative.by_twist * bend[k, :, 0]).sum(axis=1)
         return result
 
@@ -225,8 +236,8 @@ class JointRows:
         """(j, 12, 12) derivative of Bᵀλ by increments of the inner and the outer node."""
         j = len(self.joints)
         pull, entries = np.zeros((j, 3)), np.zeros((j, 3, 3))
-        np.add.at(pull, self.joint_of_row, multipliers[:, None] * self._c)
-        np.add.at(entries, self.joint_of_row, multipliers[:, None, None] * self._entries)
+        np.add.at(pull, self.joint_of_row, multipliers[:, None] * self.c)
+        np.add.at(entries, self.joint_of_row, multipliers[:, None, None] * self.entries)
         turn = np.swapaxes(relative.pose[:, :3, :3], 1, 2)
         force = (turn @ pull[:, :, None])[:, :, 0]
         spread = turn @ entries

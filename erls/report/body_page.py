@@ -17,7 +17,8 @@ def result_report(s: dict[str, Any]) -> str:
     if dynamic:
         lines.append(
             f"{s['integrator']}: {s['duration']:.6g} s in {s['steps']} steps, "
-            f"{s['iterations_per_step']:.3f} iterations per step, {s['factorizations']} factorizations, {s['wall_s']:.2f} s"
+            f"{s['iterations_per_step']:.3f} iterations per step, {s['factorizations']} factorizations, "
+            f"{s['wall_s']:.2f} s"
         )
         drift = s["energy"]["max_drift"]
         lines.append(

@@ -30,7 +30,7 @@ def comparison_text(comparison: Comparison) -> str:
     header, rows = _cost(comparison)
     parts.append(table(header, rows))
     for p in comparison.pairs:
-        header, rows = _distance_rows(p)
+        header, rows = distance_rows(p)
         parts.append(f"{p.a} against {p.b}: {p.verdict}\n" + table(header, rows))
     parts += [f"{name} failed: {error}" for name, error in comparison.errors.items()]
     if not comparison.complete:
@@ -46,7 +46,7 @@ def comparison_page(comparison: Comparison) -> str:
     parts += [paragraph(f"{name} failed: {error}", "bad") for name, error in comparison.errors.items()]
     parts += [heading("Cost"), html_table(*_cost(comparison))]
     for p in comparison.pairs:
-        parts += [heading(f"{p.a} against {p.b}"), html_table(*_distance_rows(p))]
+        parts += [heading(f"{p.a} against {p.b}"), html_table(*distance_rows(p))]
     for plot in _plots(comparison):
         parts.append(figure(plot))
     parts += [heading("Peaks of the acceleration spectra"), html_table(*_peak_rows(comparison))]
@@ -103,7 +103,8 @@ def _cost(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]
     return header, rows
 
 
-def _distance_rows(p: Pair) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def distance_rows(p: Pair) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows of all distances of a pair."""
     rows = []
     for kind, label, unit in _HISTORIES:
         found: dict[str, Distance] = getattr(p, kind)

@@ -31,7 +31,7 @@ def craig_chang(model: FEModel, options: Reduction, where: str) -> Basis:
     body = free_body(model, where)
     loads = body.interface_loads()
     static = body.static(loads)
-    omega, modes, selection = choose_free_modes(body, static, options, where)
+    omega, modes, selection = choose_free_modes(body, options, where)
     attachment = body.elastic(residual_vectors(static, loads, omega, modes, body.stiffness))
     fields, rigid = with_rigid_modes(body, np.hstack([modes, attachment]))
     return Basis(expanded(model, fields), 0, rigid, no_fixed_interface_modes(), selection)

@@ -4,6 +4,10 @@ Inertia relief: loads f are balanced by the inertia of the rigid-body accelerati
 mass-orthonormal rigid-body modes R. Balanced loads need no reaction, so any statically determinate support gives the
 same deformation; the six dofs of the first interface are one. What is left of rigid-body motion is removed, Rᵀ M u = 0.
 With P = 1 - R RᵀM the response is P K_c⁻¹ Pᵀ f (Craig & Chang, AIAA J. 14, 1976; Rubin, AIAA J. 13, 1975).
+
+The elastic modes are those of the flexibility, P K_c⁻¹ Pᵀ M φ = φ / ω². Over the dofs beside the support, φ = P z, they
+are K_c z = ω² PᵀMP z: rigid-body motion has no part in it, and K_c is as well conditioned as a clamped link allows,
+however slender it is.
 """
 
 from __future__ import annotations
@@ -14,13 +18,45 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import interface_places
 from fe_import.reduction.rigid_modes import rigid_modes
-from fe_import.sparse import Factorization, dense_modes, factorize, lowest_modes
+from fe_import.sparse import Factorization, factorize, lowest_modes, modes_below
 
-_RIGID = 1e-6  # ω² of a rigid-body mode, per the shift; rounding leaves 1e-9 on a slender solid
+
+@dataclass(frozen=True)
+class RelievedMass:
+    """PᵀMP over some dofs, M - (MR)(MR)ᵀ there.
+
+    Attributes
+    ----------
+    mass : (r, r) sparse CSC
+    momentum : (r, 6) array
+        MR: momenta of the rigid-body modes.
+    """
+
+    mass: sp.csc_array
+    momentum: Array
+
+    def __matmul__(self, fields: Array) -> Array:
+        return np.asarray(self.mass @ fields - self.momentum @ (self.momentum.T @ fields))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(r, r)."""
+        return len(self.momentum), len(self.momentum)
+
+    def diagonal(self) -> Array:
+        """(r,) of the mass: none is massless but by having no mass."""
+        return np.asarray(self.mass.diagonal())
+
+    def count_nonzero(self) -> int:
+        """Entries of the mass."""
+        return int(self.mass.count_nonzero())
+
+    def toarray(self) -> Array:
+        """(r, r) dense."""
+        return np.asarray(self.mass.toarray() - self.momentum @ self.momentum.T)
 
 
 @dataclass(frozen=True)
@@ -85,6 +121,40 @@ class FreeBody:
             found[self._rest] += self._solve(right - self._supported @ found[self._rest])
         return self.elastic(found)
 
+    def modes(self, count: int) -> tuple[Array, Array]:
+        """Lowest elastic modes.
+
+        Parameters
+        ----------
+        count : int
+
+        Returns
+        -------
+        omega : (m,) array
+            Rising [rad/s]; m < ``count`` where there are no more.
+        modes : (f, m) array
+            Mass-orthonormal, free of rigid-body motion.
+
+        Raises
+        ------
+        FEImportError
+            NOT_DEFINITE: some part can move without strain; EIGENSOLVER: the solver failed, or a mode is missing.
+        """
+        rest = self._rest
+        momentum = (self.mass @ self.rigid)[rest]
+        relieved = RelievedMass(self.mass[rest][:, rest].tocsc(), momentum)
+
+        def below(shift: float) -> int | None:
+            count = modes_below(self.stiffness, self.mass, shift, positions=self.places)
+            return None if count is None else count - 6
+
+        omega, found = lowest_modes(
+            self._supported, relieved, count, "free link", solve=self._solve if len(rest) else None, below=below
+        )
+        modes = np.zeros((self.mass.shape[0], found.shape[1]))
+        modes[rest] = found
+        return omega, self.elastic(modes)
+
     def interface_loads(self) -> Array:
         """(f, b) unit loads at the interface dofs."""
         loads = np.zeros((self.mass.shape[0], len(self.interfaces)))
@@ -104,50 +174,3 @@ def free_body(model: FEModel, where: str) -> FreeBody:
     rigid, motions = rigid_modes(mass, model.rigid_body_modes()[model.independent], where)
     return FreeBody(mass, stiffness, rigid, motions, interface_places(model), model.dof_positions())
 
-
-def lowest_free_modes(body: FreeBody, static: Array, count: int) -> tuple[Array, Array]:
-    """Lowest elastic modes of a free link.
-
-    K + αM is positive definite and has the same modes; α is of the size of the lowest ω², as the best of some static
-    fields has it, so that no digits are lost to it. The six modes with ω² = 0 are taken out and the elastic ones freed
-    of rigid-body motion before they are solved for again within their span.
-
-    Parameters
-    ----------
-    body : FreeBody
-    static : (f, n) array
-        Elastic fields that resemble low modes.
-    count : int
-
-    Returns
-    -------
-    omega : (m,) array
-        Rising [rad/s]; m < ``count`` where there are no more.
-    modes : (f, m) array
-        Mass-orthonormal.
-
-    Raises
-    ------
-    FEImportError
-        EIGENSOLVER: not six rigid-body modes found, or another failure of the solver.
-    """
-    inertia = np.einsum("fn,fn->n", static, body.mass @ static)
-    strain = np.einsum("fn,fn->n", static, body.stiffness @ static)
-    moved = inertia > 0
-    if count == 0 or not moved.any():
-        return np.zeros(0), np.zeros((body.mass.shape[0], 0))
-    shift = float((strain[moved] / inertia[moved]).min())
-    shifted = (body.stiffness + shift * body.mass).tocsc()
-    omega, modes = lowest_modes(shifted, body.mass, count + 6, "free link", positions=body.places)
-    above = omega**2 / shift - 1  # ω² of the free link, per the shift
-    if (above < _RIGID).sum() != 6:
-        raise FEImportError(
-            Cause.EIGENSOLVER,
-            "modes of the free link: not six rigid-body modes",
-            value=int((above < _RIGID).sum()),
-            limit=6,
-            remedy="ask for more or for fewer modes",
-        )
-    modes = body.elastic(modes[:, 6:])
-    found, turn = dense_modes(modes.T @ (body.stiffness @ modes), modes.T @ (body.mass @ modes), None, "free link")
-    return found, modes @ turn

@@ -8,7 +8,7 @@ import numpy as np
 
 from fe_import.link_reduction import Reduction
 from fe_import.model import Array
-from fe_import.reduction.free_body import FreeBody, lowest_free_modes
+from fe_import.reduction.free_body import FreeBody
 from fe_import.reduction.selection import below_frequency, lowest_by_count
 
 REFUSED = {
@@ -22,18 +22,12 @@ REFUSED_SELECTIONS = {
 }
 
 
-def choose_free_modes(
-    body: FreeBody, static: Array, options: Reduction, where: str
-) -> tuple[Array, Array, dict[str, Any]]:
-    """Circular frequencies, shapes (f, m) and how they were chosen; ``static`` as in `lowest_free_modes`."""
+def choose_free_modes(body: FreeBody, options: Reduction, where: str) -> tuple[Array, Array, dict[str, Any]]:
+    """Circular frequencies, shapes (f, m) and how they were chosen."""
     available = body.mass.shape[0] - 6
-
-    def lowest(count: int) -> tuple[Array, Array]:
-        return lowest_free_modes(body, static, count)
-
     if options.selection == "frequency":
-        return below_frequency(lowest, options, available, where)
-    return *lowest_by_count(lowest, options.free_modes, available, f"{where}: reduction.free_modes"), {}
+        return below_frequency(body.modes, options, available, where)
+    return *lowest_by_count(body.modes, options.free_modes, available, f"{where}: reduction.free_modes"), {}
 
 
 def with_rigid_modes(body: FreeBody, fields: Array) -> tuple[Array, Array]:

@@ -30,7 +30,7 @@ def mode_displacement(model: FEModel, options: Reduction, where: str) -> Basis:
     refuse_fields(options, where, _REFUSED, REFUSED_SELECTIONS)
     body = free_body(model, where)
     static = body.static(body.interface_loads())
-    _, modes, selection = choose_free_modes(body, static, options, where)
+    _, modes, selection = choose_free_modes(body, options, where)
     fields, rigid = with_rigid_modes(body, modes)
     flexibility = static[body.interfaces]
     return Basis(expanded(model, fields), 0, rigid, no_fixed_interface_modes(), selection, flexibility)

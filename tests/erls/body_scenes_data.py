@@ -14,9 +14,7 @@ STRIP: dict[str, Any] = {
     "materials": {"rubber": {"youngs_modulus": 1e6, "poissons_ratio": 0.0, "density": 1000.0}},
     "sections": {"strip": {"shape": "rectangular", "width": 0.1, "height": 0.02}},
     "nodes": {"root": [0.0, 0.0, 0.0], "tip": [2.0, 0.0, 0.0]},
-    "beams": [
-        {"name": "strip", "from": "root", "to": "tip", "elements": 8, "material": "rubber", "section": "strip"}
-    ],
+    "beams": [{"name": "strip", "from": "root", "to": "tip", "elements": 8, "material": "rubber", "section": "strip"}],
     "connections": [{"name": "clamp", "type": "fixed", "node": "root"}],
     "loads": [{"node": "tip", "force": [0.0, 0.0, 1e-3]}],
 }

@@ -38,6 +38,9 @@ MOTIONS = {
     "degree 7": "shape = 'polynomial'\nfrom = 0.2\nto_deg = 90\nstart = 0.1\nduration = 0.7",
     "waypoints": "shape = 'waypoints'\ntimes = [0, 0.3, 0.5, 0.9]\nvalues_deg = [0, 40, 40, -10]\ndegree = 5",
     "sine": "shape = 'sine'\namplitude_deg = 9\nfrequency_hz = 1.5\noffset = 1\nstart = 0.2\nphase_deg = 90",
+    "spin up": "shape = 'spin_up'\nrate_deg = 90\nfrom = 0.2\nstart = 0.1\nduration = 0.7",
+    "spin up, degree 3": "shape = 'spin_up'\nrate = -2\nduration = 0.7\ndegree = 3",
+    "spin up, sine": "shape = 'spin_up'\nrate = 2\nfrom_deg = 9\nstart = 0.1\nduration = 0.7\nramp = 'sine'",
     "spline": "shape = 'table'\ntimes = [0, 0.2, 0.5, 0.9]\nvalues = [0, 1, 1.5, 0.5]",
     "rates": "shape = 'table'\ntimes = [0, 0.2, 0.5, 0.9]\nvalues = [0, 1, 1.5, 0.5]\nrates = [1, -2]",
 }
@@ -108,7 +111,10 @@ def test_end_values_hold(kind, text):
         return
     first, last = curve.breakpoints[0], curve.breakpoints[-1]
     assert curve.derivatives(first - 5.0) == (curve.value(first, left=True), 0.0, 0.0)
-    if kind is Motion and "sine" not in text:
+    if "spin_up" in text:
+        value, rate, acceleration = curve.derivatives(last + 5.0)
+        assert (value, rate, acceleration) == pytest.approx((curve.value(last) + 5.0 * rate, rate, 0.0))
+    elif kind is Motion and "sine" not in text:
         assert curve.derivatives(last + 5.0) == (curve.value(last), 0.0, 0.0)
 
 

@@ -24,10 +24,10 @@ from erls.formulations.ffr.joint_conditions import (
     joint_motion,
     less_motion,
 )
+from erls.formulations.ffr.recursion import node_motion
 from erls.lie import motion_maps
 from erls.lie.se3 import inverse, pose
 from erls.lie.so3 import Array, cross, skew
-from erls.mechanism.links import node_shape6
 from fe_import.model import InterfaceNode
 
 
@@ -69,9 +69,9 @@ class ConstrainedFfr:
 
     def _node(self, k: int, interface: InterfaceNode, frame: Array) -> tuple[InterfaceMotion, Array]:
         """Interface node of link ``k``, and the offset from it of a joint frame given in the mesh frame."""
-        translation, rotation = node_shape6(self.mechanism.links[k].model, interface.node)
-        basis = self.reduced.bases[k]
-        motion = InterfaceMotion(interface.position, translation @ basis, rotation @ basis)
+        motion = node_motion(
+            self.mechanism.links[k], interface.node, self.reduced.bases[k], self.reduced.stiffened
+        )
         return motion, pose(position=-interface.position) @ frame
 
     @property

@@ -19,14 +19,14 @@ from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State
 from erls.formulations.equilibrium import held_equilibrium
 from erls.formulations.ffr.body_frame import elastic_basis
-from erls.formulations.ffr.interface_motion import InterfaceMotion
 from erls.formulations.ffr.joint_effort import JointEfforts
-from erls.formulations.ffr.recursion import Recursion, Step, bracket
+from erls.formulations.ffr.recursion import Recursion, Step, bracket, node_motion
+from erls.formulations.ffr.second_order import SecondOrderData
 from erls.formulations.ffr.standard_data import StandardData
 from erls.formulations.joint_frames import FrameMotion, attached, carried
 from erls.lie.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.links import node_shape6
+from erls.mechanism.links import Link
 from erls.mechanism.loops import LoopEnd
 
 
@@ -65,11 +65,9 @@ class Ffr:
     def __init__(self, mechanism: Mechanism, body_frame: str = "tangent") -> None:
         self.mechanism, self.body_frame = mechanism, body_frame
         self.bases = [elastic_basis(link, body_frame) for link in mechanism.links]
-        self.data = [
-            StandardData(link.invariants, basis, mechanism.effects)
-            for link, basis in zip(mechanism.links, self.bases, strict=True)
-        ]
-        self.recursion = Recursion(mechanism, self.bases, body_frame)
+        self.stiffened = "geometric_stiffening" in mechanism.effects
+        self.data = [self._data(link, basis) for link, basis in zip(mechanism.links, self.bases, strict=True)]
+        self.recursion = Recursion(mechanism, self.bases, body_frame, self.stiffened)
         self.efforts = JointEfforts(mechanism)
         self.joints = len(mechanism.joints)
         ends = np.cumsum([data.size for data in self.data])
@@ -81,6 +79,12 @@ class Ffr:
         self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
         self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
         self.damping = np.concatenate([link.damping for link in mechanism.links])
+
+    def _data(self, link: Link, basis: Array) -> StandardData:
+        linear = StandardData(link.invariants, basis, self.mechanism.effects)
+        if not self.stiffened or not link.elastic_modes or link.second_order is None:
+            return linear
+        return SecondOrderData(linear, link.second_order, basis)
 
     @property
     def size(self) -> int:
@@ -197,13 +201,13 @@ class Ffr:
         result = np.zeros((self.joints + self.elastic,) * 2)
         result.flat[: self.joints * (len(result) + 1) : len(result) + 1] = self.efforts.rotors
         for at, data, jacobian in zip(self.modes, self.data, self.jacobians(motion.steps), strict=True):
-            eta = motion.eta[at]
+            mass = data.mass_matrix(motion.eta[at])
             columns = slice(self.joints + at.start, self.joints + at.stop)
-            result += jacobian.T @ (data.frame_mass(eta) @ jacobian)
-            cross_terms = jacobian.T @ data.frame_coupling(eta)
+            result += jacobian.T @ (mass[:6, :6] @ jacobian)
+            cross_terms = jacobian.T @ mass[:6, 6:]
             result[:, columns] += cross_terms
             result[columns] += cross_terms.T
-            result[columns, columns] += data.elastic
+            result[columns, columns] += mass[6:, 6:]
         return np.asarray(result[np.ix_(self.free, self.free)])
 
     def mass_matrix(self, t: float, y: Array) -> Array:
@@ -297,9 +301,8 @@ class Ffr:
         jacobians = self.jacobians(motion.steps)
         result: list[FrameMotion] = []
         for k, node, offset in ((int(end.link or 0), end.node, end.frame) for end in ends):
-            model, at = self.mechanism.links[k].model, self.modes[k]
-            translation, rotation = node_shape6(model, node)
-            interface = InterfaceMotion(model.nodes[node], translation @ self.bases[k], rotation @ self.bases[k])
+            at = self.modes[k]
+            interface = node_motion(self.mechanism.links[k], node, self.bases[k], self.stiffened)
             moved = interface.at(motion.eta[at], motion.eta_rates[at])
             rows = np.zeros((6, self.joints + self.elastic))
             rows[:, self.joints + at.start : self.joints + at.stop] = moved.jacobian

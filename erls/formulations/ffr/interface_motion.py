@@ -1,4 +1,6 @@
-"""Motion of an interface node in the floating frame: displaced by u, turned by exp(φ), both linear in η."""
+"""Motion of an interface node in the floating frame: displaced by u, turned by exp(φ), both linear in η, or of second
+order.
+"""
 
 from __future__ import annotations
 
@@ -61,14 +63,25 @@ class InterfaceMotion:
         Undeformed, in the floating frame.
     translation, rotation : (3, n) arrays
         u and φ per elastic coordinate.
+    second_order : (6, n, n) array, optional
+        Ψ of u and φ, which gain ½ ηᵀ Ψ η.
     """
 
-    def __init__(self, position: Array, translation: Array, rotation: Array) -> None:
+    def __init__(
+        self, position: Array, translation: Array, rotation: Array, second_order: Array | None = None
+    ) -> None:
         self.position, self.translation, self.rotation = position, translation, rotation
+        self.second_order = second_order
 
     def at(self, eta: Array, rate: Array) -> Displaced:
         """The node at elastic coordinates η and their rates, (n,) each."""
-        phi, phi_rate = self.rotation @ eta, self.rotation @ rate
+        translation, rotation = self.translation, self.rotation
+        u, phi = translation @ eta, rotation @ eta
+        if self.second_order is not None:
+            slope = self.second_order @ eta
+            u, phi = u + slope[:3] @ eta / 2, phi + slope[3:] @ eta / 2
+            translation, rotation = translation + slope[:3], rotation + slope[3:]
+        phi_rate = rotation @ rate
         s, s_rate = float(phi @ phi), 2 * float(phi @ phi_rate)
         a, a_slope, b, b_slope = turn_factors(s)
         tilde = skew(phi)
@@ -79,16 +92,20 @@ class InterfaceMotion:
         tangent.flat[::4] += 1.0
 
         jacobian = np.empty((6, len(eta)))
-        jacobian[:3] = turn.T @ self.translation
-        jacobian[3:] = tangent @ self.rotation
+        jacobian[:3] = turn.T @ translation
+        jacobian[3:] = tangent @ rotation
         twist = jacobian @ rate
         once = cross(phi, phi_rate)
         twice = cross(phi, once)
         bias = np.empty(6)
         bias[:3] = cross(twist[:3], twist[3:])
         bias[3:] = (b_slope * twice - a_slope * once) * s_rate + b * cross(phi_rate, once)
+        if self.second_order is not None:
+            curved = (self.second_order @ rate) @ rate
+            bias[:3] += turn.T @ curved[:3]
+            bias[3:] += tangent @ curved[3:]
 
         pose = np.eye(4)
         pose[:3, :3] = turn
-        pose[:3, 3] = self.position + self.translation @ eta
+        pose[:3, 3] = self.position + u
         return Displaced(pose, jacobian, bias)

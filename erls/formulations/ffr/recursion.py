@@ -16,8 +16,17 @@ from erls.formulations.ffr.interface_motion import InterfaceMotion
 from erls.lie.se3 import inverse, joint_pose, pose, twist_transform
 from erls.lie.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.links import node_shape6
+from erls.mechanism.links import Link, node_shape6
 from fe_import.model import InterfaceNode
+
+
+def node_motion(link: Link, node: int, basis: Array, stiffened: bool) -> InterfaceMotion:
+    """Motion of a node of a link whose elastic coordinates stand for the fields ``basis`` (m, n)."""
+    translation, rotation = node_shape6(link.model, node)
+    second = None
+    if stiffened and link.second_order is not None:
+        second = basis.T @ link.second_order.node(node) @ basis
+    return InterfaceMotion(link.model.nodes[node], translation @ basis, rotation @ basis, second)
 
 
 def bracket(a: Array, b: Array) -> Array:
@@ -60,9 +69,11 @@ class Recursion:
         Of every link, see `elastic_basis`.
     body_frame : str
         With ``tangent`` the inboard node rests in its floating frame.
+    stiffened : bool
+        Whether interface nodes move by second-order displacements, too.
     """
 
-    def __init__(self, mechanism: Mechanism, bases: list[Array], body_frame: str) -> None:
+    def __init__(self, mechanism: Mechanism, bases: list[Array], body_frame: str, stiffened: bool = False) -> None:
         self.joints = mechanism.joints
         self.before: list[Array] = []
         self.after: list[Array] = []
@@ -73,8 +84,7 @@ class Recursion:
         def node(k: int, interface: InterfaceNode) -> InterfaceMotion | None:
             if not bases[k].shape[1]:
                 return None
-            translation, rotation = node_shape6(mechanism.links[k].model, interface.node)
-            return InterfaceMotion(interface.position, translation @ bases[k], rotation @ bases[k])
+            return node_motion(mechanism.links[k], interface.node, bases[k], stiffened)
 
         for k, (joint, link) in enumerate(zip(mechanism.joints, mechanism.links, strict=True)):
             parent = mechanism.links[k - 1].outboard if k else None

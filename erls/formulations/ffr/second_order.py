@@ -1,93 +1,108 @@
-"""Standard data of the second-order displacement ½ ηᵀ Ψ η: what it adds to mass matrix, momentum and weight of a body.
+"""Standard data of a body with its second-order displacement ½ ηᵀ Ψ η: geometric stiffening.
 
-With the tensors of `fe_import.second_order.data` in the elastic coordinates, S = ½ ηᵀ S_ab η,
+Beside the blocks of T = ½ νᵀ M ν + νᵀ C η̇ + ½ η̇ᵀ M_e η̇ the second-order displacement has, with the tensors of
+`fe_import.second_order.data` in the elastic coordinates,
 
-    M₂(η) = [0, -S̃; S̃, ηᵀ W η],   C₂(η) = [S_ab η; ηᵀ P]
+    C₂(η) = [S_ab η; ηᵀ P],   M₂(η) = [0, -S̃; S̃, ηᵀ W η],   S = ½ ηᵀ S_ab η
 
-are added to the blocks of T = ½ νᵀ M ν + νᵀ C η̇ + ½ η̇ᵀ M_e η̇, and S to the first moment. Their forces are geometric
-stiffening (O. Wallrapp and R. Schwertassek, Int. J. Numer. Methods Eng. 32 (1991) 1833-1850).
+(O. Wallrapp and R. Schwertassek, Int. J. Numer. Methods Eng. 32 (1991) 1833-1850). Added to C and M as they stand they
+could make the mass matrix indefinite where elastic motion cancels that of the frame. The frame's twist is corrected
+instead, ν' = ν + M₀⁻¹ (C₂ η̇ + ½ M₂ ν), which gives the same to second order in η and stays positive. The forces on η and
+on the frame are those of Lagrange and of Boltzmann and Hamel in the uncorrected twist.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from erls.formulations.ffr.standard_data import StandardData
+from erls.lie.se3 import twist_cross
 from erls.lie.so3 import Array, cross, skew
 from erls.mechanism.second_order import LinkSecondOrder
 
 
-class Terms(NamedTuple):
-    """M₂ (6, 6), C₂ (6, n), the gradient of ½ ωᵀWω (3, 3, n) and S (3,) at elastic coordinates."""
+class SecondOrderData(StandardData):
+    """Standard data of one body with second-order terms."""
 
-    mass: Array
-    coupling: Array
-    spin: Array
-    moment: Array
+    linear: StandardData
 
-
-class SecondOrderData:
-    """Second-order tensors of one body in its elastic coordinates.
-
-    Parameters
-    ----------
-    data : LinkSecondOrder
-    basis : (m, n) array
-        Modal coordinates of the field of each elastic coordinate.
-    """
-
-    def __init__(self, data: LinkSecondOrder, basis: Array) -> None:
-        n = basis.shape[1]
-        self.size = n
+    def __init__(self, linear: StandardData, data: LinkSecondOrder, basis: Array) -> None:
+        self.__dict__.update(linear.__dict__)
+        self.linear = linear
+        n = linear.size
         momentum = basis.T @ data.momentum @ basis
-        self._momentum = momentum
-        # from the left, η meets the first index
-        self._left = np.ascontiguousarray(momentum.transpose(0, 2, 1)).reshape(6 * n, n)
-        self._right = np.ascontiguousarray(momentum).reshape(6 * n, n)
+        self._momentum = np.ascontiguousarray(momentum)
         self._spin = np.ascontiguousarray(basis.T @ data.spin @ basis).reshape(9 * n, n)
+        self._per_mass = np.linalg.inv(linear.rigid)
 
-    def terms(self, eta: Array) -> Terms:
-        """What is added at elastic coordinates η."""
-        coupling = (self._left @ eta).reshape(6, self.size)
-        spin = (self._spin @ eta).reshape(3, 3, self.size)
-        moment = coupling[:3] @ eta / 2
-        return Terms(self._mass(moment, spin @ eta), coupling, spin, moment)
+    def _at(self, eta: Array) -> tuple[Array, Array, Array]:
+        """C₂ (6, n), M₂ (6, 6) and W η (9, n)."""
+        coupling = eta @ self._momentum
+        spin = (self._spin @ eta).reshape(9, self.size)
+        return coupling, self._block(coupling[:3] @ eta / 2, spin @ eta), spin
 
     @staticmethod
-    def _mass(moment: Array, square: Array) -> Array:
+    def _block(moment: Array, square: Array) -> Array:
         result = np.zeros((6, 6))
         result[3:, :3] = skew(moment)
         result[:3, 3:] = -result[3:, :3]
-        result[3:, 3:] = square
+        result[3:, 3:] = square.reshape(3, 3)
         return result
 
     def forces(
-        self, twist: Array, twist_rate: Array, g: Array, eta: Array, rate: Array, acceleration: Array
+        self, twist: Array, twist_rate: Array, eta: Array, rate: Array, acceleration: Array
     ) -> tuple[Array, Array]:
-        """Inertia forces less weight: (6,) wrench about the frame's origin and (n,) forces on η; see `StandardData`.
+        """Inertia forces; see `StandardData.forces`."""
+        coupling, block, spin = self._at(eta)
+        coupling_rate = rate @ self._momentum
+        block_rate = self._block(coupling[:3] @ rate, 2 * (spin @ rate))
+        corrected = twist + self._per_mass @ (coupling @ rate + block @ twist / 2)
+        added = coupling @ acceleration + coupling_rate @ rate + (block @ twist_rate + block_rate @ twist) / 2
+        wrench, elastic = self.linear.forces(
+            corrected, twist_rate + self._per_mass @ added, eta, rate, acceleration
+        )
+        momentum = self.linear.momentum(corrected, eta, rate)
+        change = wrench + twist_cross(corrected).T @ momentum  # d/dt of the momentum: ad* = -adᵀ
+        carried, carried_rate = self._per_mass @ momentum, self._per_mass @ change
+        total = momentum + block @ carried / 2
+        wrench = change + (block_rate @ carried + block @ carried_rate) / 2 - twist_cross(twist).T @ total
 
-        ``g`` (3,) is gravity in the frame's axes.
-        """
-        omega, now = twist[3:], self.terms(eta)
-        coupling_rate = (self._left @ rate).reshape(6, self.size)
-        mass_rate = self._mass(now.coupling[:3] @ rate, 2 * (now.spin @ rate))
-        momentum = now.mass @ twist + now.coupling @ rate
-        wrench = now.mass @ twist_rate + now.coupling @ acceleration + mass_rate @ twist + coupling_rate @ rate
-        wrench[:3] += cross(omega, momentum[:3])
-        wrench[3:] += cross(omega, momentum[3:]) + cross(twist[:3], momentum[:3])
-        wrench[3:] -= cross(now.moment, g)
-        elastic = now.coupling.T @ twist_rate + coupling_rate.T @ twist
-        elastic -= twist @ (self._right @ rate).reshape(6, self.size)  # νᵀ C₂ η̇
-        elastic -= cross(twist[:3], omega) @ now.coupling[:3]  # v·(ω × S)
-        elastic -= np.multiply.outer(omega, omega).ravel() @ now.spin.reshape(9, self.size)
-        return wrench, elastic - g @ now.coupling[:3]
+        # d/dt (C₂ᵀ λ) less the gradient of λ·(C₂ η̇ + ½ M₂ ν) at fixed λ = M₀⁻¹ p
+        elastic = elastic + carried_rate @ coupling + carried @ coupling_rate
+        elastic -= carried @ (self._momentum @ rate)
+        pull = cross(carried[:3], twist[3:]) + cross(twist[:3], carried[3:])
+        elastic -= pull @ coupling[:3] / 2
+        elastic -= np.multiply.outer(carried[3:], twist[3:]).ravel() @ spin
+        return wrench, elastic
+
+    def mass_matrix(self, eta: Array) -> Array:
+        """(6 + n, 6 + n) mass matrix of (ν, η̇)."""
+        coupling, block, _ = self._at(eta)
+        mass = self.linear.mass_matrix(eta)
+        change = np.hstack([np.eye(6) + self._per_mass @ block / 2, self._per_mass @ coupling])
+        result = change.T @ mass[:6, :6] @ change
+        result[:, 6:] += change.T @ mass[:6, 6:]
+        result[6:] += mass[6:, :6] @ change
+        result[6:, 6:] += mass[6:, 6:]
+        return np.asarray(result)
 
     def kinetic_energy(self, twist: Array, eta: Array, rate: Array) -> float:
-        """What is added to T."""
-        now = self.terms(eta)
-        return float(twist @ now.mass @ twist / 2 + twist @ (now.coupling @ rate))
+        """T."""
+        velocity = np.concatenate([twist, rate])
+        return float(velocity @ self.mass_matrix(eta) @ velocity / 2)
 
-    def gravity_energy(self, g: Array, turn: Array, eta: Array) -> float:
-        """What is added to the potential in the gravity vector ``g`` (world axes), the frame turned by ``turn``."""
-        return -float(g @ (turn @ self.terms(eta).moment))
+    def momentum(self, twist: Array, eta: Array, rate: Array) -> Array:
+        """(6,) ∂T/∂ν: linear momentum, and angular momentum about the frame's origin, in its axes."""
+        return np.asarray(self.mass_matrix(eta)[:6] @ np.concatenate([twist, rate]))
+
+    def weight(self, g: Array, eta: Array) -> tuple[Array, Array]:
+        """Wrench and elastic forces of gravity; see `StandardData.weight`."""
+        wrench, elastic = self.linear.weight(g, eta)
+        pull = eta @ self._momentum[:3]
+        wrench[3:] += cross(pull @ eta / 2, g)
+        return wrench, elastic + g @ pull
+
+    def gravity_energy(self, g: Array, world: Array, eta: Array) -> float:
+        """Potential energy; see `StandardData.gravity_energy`."""
+        moment = eta @ self._momentum[:3] @ eta / 2
+        return self.linear.gravity_energy(g, world, eta) - float(g @ (world[:3, :3] @ moment))

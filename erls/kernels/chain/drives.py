@@ -83,7 +83,7 @@ def effort(reals: Array, integers: IntArray, record: int, t: float, link: Array)
     torque -= reals[joint + at.SPRING] * (angle - reals[joint + at.REST]) + reals[joint + at.DAMPER] * rate
     if reals[joint + at.FRICTION] != 0.0:
         torque -= reals[joint + at.FRICTION] * math.tanh(rate / reals[joint + at.TRANSITION])
-    return torque
+    return float(torque)
 
 
 @helper

@@ -194,7 +194,7 @@ def solve(reals: Array, integers: IntArray, scratch: Array, out: Array) -> int:
                 along += link[at.PULL + i] * link[at.PATH + i]
                 left -= link[at.LOADING + i] * link[at.PATH + i]
             if not along > _SINGULAR * before_elimination:
-                return joint + 1
+                return int(joint + 1)
             link[at.EFFECTIVE] = along
             out[joint] = left
             if k > 0:

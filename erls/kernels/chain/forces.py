@@ -22,7 +22,7 @@ def vector(scratch: Array, memory: int, n: int, number: int) -> Array:
 @helper
 def along(reals: Array, axis: int, x: Array, place: int) -> float:
     """Component of a vector (3,) along an axis."""
-    return reals[axis] * x[place] + reals[axis + 1] * x[place + 1] + reals[axis + 2] * x[place + 2]
+    return float(reals[axis] * x[place] + reals[axis + 1] * x[place + 1] + reals[axis + 2] * x[place + 2])
 
 
 @helper

@@ -97,7 +97,7 @@ def add_transport(x: Array, at: int, p: Array, of: int, out: Array, to: int) -> 
 @helper
 def dot6(x: Array, at: int, y: Array, of: int) -> float:
     """Product of six numbers each."""
-    return (
+    return float(
         x[at] * y[of]
         + x[at + 1] * y[of + 1]
         + x[at + 2] * y[of + 2]

@@ -7,10 +7,10 @@ make room for what row exchanges fill. (G. H. Golub, C. F. Van Loan, Matrix Comp
 from __future__ import annotations
 
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 
-@helper
+@part
 def factor(band: Array, pivots: IntArray) -> int:
     """Factor; 0, or 1 + the number of the unknown at which it broke down."""
     n, width = len(band), (band.shape[1] - 1) // 3
@@ -41,7 +41,7 @@ def factor(band: Array, pivots: IntArray) -> int:
     return 0
 
 
-@helper
+@part
 def solve(band: Array, pivots: IntArray, values: Array) -> None:
     """Solution in place of the right-hand side."""
     n, width = len(band), (band.shape[1] - 1) // 3

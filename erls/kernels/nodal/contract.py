@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from erls.kernels.contract import Array, IntArray
+from erls.kernels.contract import Array, IntArray, pointer
 from erls.kernels.jit import ENABLED
 
 
@@ -212,7 +212,8 @@ KNOTS: Any = None
 SETTINGS: Any = None
 PROGRESS: Any = None
 ADVANCE: Any = None
-EVALUATE: Any = None
+FORCES: Any = None
+FACTOR: Any = None
 if ENABLED:
     from numba import types as _t
 
@@ -229,5 +230,7 @@ if ENABLED:
     KNOTS = _t.NamedUniTuple(_r2, 5, Knots)
     SETTINGS = _t.NamedTuple((*(_t.float64,) * 19, *(_t.int64,) * 3), Settings)
     PROGRESS = _t.NamedTuple((_r1, _i1), Progress)
-    ADVANCE = _t.int64(MODEL, STATE, WORK, SETTINGS, PROGRESS, _r2, KNOTS, _t.int64)
-    EVALUATE = _t.int64(MODEL, STATE, WORK, _r1, _t.float64, _t.float64, _t.float64)
+    FORCES = _t.void(MODEL, WORK, STATE, _r1)
+    FACTOR = _t.int64(MODEL, WORK, _r1, _t.float64, _t.float64, _t.float64)
+    _steps = (MODEL, STATE, WORK, SETTINGS, PROGRESS, _r2, KNOTS, _t.int64)
+    ADVANCE = _t.int64(pointer(FORCES), pointer(FACTOR), *_steps)

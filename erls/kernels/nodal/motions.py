@@ -6,50 +6,50 @@ Coefficients f, g of A come from `erls.kernels.nodal.rotations`.
 
 from __future__ import annotations
 
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 from erls.kernels.nodal.rotations import Three, first, second, value
 from erls.kernels.nodal.vectors import Rotation, Twist, Vector, cross, minus, plus, scaled, times, turned
 
 
-@helper
+@part
 def transformed(p: Vector, r: Rotation, v: Vector, w: Vector) -> Twist:
     """Ad⁻¹ [v; w] of the motion (p, R)."""
     return turned(r, minus(v, cross(p, w))), turned(r, w)
 
 
-@helper
+@part
 def transposed(p: Vector, r: Rotation, n: Vector, m: Vector) -> Twist:
     """Ad⁻ᵀ [n; m]."""
     force = times(r, n)
     return force, plus(cross(p, force), times(r, m))
 
 
-@helper
+@part
 def bracket(v: Vector, w: Vector, a: Vector, b: Vector) -> Twist:
     """ad([v; w]) [a; b]."""
     return plus(cross(w, a), cross(v, b)), cross(w, b)
 
 
-@helper
+@part
 def cobracket(v: Vector, w: Vector, n: Vector, m: Vector) -> Twist:
     """ad([v; w])ᵀ [n; m]."""
     return cross(n, w), plus(cross(n, v), cross(m, w))
 
 
-@helper
+@part
 def series(f: Three, g: Three, u: Vector, psi: Vector, a: Vector, b: Vector) -> Twist:
     """[[A, B], [0, A]] [a; b]."""
     return plus(value(f[0], g[0], psi, a), first(f[0], f[1], g[0], g[1], psi, u, b)), value(f[0], g[0], psi, b)
 
 
-@helper
+@part
 def series_transposed(f: Three, g: Three, u: Vector, psi: Vector, n: Vector, m: Vector) -> Twist:
     """[[A, B], [0, A]]ᵀ [n; m]."""
     below = first(-f[0], -f[1], g[0], g[1], psi, u, n)
     return value(-f[0], g[0], psi, n), plus(below, value(-f[0], g[0], psi, m))
 
 
-@helper
+@part
 def change(f: Three, g: Three, u: Vector, psi: Vector, du: Vector, dpsi: Vector, a: Vector, b: Vector) -> Twist:
     """Derivative of [[A, B], [0, A]] along [du; dψ], times [a; b]."""
     above = plus(second(f[1], f[2], g, psi, u, dpsi, b), first(f[0], f[1], g[0], g[1], psi, du, b))
@@ -57,7 +57,7 @@ def change(f: Three, g: Three, u: Vector, psi: Vector, du: Vector, dpsi: Vector,
     return plus(first(f[0], f[1], g[0], g[1], psi, dpsi, a), above), below
 
 
-@helper
+@part
 def change_transposed(
     f: Three, g: Three, u: Vector, psi: Vector, du: Vector, dpsi: Vector, n: Vector, m: Vector
 ) -> Twist:
@@ -67,16 +67,16 @@ def change_transposed(
     return first(-f[0], -f[1], g[0], g[1], psi, dpsi, n), below
 
 
-@helper
+@part
 def pair_plus(a: Twist, b: Twist) -> Twist:
     return plus(a[0], b[0]), plus(a[1], b[1])
 
 
-@helper
+@part
 def pair_minus(a: Twist, b: Twist) -> Twist:
     return minus(a[0], b[0]), minus(a[1], b[1])
 
 
-@helper
+@part
 def pair_scaled(s: float, a: Twist) -> Twist:
     return scaled(s, a[0]), scaled(s, a[1])

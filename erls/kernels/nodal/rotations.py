@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from scipy.special import zeta
 
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 from erls.kernels.nodal.vectors import Rotation, Vector, cross, dot, plus, scaled
 
 Three: TypeAlias = tuple[float, float, float]
@@ -24,7 +24,7 @@ _RATIO_BELOW = 0.5  # of x to the pole
 _ZETA = tuple(2.0 * float(zeta(2 * k + 2) - 1) for k in range(19))  # falls by four from term to term
 
 
-@helper
+@part
 def stumpff(x: float) -> Seven:
     """c₁ to c₇ of a squared angle."""
     if x <= _MIDDLE:
@@ -42,7 +42,7 @@ def stumpff(x: float) -> Seven:
     return c1, c2, c3, c4, c5, (_FACTORIALS[4] - c4) / x, (_FACTORIALS[5] - c5) / x
 
 
-@helper
+@part
 def inverse_coefficient(x: float) -> Three:
     """b(x) with two derivatives; infinite at a full turn."""
     y = x / _POLE
@@ -61,7 +61,7 @@ def inverse_coefficient(x: float) -> Three:
     return (value + 2 * gap) / _POLE, above[0], above[1]
 
 
-@helper
+@part
 def tangent_coefficients(c: Seven) -> tuple[Three, Three]:
     """f and g of the tangent operator."""
     c4_, c3_, c2_ = (4 * c[5] - c[4]) / 2, (3 * c[4] - c[3]) / 2, (2 * c[3] - c[2]) / 2
@@ -69,7 +69,7 @@ def tangent_coefficients(c: Seven) -> tuple[Three, Three]:
     return (-c[1], -c2_, -(2 * c4_ - c3_) / 2), (c[2], c3_, (3 * c5_ - c4_) / 2)
 
 
-@helper
+@part
 def exponential(psi: Vector, c1: float, c2: float) -> Rotation:
     """1 + c₁ ψ̃ + c₂ ψ̃²."""
     x, y, z = psi
@@ -79,7 +79,7 @@ def exponential(psi: Vector, c1: float, c2: float) -> Rotation:
     return 1 - b - c, d - w, f + v, d + w, 1 - a - c, e - u, f - v, e + u, 1 - a - b
 
 
-@helper
+@part
 def logarithm(r: Rotation) -> Vector:
     """At most π long; over the largest component of the unit quaternion."""
     trace = r[0] + r[4] + r[8]
@@ -100,7 +100,7 @@ def logarithm(r: Rotation) -> Vector:
     return factor * x, factor * y, factor * z
 
 
-@helper
+@part
 def logarithm_near(r: Rotation, near: Vector) -> Vector:
     """The logarithm closest to ``near``: it may pass π, and turn on."""
     psi = logarithm(r)
@@ -111,14 +111,14 @@ def logarithm_near(r: Rotation, near: Vector) -> Vector:
     return scaled(1.0 + 2 * math.pi * turns / angle, psi)
 
 
-@helper
+@part
 def value(f: float, g: float, psi: Vector, a: Vector) -> Vector:
     """(1 + f ψ̃ + g ψ̃²) a."""
     s = cross(psi, a)
     return plus(plus(a, scaled(f, s)), scaled(g, cross(psi, s)))
 
 
-@helper
+@part
 def first(f: float, f1: float, g: float, g1: float, psi: Vector, d: Vector, a: Vector) -> Vector:
     """Derivative along d of the above."""
     s, t = cross(psi, a), cross(d, a)
@@ -128,7 +128,7 @@ def first(f: float, f1: float, g: float, g1: float, psi: Vector, d: Vector, a: V
     return plus(result, scaled(along, plus(scaled(f1, s), scaled(g1, cross(psi, s)))))
 
 
-@helper
+@part
 def second(f1: float, f2: float, g: Three, psi: Vector, d: Vector, e: Vector, a: Vector) -> Vector:
     """Second derivative along d and e; f itself does not enter."""
     s, t, u = cross(psi, a), cross(d, a), cross(e, a)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import TypeAlias
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import helper, kernel
+from erls.kernels.jit import kernel, part
 from erls.kernels.nodal import band
 from erls.kernels.nodal.actuators import set_coordinates, store_coordinates
 from erls.kernels.nodal.beam import bend
 from erls.kernels.nodal.contract import ADVANCE, Knots, Model, Progress, Settings, State, Work
-from erls.kernels.nodal.system import compose, forces, iteration_matrix, set_twists
+from erls.kernels.nodal.system import compose, set_twists
 from erls.kernels.nodal.vectors import cross, dot, nine, plus, put, scaled, three, times, vector
+
+Forces: TypeAlias = Callable[[Model, Work, State, Array], None]
+Factor: TypeAlias = Callable[[Model, Work, Array, float, float, float], int]
 
 DONE, FAILED, INACCURATE, TIMID = 0, 1, 2, 3
 """Ends of a stretch: all steps made; Newton's method failed; the local error is too large; a larger step would do."""
@@ -26,6 +31,8 @@ AUTO, UPDATE, FROZEN = range(3)
 
 @kernel(ADVANCE)
 def advance(
+    forces: Forces,
+    factor: Factor,
     model: Model,
     state: State,
     work: Work,
@@ -38,7 +45,7 @@ def advance(
     """Steps to the times of ``samples``, one row each; knots go into rows from ``first`` on."""
     progress.counts[STEPS] = 0
     for k in range(len(samples)):
-        if not _step(model, state, work, settings, progress, samples[k]):
+        if not _step(forces, factor, model, state, work, settings, progress, samples[k]):
             return FAILED
         status = _judge(state, work, settings, progress, model.metres)
         if status == INACCURATE:
@@ -51,7 +58,7 @@ def advance(
     return DONE
 
 
-@helper
+@part
 def _judge(state: State, work: Work, settings: Settings, progress: Progress, metres: Array) -> int:
     if settings.error_limit == 0.0:
         return DONE
@@ -65,8 +72,17 @@ def _judge(state: State, work: Work, settings: Settings, progress: Progress, met
     return TIMID if error * settings.growth**3 < settings.error_limit else DONE
 
 
-@helper
-def _step(model: Model, state: State, work: Work, settings: Settings, progress: Progress, sample: Array) -> bool:
+@part
+def _step(
+    forces: Forces,
+    factor: Factor,
+    model: Model,
+    state: State,
+    work: Work,
+    settings: Settings,
+    progress: Progress,
+    sample: Array,
+) -> bool:
     """One step from ``state`` into ``work``; False when Newton's method fails even with a fresh matrix."""
     counts = progress.counts
     fresh = counts[MATRIX] == 0 or settings.mode == UPDATE
@@ -74,14 +90,14 @@ def _step(model: Model, state: State, work: Work, settings: Settings, progress: 
         fresh = True
     while True:
         _predict(state, work, settings)
-        if _iterate(model, state, work, settings, progress, sample, fresh):
+        if _iterate(forces, factor, model, state, work, settings, progress, sample, fresh):
             return True
         if fresh or settings.mode == FROZEN:
             return False
         fresh = True
 
 
-@helper
+@part
 def _predict(state: State, work: Work, settings: Settings) -> None:
     h, beta, gamma = settings.h, settings.beta, settings.gamma
     for i in range(len(work.v)):
@@ -94,9 +110,17 @@ def _predict(state: State, work: Work, settings: Settings) -> None:
         work.multipliers[i] = state.multipliers[i] if settings.predict else 0.0
 
 
-@helper
+@part
 def _iterate(
-    model: Model, state: State, work: Work, settings: Settings, progress: Progress, sample: Array, fresh: bool
+    forces: Forces,
+    factor: Factor,
+    model: Model,
+    state: State,
+    work: Work,
+    settings: Settings,
+    progress: Progress,
+    sample: Array,
+    fresh: bool,
 ) -> bool:
     rates, counts = progress.rates, progress.counts
     n, m = len(work.v), len(work.multipliers)
@@ -131,7 +155,7 @@ def _iterate(
         if k == settings.iterations:
             break
         if fresh:
-            found = iteration_matrix(model, work, sample, settings.to_a, settings.to_v, settings.period)
+            found = factor(model, work, sample, settings.to_a, settings.to_v, settings.period)
             counts[FACTORIZATIONS] += 1
             counts[MATRIX], counts[USUAL], counts[EXCESS] = 1, settings.iterations, 0
             rates[RATE], rates[SPENT] = settings.slowest, 0.0
@@ -166,7 +190,7 @@ def _iterate(
     return False
 
 
-@helper
+@part
 def _correct(model: Model, work: Work, settings: Settings) -> float:
     """Solve for a correction, apply it, and return its size [m]."""
     n = len(work.v)
@@ -194,7 +218,7 @@ def _correct(model: Model, work: Work, settings: Settings) -> float:
     return size
 
 
-@helper
+@part
 def _settle(model: Model, state: State, work: Work) -> None:
     """Bring everything in ``work`` to its last increment."""
     compose(model, state.poses, work.increment, work.poses)
@@ -204,7 +228,7 @@ def _settle(model: Model, state: State, work: Work) -> None:
     set_twists(model, work)
 
 
-@helper
+@part
 def _note(settings: Settings, progress: Progress, iterations: int, rate: float) -> None:
     """How fast iteration was."""
     rates, counts = progress.rates, progress.counts
@@ -214,7 +238,7 @@ def _note(settings: Settings, progress: Progress, iterations: int, rate: float) 
         rates[SPENT] += iterations - counts[USUAL]
 
 
-@helper
+@part
 def _accept(state: State, work: Work, settings: Settings) -> None:
     """The state that was tried becomes the state."""
     for i in range(len(work.v)):
@@ -233,7 +257,7 @@ def _accept(state: State, work: Work, settings: Settings) -> None:
             state.poses[node, i] = work.poses[node, i]
 
 
-@helper
+@part
 def _store(model: Model, work: Work, knots: Knots, at: int) -> None:
     """Positions and rotation matrices with their derivatives, joint coordinates, rates of twists, multipliers."""
     for node in range(len(work.poses)):

@@ -7,12 +7,12 @@ The conventions are those of `erls.nodal.assembly` and `erls.integrators.saddle`
 from __future__ import annotations
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import helper, kernel
+from erls.kernels.jit import kernel, part
 from erls.kernels.nodal import band
 from erls.kernels.nodal.actuators import actuator_derivatives, actuator_forces
 from erls.kernels.nodal.beam import beam_derivatives, beam_forces
 from erls.kernels.nodal.bodies import body_derivatives, body_forces, load_derivatives, load_forces
-from erls.kernels.nodal.contract import EVALUATE, Model, State, Work
+from erls.kernels.nodal.contract import FACTOR, FORCES, Model, State, Work
 from erls.kernels.nodal.joints import joint_derivatives, joint_forces
 from erls.kernels.nodal.motions import series
 from erls.kernels.nodal.rotations import exponential, stumpff, tangent_coefficients, value
@@ -22,7 +22,7 @@ _ZERO = (0.0, 0.0, 0.0)
 GROUND = -1
 
 
-@helper
+@part
 def compose(model: Model, start: Array, increment: Array, out: Array) -> None:
     """Poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
     for node in range(len(start)):
@@ -43,7 +43,7 @@ def compose(model: Model, start: Array, increment: Array, out: Array) -> None:
             out[node, 3 + i] = r[i]
 
 
-@helper
+@part
 def set_twists(model: Model, work: Work) -> None:
     """Twists of all nodes in their own axes, and their rates."""
     for node in range(len(work.poses)):
@@ -59,7 +59,7 @@ def set_twists(model: Model, work: Work) -> None:
         put(work.rate, at + 3, three(work.a, at + 3))
 
 
-@helper
+@kernel(FORCES)
 def forces(model: Model, work: Work, before: State, sample: Array) -> None:
     """Residual and Bᵀλ (n,), violations (m,) of the state that ``work`` tries."""
     set_twists(model, work)
@@ -77,7 +77,7 @@ def forces(model: Model, work: Work, before: State, sample: Array) -> None:
             put(work.reaction, 6 * node, times(turn, three(work.reaction, 6 * node)))
 
 
-@helper
+@kernel(FACTOR)
 def iteration_matrix(model: Model, work: Work, sample: Array, to_a: float, to_v: float, period: float) -> int:
     """Factor [[β' M + γ' C + K T, Bᵀ], [B T, 0]]; 0, or 1 + the number of the unknown that is to blame.
 
@@ -119,7 +119,7 @@ def iteration_matrix(model: Model, work: Work, sample: Array, to_a: float, to_v:
     return found
 
 
-@helper
+@part
 def _node_factors(model: Model, work: Work, to_a: float, to_v: float) -> None:
     """What stands to the right of M, C and K for each node; on R³×SO(3) the chain rule over E v, E a + Ė v, Eᵀ f."""
     for node in range(len(work.poses)):
@@ -161,13 +161,13 @@ def _node_factors(model: Model, work: Work, to_a: float, to_v: float) -> None:
                     _enter(model, work, at + i, at + 3 + j, column[i])
 
 
-@helper
+@part
 def _enter(model: Model, work: Work, row: int, column: int, entry: float) -> None:
     place, width = model.place[row], (work.band.shape[1] - 1) // 3
     work.band[place, model.place[column] - place + width] += entry
 
 
-@helper
+@part
 def _add_blocks(model: Model, work: Work, first: int, second: int) -> None:
     """Add M X + C Y + K Z of one element between two nodes, of which the ground has no share."""
     for row_side in range(2):
@@ -203,17 +203,17 @@ def _add_blocks(model: Model, work: Work, first: int, second: int) -> None:
                     _enter(model, work, 6 * node + 3 + i, 6 * other + j, below[i])
 
 
-@helper
+@part
 def _three(table, row, column):  # type: ignore[no-untyped-def]
     return table[row, column], table[row + 1, column], table[row + 2, column]
 
 
-@helper
+@part
 def _own(work, row, column, to_a, to_v):  # type: ignore[no-untyped-def]
     return plus(scaled(to_a, _three(work.mass, row, column)), scaled(to_v, _three(work.damping, row, column)))
 
 
-@helper
+@part
 def _mixed(work, row, column, right, k, j):  # type: ignore[no-untyped-def]
     found = plus(
         scaled(right[0, k, j], _three(work.mass, row, column)), scaled(right[1, k, j], _three(work.damping, row, column))
@@ -221,7 +221,7 @@ def _mixed(work, row, column, right, k, j):  # type: ignore[no-untyped-def]
     return plus(found, scaled(right[2, k, j], _three(work.stiffness, row, column)))
 
 
-@helper
+@part
 def _add_condition(model: Model, work: Work, j: int, row: int) -> None:
     """Row B T and column Bᵀ of a condition; its scale, so that the largest derivative by a displacement is one."""
     n = len(work.force)
@@ -249,7 +249,7 @@ def _add_condition(model: Model, work: Work, j: int, row: int) -> None:
     work.left[n + row] = 1.0 / size if size > 0.0 else 1.0
 
 
-@helper
+@part
 def _scale(model: Model, work: Work, period: float) -> None:
     """Units of `erls.integrators.saddle`: metres, and newtons per mass."""
     n = len(work.force)
@@ -269,11 +269,3 @@ def _scale(model: Model, work: Work, period: float) -> None:
         for j in range(max(0, i - width), min(size, i + width + 1)):
             table[i, j - i + width] *= left * work.right[model.order[j]]
 
-
-@kernel(EVALUATE)
-def evaluate(
-    model: Model, state: State, work: Work, sample: Array, to_a: float, to_v: float, period: float
-) -> int:
-    """Forces of the state that ``work`` tries, then the factored iteration matrix: what tests hold against NumPy."""
-    forces(model, work, state, sample)
-    return iteration_matrix(model, work, sample, to_a, to_v, period)

@@ -5,45 +5,45 @@ from __future__ import annotations
 from typing import TypeAlias
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 Vector: TypeAlias = tuple[float, float, float]
 Twist: TypeAlias = tuple[Vector, Vector]
 Rotation: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
 
-@helper
+@part
 def plus(a: Vector, b: Vector) -> Vector:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@helper
+@part
 def minus(a: Vector, b: Vector) -> Vector:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@helper
+@part
 def scaled(s: float, a: Vector) -> Vector:
     return s * a[0], s * a[1], s * a[2]
 
 
-@helper
+@part
 def dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@helper
+@part
 def cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@helper
+@part
 def unit(k: int) -> Vector:
     """Axis k; zero for any other number."""
     return 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
 
 
-@helper
+@part
 def times(r: Rotation, a: Vector) -> Vector:
     """R a."""
     return (
@@ -53,7 +53,7 @@ def times(r: Rotation, a: Vector) -> Vector:
     )
 
 
-@helper
+@part
 def turned(r: Rotation, a: Vector) -> Vector:
     """Rᵀ a."""
     return (
@@ -63,7 +63,7 @@ def turned(r: Rotation, a: Vector) -> Vector:
     )
 
 
-@helper
+@part
 def product(a: Rotation, b: Rotation) -> Rotation:
     """A B."""
     return (
@@ -79,7 +79,7 @@ def product(a: Rotation, b: Rotation) -> Rotation:
     )
 
 
-@helper
+@part
 def back_product(a: Rotation, b: Rotation) -> Rotation:
     """Aᵀ B."""
     return (
@@ -95,19 +95,19 @@ def back_product(a: Rotation, b: Rotation) -> Rotation:
     )
 
 
-@helper
+@part
 def axial(n: Rotation) -> Vector:
     """z with z · ω = ⟨N, ω̃⟩."""
     return n[7] - n[5], n[2] - n[6], n[3] - n[1]
 
 
-@helper
+@part
 def vector(table: Array, row: int, at: int) -> Vector:
     """Three numbers of a row of a table."""
     return table[row, at], table[row, at + 1], table[row, at + 2]
 
 
-@helper
+@part
 def nine(table: Array, row: int, at: int) -> Rotation:
     """Nine numbers of a row of a table."""
     return (
@@ -123,13 +123,13 @@ def nine(table: Array, row: int, at: int) -> Rotation:
     )
 
 
-@helper
+@part
 def put(out: Array, at: int, a: Vector) -> None:
     """out[at : at + 3] = a."""
     out[at], out[at + 1], out[at + 2] = a
 
 
-@helper
+@part
 def add(out: Array, at: int, a: Vector) -> None:
     """out[at : at + 3] += a."""
     out[at] += a[0]
@@ -137,13 +137,13 @@ def add(out: Array, at: int, a: Vector) -> None:
     out[at + 2] += a[2]
 
 
-@helper
+@part
 def three(values: Array, at: int) -> Vector:
     """values[at : at + 3]."""
     return values[at], values[at + 1], values[at + 2]
 
 
-@helper
+@part
 def of_matrix(matrices: Array, e: int, v: Vector, w: Vector) -> Twist:
     """Pair of vectors M [v; w] of matrix e of a pile (e, 6, 6)."""
     return (
@@ -153,7 +153,7 @@ def of_matrix(matrices: Array, e: int, v: Vector, w: Vector) -> Twist:
     ), (_row(matrices, e, 3, v, w), _row(matrices, e, 4, v, w), _row(matrices, e, 5, v, w))
 
 
-@helper
+@part
 def _row(matrices: Array, e: int, i: int, v: Vector, w: Vector) -> float:
     linear: float = matrices[e, i, 0] * v[0] + matrices[e, i, 1] * v[1] + matrices[e, i, 2] * v[2]
     angular: float = matrices[e, i, 3] * w[0] + matrices[e, i, 4] * w[1] + matrices[e, i, 5] * w[2]

@@ -1,0 +1,98 @@
+"""Pieces of the links that a scene splits into substructures: their modal models, and links of a mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from erls.mechanism.links import Link, truncated
+from erls.scene import Link as LinkRecord
+from fe_import.link import LinkFile
+from fe_import.modal.file import ModalModel
+from fe_import.modes import damping_ratios
+from fe_import.reduce import reduce_cached
+from fe_import.substructures import split_link
+
+
+def piece_models(
+    record: LinkRecord, link: LinkFile, whole: ModalModel, folder: Path, where: str
+) -> tuple[ModalModel, ...]:
+    """Modal models of the pieces of a link, from its inboard end outward.
+
+    Parameters
+    ----------
+    record : LinkRecord
+        The link in the scene.
+    link : LinkFile
+        Its description.
+    whole : ModalModel
+        Its reduction in one piece.
+    folder : Path
+        Where reductions are kept.
+    where : str
+        Place of the link, for messages.
+
+    Raises
+    ------
+    FEImportError
+        The link cannot be split: see `fe_import.substructures.split_link`.
+    """
+    names = [i.name for i in whole.interface_nodes]
+    inboard = record.inboard or names[0]
+    others = [name for name in names if name != inboard]
+    outboard = record.outboard or (others[0] if others else "")
+    pieces = split_link(link, record.substructures, inboard, outboard, f"{where}.substructures")
+    models = [reduce_cached(piece, folder)[0] for piece in pieces]
+    if record.elastic_modes is None:
+        return tuple(models)
+    return tuple(truncated(m, min(record.elastic_modes, m.elastic_modes)) for m in models)
+
+
+def piece_links(record: LinkRecord, whole: Link, models: Sequence[ModalModel], where: str) -> tuple[Link, ...]:
+    """The pieces as links; payloads are put on them when the mechanism is split."""
+    result = []
+    for number, model in enumerate(models):
+        ends = model.interface_nodes
+        outboard = ends[1] if number < len(models) - 1 else None
+        if outboard is None and whole.outboard is not None:
+            outboard = model.interface(whole.outboard.name)
+        omega = 2 * np.pi * model.frequencies_hz
+        ratios = model.damping_ratios
+        if record.damping is not None:
+            ratios = damping_ratios(record.damping, omega, where)
+        result.append(
+            replace(
+                whole,
+                name=f"{whole.name}/{number + 1}",
+                model=model,
+                invariants=model.invariants,
+                inboard=ends[0],
+                outboard=outboard,
+                stiffness=np.diag(model.stiffness)[6:].copy(),
+                damping=(2 * ratios * omega)[6:],
+                payloads=(),
+                description=None,
+                pieces=(),
+            )
+        )
+    return tuple(result)
+
+
+def piece_warnings(link: Link) -> list[str]:
+    """Modal damping ratios belong to modes of the pieces, which lie above those of the link."""
+    first = next((p for p in link.pieces if p.damping.any()), None)
+    if first is None or not link.damping.any():
+        return []
+    lowest, whole = (float(x.stiffness[0]) ** 0.5 / (2 * np.pi) for x in (first, link))
+    ratio = [float(x.damping[0]) / (4 * np.pi * f) for x, f in ((first, lowest), (link, whole))]
+    stiff = ratio[1] * lowest / whole  # what damping in proportion to stiffness gives the piece
+    if abs(ratio[0] - stiff) <= 1e-3 * stiff:
+        return []
+    return [
+        f"link {link.name!r}: damping holds for the modes of its {len(link.pieces)} substructures (from "
+        f"{lowest:.4g} Hz on), so that its own lowest mode ({whole:.4g} Hz) is damped less than stated; damping.rayleigh with beta "
+        "alone is the same for both"
+    ]

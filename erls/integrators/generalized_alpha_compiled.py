@@ -1,0 +1,80 @@
+"""Generalized-α over a system in compiled form: the same steps in chunks, with Python in between for the observer."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from erls.integrators.base import Array, Leg
+from erls.integrators.driver import Recorder
+from erls.kernels.contract import CompiledSystem
+from erls.kernels.stepping import generalized_alpha as loop
+
+_PAUSE = 0.05  # s between looks at the observer and at interrupts
+
+
+class Chunks:
+    """Memory of the compiled loop over one run.
+
+    Parameters
+    ----------
+    system : CompiledSystem
+    settings : mapping of names of `loop` constants to numbers
+        What stays the same over the run.
+    metres : (n,) array
+        Per unit of each coordinate.
+    """
+
+    def __init__(self, system: CompiledSystem, known: dict[int, float], counts: dict[int, int], metres: Array) -> None:
+        n = system.size
+        self.system = system
+        self.known, self.counts = np.zeros(loop.KNOWN), np.zeros(loop.COUNTS, dtype=np.int64)
+        self.known[list(known)], self.counts[list(counts)] = list(known.values()), list(counts.values())
+        self.state, self.matrices = np.zeros((loop.STATE, n)), np.zeros((4, n, n))
+        self.state[loop.METRES], self.state[loop.PER_METRE] = metres, 1 / metres
+        self.pivots = np.zeros(n, dtype=np.int64)
+        self.steps = 8
+
+    def advance(self, leg: Leg, count: int, y: Array, v: Array, a: Array, recorder: Recorder) -> bool:
+        """``count`` equal steps over a leg from (y, v) with acceleration ``a``; False when one fails."""
+        known, counts, state = self.known, self.counts, self.state
+        known[[loop.START, loop.SPAN, loop.LAST, loop.END]] = leg.start, leg.end - leg.start, leg.last, leg.end
+        unit = 1 << int(counts[loop.MAX_HALVINGS])
+        counts[[loop.AT, loop.TOTAL, loop.UNIT]] = 0, count * unit, unit
+        counts[[loop.HALVINGS, loop.SERVED]] = 0
+        for row, start in ((loop.Y, y), (loop.V, v), (loop.ACC, a), (loop.ALG, a)):
+            state[row] = start
+        state[[loop.CHANGE, loop.GUESS]] = 0.0
+        loop.set_step(known, counts, known[loop.SPAN] / count)
+        functions = self.system.residual, self.system.mass_matrix, self.system.stiffness_and_damping
+        while counts[loop.AT] < counts[loop.TOTAL]:
+            times, knots = np.empty(self.steps), np.empty((self.steps, 3, self.system.size))
+            begun = time.perf_counter()
+            made = loop.advance(
+                *functions,
+                self.system.reals,
+                self.system.integers,
+                self.system.scratch,
+                known,
+                counts,
+                state,
+                self.matrices,
+                self.pivots,
+                times,
+                knots,
+            )
+            spent = time.perf_counter() - begun
+            failed, made = made < 0, made if made >= 0 else -1 - made
+            self.steps = max(1, min(2 * self.steps, 4096, math.ceil(_PAUSE * self.steps / max(spent, 1e-6))))
+            work = recorder.work
+            work.rhs_calls += int(counts[loop.RHS_CALLS])
+            work.newton_iterations += int(counts[loop.ITERATIONS])
+            work.factorizations += int(counts[loop.FACTORIZATIONS])
+            work.rejected_steps += int(counts[loop.REJECTED])
+            counts[[loop.RHS_CALLS, loop.ITERATIONS, loop.FACTORIZATIONS, loop.REJECTED]] = 0
+            recorder.extend(times[:made], knots[:made])
+            if failed:
+                return False
+        return True

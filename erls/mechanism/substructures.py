@@ -1,0 +1,116 @@
+"""Links split into substructures: pieces of their own, rigidly joined, in a mechanism that formulations solve.
+
+A link is one body for whoever asks a run, and a chain of pieces for the equations of motion. All pieces share the mesh
+frame of their link. A weld between two of them is a revolute joint held at 0: where a motion is prescribed every
+formulation keeps all six conditions, so that a weld needs nothing of its own.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from erls.lie.se3 import pose
+from erls.lie.so3 import Array
+from erls.mechanism.chain import Mechanism, Point
+from erls.mechanism.curves import piecewise
+from erls.mechanism.drives import Drive
+from erls.mechanism.joints import JOINT_TYPES, Joint, JointForces
+from erls.mechanism.links import Link, payload_invariants
+from erls.mechanism.loops import LoopEnd
+from fe_import.model import IntArray
+
+
+@dataclass(frozen=True)
+class Split:
+    """A mechanism of whole links, and the one of their pieces.
+
+    Attributes
+    ----------
+    whole, pieces : Mechanism
+    links : tuple of range
+        Pieces of each link, by their number in ``pieces``; one for a link that is not split.
+    places : tuple of (n, 2) int arrays
+        Piece, by that number, and node of it, for each node of each link.
+    """
+
+    whole: Mechanism
+    pieces: Mechanism
+    links: tuple[range, ...]
+    places: tuple[IntArray, ...]
+
+    @property
+    def joints(self) -> list[int]:
+        """Number in ``pieces`` of each joint of the whole links: it carries their first piece."""
+        return [own.start for own in self.links]
+
+
+def is_split(mechanism: Mechanism) -> bool:
+    """Whether any link is split."""
+    return any(link.pieces for link in mechanism.links)
+
+
+def split(mechanism: Mechanism) -> Split:
+    """The mechanism of pieces; payloads, points and loops sit on the piece that carries their node."""
+    ends = np.cumsum([0, *(max(1, len(link.pieces)) for link in mechanism.links)]).tolist()
+    ranges = tuple(range(a, b) for a, b in itertools.pairwise(ends))
+    places = tuple(_places(link, own) for link, own in zip(mechanism.links, ranges, strict=True))
+    joints: list[Joint] = []
+    links: list[Link] = []
+    for joint, link, where in zip(mechanism.joints, mechanism.links, places, strict=True):
+        joints.append(joint)
+        if not link.pieces:
+            links.append(link)
+            continue
+        first = len(links)
+        joints += [_weld(link.name, k, piece.inboard.position) for k, piece in enumerate(link.pieces) if k]
+        links += [_loaded(piece, link, where, first + k) for k, piece in enumerate(link.pieces)]
+
+    def moved(end: LoopEnd) -> LoopEnd:
+        if end.link is None:
+            return end
+        piece, node = places[end.link][end.node].tolist()
+        return replace(end, link=piece, node=node)
+
+    pieces = replace(
+        mechanism,
+        joints=tuple(joints),
+        links=tuple(links),
+        points=tuple(Point(p.name, *places[p.link][p.node].tolist()) for p in mechanism.points),
+        loops=tuple(replace(loop, inner=moved(loop.inner), outer=moved(loop.outer)) for loop in mechanism.loops),
+    )
+    return Split(mechanism, pieces, ranges, places)
+
+
+def _places(link: Link, own: range) -> IntArray:
+    """(n, 2) piece and node of each node of a link; that of two pieces belongs to the inner one."""
+    if not link.pieces:
+        nodes = np.arange(len(link.model.nodes))
+        return np.column_stack([np.full(len(nodes), own.start), nodes])
+    names = {number: name for name, number in link.model.node_names.items()}
+    known = [piece.model.node_names for piece in link.pieces]
+    result = np.empty((len(link.model.nodes), 2), dtype=np.int64)
+    for number in range(len(result)):
+        place = next(k for k, nodes_of in enumerate(known) if names[number] in nodes_of)
+        result[number] = own[place], known[place][names[number]]
+    return result
+
+
+def _weld(link: str, number: int, position: Array) -> Joint:
+    """Joint that holds piece ``number`` on the one before."""
+    held = Drive("motion", motion=piecewise([], [0.0]))
+    frame, back = pose(position=position), pose(position=-position)
+    return Joint(f"{link}: weld {number}", JOINT_TYPES["revolute"], frame, back, JointForces(), 0.0, held, 0.0, 0.0)
+
+
+def _loaded(piece: Link, whole: Link, places: IntArray, number: int) -> Link:
+    """A piece with those payloads of the whole link that sit on it."""
+    payloads = tuple(
+        replace(p, node=int(places[p.node, 1])) for p in whole.payloads if places[p.node, 0] == number
+    )
+    invariants = piece.invariants
+    for p in payloads:
+        invariants = invariants + payload_invariants(piece.model, p.node, p.offset, p.mass, p.inertia)
+    return replace(piece, invariants=invariants, payloads=payloads)

@@ -1,0 +1,260 @@
+"""A `NodalSystem` as arrays for compiled steps (`erls.kernels.nodal`), where all its elements have kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from erls.integrators.base import metre_scales
+from erls.integrators.constrained import ConstrainedState
+from erls.kernels.nodal.contract import Model, State, Work
+from erls.lie.so3 import Array
+from erls.mechanism.drives import Drive
+from erls.mechanism.joints import JointForces
+from erls.nodal.actuators import Actuators, Turned
+from erls.nodal.assembly import NodalSystem, Nodes
+from erls.nodal.beam import Beams
+from erls.nodal.joints import JointRows
+from erls.nodal.loads import NodalLoads
+from erls.nodal.rigid_body import RigidBodies
+from erls.nodal.scatter import IntArray
+
+_ASKED = (
+    "compose",
+    "tangent",
+    "residual",
+    "mass_matrix",
+    "stiffness_and_damping",
+    "constraint",
+    "constraint_matrix",
+    "length_scales",
+)  # methods of a system that the kernels stand for
+
+
+def has_kernels(system: NodalSystem) -> bool:
+    """Whether the kernels compute what the system does: it may not change methods, nor hold other kinds of elements."""
+    if any(getattr(type(system), name) is not getattr(NodalSystem, name) for name in _ASKED):
+        return False
+    kinds: list[type] = [type(e) for e in system.elements]
+    if any(kind not in (Beams, RigidBodies, NodalLoads, Actuators) for kind in kinds):
+        return False
+    if any(kinds.count(kind) > 1 for kind in (Beams, RigidBodies, NodalLoads)) or type(system.rows) is not JointRows:
+        return False
+    acting = [j for e in system.elements if isinstance(e, Actuators) for j in e.joints]
+    return all(type(j.drive) is Drive and type(j.forces) is JointForces for j in acting)
+
+
+class CompiledSystem:
+    """Arrays of a system, and how its configurations lie in them.
+
+    Parameters
+    ----------
+    system : NodalSystem
+        With `has_kernels`.
+    """
+
+    def __init__(self, system: NodalSystem) -> None:
+        self.system = system
+        self._beams: Beams | None = self._of(Beams)
+        self._loads: NodalLoads | None = self._of(NodalLoads)
+        self._actuators = [e for e in system.elements if isinstance(e, Actuators)]
+        self.places, self.width = _order(system)
+        self.model = self._model()
+        self.stored = 12 * system.count + len(self.model.actuators)
+
+    def _of(self, kind: type) -> Any:
+        return next((e for e in self.system.elements if type(e) is kind), None)
+
+    def samples(self, times: Array) -> Array:
+        """(times, ...) what depends on time alone; see `erls.kernels.nodal.contract`."""
+        system = self.system
+        joints = len(system.rows.joints)
+        loads = self._loads.loads if self._loads is not None else ()
+        result = np.zeros((len(times), joints + len(loads) + 3 * len(self.model.actuators)))
+        for k, joint in enumerate(system.rows.joints):
+            if joint.motion is not None:
+                result[:, k] = [joint.motion(t)[0] for t in times.tolist()]
+        for k, load in enumerate(loads, joints):
+            result[:, k] = [load.factor(t) for t in times.tolist()]
+        column = joints + len(loads)
+        for group in self._actuators:
+            for k, joint in enumerate(group.joints):
+                if k in group.acting:
+                    result[:, column : column + 3] = [_wanted(joint.drive, group.leads[k], t) for t in times.tolist()]
+                column += 3
+        return result
+
+    def state(self, known: ConstrainedState, algorithmic: Array) -> State:
+        """A copy as arrays."""
+        q: Nodes = known.q
+        memory = dict(zip(map(id, self.system.elements), q.memory, strict=True))
+        bent = memory[id(self._beams)].d if self._beams is not None else np.zeros((0, 6))
+        angles = [memory[id(group)].angles for group in self._actuators]
+        return State(
+            _rows(q.poses),
+            np.array(bent, dtype=float),
+            np.concatenate([*angles, np.zeros(0)]),
+            known.v.copy(),
+            known.a.copy(),
+            algorithmic.copy(),
+            known.multipliers.copy(),
+        )
+
+    def configuration(self, state: State) -> Nodes:
+        """Nodes of a state."""
+        poses = np.zeros((self.system.count, 4, 4))
+        poses[:, :3, 3], poses[:, :3, :3] = state.poses[:, :3], state.poses[:, 3:].reshape(-1, 3, 3)
+        poses[:, 3, 3] = 1.0
+        near, first = [], 0
+        for element, memory in zip(self.system.elements, self.system.start.memory, strict=True):
+            if element is self._beams:
+                near.append(_Near(state.bent))
+            elif isinstance(element, Actuators):
+                near.append(Turned(state.turned[first : first + len(element.joints)].copy(), np.zeros(0)))
+                first += len(element.joints)
+            else:
+                near.append(memory)
+        return self.system.at(poses, Nodes(poses, tuple(near)))
+
+    def work(self) -> Work:
+        """Memory for steps."""
+        n, m, k = self.system.size, self.system.constraints, self.system.count
+        blocks = np.zeros((3, 12, 12))
+        return Work(
+            np.zeros((k, 12)),
+            np.zeros_like(self.model.beam_built),
+            np.zeros(len(self.model.actuators)),
+            *np.zeros((2, n)),
+            np.zeros(m),
+            *np.zeros((5, n)),
+            np.zeros(m),
+            *np.zeros((2, n + m)),
+            *blocks,
+            *np.zeros((2, 6, 12)),
+            np.zeros((m, 12)),
+            np.zeros((k, 3, 6, 6)),
+            np.zeros(n),
+            np.zeros((n + m, 3 * self.width + 1)),
+            np.zeros(n + m, dtype=np.int64),
+            *np.zeros((2, n + m)),
+        )
+
+    def _model(self) -> Model:
+        system, rows = self.system, self.system.rows
+        bodies: RigidBodies | None = self._of(RigidBodies)
+        gravity = np.array([b.gravity if b is not None else np.zeros(3) for b in (self._beams, bodies)], dtype=float)
+        driven = np.array([rows.driven_along(j) for j in rows.joints], dtype=np.int64)
+        signs = np.array([rows.sign(j) for j in rows.joints], dtype=float)
+        firsts = np.searchsorted(rows.joint_of_row, np.arange(len(rows.joints) + 1))
+        order = np.argsort(self.places)
+        return Model(
+            int(system.local),
+            gravity,
+            *_of_beams(self._beams),
+            *((bodies.nodes[:, 0].copy(), bodies.matrices) if bodies else (_none(int), np.zeros((0, 6, 6)))),
+            *_of_loads(self._loads),
+            *_of_actuators(self._actuators),
+            rows.nodes,
+            _pairs(*rows.frames),
+            driven,
+            signs,
+            firsts.astype(np.int64),
+            np.ascontiguousarray(np.concatenate([rows.c, rows.entries.reshape(-1, 9)], axis=1)),
+            metre_scales(system),
+            self.places,
+            order.astype(np.int64),
+        )
+
+
+class _Near:
+    """Memory of beams as far as the next one asks for it."""
+
+    def __init__(self, d: Array) -> None:
+        self.d = d.copy()
+
+
+def _wanted(drive: Drive, lead: Any, t: float) -> tuple[float, float, float]:
+    """Wanted coordinate, wanted rate, and torque besides."""
+    if drive.load is not None or drive.motion is None:
+        return 0.0, 0.0, drive.torque(t, 0.0, 0.0) + lead(t)
+    wanted = drive.reference(t)
+    assert wanted is not None
+    return wanted[0], wanted[1], lead(t)
+
+
+def _none(kind: type, *shape: int) -> Any:
+    return np.zeros((0, *shape), dtype=np.int64 if kind is int else float)
+
+
+def _rows(poses: Array) -> Array:
+    """(..., 12) position and rotation, rows first."""
+    flat = poses[..., :3, :3].reshape(*poses.shape[:-2], 9)
+    return np.ascontiguousarray(np.concatenate([poses[..., :3, 3], flat], axis=-1))
+
+
+def _pairs(first: Array, second: Array) -> Array:
+    return np.ascontiguousarray(np.concatenate([_rows(first), _rows(second)], axis=-1).reshape(-1, 24))
+
+
+def _of_beams(beams: Beams | None) -> tuple[Any, ...]:
+    if beams is None:
+        return _none(int, 2), _none(float, 24), _none(float, 6), _none(float, 6, 6), _none(float, 6, 6), _none(int)
+    moving = np.array([m.any() for m in beams.inertia], dtype=np.int64)
+    frames = _pairs(beams.frames[:, 0], beams.frames[:, 1])
+    return beams.nodes, frames, beams.built, beams.stiffness, beams.inertia, moving
+
+
+def _of_loads(loads: NodalLoads | None) -> tuple[Any, ...]:
+    if loads is None:
+        return _none(int), _none(float, 6), _none(int)
+    wrenches = np.array([[*x.force, *x.moment] for x in loads.loads], dtype=float).reshape(-1, 6)
+    return loads.nodes[:, 0].copy(), wrenches, np.array([not x.follower for x in loads.loads], dtype=np.int64)
+
+
+def _of_actuators(groups: Sequence[Actuators]) -> tuple[Any, ...]:
+    nodes, frames, along, active, laws = [], [], [], [], []
+    for group in groups:
+        for k, joint in enumerate(group.joints):
+            ends = group.nodes[k]
+            nodes.append([ends[0] if len(ends) == 2 else -1, ends[-1]])
+            frames.append(_pairs(group.inner_frames[k], group.outer_frames[k])[0])
+            along.append(group.along[k])
+            active.append(k in group.acting or joint.rotor_inertia != 0)
+            own, drive = joint.forces, joint.drive
+            gains = drive.gains if k in group.acting else (0.0, 0.0)
+            law = (own.stiffness, own.rest, own.damping, own.friction, own.transition_rate, *gains, drive.torque_limit)
+            laws.append([joint.rotor_inertia, *law])
+    integers = (np.array(x, dtype=np.int64) for x in (along, active))
+    return (
+        np.array(nodes, dtype=np.int64).reshape(-1, 2),
+        np.array(frames).reshape(-1, 24),
+        *integers,
+        np.array(laws, dtype=float).reshape(-1, 9),
+    )
+
+
+def _order(system: NodalSystem) -> tuple[IntArray, int]:
+    """Numbers of all unknowns in the band, nodes and joints by the reverse Cuthill-McKee order; width of the band.
+
+    E. Cuthill, J. McKee, Proc. 24th Nat. Conf. ACM (1969) 157–172.
+    """
+    joints, count = len(system.rows.joints), system.count
+    groups = [np.concatenate([nodes[nodes >= 0]]) for e in system.elements for nodes in e.nodes]
+    for k, pair in enumerate(system.rows.nodes):
+        groups.append(np.append(pair[pair >= 0], count + k))
+    rows = np.concatenate([np.repeat(g, len(g)) for g in groups] or [_none(int)])
+    columns = np.concatenate([np.tile(g, len(g)) for g in groups] or [_none(int)])
+    graph = sp.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count + joints, count + joints))
+    sizes = np.concatenate([np.full(count, 6), np.bincount(system.rows.joint_of_row, minlength=joints)]).astype(np.int64)
+    own = np.concatenate([[0], np.cumsum(sizes)])
+    places = np.zeros(own[-1], dtype=np.int64)
+    last = 0
+    for block in reverse_cuthill_mckee(graph, symmetric_mode=True):
+        places[own[block] : own[block + 1]] = np.arange(last, last + sizes[block])
+        last += sizes[block]
+    spans = [np.concatenate([places[own[b] : own[b + 1]] for b in g]) for g in groups]
+    return places, max((int(np.ptp(s)) for s in spans if len(s)), default=5)

@@ -1,0 +1,1 @@
+"""Which effects a scene needs: probed before a run, certified after it."""

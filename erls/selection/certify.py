@@ -1,0 +1,90 @@
+"""What leaving out effects has changed in a run: an estimate after the fact, along the computed motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from erls.effects import Certificate
+from erls.formulations import formulate
+from erls.formulations.substructures import solved
+from erls.integrators.base import Array, hermite
+from erls.mechanism.chain import Mechanism
+from erls.run import Run
+from erls.selection.error_motion import Knots, error_motion
+from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
+
+STEPS = 400
+_EFFORTS = 40  # knots at which drive forces are compared
+
+
+def certify(run: Run, whole: Mechanism) -> Certificate:
+    """Estimate the error of a run that left out effects.
+
+    Parameters
+    ----------
+    run : Run
+    whole : Mechanism
+        With all effects.
+
+    Raises
+    ------
+    SimulationError
+        The error cannot be followed.
+    """
+    settings = run.scene.record.simulation
+    formulation = formulate(whole, settings)
+    system, reduced = solved(formulation), solved(run.formulation)
+    kept = reduced.size  # coordinates of elastic modes, where only the whole has them, come last
+
+    def embedded(values: Array) -> Array:
+        result = np.zeros((*values.shape[:-1], system.size))
+        result[..., :kept] = values
+        return result
+
+    def balance(t: float, y: Array, v: Array, a: Array) -> Array:
+        return embedded(reduced.residual(t, y[:kept], v[:kept], a[:kept]))
+
+    legs = _legs(run)
+    begin, begun = formulation.initial_state(), run.formulation.initial_state()
+    start = (begin[0] - embedded(begun[0]), begin[1] - embedded(begun[1]))
+    embedded_legs = [Knots(k.t, embedded(k.y), embedded(k.v), embedded(k.a)) for k in legs]
+    stride = max(1, round(sum(len(k.t) for k in legs) / STEPS))
+    found = error_motion(system, embedded_legs, start, balance, stride, 1e-2 * settings.effects_tolerance)
+    watched = watched_nodes(whole)
+    ours = Outputs(run.scene, run.formulation, watched)
+    others = Outputs(run.scene, formulation, watched)
+    here = [ours.positions(run.formulation.state(d.t, d.y[:kept], d.v[:kept])) for d in found]
+    there = [others.positions(formulation.state(d.t, d.other_y, d.other_v)) for d in found]
+    efforts: tuple[list[Array], list[Array]] = ([], [])
+    if ours.driven:
+        for d in found[:: max(1, len(found) // _EFFORTS)]:
+            efforts[0].append(others.efforts(d.t, d.other_y, d.other_v))
+            efforts[1].append(ours.efforts(d.t, d.y[:kept], d.v[:kept]))
+    return Certificate(
+        largest_distance(here, there),
+        effort_error(*efforts),
+        settings.effects_tolerance,
+        settings.effects_effort_tolerance,
+    )
+
+
+def _legs(run: Run) -> list[Knots]:
+    """Knots of a run between jumps; where they are few, states between them with accelerations of their own."""
+    s, system = run.solution, solved(run.formulation)
+    jumps = np.flatnonzero(np.diff(s.t) == 0) + 1
+    result = []
+    for part in np.split(np.arange(len(s.t)), jumps):
+        t = s.t[part]
+        if len(part) < 2:
+            continue
+        wanted = int(np.ceil(STEPS * (t[-1] - t[0]) / (s.t[-1] - s.t[0])))
+        if len(part) > wanted:
+            result.append(Knots.inside(t, s.y[part], s.v[part], s.a[part]))
+            continue
+        times = np.linspace(t[0], t[-1], max(wanted, 2) + 1)
+        y, v = hermite(t, s.y[part], s.v[part], s.a[part], times)
+        knots = Knots.inside(times, y, v, np.zeros_like(y))
+        states = zip(knots.t.tolist(), y, v, strict=True)
+        accelerations = np.array([system.acceleration(*state) for state in states]).reshape(y.shape)
+        result.append(Knots(knots.t, y, v, accelerations))
+    return result

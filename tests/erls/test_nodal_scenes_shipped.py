@@ -1,0 +1,102 @@
+"""The shipped scenes of bodies and beams: what their headers say."""
+
+from __future__ import annotations
+
+import functools
+
+import heavy_top
+import numpy as np
+import pytest
+import scenes
+
+from erls.body_scenes import load_body_scene, solve
+from erls.body_scenes.result import Motion, Rest
+from erls.errors import Cause, SimulationError
+
+DATA = scenes.ROOT / "data"
+
+
+@functools.cache
+def _top(speed: str, *changes: str) -> Motion:
+    found = solve(load_body_scene(DATA / "heavy_top" / f"{speed}.toml", [f"simulation.{c}" for c in changes]))
+    assert isinstance(found, Motion)
+    return found
+
+
+def _rest(name: str, *changes: str) -> Rest:
+    found = solve(load_body_scene(DATA / "statics" / f"{name}.toml", changes))
+    assert isinstance(found, Rest)
+    return found
+
+
+def _places(times: list[float], column: str) -> np.ndarray:
+    reference = heavy_top.reference()
+    rows = [int(np.abs(reference["t"] - t).argmin()) for t in times]
+    return np.array(reference[column][rows])
+
+
+@pytest.mark.parametrize(
+    ("group", "matrix", "iterations", "largest"),
+    [("R3xSO(3)", "update", 2.678, 0.0688), ("SE(3)", "update", 2.0, 0.774), ("SE(3)", "frozen", 2.966, 0.774)],
+)
+def test_fast_top(group: str, matrix: str, iterations: float, largest: float) -> None:
+    """Iterations per step of an independent implementation within 5 %, and its largest errors at this step."""
+    duration = 2.0 if group == "R3xSO(3)" else 1.0
+    found = _top("fast", f"group={group}", f"iteration_matrix={matrix}", f"duration={duration}")
+    assert found.summary()["iterations_per_step"] == pytest.approx(iterations, rel=0.05)
+    off = np.linalg.norm(found.position("top", [0.5, 1.0]) - _places([0.5, 1.0], "fast_x"), axis=1)
+    assert off.max() < 1.01 * largest
+
+
+def test_fast_top_tends_to_the_reference() -> None:
+    """Steps of 2 and 1 ms, extrapolated, at 0.5 s; a frozen matrix fails on R3xSO(3)."""
+    coarse, fine = (_top("fast", f"step={h}", "duration=0.5").position("top", 0.5) for h in (2e-3, 1e-3))
+    np.testing.assert_allclose((4 * fine - coarse) / 3, _places([0.5], "fast_x")[0], atol=2e-4)
+    with pytest.raises(SimulationError) as caught:
+        _top("fast", "iteration_matrix=frozen")
+    assert caught.value.cause is Cause.NEWTON_FAILED
+
+
+def test_slow_top() -> None:
+    """Places at three times to 5e-5 m, and the energy band of the header."""
+    found = _top("slow")
+    np.testing.assert_allclose(found.position("top", [0.5, 1, 2]), _places([0.5, 1, 2], "slow_x"), atol=5e-5)
+    drift = found.summary()["energy"]["max_drift"]
+    assert drift == pytest.approx(6.5e-4, rel=0.01)
+    assert np.ptp(found.energies()[1]) == drift
+
+
+@pytest.mark.parametrize("tangent", ["full", "material"])
+def test_bend_45(tangent: str) -> None:
+    """The eight published figures to their digits, with either tangent."""
+    found = _rest("bend_45", f"simulation.tangent={tangent}", "simulation.compare_tangents=false")
+    np.testing.assert_allclose(found.position("tip", 0), (58.84, 22.30, 40.03), atol=0.01)
+    np.testing.assert_allclose(found.position("tip", 1), (47.23, 15.76, 53.28), atol=0.01)
+    clamp = found.summary()["samples"][1]["connections"]["clamp"]
+    np.testing.assert_allclose(clamp["force"], [0, 0, -600], atol=1e-9)
+    np.testing.assert_allclose(clamp["moment"], -np.cross(found.position("tip"), [0, 0, 600]), atol=1e-6)
+
+
+def test_iterations_of_every_tangent_are_counted() -> None:
+    """At a thirtieth of the load, where the frozen tangent need not be helped along for long."""
+    found = _rest("bend_45", "loads.0.force=[0,0,20]").summary()
+    assert set(found["tangents"]) == {"full", "material", "frozen"}
+    assert all(w["converged"] and w["iterations"] > 0 for w in found["tangents"].values())
+    assert found["tangents"]["full"]["iterations"] == found["iterations"]
+    frozen = found["tangents"]["frozen"]
+    assert frozen["factorizations"] < frozen["iterations"] / 5
+
+
+def test_roll_up() -> None:
+    """Two full turns with three elements, exactly; after half of the load a circle."""
+    found = _rest("roll_up")
+    np.testing.assert_allclose(found.position("tip"), 0, atol=1e-10)
+    circle = [found.position(name, 3) - [0, 10 / (2 * np.pi), 0] for name in ("root", "strip/1", "strip/2", "tip")]
+    np.testing.assert_allclose(np.linalg.norm(circle, axis=1), 10 / (2 * np.pi), rtol=1e-11)
+
+
+@pytest.mark.parametrize(("axis", "expected"), [(1, 1.754e-3), (2, 5.424e-3)])
+def test_twisted_beam(axis: int, expected: float) -> None:
+    """The published displacements along the load within 1 %."""
+    found = _rest("twisted_beam", f"loads.0.force={np.eye(3)[axis].tolist()}")
+    assert found.position("tip")[axis] == pytest.approx(expected, rel=0.01)
