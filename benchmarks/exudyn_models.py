@@ -24,9 +24,6 @@ from erls.mechanism.chain import Mechanism, poses
 from erls.mechanism.links import Link
 
 Array = np.ndarray
-EULER = False  # parameters of the rotation; Rxyz takes less time
-
-
 @dataclass(frozen=True)
 class Section:
     """Rectangular section of all members of a link, height along z, and its mass per length [kg/m]."""
@@ -122,6 +119,9 @@ class Model:
 
 def build(mechanism: Mechanism, sections: Sequence[Section], point: int, duration: float) -> Model:
     """All links of a mechanism at its initial angles; prescribed joints follow their motion."""
+    # Rxyz takes less time; joints with an offset between two such bodies miss the motion by 5e-4 m here, Euler
+    # parameters by nothing
+    euler = len(mechanism.links) > 1
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     theta = np.array([joint.position for joint in mechanism.joints])
@@ -129,7 +129,7 @@ def build(mechanism: Mechanism, sections: Sequence[Section], point: int, duratio
     previous, objects = None, []
     for k, (link, frame) in enumerate(zip(mechanism.links, poses(mechanism, theta), strict=True)):
         body = body_of(link, sections[k])
-        cms = _interface(body, EULER)
+        cms = _interface(body, euler)
         made = cms.AddObjectFFRFreducedOrderWithUserFunctions(
             exu, mbs, positionRef=frame[:3, 3], rotationMatrixRef=frame[:3, :3], gravity=[0, 0, 0]
         )

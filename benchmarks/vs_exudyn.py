@@ -9,7 +9,8 @@ Each program runs a ladder of steps or tolerances; error is the largest distance
 run of the program's own equations (erls: Equivalent Rigid Link System; exudyn: floating frame of reference). How far
 the two tight runs are apart is printed: it is of second order in the deflection, and no error of either program. Time
 is the median of the integration alone. exudyn runs generalized-alpha with modified Newton and its best settings found
-here: rotation Rxyz, spectral radius 0.95, relative tolerance 1e-5; gravity as forces on nodal masses.
+here: rotation Rxyz for one link, Euler parameters for more, spectral radius 0.95, relative tolerance 1e-5; gravity as
+forces on nodal masses.
 
 Run: python benchmarks/vs_exudyn.py [--scenes l,robot2,robot3] [--runs 5]
 """

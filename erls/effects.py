@@ -165,14 +165,26 @@ class Certificate:
         Of drive forces, relative to their peak; None where no drive reacts.
     tolerance, effort_tolerance : float
         Those of the scene.
+    wall_s : float
+        Time that choosing effects and this estimate took.
     """
 
     error: float
     effort_error: float | None
     tolerance: float
     effort_tolerance: float
+    wall_s: float = 0.0
 
     @property
     def ok(self) -> bool:
         """Whether both are within tolerance."""
         return self.error <= self.tolerance and (self.effort_error or 0.0) <= self.effort_tolerance
+
+    def summary(self) -> dict[str, float | None]:
+        """Part of the JSON of ``erls simulate``."""
+        return {
+            "certified_error": self.error,
+            "certified_effort_error": self.effort_error,
+            "effects_tolerance": self.tolerance,
+            "effects_wall_s": self.wall_s,
+        }

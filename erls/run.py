@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from erls.effects import conserves_energy, in_order
+from erls.effects import Certificate, conserves_energy, in_order
 from erls.errors import Cause, SceneError, SimulationError
 from erls.formulations.base import Energy, Formulation, State
 from erls.formulations.closed_chain import ClosedChain
@@ -36,6 +36,8 @@ class Run:
         Time that the integration took.
     warnings : tuple of str
         What the user should know before trusting the run.
+    certificate : Certificate or None
+        Of a run with ``effects = "auto"``.
 
     Examples
     --------
@@ -60,6 +62,7 @@ class Run:
     solution: Solution
     wall_s: float = 0.0
     warnings: tuple[str, ...] = field(default=())
+    certificate: Certificate | None = None
 
     @property
     def failure(self) -> SimulationError | None:
@@ -233,6 +236,7 @@ class Run:
             "scene": self.scene.name,
             **self.formulation.describe(),
             "effects": in_order(self.formulation.mechanism.effects),
+            **({} if self.certificate is None else self.certificate.summary()),
             "integrator": self.scene.record.simulation.integrator,
             "duration": self.end,
             "steps": work.steps,

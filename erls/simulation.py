@@ -19,6 +19,7 @@ from erls.mechanism.chain import Mechanism
 from erls.run import Run, node_positions
 from erls.run_file import self_contained, write_run
 from erls.scene import Scene, load_scene
+from erls.selection.automatic import automatic
 from fe_import.toml_file import choose
 
 Progress = Callable[[float, float], None]  # (time, duration)
@@ -36,6 +37,7 @@ def simulate(
     progress: Progress | None = None,
     tell: Message = lambda text: None,
     checkpoint: Path | None = None,
+    strict: bool = False,
 ) -> Run:
     """Simulate a scene.
 
@@ -48,6 +50,8 @@ def simulate(
         Told about each preparation that takes time, and every warning as soon as it is known.
     checkpoint : Path, optional
         Run file to which a long run saves what it has, every 20 s of work.
+    strict : bool
+        With ``effects = "auto"``: whether to repeat the run where what was left out passes the tolerance.
 
     Returns
     -------
@@ -84,7 +88,33 @@ def simulate(
                 tell(f"warning: {text}")
 
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
-    formulation = formulate(built.mechanism, settings)
+
+    def run_with(scene: Scene, mechanism: Mechanism) -> Run:
+        return _integrated(scene, mechanism, warned, progress, tell, checkpoint)
+
+    if settings.effects == "auto":
+        return automatic(scene, built.mechanism, run_with, tell, strict)
+    return run_with(scene, built.mechanism)
+
+
+def _integrated(
+    scene: Scene,
+    mechanism: Mechanism,
+    warned: list[str],
+    progress: Progress | None,
+    tell: Message,
+    checkpoint: Path | None,
+) -> Run:
+    """Run a mechanism as the scene says; adds to ``warned`` what it tells."""
+    settings = scene.record.simulation
+
+    def warn(texts: Iterable[str]) -> None:
+        for text in texts:
+            if text not in warned:
+                warned.append(text)
+                tell(f"warning: {text}")
+
+    formulation = formulate(mechanism, settings)
     y, v = formulation.initial_state()
     if isinstance(chain := solved(formulation), ClosedChain):
         warn(chain.warnings)
@@ -111,7 +141,7 @@ def simulate(
             saved = time.perf_counter()
 
     times = (0.0, settings.duration)
-    solution = integrator(built.mechanism, settings)(formulation, times, y, v, options, observe)
+    solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
     run = make_run(solution)
     warn((*solution.warnings, *range_warnings(run)))
     run = replace(run, warnings=tuple(warned))

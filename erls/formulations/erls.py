@@ -97,8 +97,8 @@ class Erls:
 
     @cached_property
     def compiled(self) -> CompiledSystem | None:
-        """The same equations in compiled form; None in the minimum-norm gauge."""
-        if self.gauge != "joint-angle":
+        """The same equations in compiled form; None in the minimum-norm gauge and with geometric stiffening."""
+        if self.gauge != "joint-angle" or self.stiffened:
             return None
         from erls.formulations.erls_compiled import compile_chain  # here: it imports the compiler
 

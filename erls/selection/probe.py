@@ -170,4 +170,3 @@ def of_links(name: str) -> bool:
     return name == "flexibility" or EFFECTS[name].of_links
 
 
-__all__ = ["EffectSize", "SimulationError", "coarse_run", "effect_sizes", "of_links"]

@@ -35,6 +35,8 @@ class Departure:
         Largest one of the reference: of a node against its link's rigid shape [m].
     size : float
         Of the largest link [m].
+    as_expected : bool
+        Whether second order in the deflection, phase drift included, explains it (`erls.studies.compare.Pair`).
     """
 
     scene: str
@@ -42,6 +44,7 @@ class Departure:
     largest: float
     deflection: float
     size: float
+    as_expected: bool
 
     @property
     def share(self) -> float:
@@ -78,10 +81,10 @@ class SceneComparison:
         return tuple(dict.fromkeys(d.formulation for d in self.departures))
 
     def order(self, formulation: str) -> float | None:
-        """Power of the deflection with which departures grow over the scenes, by least squares of logarithms; None
-        when fewer than two scenes bend by different amounts.
+        """Power of the deflection with which departures grow over the scenes that are as expected, by least squares of
+        logarithms; None when fewer than two of them bend by different amounts.
         """
-        own = [d for d in self.departures if d.formulation == formulation and d.largest > 0]
+        own = [d for d in self.departures if d.formulation == formulation and d.largest > 0 and d.as_expected]
         largest = max((d.deflection for d in own), default=0.0)
         own = [d for d in own if d.deflection > _NEGLIGIBLE * largest]
         x, y = np.log([[d.deflection / d.size, d.largest / d.size] for d in own]).reshape(-1, 2).T
@@ -161,8 +164,9 @@ def departures(scene: str, comparison: Comparison, reference: str) -> list[Depar
     result = []
     for name, other in comparison.outputs.items():
         if name != reference:
-            apart = [distance(judge.points[p], other.points[p]).largest for p in judge.points]
-            result.append(Departure(scene, name, max(apart, default=0.0), judge.deflection, judge.size))
+            apart = max((distance(judge.points[p], other.points[p]).largest for p in judge.points), default=0.0)
+            fine = all(p.as_expected for p in comparison.pairs if {p.a, p.b} == {name, reference})
+            result.append(Departure(scene, name, apart, judge.deflection, judge.size, fine))
     return result
 
 
@@ -179,6 +183,7 @@ def scenes_summary(comparison: SceneComparison) -> dict[str, Any]:
                 "deflection": d.deflection,
                 "size": d.size,
                 "share_of_second_order": d.share,
+                "as_expected": d.as_expected,
             }
             for d in comparison.departures
         ],

@@ -171,7 +171,7 @@ FAULTS = [
     frame("unknown inboard", {"reduction": {"inboard": "root"}}, REFERENCE, "reduction.inboard", "hand, hub"),
     frame("physical, elastic", {"reduction": {"form": "physical", "elastic_modes": 3}}, BAD, "reduction.elastic_modes",
           "remove it"),
-    frame("physical, clamped", {"reduction": {"form": "physical", "truncation": "clamped"}}, BAD, "reduction.truncation",
+    frame("physical, clamped", {"reduction": {"form": "physical", "truncation": "clamped"}}, BAD, "reduction.tru",
           "keeps the interface displacements"),
     frame("physical, inboard", {"reduction": {"form": "physical", "inboard": "hand"}}, BAD, "reduction.inboard",
           "keeps the interface displacements"),

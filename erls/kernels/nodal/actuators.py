@@ -83,7 +83,9 @@ def _swing(model: Model, k: int, reach: Vector, axes: Rotation, twist: Array) ->
     )
     apart = pair_minus(end, carried)
     v, w = bracket(apart[0], apart[1], carried[0], carried[1])
-    return v[2] if model.actuator_along[k] == 2 else w[2]
+    if model.actuator_along[k] == 2:
+        return v[2]
+    return w[2]
 
 
 @part
@@ -158,13 +160,13 @@ def set_coordinates(model: Model, work: Work, before: Array) -> None:
 @part
 def store_coordinates(model: Model, work: Work, knots: Knots, at: int) -> None:
     """Coordinates, rates and accelerations of all actuators behind the frames of knot ``at``."""
-    first_entry = knots.y.shape[1] - len(model.actuator_nodes)
+    first_entry = knots.states.shape[2] - len(model.actuator_nodes)
     for k in range(len(model.actuator_nodes)):
         _, _, reach, axes = _posed(model, work.poses, k)
         inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
         first, second = _rows(model, k, reach, axes)
         column = first_entry + k
-        knots.y[at, column] = work.turned[k]
-        knots.v[at, column] = _along(first, work.twist, inner) + _along(second, work.twist, outer)
+        knots.states[at, 0, column] = work.turned[k]
+        knots.states[at, 1, column] = _along(first, work.twist, inner) + _along(second, work.twist, outer)
         gain = _along(first, work.rate, inner) + _along(second, work.rate, outer)
-        knots.a[at, column] = gain + _swing(model, k, reach, axes, work.twist)
+        knots.states[at, 2, column] = gain + _swing(model, k, reach, axes, work.twist)

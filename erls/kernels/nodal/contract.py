@@ -131,14 +131,12 @@ class Work(NamedTuple):
 
 
 class Knots(NamedTuple):
-    """Where accepted steps are written: what a run stores (s, 12 k + a) with two derivatives, rates (s, n) of the twists
-    in node axes, multipliers (s, m).
+    """Where accepted steps are written: what a run stores (s, 3, 12 k + a) with two derivatives, accelerations (s, n),
+    multipliers (s, m).
     """
 
-    y: Array
-    v: Array
-    a: Array
-    rates: Array
+    states: Array
+    accelerations: Array
     multipliers: Array
 
 
@@ -227,7 +225,7 @@ if ENABLED:
     WORK = _t.NamedTuple(
         (*_tried, *(_r1,) * 7, *(_r2,) * 5, _r2, _r4, _r1, _r2, _i1, _r1, _r1), Work
     )
-    KNOTS = _t.NamedUniTuple(_r2, 5, Knots)
+    KNOTS = _t.NamedTuple((_r3, _r2, _r2), Knots)
     SETTINGS = _t.NamedTuple((*(_t.float64,) * 19, *(_t.int64,) * 3), Settings)
     PROGRESS = _t.NamedTuple((_r1, _i1), Progress)
     FORCES = _t.void(MODEL, WORK, STATE, _r1)

@@ -147,11 +147,11 @@ def joint_derivatives(model: Model, work: Work, sample: Array, j: int) -> None:
             v, w = scaled(-1.0, v), scaled(-1.0, w)
         else:
             v, w = transformed(p, r, a, b)
-        along = cross(force, w), minus(times(spread, w), scaled(trace, w))
+        pushed = cross(force, w), minus(times(spread, w), scaled(trace, w))
         # the inner node's share of the wrench turns with the relative pose
-        inner = pair_minus(cobracket(v, w, force, moment), along)
+        inner = pair_minus(cobracket(v, w, force, moment), pushed)
         n, m = transposed(reach, axes, inner[0], inner[1])
-        end, end_moment = transposed(p, r, along[0], along[1])
+        end, end_moment = transposed(p, r, pushed[0], pushed[1])
         for i in range(3):
             work.stiffness[i, k], work.stiffness[3 + i, k] = n[i], m[i]
             work.stiffness[6 + i, k], work.stiffness[9 + i, k] = end[i], end_moment[i]

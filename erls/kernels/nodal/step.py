@@ -29,35 +29,6 @@ MATRIX, USUAL, EXCESS, EVALUATIONS, ITERATIONS, FACTORIZATIONS, REASON, STEPS = 
 AUTO, UPDATE, FROZEN = range(3)
 
 
-@kernel(ADVANCE)
-def advance(
-    forces: Forces,
-    factor: Factor,
-    model: Model,
-    state: State,
-    work: Work,
-    settings: Settings,
-    progress: Progress,
-    samples: Array,
-    knots: Knots,
-    first: int,
-) -> int:
-    """Steps to the times of ``samples``, one row each; knots go into rows from ``first`` on."""
-    progress.counts[STEPS] = 0
-    for k in range(len(samples)):
-        if not _step(forces, factor, model, state, work, settings, progress, samples[k]):
-            return FAILED
-        status = _judge(state, work, settings, progress, model.metres)
-        if status == INACCURATE:
-            return status
-        _accept(state, work, settings)
-        _store(model, work, knots, first + k)
-        progress.counts[STEPS] = k + 1
-        if status == TIMID:
-            return status
-    return DONE
-
-
 @part
 def _judge(state: State, work: Work, settings: Settings, progress: Progress, metres: Array) -> int:
     if settings.error_limit == 0.0:
@@ -69,7 +40,7 @@ def _judge(state: State, work: Work, settings: Settings, progress: Progress, met
     progress.rates[ERROR] = error
     if error > settings.error_limit:
         return INACCURATE
-    return TIMID if error * settings.growth**3 < settings.error_limit else DONE
+    return TIMID if settings.growth > 0.0 and error * settings.growth**3 < settings.error_limit else DONE
 
 
 @part
@@ -265,18 +236,47 @@ def _store(model: Model, work: Work, knots: Knots, at: int) -> None:
         push, gain = three(work.rate, 6 * node), three(work.rate, 6 * node + 3)
         turn, entry = nine(work.poses, node, 3), 12 * node
         for i in range(12):
-            knots.y[at, entry + i] = work.poses[node, i]
-        put(knots.v[at], entry, times(turn, v))
-        put(knots.a[at], entry, times(turn, plus(push, cross(w, v))))
+            knots.states[at, 0, entry + i] = work.poses[node, i]
+        put(knots.states[at, 1], entry, times(turn, v))
+        put(knots.states[at, 2], entry, times(turn, plus(push, cross(w, v))))
         speed = dot(w, w)
         for i in range(3):
             row = vector(work.poses, node, 3 + 3 * i)
-            put(knots.v[at], entry + 3 + 3 * i, cross(row, w))
+            put(knots.states[at, 1], entry + 3 + 3 * i, cross(row, w))
             second = plus(cross(row, gain), plus(scaled(dot(row, w), w), scaled(-speed, row)))
-            put(knots.a[at], entry + 3 + 3 * i, second)
-    for i in range(len(work.rate)):
-        knots.rates[at, i] = work.rate[i]
+            put(knots.states[at, 2], entry + 3 + 3 * i, second)
+    for i in range(len(work.a)):
+        knots.accelerations[at, i] = work.a[i]
     for i in range(len(work.multipliers)):
         knots.multipliers[at, i] = work.multipliers[i]
     store_coordinates(model, work, knots, at)
 
+
+
+@kernel(ADVANCE)
+def advance(
+    forces: Forces,
+    factor: Factor,
+    model: Model,
+    state: State,
+    work: Work,
+    settings: Settings,
+    progress: Progress,
+    samples: Array,
+    knots: Knots,
+    first: int,
+) -> int:
+    """Steps to the times of ``samples``, one row each; knots go into rows from ``first`` on."""
+    progress.counts[STEPS] = 0
+    for k in range(len(samples)):
+        if not _step(forces, factor, model, state, work, settings, progress, samples[k]):
+            return FAILED
+        status = _judge(state, work, settings, progress, model.metres)
+        if status == INACCURATE:
+            return status
+        _accept(state, work, settings)
+        _store(model, work, knots, first + k)
+        progress.counts[STEPS] = k + 1
+        if status == TIMID:
+            return status
+    return DONE

@@ -117,10 +117,9 @@ def back_solve(a: Array, pivots: IntArray, b: Array) -> None:
     n = a.shape[0]
     for k in range(n):
         row = pivots[k]
-        weight = b[row]
-        b[row] = b[k]
-        b[k] = weight
-        column = a[k]
+        b[k], b[row] = b[row], b[k]
+    for k in range(n):
+        column, weight = a[k], b[k]
         for i in range(k + 1, n):
             b[i] -= weight * column[i]
     for k in range(n - 1, -1, -1):
