@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 import platformdirs
 
+from erls.build_joints import angle, joint_forces, reflected_inertia
 from erls.build_loops import build_loops
 from erls.build_substructures import piece_links, piece_models, piece_warnings
 from erls.effects import ALL, inconsistencies, named_effects
@@ -22,7 +22,7 @@ from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.dh import DHRow, split
 from erls.mechanism.drives import build_drive
 from erls.mechanism.effects import without
-from erls.mechanism.joints import JOINT_TYPES, Joint, JointForces
+from erls.mechanism.joints import JOINT_TYPES, Joint
 from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model, truncated
 from erls.mechanism.place import Place
 from erls.scene import Joint as JointRecord
@@ -232,23 +232,10 @@ def _dh_row(joint: JointRecord, place: str) -> DHRow:
     return DHRow(
         dh.convention,
         at.number("a", dh.a),
-        _angle(at, "alpha", dh.alpha, dh.alpha_deg),
+        angle(at, "alpha", dh.alpha, dh.alpha_deg),
         at.number("d", dh.d),
-        _angle(at, "theta", dh.theta, dh.theta_deg),
+        angle(at, "theta", dh.theta, dh.theta_deg),
     )
-
-
-def _angle(place: Place, name: str, plain: float | None, degrees: float | None) -> float:
-    """A quantity in SI or in degrees; 0 unless given."""
-    if plain is not None and degrees is not None:
-        raise place.error(name, f"both {name} and {name}_deg", remedy="keep one")
-    if degrees is not None:
-        if not place.revolute:
-            raise place.error(
-                f"{name}_deg", "degrees at a prismatic joint", degrees, remedy=f"give {name} in metres"
-            )
-        return math.radians(place.number(f"{name}_deg", degrees))
-    return place.number(name, plain or 0.0)
 
 
 def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joint:
@@ -256,8 +243,8 @@ def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joi
     place = replace(place, revolute=kind.revolute)
     drive = build_drive(joint.drive, place.folder, place.field("drive"), kind.revolute)
     start = place.at("initial")
-    position = _angle(start, "position", joint.initial.position, joint.initial.position_deg)
-    rate = _angle(start, "rate", joint.initial.rate, joint.initial.rate_deg)
+    position = angle(start, "position", joint.initial.position, joint.initial.position_deg)
+    rate = angle(start, "rate", joint.initial.rate, joint.initial.rate_deg)
     if drive.prescribed:
         if any(getattr(joint.initial, f) is not None for f in joint.initial.__struct_fields__):
             raise place.error(
@@ -266,20 +253,8 @@ def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joi
                 remedy="remove 'initial', or change the motion",
             )
         position, rate, _ = drive.reference(0.0)  # type: ignore[misc]
-    friction = joint.friction
-    forces = JointForces(
-        stiffness=place.not_negative("stiffness", joint.stiffness),
-        rest=_angle(place, "rest", joint.rest, joint.rest_deg),
-        damping=place.not_negative("damping", joint.damping),
-        friction=place.at("friction").not_negative("force", friction.force) if friction else 0.0,
-        transition_rate=place.at("friction").positive("transition_rate", friction.transition_rate)
-        if friction
-        else 1.0,
-    )
-    motor = place.at("motor")
-    rotor = motor.not_negative("rotor_inertia", joint.motor.rotor_inertia)
-    ratio = motor.number("gear_ratio", joint.motor.gear_ratio)
-    return Joint(joint.name, kind, before, after, forces, rotor * ratio**2, drive, position, rate)
+    forces, rotor = joint_forces(joint, place), reflected_inertia(joint, place)
+    return Joint(joint.name, kind, before, after, forces, rotor, drive, position, rate)
 
 
 def _link(link: LinkRecord, model: ModalModel, k: int, count: int, file: str) -> Link:

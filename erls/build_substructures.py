@@ -10,6 +10,7 @@ import numpy as np
 
 from erls.mechanism.links import Link, truncated
 from erls.scene import Link as LinkRecord
+from fe_import.errors import Cause, FEImportError
 from fe_import.link import LinkFile
 from fe_import.modal.file import ModalModel
 from fe_import.modes import damping_ratios
@@ -52,10 +53,21 @@ def piece_models(
 
 
 def piece_links(record: LinkRecord, whole: Link, models: Sequence[ModalModel], where: str) -> tuple[Link, ...]:
-    """The pieces as links; payloads are put on them when the mechanism is split."""
+    """The pieces as links; payloads are put on them when the mechanism is split.
+
+    Raises
+    ------
+    FEImportError
+        MODAL_FILE: models that do not make up the link.
+    """
     result = []
+    known = set().union(*(model.node_names for model in models))
+    if len(whole.model.node_names) < len(whole.model.nodes) or not known.issuperset(whole.model.node_names):
+        raise _unfit(whole, "its nodes are not those of its substructures", where)
     for number, model in enumerate(models):
         ends = model.interface_nodes
+        if len(ends) < (1 if number == len(models) - 1 else 2):
+            raise _unfit(whole, f"substructure {number + 1} has too few interfaces", where)
         outboard = ends[1] if number < len(models) - 1 else None
         if outboard is None and whole.outboard is not None:
             outboard = model.interface(whole.outboard.name)
@@ -81,6 +93,12 @@ def piece_links(record: LinkRecord, whole: Link, models: Sequence[ModalModel], w
     return tuple(result)
 
 
+def _unfit(link: Link, message: str, where: str) -> FEImportError:
+    return FEImportError(
+        Cause.MODAL_FILE, message, where=f"{where}.substructures", value=link.name, remedy="simulate the scene again"
+    )
+
+
 def piece_warnings(link: Link) -> list[str]:
     """Modal damping ratios belong to modes of the pieces, which lie above those of the link."""
     first = next((p for p in link.pieces if p.damping.any()), None)
@@ -93,6 +111,6 @@ def piece_warnings(link: Link) -> list[str]:
         return []
     return [
         f"link {link.name!r}: damping holds for the modes of its {len(link.pieces)} substructures (from "
-        f"{lowest:.4g} Hz on), so that its own lowest mode ({whole:.4g} Hz) is damped less than stated; damping.rayleigh with beta "
-        "alone is the same for both"
+        f"{lowest:.4g} Hz on), so that its own lowest mode ({whole:.4g} Hz) is damped less than stated; "
+        "damping.rayleigh with beta alone is the same for both"
     ]

@@ -17,6 +17,7 @@ from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
+from erls.cli_effects import effects
 from erls.cli_studies import compare, study
 from erls.terminal import (
     Json,
@@ -108,6 +109,7 @@ def simulate(
     formulation: str | None = None,
     set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
     at: str = "",
+    strict: Annotated[bool, Parameter(negative="")] = False,
     json: Json = False,
 ) -> None:
     """Simulate a scene; links are reduced on the fly and cached by content.
@@ -125,6 +127,8 @@ def simulate(
         links.arm.elastic_modes=8, joints.0.initial.position_deg=30.
     at
         Times in seconds, separated by commas, at which to report joints and points.
+    strict
+        With effects = "auto": repeat the run where what was left out passes the tolerance.
     json
         Print one JSON object.
     """
@@ -150,7 +154,7 @@ def simulate(
     partial = output.with_name(f"{output.name}.partial") if output is not None else None
     try:
         with Progress("simulating") as advance:
-            run = run_simulation(loaded, progress=advance, tell=tell, checkpoint=partial)
+            run = run_simulation(loaded, progress=advance, tell=tell, checkpoint=partial, strict=strict)
     except SimulationError as problem:
         if output is None and problem.run is not None:
             hint = "give -o RUN.h5 to keep what was computed"
@@ -254,6 +258,7 @@ def view(
 
 
 app.command(compare)
+app.command(effects)
 app.command(study)
 
 

@@ -11,7 +11,6 @@ from erls.lie.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
 from erls.mechanism.loops import LoopEnd
 from erls.run import Run
-from fe_import.build.model import inertia_matrix
 
 _STEP = 1e-5  # s, of central differences: 1e-6 m/s² of rounding, and below 1 kHz 3e-4 of the acceleration
 
@@ -115,21 +114,11 @@ def _place(run: Run, state: State, number: int, node: int) -> Array:
 
 def _carried(run: Run, number: int) -> list[_Carried]:
     """Payloads on interface nodes of a link, and the motor of the joint after it."""
-    mechanism, record = run.formulation.mechanism, run.scene.record
-    link = mechanism.links[number]
+    link = run.formulation.mechanism.links[number]
     nodes = [i.node for i in link.model.interface_nodes]
-    points = {p.name: p for p in mechanism.points}
-    result = []
-    for payload in record.payloads if "payload" in mechanism.effects else ():
-        point = points[payload.point]
-        if point.link == number and point.node in nodes:
-            inertia = inertia_matrix(payload.inertia, "payloads")
-            result.append(_Carried(nodes.index(point.node), payload.mass, np.array(payload.offset), inertia))
-    if number + 1 < len(record.joints) and link.outboard is not None:
-        motor = record.joints[number + 1].motor
-        inertia = inertia_matrix(motor.inertia, "motor")
-        result.append(_Carried(nodes.index(link.outboard.node), motor.mass, np.zeros(3), inertia))
-    return result
+    return [
+        _Carried(nodes.index(p.node), p.mass, p.offset, p.inertia) for p in link.payloads if p.node in nodes
+    ]
 
 
 def _omega(three: tuple[State, State, State], number: int, step: float) -> Array:

@@ -8,17 +8,20 @@ carry is corrected by the static answer of all others to the loads of the run (m
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from erls.errors import Cause, SceneError
+from erls.formulations.substructures import solved
 from erls.lie.so3 import Array
 from erls.link_loads import link_loads
 from erls.mechanism.links import Link
 from erls.output_file import replacing
 from erls.run import Run
+from fe_import.modal.model import ModalModel
 from fe_import.recovery.maps import UNITS, RecoveryMaps, spin_products
 from fe_import.recovery.recover import mode_acceleration, required_maps
 from fe_import.toml_file import choose
@@ -109,6 +112,8 @@ def export_recovery(run: Run, link: str, path: Path | str, t: ArrayLike, *, stat
 def _recovered(run: Run, link: str, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
     """(..., p, 6) components at the places of the link's recovery maps."""
     maps = recovery_places(run, link)
+    if _link(run, link)[1].pieces:
+        return _of_pieces(run, _link(run, link)[1], t, quantity, static_correction)
     if maps.quantity != quantity:
         other = "section_forces" if maps.quantity == "section forces" else "stress"
         raise SceneError(
@@ -127,6 +132,39 @@ def _recovered(run: Run, link: str, t: ArrayLike, quantity: str, static_correcti
     else:
         values = np.tensordot(run.modal_coordinates(link, times.ravel()), maps.modes, (1, 2))
     return np.asarray(values.reshape(*times.shape, len(maps.nodes), 6))
+
+
+def _of_pieces(run: Run, link: Link, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
+    """(..., p, 6) components at the places of a split link."""
+    solved_for = replace(run, formulation=solved(run.formulation))
+    parts = [_recovered(solved_for, piece.name, t, quantity, static_correction) for piece in link.pieces]
+    return np.stack([parts[piece][..., at, :] for piece, at in _places_in_pieces(link)], axis=-2)
+
+
+def _places_in_pieces(link: Link) -> list[tuple[int, int]]:
+    """Piece and place in its maps of each place of a split link: at the same node, along the same element."""
+    maps = required_maps(link.model, f"link {link.name!r}")
+    names = {number: name for name, number in link.model.node_names.items()}
+    known: dict[str, list[tuple[Array, tuple[int, int]]]] = {}
+    for number, piece in enumerate(link.pieces):
+        own = required_maps(piece.model, piece.name)
+        own_names = {k: name for name, k in piece.model.node_names.items()}
+        for at, (node, element) in enumerate(zip(own.nodes.tolist(), own.elements.tolist(), strict=True)):
+            away = _direction(piece.model, node, element)
+            known.setdefault(own_names[node], []).append((away, (number, at)))
+    result = []
+    for node, element in zip(maps.nodes.tolist(), maps.elements.tolist(), strict=True):
+        away = _direction(link.model, node, element)
+        candidates = known[names[node]]
+        result.append(candidates[int(np.argmax([way @ away for way, _ in candidates]))][1])
+    return result
+
+
+def _direction(model: ModalModel, node: int, element: int) -> Array:
+    """(3,) unit vector from a node along an element of a frame that ends there."""
+    first, second = model.lines[element].tolist()
+    along = model.nodes[second if first == node else first] - model.nodes[node]
+    return np.asarray(along / np.linalg.norm(along))
 
 
 def _link(run: Run, name: str) -> tuple[int, Link]:

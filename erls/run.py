@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -17,6 +17,8 @@ from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.substructures import solved
 from erls.integrators.base import Solution, hermite
 from erls.lie.so3 import Array
+from erls.mechanism.joints import Joint
+from erls.mechanism.loops import LoopFreedom
 from erls.scene import Scene
 from fe_import.toml_file import choose
 
@@ -205,14 +207,35 @@ class Run:
         shape = (*np.shape(t), 3)
         return np.array([f.force for f in found]).reshape(shape), np.array([f.moment for f in found]).reshape(shape)
 
+    def loop_coordinate(self, loop: str, t: ArrayLike) -> Array:
+        """(...) coordinate of a revolute or prismatic closing joint [rad or m]."""
+        return self._of_loop(loop, t, lambda chain, *at: chain.loop_motion(*at)[0])
+
+    def loop_rate(self, loop: str, t: ArrayLike) -> Array:
+        """(...) its rate [rad/s or m/s]."""
+        return self._of_loop(loop, t, lambda chain, *at: chain.loop_motion(*at)[1])
+
+    def loop_effort(self, loop: str, t: ArrayLike) -> Array:
+        """(...) torque [N m] or force [N] of drive, spring, damper and friction along it; for a prescribed motion, what
+        its motor must give.
+        """
+        return self._of_loop(loop, t, lambda chain, *at: chain.loop_effort(*at))
+
+    def _of_loop(self, loop: str, t: ArrayLike, what: Callable[..., float]) -> Array:
+        names = [x.name for x in self.formulation.mechanism.loops if x.freedom is not None]
+        choose(loop, names, "loop", SceneError)
+        number, chain = self.loop_names.index(loop), solved(self.formulation)
+        _, flat, y, v = self._interpolated(t)
+        found = [what(chain, *at, number) for at in zip(flat.tolist(), y, v, strict=True)]
+        return np.array(found).reshape(np.shape(t))
+
     @property
     def conservative(self) -> bool:
         """Whether total energy should stay constant: no drives, damping or friction."""
         mechanism = self.formulation.mechanism
-        passive = all(
-            j.drive.kind == "free" and not j.forces.damping and not j.forces.friction
-            for j in mechanism.joints
-        )
+        joints: list[Joint | LoopFreedom] = [*mechanism.joints]
+        joints += [x.freedom for x in mechanism.loops if x.freedom is not None]
+        passive = all(j.drive.kind == "free" and not j.forces.damping and not j.forces.friction for j in joints)
         damped = any(link.damping.any() for link in mechanism.links)
         return passive and not damped and conserves_energy(mechanism.effects)
 

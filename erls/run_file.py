@@ -6,6 +6,7 @@ only want curves (MATLAB, Julia, a plot) the group ``output`` with points, joint
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import msgspec
 import numpy as np
 
 from erls.build import build_mechanism
+from erls.effects import Certificate
 from erls.errors import Cause, SceneError, SimulationError
 from erls.formulations import FORMULATIONS, formulate
 from erls.integrators.base import Solution, Work
@@ -23,8 +25,10 @@ from erls.scene import Scene, SceneRecord
 from erls.scene_check import check_scene
 from fe_import.errors import ReportedError
 from fe_import.hdf5.files import open_for_reading, write_array, write_atomically, write_attribute, write_strings
+from fe_import.hdf5.values import Reader
 from fe_import.link import LinkDescription
 from fe_import.modal.file import ModalModel, read_modal_group, write_modal_group
+from fe_import.substructures import MOST_PIECES
 from fe_import.toml_file import choose, convert
 
 SCHEMA = "erls run"
@@ -61,6 +65,9 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
     write_attribute(group, "message", "" if run.failure is None else str(run.failure))
     write_attribute(group, "scene_file", run.scene.path.name)
     write_attribute(group, "wall_s", run.wall_s)
+    for name, value in {} if run.certificate is None else run.certificate.summary().items():
+        if value is not None and np.isfinite(value):
+            write_attribute(group, name, value)
     scene = msgspec.json.encode(self_contained(run.scene).record).decode()
     write_strings(group, "scene", scene, "the scene as JSON")
     write_strings(group, "warnings", run.warnings, "what the user was told")
@@ -76,17 +83,22 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
     stored: list[ModalModel] = []
     numbers: list[int] = []
     models = group.create_group("models")
-    for link in run.formulation.mechanism.links:
-        known = [k for k, other in enumerate(stored) if other is link.model]
+    every = [link.model for link in run.formulation.mechanism.links]
+    every += [piece.model for link in run.formulation.mechanism.links for piece in link.pieces]
+    for model in every:
+        known = [k for k, other in enumerate(stored) if other is model]
         if not known:
             known = [len(stored)]
-            stored.append(link.model)
-            write_modal_group(models.create_group(f"{len(stored):04d}"), link.model)
+            stored.append(model)
+            write_modal_group(models.create_group(f"{len(stored):04d}"), model)
         numbers.append(known[0] + 1)
-    write_array(
-        group, "model_of_link", np.array(numbers, dtype=np.int64), "1", "group of models/ of each link"
-    )
     links = run.formulation.mechanism.links
+    own, others = np.split(np.array(numbers, dtype=np.int64), [len(links)])
+    write_array(group, "model_of_link", own, "1", "group of models/ of each link")
+    counts = np.array([len(link.pieces) for link in links], dtype=np.int64)
+    if counts.any():
+        write_array(group, "substructures/count", counts, "1", "pieces of each link; 0 for a link in one")
+        write_array(group, "substructures/model", others, "1", "group of models/ of each piece, link by link")
     if run.scene.record.simulation.formulation == "nodal":
         texts = [link.description and msgspec.json.encode(link.description).decode() for link in links]
         write_strings(group, "descriptions", tuple(t or "" for t in texts), "links made of beams as JSON, or empty")
@@ -162,15 +174,19 @@ def load_run(path: Path | str) -> Run:
         count = len(record.links)
         numbers = file.integers("model_of_link", (count,), 1, count + 1)
         models = file.subgroup("models")
+        counts, others = _pieces(file, record)
         read = {
             int(n): read_modal_group(models.subgroup(f"{n:04d}").group, str(path))
-            for n in sorted(set(numbers.tolist()))
+            for n in sorted({*numbers.tolist(), *map(int, others)})
         }
+        ends = np.cumsum([0, *counts])
+        pieces = [[read[int(n)] for n in others[a:b]] for a, b in pairwise(ends.tolist())]
         descriptions: list[LinkDescription | None] = []
         if record.simulation.formulation == "nodal":
             descriptions = [_description(text, f"{path}: /descriptions") for text in file.names("descriptions", count)]
         try:
-            built = build_mechanism(scene, models=[read[int(n)] for n in numbers], descriptions=descriptions)
+            whole = [read[int(n)] for n in numbers]
+            built = build_mechanism(scene, models=whole, descriptions=descriptions, pieces=pieces)
             formulation = formulate(built.mechanism, record.simulation)
         except ReportedError as problem:
             problem.where = f"{path}: /scene: {problem.where}"
@@ -191,7 +207,31 @@ def load_run(path: Path | str) -> Run:
             work, failure,
         )  # fmt: skip
         warnings = file.names("warnings")
-        return Run(scene, formulation, solution, file.attribute("wall_s", float), warnings)
+        return Run(scene, formulation, solution, file.attribute("wall_s", float), warnings, _certificate(file, record))
+
+
+def _certificate(file: Reader, record: SceneRecord) -> Certificate | None:
+    """Of a run with ``effects = "auto"``; an error that is not there could not be followed."""
+    known = file.attribute_names()
+    if "effects_wall_s" not in known:
+        return None
+    error = file.attribute("certified_error", float) if "certified_error" in known else float("inf")
+    effort = file.attribute("certified_effort_error", float) if "certified_effort_error" in known else None
+    settings = record.simulation
+    tolerances = settings.effects_tolerance, settings.effects_effort_tolerance
+    return Certificate(error, effort, *tolerances, file.attribute("effects_wall_s", float))
+
+
+def _pieces(file: Reader, record: SceneRecord) -> tuple[list[int], list[int]]:
+    """Number of substructures of each link, 0 for one in one piece, and the groups of their models."""
+    if "substructures" not in file.names_inside():
+        return [0] * len(record.links), []
+    group = file.subgroup("substructures")
+    counts = group.integers("count", (len(record.links),), 0, MOST_PIECES + 1).tolist()
+    for count, link in zip(counts, record.links, strict=True):
+        if count not in (0, link.substructures) or count == 1:
+            raise group.fail("count", f"does not fit link {link.name!r}", count, link.substructures)
+    return counts, group.integers("model", (sum(counts),), 1).tolist()
 
 
 def _description(text: str, where: str) -> LinkDescription | None:

@@ -122,6 +122,13 @@ class Motor(_Record, frozen=True):
     inertia: Inertia = (0.0, 0.0, 0.0)
 
 
+class Rotor(_Record, frozen=True):
+    """Rotor inertia [kg m²] behind a gear (reflected inertia: rotor_inertia · gear_ratio²), of a closing joint."""
+
+    rotor_inertia: float = 0.0
+    gear_ratio: float = 1.0
+
+
 class Joint(_Record, frozen=True):
     """A joint between the link before it (or the ground) and its own link."""
 
@@ -216,6 +223,10 @@ class Loop(_Record, frozen=True):
     ``position``: where the node meets the ground, in the world; where it is at the initial joint coordinates unless
     given. ``axis``: in the world at those coordinates, fixed to both sides from then on; that of the joint which
     carries the link unless given.
+
+    Drive, spring, damper, friction and rotor act along the coordinate of a revolute or prismatic one: how far the link
+    has moved about or along the axis. It is ``coordinate`` at the initial joint coordinates; unless given, 0 there, or
+    the distance of ``node`` from where it meets the other side.
     """
 
     name: str
@@ -226,6 +237,15 @@ class Loop(_Record, frozen=True):
     to_node: str = ""
     position: Vector | None = None
     axis: Vector | None = None
+    coordinate: float | None = None
+    coordinate_deg: float | None = None
+    drive: DriveRecord = FreeDrive()
+    stiffness: float = 0.0
+    rest: float | None = None
+    rest_deg: float | None = None
+    damping: float = 0.0
+    friction: Friction | None = None
+    motor: Rotor = Rotor()
 
 
 class SceneRecord(_Record, frozen=True):

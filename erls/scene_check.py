@@ -25,6 +25,7 @@ BODY_FRAMES = ("tangent", "mean-axis")
 COORDINATES = ("independent", "absolute")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
+_ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "damping", "friction", "motor")  # on one coordinate
 MOST_STEPS = 100_000_000  # fill any memory; more are a slip
 SMALLEST_RTOL = 3e-14  # rounding
 
@@ -79,10 +80,11 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         if scene.simulation.coordinates != "independent":
             message, right = "loops tie independent coordinates", "remove it, or the loops"
             raise _bad(f"{file}: simulation.coordinates", message, scene.simulation.coordinates, right)
-        for k, joint in enumerate(scene.joints):
-            if getattr(joint.drive, "feed_forward", False):
-                message = "the inverse dynamics of the chain does not know its loops"
-                raise _bad(f"{file}: joints[{k}].drive.feed_forward", message, True, "set it to false")
+        for kind in ("joints", "loops"):
+            for k, item in enumerate(getattr(scene, kind)):
+                if getattr(item.drive, "feed_forward", False):
+                    message = "the inverse dynamics of the chain does not know its loops"
+                    raise _bad(f"{file}: {kind}[{k}].drive.feed_forward", message, True, "set it to false")
 
 
 def every_number(value: Any, path: str = "") -> Iterable[tuple[str, float]]:
@@ -207,6 +209,12 @@ def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
         raise _bad(f"{place}.axis", f"a {loop.type} joint has no axis", loop.axis, "remove it")
     if loop.axis is not None and not any(loop.axis):
         raise _bad(f"{place}.axis", "an axis needs a direction", loop.axis, "give three numbers, not all zero")
+    if loop.type not in JOINT_TYPES:
+        plain = type(loop)(name=loop.name, link=loop.link, node=loop.node)
+        for field in _ACTING:
+            if getattr(loop, field) != getattr(plain, field):
+                message = f"a {loop.type} joint has no single coordinate that this could act along"
+                raise _bad(f"{place}.{field}", message, loop.type, "remove it, or use " + " or ".join(JOINT_TYPES))
 
 
 def _bad(where: str, message: str, value: Any, remedy: str) -> SceneError:

@@ -79,41 +79,36 @@ def simulate(
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
     built = build_mechanism(scene, tell)
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
-    warned: list[str] = []
-
-    def warn(texts: Iterable[str]) -> None:
-        for text in texts:
-            if text not in warned:
-                warned.append(text)
-                tell(f"warning: {text}")
-
+    warn = _Warnings(tell)
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
 
     def run_with(scene: Scene, mechanism: Mechanism) -> Run:
-        return _integrated(scene, mechanism, warned, progress, tell, checkpoint)
+        return _integrated(scene, mechanism, warn, progress, checkpoint)
 
     if settings.effects == "auto":
         return automatic(scene, built.mechanism, run_with, tell, strict)
     return run_with(scene, built.mechanism)
 
 
-def _integrated(
-    scene: Scene,
-    mechanism: Mechanism,
-    warned: list[str],
-    progress: Progress | None,
-    tell: Message,
-    checkpoint: Path | None,
-) -> Run:
-    """Run a mechanism as the scene says; adds to ``warned`` what it tells."""
-    settings = scene.record.simulation
+class _Warnings:
+    """Warnings so far, each told once."""
 
-    def warn(texts: Iterable[str]) -> None:
+    def __init__(self, tell: Message) -> None:
+        self.tell = tell
+        self.told: list[str] = []
+
+    def __call__(self, texts: Iterable[str]) -> None:
         for text in texts:
-            if text not in warned:
-                warned.append(text)
-                tell(f"warning: {text}")
+            if text not in self.told:
+                self.told.append(text)
+                self.tell(f"warning: {text}")
 
+
+def _integrated(
+    scene: Scene, mechanism: Mechanism, warn: _Warnings, progress: Progress | None, checkpoint: Path | None
+) -> Run:
+    """Run a mechanism as the scene says."""
+    settings = scene.record.simulation
     formulation = formulate(mechanism, settings)
     y, v = formulation.initial_state()
     if isinstance(chain := solved(formulation), ClosedChain):
@@ -122,7 +117,7 @@ def _integrated(
     begun = saved = time.perf_counter()
 
     def make_run(solution: Solution) -> Run:
-        return Run(scene, formulation, solution, time.perf_counter() - begun, tuple(warned))
+        return Run(scene, formulation, solution, time.perf_counter() - begun, tuple(warn.told))
 
     first = True
 
@@ -137,14 +132,14 @@ def _integrated(
             try:
                 write_run(checkpoint, make_run(knots()), "unfinished")
             except SceneError as problem:  # a full disk may have room again at the end
-                tell(f"warning: no checkpoint: {problem}")
+                warn.tell(f"warning: no checkpoint: {problem}")
             saved = time.perf_counter()
 
     times = (0.0, settings.duration)
     solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
     run = make_run(solution)
     warn((*solution.warnings, *range_warnings(run)))
-    run = replace(run, warnings=tuple(warned))
+    run = replace(run, warnings=tuple(warn.told))
     if solution.failure is not None:
         solution.failure.run = run
         raise solution.failure
@@ -154,18 +149,20 @@ def _integrated(
 def impulse_warnings(mechanism: Mechanism, duration: float) -> list[str]:
     """Prescribed motions whose rate jumps would need an infinite force."""
     result = []
-    for joint in mechanism.joints:
-        if not joint.drive.prescribed:
+    drives = [(f"joint {joint.name!r}", joint.drive) for joint in mechanism.joints]
+    drives += [(f"loop {loop.name!r}", loop.freedom.drive) for loop in mechanism.loops if loop.freedom is not None]
+    for name, drive in drives:
+        if not drive.prescribed:
             continue
-        for t in (b for b in joint.drive.breakpoints if 0 <= b < duration):
-            before, after = joint.drive.reference(t, left=True), joint.drive.reference(t)
+        for t in (b for b in drive.breakpoints if 0 <= b < duration):
+            before, after = drive.reference(t, left=True), drive.reference(t)
             if (
                 before is not None
                 and after is not None
                 and abs(before[1] - after[1]) > 1e-9 * max(1, abs(after[1]))
             ):
                 result.append(
-                    f"joint {joint.name!r}: the prescribed rate jumps at t = {t:.6g} s; the links do not feel the "
+                    f"{name}: the prescribed rate jumps at t = {t:.6g} s; the links do not feel the "
                     "blow (use a motion with continuous rate)"
                 )
     return result

@@ -5,14 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from erls.body_scenes.analyses import AtRest, Dynamics, StaticSteps
+from erls.body_scenes.analyses import AtRest, Buckling, Dynamics, Frequencies, StaticSteps
 from erls.body_scenes.build import Assembly, assemble
 from erls.body_scenes.result import Motion, Rest, work
 from erls.body_scenes.scene import BodyScene, load_body_scene
 from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
-from erls.nodal.statics import TANGENTS, solve_statics
+from erls.nodal.spectrum import buckling_loads, natural_frequencies
+from erls.nodal.statics import TANGENTS, Statics, solve_statics
 
 Progress = Callable[[float, float], None]
 
@@ -79,7 +81,9 @@ def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, progress: 
 def _rest(scene: BodyScene, assembly: Assembly, analysis: AtRest) -> Rest:
     system, tangents = assembly.system, {}
     begun = time.perf_counter()
-    found = solve_statics(system, system.start, analysis.load_steps, analysis.tangent)
+    end = analysis.load if isinstance(analysis, (Buckling, Frequencies)) else 1.0
+    found = solve_statics(system, system.start, analysis.load_steps, analysis.tangent, end=end)
+    modes = _modes(assembly, analysis, found) if found.failure is None else ()
     wall = time.perf_counter() - begun
     if isinstance(analysis, StaticSteps) and analysis.compare_tangents:
         for name in TANGENTS:
@@ -87,4 +91,22 @@ def _rest(scene: BodyScene, assembly: Assembly, analysis: AtRest) -> Rest:
                 found if name == analysis.tangent else solve_statics(system, system.start, analysis.load_steps, name)
             )
             tangents[name] = work(other)
-    return Rest(scene, assembly, wall, (), found, (), tangents)
+    return Rest(scene, assembly, wall, (), found, modes, tangents)
+
+
+def _modes(assembly: Assembly, analysis: AtRest, found: Statics) -> tuple[dict[str, Any], ...]:
+    """What a buckling or frequency analysis finds about the last equilibrium."""
+    system, last = assembly.system, found.path[-1]
+    if isinstance(analysis, Buckling):
+        name, modes = "load", buckling_loads(system, last, analysis.count)
+    elif isinstance(analysis, Frequencies):
+        name, modes = "frequency_hz", natural_frequencies(system, last, analysis.count)
+    else:
+        return ()
+    turns = last.q.poses[:, :3, :3]
+    result = []
+    for value, shape in zip(modes.values.tolist(), modes.shapes.reshape(len(modes.values), -1, 6), strict=True):
+        moved = (turns @ shape[:, :3, None])[:, :, 0]
+        points = {node: moved[assembly.numbers[node]].tolist() for node in assembly.reported}
+        result.append({name: value, "points": points})
+    return tuple(result)

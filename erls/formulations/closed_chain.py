@@ -19,8 +19,9 @@ import scipy.linalg as la
 
 from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State, TreeFormulation
+from erls.formulations.loop_efforts import ActuatedTree, LoopEfforts
 from erls.formulations.loop_failures import comes_apart, locks
-from erls.formulations.loop_rows import Closure, LoopForce, LoopRows, about
+from erls.formulations.loop_rows import Closure, LoopForce, LoopRows, about, applied
 from erls.formulations.loop_start import Start, find_start, start_velocity
 from erls.formulations.loop_static import closed_equilibrium
 from erls.integrators.base import metre_scales
@@ -44,11 +45,12 @@ class ClosedChain:
     """
 
     def __init__(self, tree: TreeFormulation) -> None:
-        self.tree, self.mechanism = tree, tree.mechanism
+        self.mechanism = tree.mechanism
         self.rows = LoopRows(tree, tree.mechanism.loops)
+        self.efforts = LoopEfforts(tree, self.rows)
+        self.tree: TreeFormulation = ActuatedTree(tree, self.efforts) if self.efforts.any else tree
         self.metres = metre_scales(tree)
         self.reach = max(1e-3, *(float(np.linalg.norm(np.ptp(k.model.nodes, axis=0))) for k in self.mechanism.links))
-        self._known: tuple[float, Array, Array, Closure] | None = None
         self.row_metres = np.where(self.rows.turns, self.reach, 1.0)
 
     @property
@@ -64,7 +66,8 @@ class ClosedChain:
     @property
     def breakpoints(self) -> tuple[float, ...]:
         """Breakpoints of all drives."""
-        return self.tree.breakpoints
+        own = (loop.freedom.drive.breakpoints for loop in self.mechanism.loops if loop.freedom is not None)
+        return tuple(sorted({*self.tree.breakpoints, *(t for times in own for t in times)}))
 
     @cached_property
     def start(self) -> Start:
@@ -95,11 +98,8 @@ class ClosedChain:
         )
 
     def closure(self, t: float, y: Array, v: Array) -> Closure:
-        """Conditions of the loops at a state; the last one is remembered, since integrators ask in several ways."""
-        known = self._known
-        if known is None or known[0] != t or not (np.array_equal(known[1], y) and np.array_equal(known[2], v)):
-            known = self._known = (t, y.copy(), v.copy(), self.rows.closure(t, y, v))
-        return known[3]
+        """Conditions of the loops at a state."""
+        return self.rows.closure(t, y, v)
 
     def scaled_rows(self, found: Closure, rows: IntArray) -> Array:
         """(r, n) some rows over the independent coordinates, in metres per metre."""
@@ -231,8 +231,33 @@ class ClosedChain:
 
     def loop_forces(self, t: float, y: Array, v: Array) -> list[LoopForce]:
         """What every closing joint does to its link."""
-        _, multipliers, found = self.accelerations(t, *self.closed(t, y, v))
-        return self.rows.forces(found, multipliers)
+        y, v = self.closed(t, y, v)
+        a, multipliers, found = self.accelerations(t, y, v)
+        wrenches = self._wrenches(t, y, a, multipliers, found)
+        return [applied(outer, wrench) for outer, wrench in zip(found.outer, wrenches, strict=True)]
+
+    def _wrenches(self, t: float, y: Array, a: Array, multipliers: Array, found: Closure) -> list[Array]:
+        """(6,) what every closing joint does to its link, in the axes of the outer frame: reactions, drives, rotors."""
+        result = self.rows.wrenches(found, multipliers)
+        for effort in self.efforts.at(t, y, found):
+            turning = float(effort.row[self.tree.free] @ a) + effort.bias
+            along = self.efforts.along(effort.number)
+            result[effort.number][along] += effort.force - self.efforts.rotor(effort) * turning
+        return result
+
+    def loop_motion(self, t: float, y: Array, v: Array, loop: int) -> tuple[float, float]:
+        """Coordinate of a revolute or prismatic closing joint, and its rate."""
+        y, v = self.closed(t, y, v)
+        effort = next(e for e in self.efforts.at(t, y, self.closure(t, y, v)) if e.number == loop)
+        return effort.coordinate, effort.rate
+
+    def loop_effort(self, t: float, y: Array, v: Array, loop: int) -> float:
+        """Force of drive, spring, damper and friction along it; for a prescribed motion what its motor must give."""
+        y, v = self.closed(t, y, v)
+        _, multipliers, found = self.accelerations(t, y, v)
+        if self.mechanism.loops[loop].prescribed:
+            return float(self.rows.wrenches(found, multipliers)[loop][self.efforts.along(loop)])
+        return next(e.force for e in self.efforts.at(t, y, found) if e.number == loop)
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Reactions in the joints of the chain: what the links from there outward need beside what loops give."""
@@ -244,13 +269,15 @@ class ClosedChain:
             local = link.inboard.position + link.model.node_shape(link.inboard.node)[0] @ modal
             nodes.append(world[:3, :3] @ local + world[:3, 3])
         result = self.tree.reactions_at(t, y, v, a)
-        for loop, given in zip(self.mechanism.loops, self.rows.forces(found, multipliers), strict=True):
+        wrenches = self._wrenches(t, y, a, multipliers, found)
+        for loop, outer, wrench in zip(self.mechanism.loops, found.outer, wrenches, strict=True):
+            given = applied(outer, wrench)
             for end, sign in ((loop.outer, 1.0), (loop.inner, -1.0)):
                 for k in range(0 if end.link is None else end.link + 1):
                     force, moment = about(given, nodes[k])
                     old = result[k]
                     result[k] = replace(old, force=old.force - sign * force, moment=old.moment - sign * moment)
-        loads = found.rows.T @ multipliers
+        loads = -np.concatenate(found.moves).T @ np.concatenate(wrenches)
         return [
             replace(r, effort=r.effort + float(loads[k])) if self.mechanism.joints[k].drive.prescribed else r
             for k, r in enumerate(result)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.lie.se3 import inverse, twist_cross, twist_transform
+from erls.lie.se3 import inverse, joint_pose, twist_cross, twist_transform
 from erls.lie.so3 import Array, cross, skew
+from erls.mechanism.joints import JointType
 
 Turn = tuple[tuple[float, int, int], ...]  # factor, row and column of entries of R
 _AXES = "xyz"
@@ -61,6 +62,18 @@ def joint_motion(inner: FrameMotion, outer: FrameMotion) -> JointMotion:
     carried = transform @ inner.twist
     twist = outer.twist - carried
     return JointMotion(pose, transform, twist, outer.bias - transform @ inner.bias + twist_cross(twist) @ carried)
+
+
+def less_motion(
+    kind: JointType, found: JointMotion, reference: tuple[float, float, float]
+) -> tuple[JointMotion, Array]:
+    """What is left beside a prescribed coordinate, rate and acceleration; and the twist (6,) that time alone gives."""
+    value, rate, acceleration = reference
+    pose = inverse(joint_pose(kind.revolute, value)) @ found.pose
+    screw = twist_transform(pose) @ kind.screw
+    twist = found.twist - screw * rate
+    bias = found.bias - screw * acceleration + twist_cross(twist) @ (screw * rate)
+    return JointMotion(pose, found.transform, twist, bias), -screw * rate
 
 
 class Conditions:

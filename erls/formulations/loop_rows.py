@@ -8,7 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.formulations.base import TreeFormulation
-from erls.formulations.joint_frames import AXIS_TURNS, TURNS, Conditions, FrameMotion, Turn, joint_motion
+from erls.formulations.joint_frames import (
+    AXIS_TURNS,
+    TURNS,
+    Conditions,
+    FrameMotion,
+    JointMotion,
+    Turn,
+    joint_motion,
+    less_motion,
+)
 from erls.lie.so3 import Array, cross
 from erls.mechanism.loops import FREE, HELD, PARALLEL, Loop, LoopEnd, LoopType
 
@@ -25,8 +34,14 @@ class Closure:
         Φ̇ over the rates of (θ, elastic), those of prescribed joints included.
     gradients : list of (m_k, 6) arrays
         Of every loop's Φ over the twist of its outer frame, in that frame's axes.
-    outer, inner : list of FrameMotion
-        Frames of every loop.
+    outer : list of FrameMotion
+        Outer frame of every loop.
+    relative : list of JointMotion
+        Motion of it in the inner frame.
+    moves : list of (6, joints + elastic) arrays
+        Twist of that motion over the rates of (θ, elastic), in the axes of the outer frame.
+    left : list of (4, 4) arrays
+        Pose that the conditions measure: the relative one, less a prescribed motion.
     """
 
     violation: Array
@@ -35,7 +50,9 @@ class Closure:
     rows: Array
     gradients: list[Array]
     outer: list[FrameMotion]
-    inner: list[FrameMotion]
+    relative: list[JointMotion]
+    moves: list[Array]
+    left: list[Array]
 
 
 @dataclass(frozen=True)
@@ -50,13 +67,16 @@ class LoopForce:
 
 
 def conditions(kind: LoopType) -> Conditions:
-    """Rows of a kind of closing joint."""
+    """Rows of a kind of closing joint, or of one whose motion is prescribed (`_HELD`)."""
     rows: dict[tuple[str, int], Turn | None] = {("translation along", k): None for k in kind.sliding}
     if kind.turning == PARALLEL:
         rows.update({("rotation about", k): AXIS_TURNS[k] for k in range(2)})
     if kind.turning == HELD:
         rows.update({("rotation about", k): TURNS[k] for k in range(3)})
     return Conditions(rows)
+
+
+_HELD = LoopType((0, 1, 2), HELD)  # beside a prescribed motion nothing moves
 
 
 class LoopRows:
@@ -74,16 +94,26 @@ class LoopRows:
 
     def __init__(self, tree: TreeFormulation, loops: Sequence[Loop]) -> None:
         self.tree, self.loops = tree, tuple(loops)
-        self._conditions = [conditions(loop.type) for loop in loops]
+        self.kinds = [_HELD if loop.prescribed else loop.type for loop in loops]
+        self._conditions = [conditions(kind) for kind in self.kinds]
         pairs = [(k, name) for k, found in enumerate(self._conditions) for name in found.names]
         self.names = tuple(f"loop {loops[k].name!r}, {name}" for k, name in pairs)
         self.turns = np.array([name.startswith("rotation") for _, name in pairs])
         self.owner = np.array([k for k, _ in pairs])
         self.ends = np.cumsum([len(found.names) for found in self._conditions])
         self._ends = [end for loop in loops for end in (loop.outer, loop.inner) if end.link is not None]
+        self._known: tuple[float, Array, Array, Closure] | None = None
 
     def closure(self, t: float, y: Array, v: Array) -> Closure:
-        """Φ and its derivatives at a state of the chain."""
+        """Φ and its derivatives at a state of the chain; the last one is remembered, since integrators ask in several
+        ways.
+        """
+        known = self._known
+        if known is None or known[0] != t or not (np.array_equal(known[1], y) and np.array_equal(known[2], v)):
+            known = self._known = (t, y.copy(), v.copy(), self._closure(t, y, v))
+        return known[3]
+
+    def _closure(self, t: float, y: Array, v: Array) -> Closure:
         moving = iter(self.tree.frames(t, y, v, self._ends))
         size = self.tree.joints + len(self.tree.free) - len(self.tree.free_joints)
 
@@ -95,39 +125,52 @@ class LoopRows:
         parts: list[tuple[Array, ...]] = []
         gradients: list[Array] = []
         outers: list[FrameMotion] = []
-        inners: list[FrameMotion] = []
+        motions: list[JointMotion] = []
+        moves: list[Array] = []
+        poses: list[Array] = []
         for loop, rows in zip(self.loops, self._conditions, strict=True):
             outer, inner = frame(loop.outer), frame(loop.inner)
             found = joint_motion(inner, outer)
-            gradient = rows.gradient(found.pose)
+            left = found if not loop.prescribed else _less_prescribed(loop, found, t)
+            gradient = rows.gradient(left.pose)
             relative = outer.rows - found.transform @ inner.rows
-            bias = gradient @ found.bias + rows.curvature(found.pose, found.twist)
-            parts.append((rows.violation(found.pose), gradient @ found.twist, bias, gradient @ relative))
+            bias = gradient @ left.bias + rows.curvature(left.pose, left.twist)
+            parts.append((rows.violation(left.pose), gradient @ left.twist, bias, gradient @ relative))
             gradients.append(gradient)
             outers.append(outer)
-            inners.append(inner)
+            motions.append(found)
+            moves.append(relative)
+            poses.append(left.pose)
         violation, rate, bias, every = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return Closure(violation, rate, bias, every, gradients, outers, inners)
+        return Closure(violation, rate, bias, every, gradients, outers, motions, moves, poses)
 
-    def forces(self, found: Closure, multipliers: Array) -> list[LoopForce]:
-        """What multipliers λ (m,) do to the outer links: the equations of motion hold -Φ_yᵀ λ."""
-        result: list[LoopForce] = []
-        for gradient, outer, part in zip(
-            found.gradients, found.outer, np.split(multipliers, self.ends[:-1]), strict=True
-        ):
-            wrench, turn = -gradient.T @ part, outer.pose[:3, :3]
-            result.append(LoopForce(turn @ wrench[:3], turn @ wrench[3:], outer.pose[:3, 3]))
-        return result
+    def wrenches(self, found: Closure, multipliers: Array) -> list[Array]:
+        """(6,) what multipliers λ (m,) do to the outer links, in the axes of the outer frames: -Φ_yᵀ λ in all."""
+        parts = np.split(multipliers, self.ends[:-1])
+        return [-gradient.T @ part for gradient, part in zip(found.gradients, parts, strict=True)]
 
     def upside_down(self, found: Closure) -> list[str]:
         """Loops whose frames meet back to front, which their rows cannot tell from right."""
         result: list[str] = []
-        for loop, outer, inner in zip(self.loops, found.outer, found.inner, strict=True):
-            along = np.diag(inner.pose[:3, :3].T @ outer.pose[:3, :3])
-            wrong = along[2] < 0 or (loop.type.turning == HELD and along[0] < 0)
-            if loop.type.turning != FREE and wrong:
+        for loop, kind, left in zip(self.loops, self.kinds, found.left, strict=True):
+            along = np.diag(left[:3, :3])
+            wrong = along[2] < 0 or (kind.turning == HELD and along[0] < 0)
+            if kind.turning != FREE and wrong:
                 result.append(loop.name)
         return result
+
+
+def _less_prescribed(loop: Loop, found: JointMotion, t: float) -> JointMotion:
+    """The motion beside the prescribed one."""
+    assert loop.freedom is not None
+    value, rate, acceleration = loop.freedom.drive.reference(t)  # type: ignore[misc]
+    return less_motion(loop.freedom.type, found, (value - loop.freedom.zero, rate, acceleration))[0]
+
+
+def applied(outer: FrameMotion, wrench: Array) -> LoopForce:
+    """A wrench (6,) in the axes of an outer frame as a force in the world."""
+    turn = outer.pose[:3, :3]
+    return LoopForce(turn @ wrench[:3], turn @ wrench[3:], outer.pose[:3, 3])
 
 
 def about(force: LoopForce, place: Array) -> tuple[Array, Array]:

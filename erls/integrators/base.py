@@ -117,6 +117,8 @@ class Options:
     newton_tolerance : float
         Newton iterations stop when the remaining error is estimated below this [m]; at steps below 1 ms it
         falls with the cube of the step, so that convergence keeps its order.
+    tolerance : float
+        Error over the whole run [m] that the Lobatto methods aim at.
 
     Raises
     ------
@@ -129,6 +131,7 @@ class Options:
     atol: float = 1e-12
     spectral_radius: float = 0.8
     newton_tolerance: float = 1e-11
+    tolerance: float = 1e-5
 
     def __post_init__(self) -> None:
         # NaN fails every comparison, so that it is refused too
@@ -137,6 +140,7 @@ class Options:
             ("rtol", self.rtol, 3e-14 <= self.rtol < 1, "between 3e-14 (rounding) and 1"),
             ("atol", self.atol, self.atol > 0, "a positive number of metres"),
             ("spectral_radius", self.spectral_radius, 0 <= self.spectral_radius <= 1, "between 0 and 1"),
+            ("tolerance", self.tolerance, self.tolerance > 0, "a positive number of metres"),
             ("newton_tolerance", self.newton_tolerance, self.newton_tolerance >= 0, "zero or more metres"),
         )
         for name, value, ok, right in checks:

@@ -102,6 +102,10 @@ class ConstrainedOptions(Options):
     project_velocity : bool
         Move velocities onto the constraints after every step; otherwise they keep to them within the accuracy of
         the method.
+    error_tolerance : float or None
+        Largest local error of a step [m]: steps adapt to it, ``step`` being the largest. None for equal steps.
+    compiled : bool or None
+        Whether to use compiled kernels where a system has them; None where the compiler is on (`erls.kernels.jit`).
 
     Raises
     ------
@@ -112,6 +116,8 @@ class ConstrainedOptions(Options):
     iteration_matrix: str = "auto"
     residual_tolerance: float = 1e-10
     project_velocity: bool = False
+    error_tolerance: float | None = None
+    compiled: bool | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -127,6 +133,12 @@ class ConstrainedOptions(Options):
                 self.residual_tolerance,
                 0 <= self.residual_tolerance < 1,
                 "zero or more, and below 1",
+            ),
+            (
+                "error_tolerance",
+                self.error_tolerance,
+                self.error_tolerance is None or self.error_tolerance > 0,
+                "a positive number of metres",
             ),
         )
         for name, value, ok, right in checks:
@@ -148,6 +160,7 @@ class ConstrainedState(NamedTuple):
 
 @dataclass(frozen=True)
 class ConstrainedSolution(Solution):
-    """Knots of what the system stores, with the multipliers (k, m) there."""
+    """Knots of what the system stores, with rates (k, n) of the velocities v and multipliers (k, m) there."""
 
+    accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))
     multipliers: Array = field(default_factory=lambda: np.zeros((0, 0)))

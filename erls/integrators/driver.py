@@ -43,8 +43,8 @@ class Recorder:
         self._t[k] = t
         self._count = k + 1  # last, so that an interrupt never leaves half a knot
 
-    def extend(self, t: Array, knots: Array) -> None:
-        """Add knots (k, 3, n) of y, v, a at the ends ``t`` (k,) of accepted steps, and tell the observer."""
+    def extend(self, t: Array, knots: Array, steps: int | None = None) -> None:
+        """Add knots (k, 3, n) of y, v, a of accepted steps at ``t`` (k,), and tell the observer; one a step unless given."""
         start, count = self._count, len(t)
         while start + count > len(self._t):
             self._t = np.concatenate([self._t, np.empty(len(self._t))])
@@ -52,7 +52,7 @@ class Recorder:
         self._t[start : start + count], self._knots[start : start + count] = t, knots
         self._count = start + count
         if count:
-            self.accept(float(t[-1]), count)
+            self.accept(float(t[-1]), count if steps is None else steps)
 
     def accept(self, t: float, steps: int = 1) -> None:
         """Count accepted steps, whose knots were added, and tell the observer."""

@@ -242,7 +242,8 @@ class _Compiled:
     """The same steps, taken by the compiled loop (`erls.kernels.stepping.generalized_alpha`)."""
 
     def __init__(self, stepper: _Stepper, system: CompiledSystem) -> None:
-        from erls.integrators.generalized_alpha_compiled import Chunks, loop  # here: it imports the compiler
+        from erls.integrators.generalized_alpha_compiled import Chunks  # here: it imports the compiler
+        from erls.kernels.stepping import generalized_alpha as loop
 
         self.stepper, self.loop = stepper, loop
         known = {

@@ -21,8 +21,8 @@ class Chunks:
     Parameters
     ----------
     system : CompiledSystem
-    settings : mapping of names of `loop` constants to numbers
-        What stays the same over the run.
+    known, counts : mappings of places in those arrays of the loop to numbers
+        What stays the same over the run, and what it starts from.
     metres : (n,) array
         Per unit of each coordinate.
     """

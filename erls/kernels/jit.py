@@ -46,6 +46,13 @@ def part(function: F) -> F:
     return _njit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True) if ENABLED else function
 
 
+def inlined(function: F) -> F:
+    """A `part` that becomes one with its caller: for what takes many arrays and is called from one place."""
+    if not ENABLED:
+        return function
+    return _njit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
+
+
 def kernel(signature: Any) -> Callable[[F], F]:
     """A function with a fixed signature (of `erls.kernels.contract`), compiled when its module is imported."""
     return lambda function: _njit(function, signature) if ENABLED else function

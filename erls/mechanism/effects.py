@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Set
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from erls.effects import EFFECTS
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joints import Joint
+from erls.mechanism.loops import Loop, LoopFreedom
 from erls.mechanism.links import Link, payload_invariants, truncated
+
+_Acting = TypeVar("_Acting", Joint, LoopFreedom)
 
 
 def without(mechanism: Mechanism, off: Set[str]) -> Mechanism:
@@ -27,6 +31,7 @@ def without(mechanism: Mechanism, off: Set[str]) -> Mechanism:
         mechanism,
         joints=tuple(_joint_without(joint, off) for joint in mechanism.joints),
         links=tuple(_link_without(link, off) for link in mechanism.links),
+        loops=tuple(_loop_without(loop, off) for loop in mechanism.loops),
         gravity=np.zeros(3) if "gravity" in off else mechanism.gravity,
         effects=mechanism.effects - off,
     )
@@ -36,7 +41,9 @@ def present(mechanism: Mechanism) -> frozenset[str]:
     """Effects that are on and of which the mechanism holds anything; what turning and deformation add to inertia is
     taken to be there whenever a link is flexible.
     """
-    joints, links = mechanism.joints, mechanism.links
+    links = mechanism.links
+    joints: list[Joint | LoopFreedom] = [*mechanism.joints]
+    joints += [loop.freedom for loop in mechanism.loops if loop.freedom is not None]
     flexible = any(link.elastic_modes for link in links)
     found = {
         "gravity": bool(mechanism.gravity.any()),
@@ -51,7 +58,11 @@ def present(mechanism: Mechanism) -> frozenset[str]:
     return frozenset(name for name in mechanism.effects if found.get(name, flexible or not EFFECTS[name].of_links))
 
 
-def _joint_without(joint: Joint, off: Set[str]) -> Joint:
+def _loop_without(loop: Loop, off: Set[str]) -> Loop:
+    return loop if loop.freedom is None else replace(loop, freedom=_joint_without(loop.freedom, off))
+
+
+def _joint_without(joint: _Acting, off: Set[str]) -> _Acting:
     forces = joint.forces
     if "joint_stiffness" in off:
         forces = replace(forces, stiffness=0.0)

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from erls.lie.so3 import Array
+from erls.mechanism.drives import Drive
+from erls.mechanism.joints import JointForces, JointType
 
 FREE, PARALLEL, HELD = "free", "parallel", "held"
 
@@ -69,10 +71,51 @@ class LoopEnd:
 
 
 @dataclass(frozen=True)
+class LoopFreedom:
+    """What a revolute or prismatic closing joint leaves free, and what acts along it.
+
+    Attributes
+    ----------
+    type : JointType
+    zero : float
+        Coordinate where the frames coincide [rad or m].
+    forces : JointForces
+    rotor_inertia : float
+        Reflected to the coordinate [kg m² or kg].
+    drive : Drive
+    """
+
+    type: JointType
+    zero: float
+    forces: JointForces
+    rotor_inertia: float
+    drive: Drive
+
+    @property
+    def active(self) -> bool:
+        """Whether a force that is no reaction, or a rotor, acts along it."""
+        return self.forces.active or bool(self.rotor_inertia) or self.drive.kind not in ("free", "motion")
+
+    @property
+    def counts_turns(self) -> bool:
+        """Whether forces depend on how often it has turned."""
+        return self.type.revolute and bool(self.forces.stiffness or self.drive.kind == "pd")
+
+
+@dataclass(frozen=True)
 class Loop:
-    """A closing joint: ``outer`` moves against ``inner``, in whose axes its directions are named."""
+    """A closing joint: ``outer`` moves against ``inner``, in whose axes its directions are named.
+
+    ``freedom`` is that of a revolute or prismatic one.
+    """
 
     name: str
     type: LoopType
     inner: LoopEnd
     outer: LoopEnd
+    freedom: LoopFreedom | None = None
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether its coordinate follows a motion."""
+        return self.freedom is not None and self.freedom.drive.prescribed

@@ -201,6 +201,12 @@ class NodalSystem:
         pairs = [e.energy(t, q.poses[e.nodes], m, _of_elements(twist, e.nodes)) for e, m in self._each(q)]
         return sum(k for k, _ in pairs), sum(p for _, p in pairs)
 
+    def compiled(self) -> Any:
+        """The system as arrays for compiled steps (`erls.nodal.compiled.CompiledSystem`), None where it has no kernels."""
+        from erls.nodal.compiled import CompiledSystem, has_kernels
+
+        return CompiledSystem(self) if has_kernels(self) else None
+
     def _each(self, q: Nodes) -> Iterator[tuple[Elements, Any]]:
         return zip(self.elements, q.memory, strict=True)
 

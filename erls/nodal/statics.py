@@ -70,7 +70,7 @@ def solve_statics(
     tolerance : float
         Last correction, of the size of the mechanism.
     end : float
-        Last load parameter.
+        Last load parameter; 0 for the equilibrium without loads that grow.
 
     Returns
     -------
@@ -90,7 +90,12 @@ def solve_statics(
     found: list[Equilibrium] = []
     step, used = end / steps, 0
     failure = None
-    while at < end * (1 - 1e-12):
+    if end == 0:
+        result = solver.balance(0.0, q, multipliers)
+        if result is not None:
+            return Statics((Equilibrium(0.0, *result, solver.iterations),), solver.factorizations, solver.cuts)
+        failure = solver.failure(0.0)
+    while failure is None and at < end * (1 - 1e-12):
         target = min(at + step, end)
         with np.errstate(over="ignore", invalid="ignore"):  # of a step too far, which is found and cut
             result = solver.balance(target, q, multipliers)

@@ -12,9 +12,10 @@ from erls.mechanism.chain import Mechanism
 from erls.run import Run
 from erls.selection.error_motion import Knots, error_motion
 from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
+from erls.selection.quick import quick
 
 STEPS = 400
-_EFFORTS = 40  # knots at which drive forces are compared
+_PLACES, _EFFORTS = 120, 40  # knots at which points and drive forces are compared
 
 
 def certify(run: Run, whole: Mechanism) -> Certificate:
@@ -33,7 +34,7 @@ def certify(run: Run, whole: Mechanism) -> Certificate:
     """
     settings = run.scene.record.simulation
     formulation = formulate(whole, settings)
-    system, reduced = solved(formulation), solved(run.formulation)
+    system, reduced = quick(solved(formulation)), quick(solved(run.formulation))
     kept = reduced.size  # coordinates of elastic modes, where only the whole has them, come last
 
     def embedded(values: Array) -> Array:
@@ -53,8 +54,9 @@ def certify(run: Run, whole: Mechanism) -> Certificate:
     watched = watched_nodes(whole)
     ours = Outputs(run.scene, run.formulation, watched)
     others = Outputs(run.scene, formulation, watched)
-    here = [ours.positions(run.formulation.state(d.t, d.y[:kept], d.v[:kept])) for d in found]
-    there = [others.positions(formulation.state(d.t, d.other_y, d.other_v)) for d in found]
+    places = [found[k] for k in np.unique(np.linspace(0, len(found) - 1, _PLACES).astype(int))]
+    here = [ours.positions(run.formulation.state(d.t, d.y[:kept], d.v[:kept])) for d in places]
+    there = [others.positions(formulation.state(d.t, d.other_y, d.other_v)) for d in places]
     efforts: tuple[list[Array], list[Array]] = ([], [])
     if ours.driven:
         for d in found[:: max(1, len(found) // _EFFORTS)]:

@@ -1,7 +1,7 @@
 """The error that other equations of motion make, from the exact error equation along a computed motion.
 
-Let (y, v, a) be the knots of a motion that some equations gave, and R(t, y, v, a) = M a - f those of another system. Its
-motion from the same start is y + e with
+Let (y, v, a) be the knots of a motion that some equations gave, and R(t, y, v, a) = M a - f those of another system.
+Its motion from the same start is y + e with
 
     R(t, y + e, v + ė, a + ë) = r(t),
 
@@ -22,6 +22,7 @@ import scipy.linalg as la
 from erls.errors import Cause, SimulationError
 from erls.integrators.base import Array, SecondOrderSystem, metre_scales
 
+Balance = Callable[[float, Array, Array, Array], Array]
 RADIUS = 0.7  # numerical damping of what the steps do not resolve
 _ITERATIONS, _SLOW = 12, 4
 _HAIR = 2e-12  # of the run: forces jump at the ends of a leg
@@ -58,7 +59,7 @@ def error_motion(
     system: SecondOrderSystem,
     legs: list[Knots],
     start: tuple[Array, Array],
-    balance: Callable[[float, Array, Array, Array], Array],
+    balance: Balance,
     stride: int,
     accuracy: float,
 ) -> list[Deviation]:
@@ -122,13 +123,11 @@ class _Stepper:
         self.acc = self.alg = np.zeros(system.size)
         self.largest = 0.0
 
-    def acceleration(
-        self, leg: Knots, e: Array, rate: Array, balance: Callable[[float, Array, Array, Array], Array]
-    ) -> Array:
+    def acceleration(self, leg: Knots, e: Array, rate: Array, balance: Balance) -> Array:
         """ë at the first knot of a leg."""
         t, y, v, a = leg.t[0], leg.y[0], leg.v[0], leg.a[0]
         force = self.system.residual(t, y + e, v + rate, a) - balance(t, y, v, a)
-        return np.linalg.solve(self.system.mass_matrix(t, y + e), -force)
+        return np.asarray(np.linalg.solve(self.system.mass_matrix(t, y + e), -force), dtype=float)
 
     def begin(self, acceleration: Array) -> None:
         """ë and a₀ at the start of a leg."""
@@ -136,7 +135,7 @@ class _Stepper:
         self.factor = None
 
     def step(
-        self, leg: Knots, at: int, to: int, e: Array, rate: Array, balance: Callable[[float, Array, Array, Array], Array]
+        self, leg: Knots, at: int, to: int, e: Array, rate: Array, balance: Balance
     ) -> tuple[Array, Array] | None:
         """e and ė at knot ``to``; None where the iteration fails."""
         t, y, v, a = float(leg.t[to]), leg.y[to], leg.v[to], leg.a[to]

@@ -15,21 +15,23 @@ import msgspec
 import numpy as np
 
 from erls.effects import EFFECTS, in_order
-from erls.errors import Cause, SimulationError
+from erls.errors import Cause
 from erls.formulations import formulate, integrator
 from erls.formulations.substructures import solved
-from erls.integrators.base import Array, Options, metre_scales
+from erls.integrators.base import Array, Options
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import present, without
+from erls.mechanism.links import link_mass_properties
 from erls.run import Run
 from erls.scene import Scene
 from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
+from erls.selection.quick import quick
 
 STEPS = 120
 SAMPLES = 60
 RADIUS = 0.3
 _FORCES = 20  # knots at which forces are compared
-_REPEATS, _CALLS = 7, 12
+_REPEATS, _CALLS = 9, 20
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class EffectSize:
     present : bool
         Whether the scene holds anything of it.
     force : float
-        Largest generalized force that goes with it, per metre of what its coordinate moves [N].
+        Largest generalized force that goes with it, weighted so that coordinates do not matter [N].
     error : float
         Largest distance of named points without it [m]; infinite where they cannot move without it.
     effort_error : float or None
@@ -130,12 +132,16 @@ class _Curves:
 
 
 def _force(whole: Run, less: Run) -> float:
-    """Largest difference of generalized forces along the coarse run; without flexibility, what holds the modes."""
-    system, other = solved(whole.formulation), solved(less.formulation)
+    """Largest difference of generalized forces along the coarse run; without flexibility, what holds the modes.
+
+    Forces F count as sqrt(μ Fᵀ M⁻¹ F) with the mass μ of all links: one that acts on all mass alike counts as it is,
+    whatever the coordinates.
+    """
+    system, other = quick(solved(whole.formulation)), quick(solved(less.formulation))
     if not hasattr(system, "residual") or not system.size:
         return 0.0
-    metres, s = metre_scales(system), whole.solution
-    rigid = other.size
+    mass = sum(link_mass_properties(link).mass for link in whole.formulation.mechanism.links)
+    s, rigid = whole.solution, other.size
     largest = 0.0
     for k in np.unique(np.linspace(1, len(s.t) - 1, _FORCES).astype(int)):
         t, y, v, a = float(s.t[k]), s.y[k].copy(), s.v[k].copy(), s.a[k].copy()
@@ -145,19 +151,20 @@ def _force(whole: Run, less: Run) -> float:
             y[rigid:], v[rigid:], a[rigid:] = 0.0, 0.0, 0.0
             force = system.residual(t, y, v, a)
             force[:rigid] = 0.0
-        largest = max(largest, float(np.abs(force / metres).max()))
-    return largest
+        largest = max(largest, float(force @ np.linalg.solve(system.mass_matrix(t, y), force)))
+    return float(np.sqrt(max(mass, 0.0) * largest))
 
 
 def _share(whole: Run, less: Run) -> float:
-    """Part of the time of an evaluation that is saved: the smallest of several measurements of either, taken in turn."""
-    systems = [solved(run.formulation) for run in (whole, less)]
-    if not all(hasattr(system, "residual") for system in systems):
+    """Part of the time of an evaluation that is saved: least of several measurements of either, taken in turn."""
+    systems = [quick(solved(run.formulation)) for run in (whole, less)]
+    if not all(hasattr(system, "residual") and system.size for system in systems):
         return 0.0
     best = [np.inf, np.inf]
     for _ in range(_REPEATS):
         for k, (system, run) in enumerate(zip(systems, (whole, less), strict=True)):
-            t, y, v, a = float(run.solution.t[0]), run.solution.y[-1], run.solution.v[-1], run.solution.a[-1]
+            s = run.solution
+            t, y, v, a = float(s.t[0]), s.y[-1].copy(), s.v[-1].copy(), s.a[-1].copy()
             begun = time.perf_counter()
             for _ in range(_CALLS):
                 system.residual(t, y, v, a)

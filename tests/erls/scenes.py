@@ -53,7 +53,7 @@ def toml(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)  # the same escapes
-    return repr(value)
+    return repr(float(value)) if isinstance(value, float) else repr(value)  # NumPy's floats too
 
 
 def write_toml(path: Path, data: dict[str, Any]) -> Path:

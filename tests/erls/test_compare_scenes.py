@@ -30,7 +30,9 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> SceneComparison:
     damped = {**scenes.read_toml(paths[0]), "name": "damped"}
     damped["links"] = [{**damped["links"][0], "damping": {"ratio": 0.01}}]
     paths += [scenes.write_toml(folder / "damped.toml", damped), body_scene(folder, STRIP)]
-    return compare_scenes(paths, ["ffr", "nodal"], workers=1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("erls.studies.compare._SAMPLES", 40)
+        return compare_scenes(paths, ["ffr", "nodal"], workers=1)
 
 
 def test_departures_are_of_second_order(compared: SceneComparison) -> None:
@@ -39,7 +41,7 @@ def test_departures_are_of_second_order(compared: SceneComparison) -> None:
     assert [Path(d.scene).stem for d in (light, heavy)] == ["light", "heavy"]
     assert light.as_expected
     assert heavy.as_expected
-    assert heavy.deflection == pytest.approx(3 * light.deflection, rel=0.1)
+    assert heavy.deflection == pytest.approx(3 * light.deflection, rel=0.15)
     assert compared.order("ffr") == pytest.approx(2.0, abs=0.1)
     assert compared.order("erls") is None
     assert compared.reference == "nodal"
@@ -67,8 +69,11 @@ def test_all_forms_say_the_same(compared: SceneComparison) -> None:
     assert len(summary["scenes"]) == 3
 
 
-def test_command_on_several_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_on_several_scenes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """JSON on stdout and in the file; 2 when nothing could be compared, with the reasons."""
+    monkeypatch.setattr("erls.studies.compare._SAMPLES", 10)
     scenes.l_link(tmp_path)
     scene = str(scenes.l_scene(tmp_path, simulation={"duration": 0.005, "step": 1e-3}))
     bodies, output = str(body_scene(tmp_path, STRIP)), tmp_path / "c.json"

@@ -23,7 +23,7 @@ FIELDS: dict[str, tuple[dict[str, Any], str, str]] = {
     "unknown other link": ({"to_link": "crnk", "to_node": "tip", "position": None}, "loops[0].to_link", "crank"),
     "unknown other node": ({"to_link": "crank", "to_node": "top", "position": None}, "loops[0].to_node", "tip"),
     "unknown type": ({"type": "revolut"}, "loops[0].type", "revolute"),
-    "unknown field": ({"stiffness": 1.0}, "loops[0].stiffness", "known fields"),
+    "unknown field": ({"stifness": 1.0}, "loops[0].stifness", "stiffness"),
     "no name": ({"name": ""}, "loops[0].name", "rename"),
     "itself": ({"to_link": "rocker", "to_node": "root", "position": None}, "loops[0].to_link", "another link"),
     "link without node": ({"to_link": "crank", "position": None}, "loops[0].to_node", "both"),

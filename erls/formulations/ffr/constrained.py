@@ -158,7 +158,7 @@ class ConstrainedFfr:
         joint = self.mechanism.joints[k]
         if not joint.drive.prescribed:
             return found, np.zeros(6)
-        return less_motion(joint, found, joint.drive.reference(t))  # type: ignore[arg-type]
+        return less_motion(joint.type, found, joint.drive.reference(t))  # type: ignore[arg-type]
 
     def _relative_rows(self, k: int, inner: FrameMotion, outer: FrameMotion, transform: Array) -> Array:
         """(6, n) relative twist of joint ``k`` over all velocities."""

@@ -16,8 +16,9 @@ from erls.formulations.joint_frames import (
     JointMotion,
     Turn,
     joint_motion,
+    less_motion,
 )
-from erls.lie.se3 import inverse, joint_pose, twist_transform
+from erls.lie.se3 import twist_transform
 from erls.lie.so3 import Array
 from erls.mechanism.joints import Joint
 
@@ -32,16 +33,6 @@ def carried_frame(
     rows = np.hstack([carry, shift @ moved.jacobian])
     relative, carried = rows[:, 6:] @ rate, carry @ twist
     return FrameMotion(world @ local, rows, carried + relative, shift @ moved.bias + bracket(carried, relative))
-
-
-def less_motion(joint: Joint, found: JointMotion, reference: tuple[float, float, float]) -> tuple[JointMotion, Array]:
-    """What is left beside a prescribed motion, and the part (6,) of its twist that time alone gives."""
-    value, rate, acceleration = reference
-    pose = inverse(joint_pose(joint.type.revolute, value)) @ found.pose
-    screw = twist_transform(pose) @ joint.type.screw
-    twist = found.twist - screw * rate
-    bias = found.bias - screw * acceleration + bracket(twist, screw * rate)
-    return JointMotion(pose, found.transform, twist, bias), -screw * rate
 
 
 class JointConditions(Conditions):

@@ -84,7 +84,8 @@ def relax(reals: Array, integers: IntArray, scratch: Array, record: int, out: Ar
                         inertia[60 + 9 * i + j] -= both * turns
     relaxed[:] = 0.0
     add_columns(reals, inverse, e, forces, e, 1.0, relaxed)
-    forces[:] = relaxed
+    for i in range(e):
+        forces[i] = relaxed[i]
 
 
 @helper

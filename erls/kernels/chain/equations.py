@@ -47,9 +47,7 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
 
 
 @kernel(contract.ACCELERATION)
-def acceleration(
-    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array
-) -> int:
+def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> int:
     """M⁻¹ f; see `erls.kernels.contract`."""
     balance(reals, integers, scratch, t, y, v, scratch[0:0], out)
     for i in range(len(out)):

@@ -51,9 +51,7 @@ def displace(
 
 
 @helper
-def place_frames(
-    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array
-) -> None:
+def place_frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array) -> None:
     """Poses and displacements of all link frames, with the modal coordinates u, q_d of each link beside each other."""
     for k in range(integers[at.LINKS]):
         record = at.HEADER + k * at.RECORD
@@ -80,9 +78,7 @@ def place_frames(
 
 
 @helper
-def move_frames(
-    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array
-) -> None:
+def move_frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array) -> None:
     """Twists and displacement rates of all link frames; without accelerations when ``a`` is empty.
 
     The second derivatives are those at the given θ̈, q̈_d (at zero where ``a`` is empty).
@@ -136,9 +132,7 @@ def move_frames(
             add_bracket(screw, 0, link, at.U, -acceleration, link, at.U_ACCELERATION)
             for i in range(3):
                 link[at.DOWN + i] = (
-                    link[i] * before[at.DOWN]
-                    + link[3 + i] * before[at.DOWN + 1]
-                    + link[6 + i] * before[at.DOWN + 2]
+                    link[i] * before[at.DOWN] + link[3 + i] * before[at.DOWN + 1] + link[6 + i] * before[at.DOWN + 2]
                 )
         for i in range(6):
             link[at.W + i] = link[at.TWIST + i] + link[at.U_RATE + i]

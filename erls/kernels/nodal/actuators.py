@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import part
+from erls.kernels.jit import inlined, part
 from erls.kernels.nodal.contract import Knots, Model, Work
 from erls.kernels.nodal.joints import frame_in_world, relative
 from erls.kernels.nodal.motions import bracket, pair_minus, transformed, transposed
@@ -27,7 +27,7 @@ from erls.kernels.nodal.vectors import (
 _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-@part
+@inlined
 def _posed(model: Model, poses: Array, k: int) -> tuple[Vector, Rotation, Vector, Rotation]:
     """Pose of the outer frame in the inner one, and in the inner node."""
     inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
@@ -39,7 +39,7 @@ def _posed(model: Model, poses: Array, k: int) -> tuple[Vector, Rotation, Vector
     return place, turn, plus(p, times(r, place)), product(r, turn)
 
 
-@part
+@inlined
 def _coordinate(model: Model, k: int, place: Vector, turn: Rotation, near: float) -> float:
     """Joint coordinate on the turn next to ``near``."""
     if model.actuator_along[k] == 2:
@@ -48,7 +48,7 @@ def _coordinate(model: Model, k: int, place: Vector, turn: Rotation, near: float
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
 
 
-@part
+@inlined
 def _rows(model: Model, k: int, reach: Vector, axes: Rotation) -> tuple[Twist, Twist]:
     """Rate of the coordinate along the twists of the inner and the outer node."""
     along = model.actuator_along[k]
@@ -70,7 +70,7 @@ def _along(row: Twist, values: Array, node: int) -> float:
     return linear + row[1][0] * w[0] + row[1][1] * w[1] + row[1][2] * w[2]
 
 
-@part
+@inlined
 def _swing(model: Model, k: int, reach: Vector, axes: Rotation, twist: Array) -> float:
     """Acceleration of the coordinate at constant twists."""
     inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
@@ -88,7 +88,7 @@ def _swing(model: Model, k: int, reach: Vector, axes: Rotation, twist: Array) ->
     return w[2]
 
 
-@part
+@inlined
 def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> float:
     """What drive, spring, damper and friction give."""
     at = len(model.joint_nodes) + len(model.load_nodes) + 3 * k
@@ -101,7 +101,7 @@ def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> f
     return torque
 
 
-@part
+@inlined
 def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> None:
     """Add inertia of rotors less efforts to ``work.force``; coordinates near ``before`` go into ``work.turned``."""
     for k in range(len(model.actuator_nodes)):
@@ -123,7 +123,7 @@ def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> N
         add(work.force, 6 * outer + 3, scaled(balance, second[1]))
 
 
-@part
+@inlined
 def actuator_derivatives(model: Model, work: Work, k: int) -> None:
     """Mass of the rotor, damping and stiffness of actuator k; a node that is the ground counts as one without share."""
     _, _, reach, axes = _posed(model, work.poses, k)
@@ -149,7 +149,7 @@ def _entry(first: Twist, second: Twist, i: int) -> float:
     return row[0][i] if i < 3 else row[1][i - 3]
 
 
-@part
+@inlined
 def set_coordinates(model: Model, work: Work, before: Array) -> None:
     """Coordinates of all actuators near ``before``."""
     for k in range(len(model.actuator_nodes)):
@@ -157,7 +157,7 @@ def set_coordinates(model: Model, work: Work, before: Array) -> None:
         work.turned[k] = _coordinate(model, k, place, turn, before[k])
 
 
-@part
+@inlined
 def store_coordinates(model: Model, work: Work, knots: Knots, at: int) -> None:
     """Coordinates, rates and accelerations of all actuators behind the frames of knot ``at``."""
     first_entry = knots.states.shape[2] - len(model.actuator_nodes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import part
+from erls.kernels.jit import inlined, part
 from erls.kernels.nodal.contract import Model, Work
 from erls.kernels.nodal.motions import (
     bracket,
@@ -55,7 +55,7 @@ _HALF = (0.5, 0.0, 0.0)
 _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-@part
+@inlined
 def _section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rotation]:
     """Frame of the section at an end in the world."""
     node = model.beam_nodes[e, side]
@@ -64,7 +64,7 @@ def _section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rot
     return place, product(turn, nine(model.beam_frames, e, 12 * side + 3))
 
 
-@part
+@inlined
 def bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple[Vector, Vector]:
     """d of element e near that in ``before``; also written into ``out``."""
     place, turn = _section(model, poses, e, 0)
@@ -76,14 +76,14 @@ def bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple
     return u, psi
 
 
-@part
+@inlined
 def _inward(model: Model, e: int, side: int, force: Twist) -> Twist:
     """Wrench on a section as one on its node."""
     frames = model.beam_frames
     return transposed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), force[0], force[1])
 
 
-@part
+@inlined
 def _outward(model: Model, e: int, side: int, table: Array) -> Twist:
     """Twist of a section from those of the nodes."""
     at, frames = 6 * model.beam_nodes[e, side], model.beam_frames
@@ -91,13 +91,13 @@ def _outward(model: Model, e: int, side: int, table: Array) -> Twist:
     return transformed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), v, w)
 
 
-@part
+@inlined
 def _section_force(model: Model, e: int, u: Vector, psi: Vector) -> Twist:
     built = model.beam_built
     return of_matrix(model.beam_stiffness, e, minus(u, vector(built, e, 0)), minus(psi, vector(built, e, 3)))
 
 
-@part
+@inlined
 def beam_forces(model: Model, work: Work, before: Array) -> None:
     """Add inertia and internal forces less weight to ``work.force``, from poses, twists and rates there."""
     out = work.force
@@ -118,7 +118,7 @@ def beam_forces(model: Model, work: Work, before: Array) -> None:
             add(out, at + 3, force[1])
 
 
-@part
+@inlined
 def _inertia(model: Model, work: Work, e: int, u: Vector, psi: Vector, b: Three) -> tuple[Twist, Twist]:
     """Inertia less weight as a wrench on the first section, and one along d."""
     c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
@@ -175,7 +175,7 @@ def _add_power(out: Array, table: Array, j: int, scale: float, force: Twist) -> 
         out[i, j] += scale * (linear + table[3, i] * m[0] + table[4, i] * m[1] + table[5, i] * m[2])
 
 
-@part
+@inlined
 def _unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
     """Twists of both sections when coordinate j of the nodes moves alone."""
     side = j // 6
@@ -186,7 +186,7 @@ def _unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
     return _NONE, moved
 
 
-@part
+@inlined
 def beam_derivatives(model: Model, work: Work, e: int) -> None:
     """Mass, damping and stiffness of element e at ``work``'s poses, bends and twists."""
     mass, damping, stiffness, rows = work.mass, work.damping, work.stiffness, work.rows
@@ -216,7 +216,7 @@ def beam_derivatives(model: Model, work: Work, e: int) -> None:
         _inertia_derivatives(model, work, e, u, psi)
 
 
-@part
+@inlined
 def _inertia_derivatives(model: Model, work: Work, e: int, u: Vector, psi: Vector) -> None:
     rows, shape = work.rows, work.shape
     c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import part
+from erls.kernels.jit import inlined, part
 from erls.kernels.nodal.contract import Model, Work
 from erls.kernels.nodal.motions import cobracket, pair_minus, pair_plus
 from erls.kernels.nodal.vectors import Twist, Vector, add, cross, minus, nine, of_matrix, scaled, three, turned, unit, vector
@@ -11,12 +11,12 @@ from erls.kernels.nodal.vectors import Twist, Vector, add, cross, minus, nine, o
 _ZERO = (0.0, 0.0, 0.0)
 
 
-@part
+@inlined
 def _weight(model: Model, poses: Array, node: int) -> Vector:
     return turned(nine(poses, node, 3), vector(model.gravity, 1, 0))
 
 
-@part
+@inlined
 def body_forces(model: Model, work: Work) -> None:
     """Add inertia less weight to ``work.force``."""
     for k in range(len(model.body_nodes)):
@@ -31,7 +31,7 @@ def body_forces(model: Model, work: Work) -> None:
         add(work.force, at + 3, force[1])
 
 
-@part
+@inlined
 def body_derivatives(model: Model, work: Work, k: int) -> None:
     """Mass, damping and stiffness of body k in the first six rows and columns."""
     node = model.body_nodes[k]
@@ -54,7 +54,7 @@ def _fill(out: Array, j: int, scale: float, column: Twist) -> None:
         out[3 + i, j] = scale * column[1][i]
 
 
-@part
+@inlined
 def _load(model: Model, poses: Array, k: int, factor: float) -> Twist:
     """In node axes."""
     force, moment = scaled(factor, vector(model.loads, k, 0)), scaled(factor, vector(model.loads, k, 3))
@@ -64,7 +64,7 @@ def _load(model: Model, poses: Array, k: int, factor: float) -> Twist:
     return force, moment
 
 
-@part
+@inlined
 def load_forces(model: Model, work: Work, sample: Array) -> None:
     """Subtract loads from ``work.force``; their factors follow the joints in ``sample``."""
     first = len(model.joint_nodes)
@@ -75,7 +75,7 @@ def load_forces(model: Model, work: Work, sample: Array) -> None:
         add(work.force, at + 3, moment)
 
 
-@part
+@inlined
 def load_derivatives(model: Model, work: Work, sample: Array, k: int) -> None:
     """Stiffness of load k in the first six rows and columns: dead ones turn in the node's axes."""
     for j in range(6):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import part
+from erls.kernels.jit import inlined, part
 from erls.kernels.nodal.contract import Model, Work
 from erls.kernels.nodal.motions import cobracket, pair_minus, transformed, transposed
 from erls.kernels.nodal.rotations import exponential, stumpff
@@ -48,7 +48,7 @@ def relative(
     return turned(r, minus(place, p)), back_product(r, turn)
 
 
-@part
+@inlined
 def _ahead(model: Model, j: int, coordinate: float) -> tuple[Vector, Rotation]:
     """Frame of the inner node that runs ahead by a prescribed coordinate."""
     p, r = vector(model.joint_frames, j, 0), nine(model.joint_frames, j, 3)
@@ -62,7 +62,7 @@ def _ahead(model: Model, j: int, coordinate: float) -> tuple[Vector, Rotation]:
     return p, product(r, exponential(psi, c[0], c[1]))
 
 
-@part
+@inlined
 def _posed(model: Model, poses: Array, j: int, coordinate: float) -> tuple[Vector, Rotation, Vector, Rotation]:
     """Pose D of the outer frame in the inner one, and that of the outer frame in the inner node."""
     inner, outer = model.joint_nodes[j, 0], model.joint_nodes[j, 1]
@@ -76,14 +76,14 @@ def _posed(model: Model, poses: Array, j: int, coordinate: float) -> tuple[Vecto
     return place, turn, plus(p, times(r, place)), product(r, turn)
 
 
-@part
+@inlined
 def _along(model: Model, row: int, turn: Rotation) -> Twist:
     """Derivative of a condition along the relative twist."""
     pull = turned(turn, vector(model.conditions, row, 0))
     return pull, axial(back_product(turn, nine(model.conditions, row, 3)))
 
 
-@part
+@inlined
 def joint_forces(model: Model, work: Work, sample: Array) -> None:
     """Violations of all conditions, and the forces Bᵀλ in node axes, added to ``work.reaction``."""
     for j in range(len(model.joint_nodes)):
@@ -110,7 +110,7 @@ def joint_forces(model: Model, work: Work, sample: Array) -> None:
             add(work.reaction, 6 * outer + 3, m)
 
 
-@part
+@inlined
 def joint_derivatives(model: Model, work: Work, sample: Array, j: int) -> None:
     """Gradients of the joint's conditions in ``work.gradient``, stiffness of Bᵀλ in ``work.stiffness``."""
     _, turn, reach, axes = _posed(model, work.poses, j, sample[j])

@@ -7,7 +7,7 @@ The conventions are those of `erls.nodal.assembly` and `erls.integrators.saddle`
 from __future__ import annotations
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import kernel, part
+from erls.kernels.jit import inlined, kernel, part
 from erls.kernels.nodal import band
 from erls.kernels.nodal.actuators import actuator_derivatives
 from erls.kernels.nodal.beam import beam_derivatives
@@ -34,7 +34,7 @@ _ZERO = (0.0, 0.0, 0.0)
 GROUND = -1
 
 
-@part
+@inlined
 def _node_factors(model: Model, work: Work, to_a: float, to_v: float) -> None:
     """What stands to the right of M, C and K for each node; on R³×SO(3) the chain rule over E v, E a + Ė v, Eᵀ f."""
     for node in range(len(work.poses)):
@@ -76,13 +76,13 @@ def _node_factors(model: Model, work: Work, to_a: float, to_v: float) -> None:
                     _enter(model, work, at + i, at + 3 + j, column[i])
 
 
-@part
+@inlined
 def _enter(model: Model, work: Work, row: int, column: int, entry: float) -> None:
     place, width = model.place[row], (work.band.shape[1] - 1) // 3
     work.band[place, model.place[column] - place + width] += entry
 
 
-@part
+@inlined
 def _add_blocks(model: Model, work: Work, first: int, second: int) -> None:
     """Add M X + C Y + K Z of one element between two nodes, of which the ground has no share."""
     for row_side in range(2):
@@ -123,12 +123,12 @@ def _three(table: Array, row: int, column: int) -> Vector:
     return table[row, column], table[row + 1, column], table[row + 2, column]
 
 
-@part
+@inlined
 def _own(work: Work, row: int, column: int, to_a: float, to_v: float) -> Vector:
     return plus(scaled(to_a, _three(work.mass, row, column)), scaled(to_v, _three(work.damping, row, column)))
 
 
-@part
+@inlined
 def _mixed(work: Work, row: int, column: int, right: Array, k: int, j: int) -> Vector:
     found = plus(
         scaled(right[0, k, j], _three(work.mass, row, column)), scaled(right[1, k, j], _three(work.damping, row, column))
@@ -136,7 +136,7 @@ def _mixed(work: Work, row: int, column: int, right: Array, k: int, j: int) -> V
     return plus(found, scaled(right[2, k, j], _three(work.stiffness, row, column)))
 
 
-@part
+@inlined
 def _add_condition(model: Model, work: Work, j: int, row: int) -> None:
     """Row B T and column Bᵀ of a condition; its scale, so that the largest derivative by a displacement is one."""
     n = len(work.force)
@@ -164,7 +164,7 @@ def _add_condition(model: Model, work: Work, j: int, row: int) -> None:
     work.left[n + row] = 1.0 / size if size > 0.0 else 1.0
 
 
-@part
+@inlined
 def _scale(model: Model, work: Work, period: float) -> None:
     """Units of `erls.integrators.saddle`: metres, and newtons per mass."""
     n = len(work.force)

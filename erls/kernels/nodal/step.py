@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import kernel, part
+from erls.kernels.jit import inlined, kernel, part
 from erls.kernels.nodal import band
 from erls.kernels.nodal.actuators import set_coordinates, store_coordinates
 from erls.kernels.nodal.beam import bend
@@ -29,7 +29,7 @@ MATRIX, USUAL, EXCESS, EVALUATIONS, ITERATIONS, FACTORIZATIONS, REASON, STEPS = 
 AUTO, UPDATE, FROZEN = range(3)
 
 
-@part
+@inlined
 def _judge(state: State, work: Work, settings: Settings, progress: Progress, metres: Array) -> int:
     if settings.error_limit == 0.0:
         return DONE
@@ -43,7 +43,7 @@ def _judge(state: State, work: Work, settings: Settings, progress: Progress, met
     return TIMID if settings.growth > 0.0 and error * settings.growth**3 < settings.error_limit else DONE
 
 
-@part
+@inlined
 def _step(
     forces: Forces,
     factor: Factor,
@@ -68,7 +68,7 @@ def _step(
         fresh = True
 
 
-@part
+@inlined
 def _predict(state: State, work: Work, settings: Settings) -> None:
     h, beta, gamma = settings.h, settings.beta, settings.gamma
     for i in range(len(work.v)):
@@ -81,7 +81,7 @@ def _predict(state: State, work: Work, settings: Settings) -> None:
         work.multipliers[i] = state.multipliers[i] if settings.predict else 0.0
 
 
-@part
+@inlined
 def _iterate(
     forces: Forces,
     factor: Factor,
@@ -161,7 +161,7 @@ def _iterate(
     return False
 
 
-@part
+@inlined
 def _correct(model: Model, work: Work, settings: Settings) -> float:
     """Solve for a correction, apply it, and return its size [m]."""
     n = len(work.v)
@@ -189,7 +189,7 @@ def _correct(model: Model, work: Work, settings: Settings) -> float:
     return size
 
 
-@part
+@inlined
 def _settle(model: Model, state: State, work: Work) -> None:
     """Bring everything in ``work`` to its last increment."""
     compose(model, state.poses, work.increment, work.poses)
@@ -199,7 +199,7 @@ def _settle(model: Model, state: State, work: Work) -> None:
     set_twists(model, work)
 
 
-@part
+@inlined
 def _note(settings: Settings, progress: Progress, iterations: int, rate: float) -> None:
     """How fast iteration was."""
     rates, counts = progress.rates, progress.counts
@@ -209,7 +209,7 @@ def _note(settings: Settings, progress: Progress, iterations: int, rate: float) 
         rates[SPENT] += iterations - counts[USUAL]
 
 
-@part
+@inlined
 def _accept(state: State, work: Work, settings: Settings) -> None:
     """The state that was tried becomes the state."""
     for i in range(len(work.v)):
@@ -228,7 +228,7 @@ def _accept(state: State, work: Work, settings: Settings) -> None:
             state.poses[node, i] = work.poses[node, i]
 
 
-@part
+@inlined
 def _store(model: Model, work: Work, knots: Knots, at: int) -> None:
     """Positions and rotation matrices with their derivatives, joint coordinates, rates of twists, multipliers."""
     for node in range(len(work.poses)):

@@ -7,7 +7,7 @@ The conventions are those of `erls.nodal.assembly`. On R³×SO(3) a node's veloc
 from __future__ import annotations
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import kernel, part
+from erls.kernels.jit import inlined, kernel, part
 from erls.kernels.nodal.actuators import actuator_forces
 from erls.kernels.nodal.beam import beam_forces
 from erls.kernels.nodal.bodies import body_forces, load_forces
@@ -17,7 +17,7 @@ from erls.kernels.nodal.rotations import exponential, stumpff, value
 from erls.kernels.nodal.vectors import cross, dot, minus, nine, plus, product, put, three, times, turned, vector
 
 
-@part
+@inlined
 def compose(model: Model, start: Array, increment: Array, out: Array) -> None:
     """Poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
     for node in range(len(start)):
@@ -38,7 +38,7 @@ def compose(model: Model, start: Array, increment: Array, out: Array) -> None:
             out[node, 3 + i] = r[i]
 
 
-@part
+@inlined
 def set_twists(model: Model, work: Work) -> None:
     """Twists of all nodes in their own axes, and their rates."""
     for node in range(len(work.poses)):

@@ -1,99 +1,102 @@
-"""Small dense factorizations in place and without allocation: LU with row exchanges, and Cholesky.
+"""Small dense systems of equations in place and without allocation, in loops that processors do on several numbers at
+once.
 
-Matrices are (n, n) in C order. A status of 0 means done; k > 0 that elimination broke down at unknown k - 1.
+A matrix is stored transposed: row j of an array holds column j. No rows are exchanged: the matrices are mass plus
+multiples of damping and stiffness whose real part is positive definite, so elimination does not let them grow (N. J.
+Higham, Factorizing complex symmetric matrices with positive definite real and imaginary parts, 1998).
 """
 
 from __future__ import annotations
 
-from erls.kernels.contract import Array, IntArray
+import math
+
+from erls.kernels.contract import Array
 from erls.kernels.jit import helper
 
 
 @helper
-def lu_factor(a: Array, pivots: IntArray) -> int:
-    """Replace ``a`` by its factors L (unit diagonal) and U; ``pivots`` (n,) holds the row exchanged with each row."""
+def factor_real(a: Array) -> int:
+    """Replace ``a`` by L (unit diagonal) and U; 0, or 1 + the unknown at which elimination broke down."""
     n = a.shape[0]
     for k in range(n):
-        row, largest = k, abs(a[k, k])
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > largest:
-                row, largest = i, abs(a[i, k])
-        pivots[k] = row
-        if not largest > 0.0:  # NaN too
+        column = a[k]
+        if not (abs(column[k]) > 0.0 and math.isfinite(column[k])):
             return k + 1
-        if row != k:
-            for j in range(n):
-                a[k, j], a[row, j] = a[row, j], a[k, j]
-        inverse = 1.0 / a[k, k]
+        inverse = 1.0 / column[k]
         for i in range(k + 1, n):
-            factor = a[i, k] * inverse
-            a[i, k] = factor
-            if factor != 0.0:
-                for j in range(k + 1, n):
-                    a[i, j] -= factor * a[k, j]
+            column[i] *= inverse
+        for j in range(k + 1, n):
+            other = a[j]
+            weight = other[k]
+            for i in range(k + 1, n):
+                other[i] -= weight * column[i]
     return 0
 
 
 @helper
-def lu_solve(a: Array, pivots: IntArray, b: Array) -> None:
-    """Replace ``b`` (n,) by the solution, with the factors of `lu_factor`."""
+def solve_real(a: Array, b: Array) -> None:
+    """Replace ``b`` (n,) by the solution, with the factors of `factor_real`."""
     n = a.shape[0]
     for k in range(n):
-        row = pivots[k]
-        if row != k:
-            b[k], b[row] = b[row], b[k]
-    for i in range(n):
-        total = b[i]
-        for j in range(i):
-            total -= a[i, j] * b[j]
-        b[i] = total
-    for i in range(n - 1, -1, -1):
-        total = b[i]
-        for j in range(i + 1, n):
-            total -= a[i, j] * b[j]
-        b[i] = total / a[i, i]
+        column, weight = a[k], b[k]
+        for i in range(k + 1, n):
+            b[i] -= weight * column[i]
+    for k in range(n - 1, -1, -1):
+        column = a[k]
+        weight = b[k] / column[k]
+        b[k] = weight
+        for i in range(k):
+            b[i] -= weight * column[i]
 
 
 @helper
-def cholesky_factor(a: Array) -> int:
-    """Replace the lower triangle of a symmetric ``a`` by its Cholesky factor; the upper one is neither read nor set."""
-    n = a.shape[0]
-    for j in range(n):
-        for i in range(j, n):
-            total = a[i, j]
-            for k in range(j):
-                total -= a[i, k] * a[j, k]
-            if i > j:
-                a[i, j] = total / a[j, j]
-            elif total > 0.0:
-                a[j, j] = total**0.5
-            else:
-                return j + 1
+def factor_complex(re: Array, im: Array) -> int:
+    """`factor_real` of re + i im."""
+    n = re.shape[0]
+    for k in range(n):
+        x, y = re[k], im[k]
+        size = x[k] * x[k] + y[k] * y[k]
+        if not (size > 0.0 and math.isfinite(size)):
+            return k + 1
+        p, q = x[k] / size, -y[k] / size
+        for i in range(k + 1, n):
+            u = x[i]
+            x[i] = u * p - y[i] * q
+            y[i] = u * q + y[i] * p
+        for j in range(k + 1, n):
+            u_row, v_row = re[j], im[j]
+            p, q = u_row[k], v_row[k]
+            for i in range(k + 1, n):
+                u_row[i] -= p * x[i] - q * y[i]
+                v_row[i] -= p * y[i] + q * x[i]
     return 0
 
 
 @helper
-def cholesky_solve(a: Array, b: Array) -> None:
-    """Replace ``b`` (n,) by the solution, with the factor of `cholesky_factor`."""
-    lower_solve(a, b)
-    upper_solve(a, b)
+def solve_complex(re: Array, im: Array, b: Array, c: Array) -> None:
+    """Replace b + i c by the solution, with the factors of `factor_complex`."""
+    n = re.shape[0]
+    for k in range(n):
+        x, y, p, q = re[k], im[k], b[k], c[k]
+        for i in range(k + 1, n):
+            b[i] -= p * x[i] - q * y[i]
+            c[i] -= p * y[i] + q * x[i]
+    for k in range(n - 1, -1, -1):
+        x, y = re[k], im[k]
+        size = x[k] * x[k] + y[k] * y[k]
+        p = (b[k] * x[k] + c[k] * y[k]) / size
+        q = (c[k] * x[k] - b[k] * y[k]) / size
+        b[k], c[k] = p, q
+        for i in range(k):
+            b[i] -= p * x[i] - q * y[i]
+            c[i] -= p * y[i] + q * x[i]
 
 
 @helper
-def lower_solve(a: Array, b: Array) -> None:
-    """Replace ``b`` by L⁻¹ b."""
-    for i in range(a.shape[0]):
-        total = b[i]
-        for j in range(i):
-            total -= a[i, j] * b[j]
-        b[i] = total / a[i, i]
-
-
-@helper
-def upper_solve(a: Array, b: Array) -> None:
-    """Replace ``b`` by L⁻ᵀ b; rows of L are read along, not down."""
-    for i in range(a.shape[0] - 1, -1, -1):
-        value = b[i] / a[i, i]
-        b[i] = value
-        for j in range(i):
-            b[j] -= a[i, j] * value
+def add_product(a: Array, x: Array, out: Array) -> None:
+    """Add A x to ``out`` (n,)."""
+    for j in range(a.shape[0]):
+        column, weight = a[j], x[j]
+        if weight != 0.0:
+            for i in range(len(out)):
+                out[i] += weight * column[i]

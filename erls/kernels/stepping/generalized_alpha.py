@@ -1,4 +1,4 @@
-"""The steps of generalized-α over a compiled system: the algorithm of `erls.integrators.generalized_alpha`, step by step.
+"""The steps of generalized-α over a compiled system: the algorithm of `erls.integrators.generalized_alpha`.
 
 ``advance`` makes as many steps as there is room for knots, or until the leg ends or fails, and leaves everything that
 the next call needs in its arguments: numbers in ``known``, counts in ``counts``, vectors in the rows of ``state``.
@@ -21,12 +21,12 @@ H, TOLERANCE, TO_V, TO_A, SHARE, PULL, KEEP, Y_OLD, Y_NEW, V_OLD, V_NEW = range(
 RATE, BEFORE, SIZE, GOAL = 20, 21, 22, 23
 SLOWEST, FASTEST, ROUNDING = 24, 25, 26  # bounds on rates; rounding of coordinates
 KNOWN = 27
-# counts
-AT, TOTAL, UNIT, HALVINGS, SERVED, FACTORED, USUAL, EXCESS, STARTED = range(9)  # of time units: reached, of the leg, a step
-MAX_HALVINGS, MAX_ITERATIONS, REFRESH_COST = 9, 10, 11
-RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED = 12, 13, 14, 15
-REASON = 16
-COUNTS = 17
+# counts; the first three of time units: reached, of the leg, in an unhalved step
+AT, TOTAL, UNIT, HALVINGS, SERVED, FACTORED, USUAL, EXCESS = range(8)
+MAX_HALVINGS, MAX_ITERATIONS, REFRESH_COST = 8, 9, 10
+RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED = 11, 12, 13, 14
+REASON = 15
+COUNTS = 16
 SINGULAR, NOT_FINITE, SLOW = 1, 2, 3  # reasons
 # rows of state
 Y, V, ACC, ALG, CHANGE, GUESS, Y1, V1, ACC1, RESIDUAL, CORRECTION, METRES, PER_METRE = range(13)
@@ -93,7 +93,7 @@ def factor(a: Array, pivots: IntArray) -> int:
             if abs(column[i]) > largest:
                 row, largest = i, abs(column[i])
         pivots[k] = row
-        if not largest > 0.0:
+        if largest == 0.0:  # what is not finite shows in the solution
             if status == 0:
                 status = k + 1
             continue

@@ -1,0 +1,401 @@
+"""Adaptive steps of Lobatto IIIA collocation over a compiled system; `erls.integrators.lobatto` has the formulas.
+
+``advance`` makes as many steps as there is room for knots, or until the leg ends or fails, and leaves everything that
+the next call needs in its arguments: numbers in ``known``, counts in ``counts``, the stages of the present and of the
+last step, each (stages + 1, 3, n) with y, v, a at the nodes of a step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from erls.kernels import contract
+from erls.kernels.contract import Array, IntArray
+from erls.kernels.jit import ENABLED, helper, kernel
+from erls.kernels.stepping.dense import add_product, factor_complex, factor_real, solve_complex, solve_real
+
+# known: the leg, settings of a run, then what steps leave behind
+START, END, FIRST, LAST = 0, 1, 2, 3
+LARGEST, SMALLEST, TOLERANCE, GOAL, ROUNDING = 4, 5, 6, 7, 8
+T, H, BEFORE, RATE, ERROR, SIZE, NEXT = range(9, 16)  # BEFORE: the last step; NEXT: the one to try
+KNOWN = 16
+# counts
+FACTORED, USUAL, EXCESS, REASON, HISTORY, SUSPECT = range(6)
+MAX_ITERATIONS, REFRESH_COST = 6, 7
+RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED, STEPS = range(8, 13)
+COUNTS = 13
+SINGULAR, NOT_FINITE, SLOW, INACCURATE = 1, 2, 3, 4  # reasons
+# blocks of coefficients (stages + 1, stages + 1): row 0 of the last one holds the nodes, then see the names
+RATES, PLACES, FROM_RE, FROM_IM, TO_RE, TO_IM, FORETELL, ROWS = range(8)
+NODES, DIFFERENCE, LAMBDA_RE, LAMBDA_IM = range(4)
+# blocks of matrices (n, n), transposed
+MASS, DAMPING, STIFFNESS, FILTER, SOLVERS = range(5)
+# rows of vectors (n,)
+METRES, PART_RE, PART_IM, RESIDUALS = range(4)
+
+SLOWEST, FASTEST = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
+GROWTH, SHRINK, SAFETY = 2.0, 0.2, 0.9  # of steps
+KEPT, WORTH = 0.95, 1.2  # bounds on a change of the step that is not worth new factors
+
+_ADVANCE: Any = None
+if ENABLED:
+    from numba import types as _t
+
+    _CUBE = _t.float64[:, :, ::1]
+    _ADVANCE = _t.int64(
+        contract.pointer(contract.RESIDUAL),
+        contract.pointer(contract.MASS_MATRIX),
+        contract.pointer(contract.STIFFNESS_AND_DAMPING),
+        contract.REALS,
+        contract.INTEGERS,
+        contract.REALS,
+        contract.REALS,
+        contract.INTEGERS,
+        _CUBE,
+        _CUBE,
+        _CUBE,
+        _CUBE,
+        contract.MATRIX,
+        contract.REALS,
+        _CUBE,
+    )
+
+
+@helper
+def foretell(known: Array, counts: IntArray, coefficients: Array, stages: Array, last: Array, matrices: Array,
+             vectors: Array) -> int:
+    """Stages from the polynomial through the last ones, made to fulfil the linear part of the equations.
+
+    What is extrapolated is M a + C v + K y: smooth also where vibrations are not resolved.
+    """
+    m, n = stages.shape[0] - 1, stages.shape[2]
+    nodes, basis = coefficients[ROWS, NODES], coefficients[FORETELL]
+    h = known[H]
+    for i in range(1, m + 1):
+        x = 1.0 + nodes[i] * h / known[BEFORE]
+        for j in range(m + 1):
+            weight = 1.0
+            for k in range(m + 1):
+                if k != j:
+                    weight *= (x - nodes[k]) / (nodes[j] - nodes[k])
+            basis[i, j] = weight if counts[HISTORY] else (1.0 if j == m else 0.0)
+    for i in range(1, m + 1):
+        for q in range(n):
+            stages[i, 2, q] = stages[0, 2, q]
+    combine(h, coefficients, stages)
+    difference = vectors[PART_RE]
+    for i in range(1, m + 1):
+        out = vectors[RESIDUALS + i - 1]
+        out[:] = 0.0
+        for part in range(3):
+            now = stages[i, 2 - part]
+            for q in range(n):
+                total = now[q]
+                for j in range(m + 1):
+                    total -= basis[i, j] * last[j, 2 - part, q]
+                difference[q] = total
+            add_product(matrices[part], difference, out)
+    correct(h, coefficients, stages, matrices, vectors)
+    return 0
+
+
+@helper
+def combine(h: float, coefficients: Array, stages: Array) -> None:
+    """Positions and velocities of the stages from their accelerations."""
+    m, n = stages.shape[0] - 1, stages.shape[2]
+    nodes, rates, places = coefficients[ROWS, NODES], coefficients[RATES], coefficients[PLACES]
+    y, v = stages[0, 0], stages[0, 1]
+    for i in range(1, m + 1):
+        step = h * nodes[i]
+        y_out, v_out = stages[i, 0], stages[i, 1]
+        for q in range(n):
+            y_out[q], v_out[q] = y[q] + step * v[q], v[q]
+        for j in range(m + 1):
+            to_y, to_v, a = h * h * places[i, j], h * rates[i, j], stages[j, 2]
+            for q in range(n):
+                y_out[q] += to_y * a[q]
+                v_out[q] += to_v * a[q]
+
+
+@helper
+def correct(h: float, coefficients: Array, stages: Array, matrices: Array, vectors: Array) -> float:
+    """One iteration from the residuals of the stages; the largest change of a position, and of h v [metres]."""
+    m, n = stages.shape[0] - 1, stages.shape[2]
+    re, im = vectors[PART_RE], vectors[PART_IM]
+    from_re, from_im = coefficients[FROM_RE], coefficients[FROM_IM]
+    to_re, to_im = coefficients[TO_RE], coefficients[TO_IM]
+    changes = vectors[RESIDUALS + m :]
+    changes[:m] = 0.0
+    for k in range((matrices.shape[0] - SOLVERS) // 2):
+        re[:] = 0.0
+        im[:] = 0.0
+        for j in range(m):
+            p, q, out = from_re[k, j], from_im[k, j], vectors[RESIDUALS + j]
+            for i in range(n):
+                re[i] += p * out[i]
+                im[i] += q * out[i]
+        solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
+        for j in range(m):
+            p, q, change = to_re[j, k], to_im[j, k], changes[j]
+            for i in range(n):
+                change[i] -= p * re[i] - q * im[i]
+    rates, places, metres = coefficients[RATES], coefficients[PLACES], vectors[METRES]
+    largest = 0.0
+    for i in range(1, m + 1):
+        re[:] = 0.0
+        im[:] = 0.0
+        for j in range(1, m + 1):
+            to_y, to_v, change = h * h * places[i, j], h * rates[i, j], changes[j - 1]
+            for q in range(n):
+                re[q] += to_y * change[q]
+                im[q] += to_v * change[q]
+        y, v, a, change = stages[i, 0], stages[i, 1], stages[i, 2], changes[i - 1]
+        total = 0.0
+        for q in range(n):
+            y[q] += re[q]
+            v[q] += im[q]
+            a[q] += change[q]
+            largest = max(largest, metres[q] * max(abs(re[q]), h * abs(im[q])))
+            total += re[q] + im[q] + change[q]
+        if not math.isfinite(total):
+            return math.inf
+    return largest
+
+
+@helper
+def factor(h: float, coefficients: Array, matrices: Array) -> int:
+    """Factors for steps of ``h``; 0, or 1 + the coordinate at which elimination broke down."""
+    n = matrices.shape[1]
+    mass, damping, stiffness, real = matrices[MASS], matrices[DAMPING], matrices[STIFFNESS], matrices[FILTER]
+    for i in range(n):
+        for j in range(n):
+            real[i, j] = mass[i, j] + h * damping[i, j] + h * h * stiffness[i, j]
+    status = factor_real(real)
+    for k in range((matrices.shape[0] - SOLVERS) // 2):
+        p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
+        pp, qq = p * p - q * q, 2 * p * q
+        re, im = matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1]
+        for i in range(n):
+            for j in range(n):
+                re[i, j] = mass[i, j] + p * damping[i, j] + pp * stiffness[i, j]
+                im[i, j] = q * damping[i, j] + qq * stiffness[i, j]
+        status = max(status, factor_complex(re, im))
+    return status
+
+
+@helper
+def transpose(matrix: Array) -> None:
+    """In place."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            matrix[i, j], matrix[j, i] = matrix[j, i], matrix[i, j]
+
+
+@helper
+def judge(h: float, coefficients: Array, stages: Array, matrices: Array, vectors: Array) -> float:
+    """Estimated error of a step [metres]: (M + h C + h² K)⁻¹ M h² times the highest difference of the accelerations."""
+    m, n = stages.shape[0] - 1, stages.shape[2]
+    weights, metres, difference, error = coefficients[ROWS, DIFFERENCE], vectors[METRES], vectors[PART_RE], vectors[PART_IM]
+    for q in range(n):
+        total = 0.0
+        for j in range(m + 1):
+            total += weights[j] * stages[j, 2, q]
+        difference[q] = h * h * total
+        error[q] = 0.0
+    add_product(matrices[MASS], difference, error)
+    solve_real(matrices[FILTER], error)
+    largest = 0.0
+    for q in range(n):
+        largest = max(largest, metres[q] * abs(error[q]))
+    return largest
+
+
+@helper
+def farthest(stages: Array, metres: Array) -> float:
+    """Largest position in metres at the start of a step, for its rounding."""
+    largest = 0.0
+    for q in range(stages.shape[2]):
+        largest = max(largest, metres[q] * abs(stages[0, 0, q]))
+    return largest
+
+
+@helper
+def choose_step(known: Array) -> None:
+    """The next step that ends on, or leaves enough room to, the end of the leg."""
+    left = known[END] - known[T]
+    h = min(known[NEXT], known[LARGEST])
+    if KEPT * known[BEFORE] <= h < WORTH * known[BEFORE]:
+        h = known[BEFORE]  # keeps its factors
+    known[H] = left if left <= h * (1 + 1e-9) else (left / 2 if left < 2 * h else h)
+
+
+@helper
+def rate_of(k: int, size: float, before: float, rate: float) -> float:
+    """Convergence rate after iteration ``k``, until the second one the one expected."""
+    return size / before if k > 1 else rate
+
+
+@helper
+def progress(known: Array, counts: IntArray, k: int, size: float, before: float, goal: float, rounding: float) -> int:
+    """After iteration ``k``: 1 done, 0 go on, -1 give up (R. Hairer & G. Wanner, Solving ODEs II, sec. IV.8)."""
+    rate = rate_of(k, size, before, max(known[RATE], FASTEST) ** 0.8)
+    if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
+        known[RATE] = min(rate, SLOWEST)
+        counts[USUAL] = min(counts[USUAL], k)
+        if k > 1 and rate > FASTEST:  # otherwise the last iteration just confirmed
+            counts[EXCESS] += k - counts[USUAL]
+        return 1
+    left = counts[MAX_ITERATIONS] - k
+    slow = k > 2 and (rate >= 1 or size * rate ** (left + 1) > goal * (1 - rate))
+    return -1 if rate > 2 or slow or left == 0 else 0
+
+
+@helper
+def find_suspect(values: Array, nothing: int) -> int:
+    """Number of the first entry that is not finite, or ``nothing``."""
+    for q in range(len(values)):
+        if not math.isfinite(values[q]):
+            return q
+    return nothing
+
+
+@helper
+def largest_entry(values: Array, metres: Array) -> int:
+    """Number of the entry that is largest in metres."""
+    found, largest = 0, -1.0
+    for q in range(len(values)):
+        if metres[q] * abs(values[q]) > largest:
+            found, largest = q, metres[q] * abs(values[q])
+    return found
+
+
+@helper
+def accept(known: Array, counts: IntArray, stages: Array, last: Array, times: Array, knots: Array, made: int,
+           coefficients: Array) -> int:
+    """Store the knots of a step and move on to its end; how many knots there are now."""
+    m = stages.shape[0] - 1
+    t, h = known[T], known[H]
+    end = known[END] if h >= known[END] - t else t + h
+    for i in range(1, m + 1):
+        times[made] = end if i == m else t + h * coefficients[ROWS, NODES, i]
+        knots[made] = stages[i]
+        made += 1
+    last[:] = stages
+    stages[0] = last[m]
+    known[T], known[BEFORE] = end, h
+    counts[HISTORY] = 1
+    counts[STEPS] += 1
+    return made
+
+
+@helper
+def retry(known: Array, counts: IntArray, reason: int, factor_of_step: float) -> bool:
+    """Try a smaller step; False when it would be too small."""
+    counts[REASON] = reason
+    counts[REJECTED] += 1
+    known[NEXT] = known[H] * factor_of_step
+    known[RATE] = SLOWEST
+    return bool(known[NEXT] >= known[SMALLEST])
+
+
+@kernel(_ADVANCE)
+def advance(
+    residual: Callable[..., None],
+    mass_matrix: Callable[..., None],
+    stiffness_and_damping: Callable[..., None],
+    reals: Array,
+    integers: IntArray,
+    scratch: Array,
+    known: Array,
+    counts: IntArray,
+    coefficients: Array,
+    stages: Array,
+    last: Array,
+    matrices: Array,
+    vectors: Array,
+    times: Array,
+    knots: Array,
+) -> int:
+    """Steps until ``times`` (k,) and ``knots`` (k, 3, n) are full or the leg ends.
+
+    Returns
+    -------
+    int
+        Number of knots made; -1 - that number when no step is small enough to go on.
+    """
+    made, m = 0, stages.shape[0] - 1
+    factored = 0.0  # the step of the present factors
+    if counts[FACTORED]:
+        factored = known[BEFORE]
+    while made + m <= len(times) and known[T] < known[END]:
+        choose_step(known)
+        t, h = known[T], known[H]
+        fresh = factored != h or counts[EXCESS] >= counts[REFRESH_COST]
+        status = verdict = 0
+        while True:
+            if fresh:
+                at = min(max(t, known[FIRST]), known[LAST])
+                mass_matrix(reals, integers, scratch, at, stages[0, 0], matrices[MASS])
+                stiffness_and_damping(
+                    reals, integers, scratch, at, stages[0, 0], stages[0, 1], matrices[STIFFNESS], matrices[DAMPING]
+                )
+                transpose(matrices[MASS])
+                transpose(matrices[STIFFNESS])
+                transpose(matrices[DAMPING])
+                status = factor(h, coefficients, matrices)
+                counts[FACTORIZATIONS] += 1
+                known[RATE], counts[USUAL], counts[EXCESS] = SLOWEST, counts[MAX_ITERATIONS], 0
+                factored = h
+                if status != 0:
+                    counts[SUSPECT] = status - 1
+                    break
+            foretell(known, counts, coefficients, stages, last, matrices, vectors)
+            rounding = known[ROUNDING] * farthest(stages, vectors[METRES])
+            goal, before, verdict = known[GOAL] + rounding, 0.0, 0
+            for k in range(1, counts[MAX_ITERATIONS] + 1):
+                for i in range(1, m + 1):
+                    at = min(max(t + h * coefficients[ROWS, NODES, i], known[FIRST]), known[LAST])
+                    residual(
+                        reals, integers, scratch, at, stages[i, 0], stages[i, 1], stages[i, 2], vectors[RESIDUALS + i - 1]
+                    )
+                    counts[RHS_CALLS] += 1
+                counts[ITERATIONS] += 1
+                size = correct(h, coefficients, stages, matrices, vectors)
+                if not math.isfinite(size):
+                    verdict = -2
+                    break
+                known[SIZE] = size
+                verdict = progress(known, counts, k, size, before, goal, rounding)
+                if verdict != 0:
+                    break
+                before = size
+            if verdict == 1 or fresh:
+                break
+            fresh = True
+        if status != 0:
+            going = retry(known, counts, SINGULAR, 0.25)
+        elif verdict == -2:
+            counts[SUSPECT] = -1
+            for i in range(m):
+                counts[SUSPECT] = find_suspect(vectors[RESIDUALS + i], counts[SUSPECT])
+            going = retry(known, counts, NOT_FINITE, 0.25)
+        elif verdict != 1:
+            counts[SUSPECT] = largest_entry(vectors[RESIDUALS + m], vectors[METRES])
+            going = retry(known, counts, SLOW, 0.5)
+        else:
+            error = judge(h, coefficients, stages, matrices, vectors) / known[TOLERANCE]
+            scale = min(GROWTH, max(SHRINK, SAFETY * max(error, 1e-12) ** (-1.0 / (m + 2))))
+            if error > 1.0:
+                counts[SUSPECT] = largest_entry(vectors[PART_IM], vectors[METRES])
+                known[ERROR] = error
+                going = retry(known, counts, INACCURATE, min(scale, 0.8))
+            else:
+                known[NEXT] = h * scale
+                made = accept(known, counts, stages, last, times, knots, made, coefficients)
+                going = True
+        if not going:
+            return -1 - made
+        counts[FACTORED] = 1 if factored == known[BEFORE] else 0
+    return made

@@ -1,0 +1,45 @@
+"""How far a closing joint has turned, counted in the joints of the chain between its links."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from erls.lie.se3 import inverse
+from erls.lie.so3 import Array
+from erls.mechanism.chain import Mechanism, poses
+from erls.mechanism.loops import Loop
+
+_PARALLEL = 1e-6
+
+
+def turning_signs(mechanism: Mechanism, loop: Loop) -> tuple[Array, bool]:
+    """How the outer frame of a loop turns against the inner one about its axis as rigid links move.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    loop : Loop
+        Its frames as they are at the initial joint coordinates.
+
+    Returns
+    -------
+    signs : (joints,) array
+        1 or -1 where the joint's axis is parallel to that of the loop and lies between its links, 0 elsewhere.
+    all_of_it : bool
+        Whether no other joint between them turns: the angle is then the sum of theirs.
+    """
+    frames = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
+    outer, inner = (-1 if end.link is None else end.link for end in (loop.outer, loop.inner))
+    first, last = min(outer, inner) + 1, max(outer, inner)
+    axis = loop.inner.frame[:3, 2] if loop.inner.link is None else frames[inner][:3, :3] @ loop.inner.frame[:3, 2]
+    signs, complete = np.zeros(len(mechanism.joints)), True
+    for k in range(first, last + 1):
+        joint = mechanism.joints[k]
+        if not joint.type.revolute:
+            continue
+        along = float((frames[k] @ inverse(joint.after))[:3, 2] @ axis)
+        if abs(abs(along) - 1) < _PARALLEL:
+            signs[k] = np.sign(along) * (1.0 if outer > inner else -1.0)
+        else:
+            complete = False
+    return signs, complete
