@@ -2,9 +2,9 @@
 
     python benchmarks/effects_certified.py [random scenes, 24]
 
-For shipped scenes and random chains of one to three links: what auto leaves out at the scene's tolerance, the error that
-it certifies, the actual one against `all` at the same settings, and times of integration; then each effect in turn left
-out of each scene and certified alike. The ratio actual / certified should stay below 3.
+For shipped scenes and random chains of one to three links: what auto leaves out at the scene's tolerance, the error
+that it certifies, the actual one against `all` at the same settings, and times of integration; then each effect in turn
+left out of each scene and certified alike. The ratio actual / certified should stay below 3.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def check(path: Path, changes: tuple[str, ...]) -> list[float]:
     run = erls.simulate(scene)
     certificate = run.certificate
     assert certificate is not None
-    off = [n for n in in_order(mechanism.effects - run.formulation.mechanism.effects)]
+    off = in_order(mechanism.effects - run.formulation.mechanism.effects)
     ratios = [ratio(distance(run, reference), certificate.error)]
     print(
         f"{path.name:22s} {scene.record.simulation.formulation:5s} auto without {len(off):2d}: certified "

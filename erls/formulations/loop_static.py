@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _ITERATIONS = 20
 _TOLERANCE = 1e-10  # of the deflection; one more step of quadratic convergence would reach rounding
+_ROUNDING = 1e-13  # of the size of a link
 
 
 def closed_equilibrium(chain: ClosedChain, y: Array, held: IntArray) -> Array:
@@ -70,7 +71,7 @@ def closed_equilibrium(chain: ClosedChain, y: Array, held: IntArray) -> Array:
         deflection = float(np.abs(metres * y)[joints:].max(initial=0.0))
         if not deflection < chain.reach:
             break
-        if np.abs(metres * solved[:n]).max(initial=0.0) <= _TOLERANCE * max(deflection, 1e-9):
+        if np.abs(metres * solved[:n]).max(initial=0.0) <= max(_TOLERANCE * deflection, _ROUNDING * chain.reach):
             return y
     raise SimulationError(
         Cause.NO_EQUILIBRIUM,

@@ -15,7 +15,8 @@ Rules for adding an integrator:
    ``Solution.failure`` set, whose message says when, why and what to try. ``KeyboardInterrupt`` likewise ends
    in a failure with cause INTERRUPTED.
 6. It counts its work honestly in `Work`; tests assert budgets on it.
-7. It calls ``observer(t, knots)`` after each accepted step, where ``knots()`` returns the `Solution` so far.
+7. It calls ``observer(t, knots)`` after each accepted step (a compiled one after the last of some steps that took
+   about 50 ms, once a run has made its first steps), where ``knots()`` returns the `Solution` so far.
    A `SimulationError` that the observer or the system raises ends the run and becomes its failure.
 
 `erls.integrators.driver.integrate_legs` keeps rules 3, 5 and 7 for a method that can advance over one leg.

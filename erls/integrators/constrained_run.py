@@ -37,7 +37,7 @@ class ConstrainedRecorder(Recorder):
         self.append(t, *self._system.stored(t, state.q, state.v, state.a))
 
     def extend_with(self, t: Array, states: Array, accelerations: Array, multipliers: Array) -> None:
-        """Add the knots of accepted steps: what the system stores (k, 3, s), accelerations (k, n), multipliers (k, m)."""
+        """Add the knots of accepted steps: stored (k, 3, s), accelerations (k, n), multipliers (k, m)."""
         rows = self._beside(len(t))
         rows[:, : self._velocities], rows[:, self._velocities :] = accelerations, multipliers
         self.extend(t, states)

@@ -61,6 +61,11 @@ class Recorder:
             self._observer(t, self.solution)
 
     @property
+    def observed(self) -> bool:
+        """Whether anybody looks on."""
+        return self._observer is not None
+
+    @property
     def time(self) -> float | None:
         """Time of the last knot."""
         return float(self._t[self._count - 1]) if self._count else None

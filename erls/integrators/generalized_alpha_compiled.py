@@ -13,6 +13,8 @@ from erls.kernels.contract import CompiledSystem
 from erls.kernels.stepping import generalized_alpha as loop
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts
+_SINGLE = 32  # first steps of an observed run, each looked at: a short run is seen step by step
+_FIRST, _LARGEST = 32, 4096  # steps in one go
 
 
 class Chunks:
@@ -35,7 +37,7 @@ class Chunks:
         self.state, self.matrices = np.zeros((loop.STATE, n)), np.zeros((4, n, n))
         self.state[loop.METRES], self.state[loop.PER_METRE] = metres, 1 / metres
         self.pivots = np.zeros(n, dtype=np.int64)
-        self.steps = 8
+        self.steps = _FIRST
 
     def advance(self, leg: Leg, count: int, y: Array, v: Array, a: Array, recorder: Recorder) -> bool:
         """``count`` equal steps over a leg from (y, v) with acceleration ``a``; False when one fails."""
@@ -47,10 +49,10 @@ class Chunks:
         for row, start in ((loop.Y, y), (loop.V, v), (loop.ACC, a), (loop.ALG, a)):
             state[row] = start
         state[[loop.CHANGE, loop.GUESS]] = 0.0
-        loop.set_step(known, counts, known[loop.SPAN] / count)
         functions = self.system.residual, self.system.mass_matrix, self.system.stiffness_and_damping
         while counts[loop.AT] < counts[loop.TOTAL]:
-            times, knots = np.empty(self.steps), np.empty((self.steps, 3, self.system.size))
+            size = 1 if recorder.observed and recorder.work.steps < _SINGLE else self.steps
+            times, knots = np.empty(size), np.empty((size, 3, self.system.size))
             begun = time.perf_counter()
             made = loop.advance(
                 *functions,
@@ -67,7 +69,7 @@ class Chunks:
             )
             spent = time.perf_counter() - begun
             failed, made = made < 0, made if made >= 0 else -1 - made
-            self.steps = max(1, min(2 * self.steps, 4096, math.ceil(_PAUSE * self.steps / max(spent, 1e-6))))
+            self.steps = max(1, min(4 * size, _LARGEST, math.ceil(_PAUSE * size / max(spent, 1e-6))))
             work = recorder.work
             work.rhs_calls += int(counts[loop.RHS_CALLS])
             work.newton_iterations += int(counts[loop.ITERATIONS])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import math, os
 import time
 from typing import Any, Protocol
 
@@ -44,10 +44,17 @@ class Compiled(Protocol):
     stored: int
     """How many numbers the system stores of a knot."""
 
-    def samples(self, times: Array) -> Array: ...  # noqa: D102
-    def state(self, known: ConstrainedState, algorithmic: Array) -> Any: ...  # noqa: D102
-    def configuration(self, state: Any) -> Configuration: ...  # noqa: D102
-    def work(self) -> Any: ...  # noqa: D102
+    def samples(self, times: Array) -> Array:
+        """(times, ...) what depends on time alone."""
+
+    def state(self, known: ConstrainedState, algorithmic: Array) -> Any:
+        """A copy as arrays."""
+
+    def configuration(self, state: Any) -> Configuration:
+        """The other way."""
+
+    def work(self) -> Any:
+        """Memory for steps."""
 
 
 def compiled_steps(
@@ -110,11 +117,19 @@ class CompiledSteps:
             begun = time.perf_counter()
             samples = self.compiled.samples(np.minimum(part, last))
             status = kernel.advance(
-                *self._functions, self.compiled.model, self.state, self.memory, settings, self.progress, samples, knots, 0
+                *self._functions,
+                self.compiled.model,
+                self.state,
+                self.memory,
+                settings,
+                self.progress,
+                samples,
+                knots,
+                0,
             )
             spent = time.perf_counter() - begun
             made = self._count()
-            self.recorder.extend_with(part[:made], knots.states[:made], knots.accelerations[:made], knots.multipliers[:made])
+            self.recorder.extend_with(part[:made], *(of_knots[:made] for of_knots in knots))
             done += made
             self.steps = max(1, min(2 * self.steps, 4096, math.ceil(_PAUSE * max(made, 1) / max(spent, 1e-6))))
         self.error = float(self.progress.rates[kernel.ERROR])
@@ -149,7 +164,7 @@ class CompiledSteps:
             growth=GROWTH if limit.can_grow else 0.0,
             mode=MATRICES.index(options.iteration_matrix),
             iterations=MAX_ITERATIONS,
-            predict=0,
+            predict=int(os.environ.get('PRED','0')),
         )
 
     def _count(self) -> int:

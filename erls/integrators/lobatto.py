@@ -68,20 +68,21 @@ class _Run:
         m = len(nodes) - 1
         values, vectors = np.linalg.eig(rates[1:, 1:])
         inverse = np.linalg.inv(vectors)
+        values = np.where(abs(values.imag) < 1e-9, values.real, values)
         kept = np.flatnonzero(values.imag > -1e-9)
         weights = np.where(values[kept].imag > 1e-9, 2.0, 1.0)  # conjugates count with their partners
-        self.coefficients = np.zeros((loop.ROWS + 1, m + 1, m + 1))
+        self.coefficients = np.zeros((loop.ROWS + 1, 4, 4))
         c = self.coefficients
-        c[loop.RATES], c[loop.PLACES] = rates, places
+        c[loop.RATES, : m + 1, : m + 1], c[loop.PLACES, : m + 1, : m + 1] = rates, places
         for k, pick in enumerate(kept):
             c[loop.FROM_RE, k, :m], c[loop.FROM_IM, k, :m] = inverse[pick].real, inverse[pick].imag
             to = weights[k] * vectors[:, pick]
             c[loop.TO_RE, :m, k], c[loop.TO_IM, :m, k] = to.real, to.imag
             c[loop.ROWS, loop.LAMBDA_RE, k], c[loop.ROWS, loop.LAMBDA_IM, k] = values[pick].real, values[pick].imag
-        c[loop.ROWS, loop.NODES] = nodes
+        c[loop.ROWS, loop.NODES, : m + 1] = nodes
         gaps = nodes[:, None] - nodes + np.eye(m + 1)
         difference = 1 / gaps.prod(axis=1)
-        c[loop.ROWS, loop.DIFFERENCE] = DIFFERENCE[order] * difference*math.factorial(m)/4
+        c[loop.ROWS, loop.DIFFERENCE, : m + 1] = DIFFERENCE[order] * difference*math.factorial(m)/4
         self.stages, self.last = np.zeros((m + 1, 3, n)), np.zeros((m + 1, 3, n))
         self.matrices = np.zeros((loop.SOLVERS + 2 * len(kept), n, n))
         self.vectors = np.zeros((loop.RESIDUALS + 2 * m, n))

@@ -14,6 +14,7 @@ import platformdirs
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_PART = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
 ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
 
 
@@ -42,20 +43,21 @@ def helper(function: F) -> F:
 
 
 def part(function: F) -> F:
-    """A helper without a way in from Python, which would take a third of its compilation."""
-    return _njit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True) if ENABLED else function
+    """A helper of kernels that are not ``counted``: without a way in from Python, a third of its compilation."""
+    return _njit(function, **_PART) if ENABLED else function
 
 
 def inlined(function: F) -> F:
-    """A `part` that becomes one with its caller: for what takes many arrays and is called from one place."""
-    if not ENABLED:
-        return function
-    return _njit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
+    """A `part` that becomes one with its caller: for what takes many arrays."""
+    return _njit(function, **_PART, forceinline=True) if ENABLED else function
 
 
-def kernel(signature: Any) -> Callable[[F], F]:
-    """A function with a fixed signature (of `erls.kernels.contract`), compiled when its module is imported."""
-    return lambda function: _njit(function, signature) if ENABLED else function
+def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
+    """A function with a fixed signature (of `erls.kernels.contract`), compiled when its module is imported.
+
+    Unless ``counted``, it keeps no count of who refers to its arrays: atomic operations, which many arrays make dear.
+    """
+    return lambda function: _njit(function, signature, _nrt=counted) if ENABLED else function
 
 
 def _njit(function: Any, *signature: Any, **options: bool) -> Any:

@@ -11,8 +11,8 @@ import numpy as np
 from erls.effects import EFFECTS
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joints import Joint
-from erls.mechanism.loops import Loop, LoopFreedom
 from erls.mechanism.links import Link, payload_invariants, truncated
+from erls.mechanism.loops import Loop, LoopFreedom
 
 _Acting = TypeVar("_Acting", Joint, LoopFreedom)
 

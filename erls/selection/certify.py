@@ -14,7 +14,7 @@ from erls.selection.error_motion import Knots, error_motion
 from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
 from erls.selection.quick import quick
 
-STEPS = 400
+STEPS = 1000
 _PLACES, _EFFORTS = 120, 40  # knots at which points and drive forces are compared
 
 

@@ -13,9 +13,9 @@ from fe_import.model import Array, IntArray
 class SecondOrder:
     """Second-order field of a link with m modal coordinates, n of them elastic; p = n (n + 1) / 2 pairs.
 
-    With ν = [v; ω] the twist of the link's frame the kinetic energy gains
+    In a frame that turns with ω the momentum and the angular momentum about its origin gain
 
-        v·(Ṡ + ω × S) + ω_c qᵀ P_c q̇ + ½ ω_c ω_d qᵀ W_cd q,   S = ½ qᵀ S_ab q,
+        Ṡ + ω × S,   qᵀ P q̇ + ½ (qᵀ W q) ω,   S = ½ qᵀ S_ab q,
 
     and weight the potential -g·S.
 
@@ -26,7 +26,7 @@ class SecondOrder:
     momentum : (6, m, m) array
         S_ab = ∫ρ Ψ (symmetric), then P = ∫ρ x × Ψ with the turning of cross sections, which makes it unsymmetric.
     spin : (3, 3, m, m) array
-        W, symmetric in either pair.
+        W; axis of the angular momentum, axis of ω, symmetric in the modes.
     nodes : (k,) int array
         Rising; those with a stored field.
     translation, rotation : (k, 3, p) arrays

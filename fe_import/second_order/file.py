@@ -83,7 +83,7 @@ def check_second_order(model: ModalModel, field: SecondOrder, check: Check) -> N
     check.each(np.diff(nodes, prepend=-1) > 0, nodes, "second_order/nodes", "nodes must rise, each once", "from 0")
     missing = [i.name for i in model.interface_nodes if i.node not in nodes]
     check(not missing, "second_order/nodes", "every interface needs its field", ", ".join(missing))
-    for name, values in (("momentum", field.momentum[:3]), ("spin", field.spin)):
+    for name, values in (("momentum", field.momentum[:3]), ("spin", field.spin)):  # in the modes
         off = np.abs(values - np.swapaxes(values, -1, -2))
         limit = EXACT * max(float(np.abs(values).max(initial=0.0)), 1e-300)
         check.each(off <= limit, off, f"second_order/{name}", "not symmetric", limit)

@@ -14,7 +14,7 @@ for _a, _b, _c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
 def of_moments(linear: Array, moment: Array) -> tuple[Array, Array]:
     """Momentum (6, m, m) and spin (3, 3, m, m) of ∫ρ Ψ (3, m, m) and ∫ρ x ⊗ Ψ (3, 3, m, m)."""
     turning = np.einsum("ecd,cdab->eab", LEVI_CIVITA, moment)
-    spin = -(moment + moment.transpose(1, 0, 2, 3)) / 2
+    spin = -moment.transpose(1, 0, 2, 3)
     trace = np.einsum("ccab->ab", moment)
     for c in range(3):
         spin[c, c] += trace
@@ -50,5 +50,4 @@ def of_inertia(inertia: Array, phi: Array, field: Array) -> tuple[Array, Array]:
     product = (product + product.transpose(0, 1, 3, 2)) / 2
     twice = np.einsum("ce,edab->cdab", inertia, product)
     twice -= np.einsum("cd,ab->cdab", inertia, phi.T @ phi)
-    spin = once + twice
-    return momentum, (spin + spin.transpose(1, 0, 2, 3)) / 2
+    return momentum, once + twice

@@ -18,7 +18,8 @@ def random_chain(folder: Path, seed: int) -> Path:
     for k in range(count):
         length, stiff = float(rng.uniform(0.3, 0.7)), float(10 ** rng.uniform(-2.2, -1.5))
         steel = bool(rng.integers(2))
-        material = {"youngs_modulus": 2e11 if steel else 7e10, "poissons_ratio": 0.3, "density": 7800.0 if steel else 2700.0}
+        youngs_modulus, density = (2e11, 7800.0) if steel else (7e10, 2700.0)
+        material = {"youngs_modulus": youngs_modulus, "poissons_ratio": 0.3, "density": density}
         bend = rng.uniform(-0.15, 0.15, 2)
         scenes.arm_link(
             folder,
@@ -50,7 +51,8 @@ def random_chain(folder: Path, seed: int) -> Path:
 def _drive(rng: np.random.Generator, duration: float) -> dict[str, Any]:
     kind = rng.integers(5)
     end = float(rng.uniform(-120, 120))
-    motion = {"shape": "polynomial", "from_deg": 0.0, "to_deg": end, "duration": duration * float(rng.uniform(0.5, 1.2))}
+    lasting = duration * float(rng.uniform(0.5, 1.2))
+    motion = {"shape": "polynomial", "from_deg": 0.0, "to_deg": end, "duration": lasting}
     if kind == 0:
         return {"drive": {"type": "motion", "motion": motion}}
     if kind == 1:

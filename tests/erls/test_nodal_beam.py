@@ -57,10 +57,11 @@ def _tip(found: Statics) -> Array:
 
 # load, tangent, load steps, iterations at most: a tenth more than was needed
 BENDS = [
-    (300.0, "full", 1, 36),
-    (300.0, "full", 6, 60),
+    (300.0, "full", 1, 9),
+    (300.0, "full", 6, 42),
     (300.0, "material", 1, 18),
-    (600.0, "full", 6, 65),
+    (600.0, "full", 1, 14),
+    (600.0, "full", 6, 46),
     (600.0, "material", 1, 22),
     (600.0, "material", 6, 97),
 ]

@@ -149,8 +149,8 @@ def test_payloads_and_points_sit_on_their_pieces(tmp_path: Path) -> None:
 
 
 def test_every_link_of_a_spatial_chain_in_pieces(tmp_path: Path) -> None:
-    """Full models in one piece and in two, tangent frames and mean axes: apart by second order, the deflection times the angle
-    that it adds to a joint.
+    """Full models in one piece and in two, tangent frames and mean axes: apart by second order, the deflection times
+    the angle that it adds to a joint.
     """
     path = scenes.three_links(tmp_path, "prescribed", simulation={"duration": 0.05, "formulation": "ffr"})
     full = [f'links.{name}.reduction={{ method = "none" }}' for name in "abc"]

@@ -3,11 +3,11 @@
 Beside the blocks of T = ½ νᵀ M ν + νᵀ C η̇ + ½ η̇ᵀ M_e η̇ the second-order displacement has, with the tensors of
 `fe_import.second_order.data` in the elastic coordinates,
 
-    C₂(η) = [S_ab η; ηᵀ P],   M₂(η) = [0, -S̃; S̃, ηᵀ W η],   S = ½ ηᵀ S_ab η
+    C₂(η) = [S_ab η; ηᵀ P],   H(η) = [0, -S̃; 0, ½ ηᵀ W η],   S = ½ ηᵀ S_ab η
 
-(O. Wallrapp and R. Schwertassek, Int. J. Numer. Methods Eng. 32 (1991) 1833-1850). Added to C and M as they stand they
-could make the mass matrix indefinite where elastic motion cancels that of the frame. The frame's twist is corrected
-instead, ν' = ν + M₀⁻¹ (C₂ η̇ + ½ M₂ ν), which gives the same to second order in η and stays positive. The forces on η and
+(O. Wallrapp and R. Schwertassek, Int. J. Numer. Methods Eng. 32 (1991) 1833-1850). Added to C and M as C₂ and H + Hᵀ
+they could make the mass matrix indefinite where elastic motion cancels that of the frame. The frame's twist is corrected
+instead, ν' = ν + M₀⁻¹ (C₂ η̇ + H ν), which gives the same to second order in η and stays positive. The forces on η and
 on the frame are those of Lagrange and of Boltzmann and Hamel in the uncorrected twist.
 """
 
@@ -36,16 +36,15 @@ class SecondOrderData(StandardData):
         self._per_mass = np.linalg.inv(linear.rigid)
 
     def _at(self, eta: Array) -> tuple[Array, Array, Array]:
-        """C₂ (6, n), M₂ (6, 6) and W η (9, n)."""
+        """C₂ (6, n), H (6, 6) and W η (9, n)."""
         coupling = eta @ self._momentum
         spin = (self._spin @ eta).reshape(9, self.size)
-        return coupling, self._block(coupling[:3] @ eta / 2, spin @ eta), spin
+        return coupling, self._block(coupling[:3] @ eta / 2, spin @ eta / 2), spin
 
     @staticmethod
     def _block(moment: Array, square: Array) -> Array:
         result = np.zeros((6, 6))
-        result[3:, :3] = skew(moment)
-        result[:3, 3:] = -result[3:, :3]
+        result[:3, 3:] = -skew(moment)
         result[3:, 3:] = square.reshape(3, 3)
         return result
 
@@ -55,23 +54,22 @@ class SecondOrderData(StandardData):
         """Inertia forces; see `StandardData.forces`."""
         coupling, block, spin = self._at(eta)
         coupling_rate = rate @ self._momentum
-        block_rate = self._block(coupling[:3] @ rate, 2 * (spin @ rate))
-        corrected = twist + self._per_mass @ (coupling @ rate + block @ twist / 2)
-        added = coupling @ acceleration + coupling_rate @ rate + (block @ twist_rate + block_rate @ twist) / 2
+        block_rate = self._block(coupling[:3] @ rate, spin @ rate)
+        corrected = twist + self._per_mass @ (coupling @ rate + block @ twist)
+        added = coupling @ acceleration + coupling_rate @ rate + block @ twist_rate + block_rate @ twist
         wrench, elastic = self.linear.forces(
             corrected, twist_rate + self._per_mass @ added, eta, rate, acceleration
         )
         momentum = self.linear.momentum(corrected, eta, rate)
         change = wrench + twist_cross(corrected).T @ momentum  # d/dt of the momentum: ad* = -adᵀ
         carried, carried_rate = self._per_mass @ momentum, self._per_mass @ change
-        total = momentum + block @ carried / 2
-        wrench = change + (block_rate @ carried + block @ carried_rate) / 2 - twist_cross(twist).T @ total
+        total = momentum + carried @ block
+        wrench = change + carried @ block_rate + carried_rate @ block - twist_cross(twist).T @ total
 
-        # d/dt (C₂ᵀ λ) less the gradient of λ·(C₂ η̇ + ½ M₂ ν) at fixed λ = M₀⁻¹ p
+        # d/dt (C₂ᵀ λ) less the gradient of λ·(C₂ η̇ + H ν) at fixed λ = M₀⁻¹ p
         elastic = elastic + carried_rate @ coupling + carried @ coupling_rate
         elastic -= carried @ (self._momentum @ rate)
-        pull = cross(carried[:3], twist[3:]) + cross(twist[:3], carried[3:])
-        elastic -= pull @ coupling[:3] / 2
+        elastic -= cross(carried[:3], twist[3:]) @ coupling[:3]
         elastic -= np.multiply.outer(carried[3:], twist[3:]).ravel() @ spin
         return wrench, elastic
 
@@ -79,7 +77,7 @@ class SecondOrderData(StandardData):
         """(6 + n, 6 + n) mass matrix of (ν, η̇)."""
         coupling, block, _ = self._at(eta)
         mass = self.linear.mass_matrix(eta)
-        change = np.hstack([np.eye(6) + self._per_mass @ block / 2, self._per_mass @ coupling])
+        change = np.hstack([np.eye(6) + self._per_mass @ block, self._per_mass @ coupling])
         result = change.T @ mass[:6, :6] @ change
         result[:, 6:] += change.T @ mass[:6, 6:]
         result[6:] += mass[6:, :6] @ change

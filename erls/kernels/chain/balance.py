@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from erls.kernels import contract
 from erls.kernels.chain import layout as at
 from erls.kernels.chain.drives import effort, feed_forward
 from erls.kernels.chain.forces import link_forces, vector
 from erls.kernels.chain.linear import add_bracket, add_transposed, carry_back, dot6
 from erls.kernels.chain.motion import move_frames
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import kernel
 
 
-@helper
-def balance(
+@kernel(contract.RESIDUAL, counted=False)
+def residual(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
 ) -> None:
-    """M a - f; an empty ``a`` stands for zeros, with which nothing is multiplied then."""
+    """M a - f, see `erls.kernels.contract`; an empty ``a`` stands for zeros, with which nothing is multiplied then."""
     if integers[at.FEED_FORWARD]:
         feed_forward(reals, integers, scratch, t)
     move_frames(reals, integers, scratch, t, y, v, a)
@@ -26,7 +27,8 @@ def balance(
         e, first = integers[record + at.MODES], integers[record + at.FIRST_MODE]
         memory = integers[record + at.MEMORY]
         link = scratch[memory : memory + at.VECTORS]
-        forces = vector(scratch, memory, 6 + e, at.MODAL)[6:]
+        start = vector(memory, 6 + e, at.MODAL) + 6
+        forces = scratch[start : start + e]
         stiffness, damping = integers[record + at.STIFFNESS], integers[record + at.DAMPING]
         for i in range(e):
             out[first + i] = forces[i] + reals[stiffness + i] * y[first + i] + reals[damping + i] * v[first + i]
@@ -53,6 +55,7 @@ def balance(
             carry_back(link, link, at.FORCE, link, at.POINT)
             for i in range(6):
                 before[at.FORCE + i] += link[at.POINT + i]
-            modal = vector(scratch, start, 6 + count, at.MODAL)[6:]
+            modal_start = vector(start, 6 + count, at.MODAL) + 6
+            modal = scratch[modal_start : modal_start + count]
             point = link[at.POINT : at.POINT + 6]
             add_transposed(reals, integers[previous + at.OUT], 6, point, count, modal)

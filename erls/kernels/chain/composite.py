@@ -2,16 +2,69 @@
 
 from __future__ import annotations
 
+from erls.kernels import contract
 from erls.kernels.chain import layout as at
 from erls.kernels.chain.forces import deform_inertia, vector
 from erls.kernels.chain.inertia import carry9_back, carry_inertia_back, joint_path, link_inertia
+from erls.kernels.chain.motion import place_frames
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import kernel, part
 
 
-@helper
-def mass(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
-    """Mass matrix at the frames in memory."""
+@part
+def _elastic_pull(reals: Array, integers: IntArray, scratch: Array, record: int, mode: int) -> None:
+    """PULL: force on (w, ω) of a link alone by unit acceleration of a mode; PASSED: what is borne takes of it."""
+    memory, n = integers[record + at.MEMORY], 6 + integers[record + at.MODES]
+    link = scratch[memory : memory + at.VECTORS]
+    constant, axis = integers[record + at.MASS], integers[record + at.AXIS]
+    column = integers[record + at.OUT] + 6 * mode
+    for i in range(6):
+        link[at.PULL + i] = reals[constant + (6 + mode) * n + i]
+        link[at.PASSED + i] = 0.0
+        for m in range(6):
+            link[at.PASSED + i] += link[at.BORNE + 9 * i + m] * reals[column + m]
+    for i in range(3):
+        link[at.PULL + 6 + i] = 0.0
+        if integers[at.FIRST_ORDER]:
+            for a in range(integers[record + at.AXES]):
+                turning = scratch[vector(memory, n, at.X_Q + a) + 6 + mode]
+                link[at.PULL + 6 + i] += turning * reals[axis + 3 * a + i]
+
+
+@part
+def _fill(reals: Array, integers: IntArray, scratch: Array, k: int, place: int, out: Array) -> None:
+    """Row and column of a coordinate of link k whose unit acceleration pulls at its (w, ω) with PULL.
+
+    Its joint and all that stands before the link feel it.
+    """
+    start = integers[at.HEADER + k * at.RECORD + at.MEMORY]
+    pull = scratch[start + at.PULL : start + at.PULL + 9]
+    for before in range(k, -1, -1):
+        record = at.HEADER + before * at.RECORD
+        memory, joint = integers[record + at.MEMORY], integers[record + at.JOINT]
+        link = scratch[memory : memory + at.VECTORS]
+        if before < k:
+            e, first = integers[record + at.MODES], integers[record + at.FIRST_MODE]
+            outward = integers[record + at.OUT]
+            for j in range(e):
+                total = 0.0
+                for m in range(6):
+                    total += reals[outward + 6 * j + m] * pull[m]
+                out[first + j, place] = out[place, first + j] = total
+        if joint >= 0:
+            if before < k:
+                joint_path(reals, integers, record, link)
+            total = 0.0
+            for m in range(9):
+                total += link[at.PATH + m] * pull[m]
+            out[joint, place] = out[place, joint] = total
+        carry9_back(link, pull, 0, 1, pull, 0, 1)
+
+
+@kernel(contract.MASS_MATRIX, counted=False)
+def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
+    """M; see `erls.kernels.contract`."""
+    place_frames(reals, integers, scratch, t, y, y, scratch[0:0])
     links = integers[at.LINKS]
     out[:, :] = 0.0
     for k in range(links - 1, -1, -1):
@@ -54,53 +107,3 @@ def mass(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
         if k > 0:
             start = integers[record - at.RECORD + at.MEMORY]
             carry_inertia_back(link, at.INERTIA, scratch[start : start + at.VECTORS], at.BORNE)
-
-
-@helper
-def _elastic_pull(reals: Array, integers: IntArray, scratch: Array, record: int, mode: int) -> None:
-    """PULL: force on (w, ω) of a link alone by unit acceleration of a mode; PASSED: what is borne takes of it."""
-    memory, n = integers[record + at.MEMORY], 6 + integers[record + at.MODES]
-    link = scratch[memory : memory + at.VECTORS]
-    constant, axis = integers[record + at.MASS], integers[record + at.AXIS]
-    column = integers[record + at.OUT] + 6 * mode
-    for i in range(6):
-        link[at.PULL + i] = reals[constant + (6 + mode) * n + i]
-        link[at.PASSED + i] = 0.0
-        for m in range(6):
-            link[at.PASSED + i] += link[at.BORNE + 9 * i + m] * reals[column + m]
-    for i in range(3):
-        link[at.PULL + 6 + i] = 0.0
-        if integers[at.FIRST_ORDER]:
-            for a in range(integers[record + at.AXES]):
-                xq = vector(scratch, memory, n, at.X_Q + a)
-                link[at.PULL + 6 + i] += xq[6 + mode] * reals[axis + 3 * a + i]
-
-
-@helper
-def _fill(reals: Array, integers: IntArray, scratch: Array, k: int, place: int, out: Array) -> None:
-    """Row and column of a coordinate of link k whose unit acceleration pulls at its (w, ω) with PULL.
-
-    Its joint and all that stands before the link feel it.
-    """
-    start = integers[at.HEADER + k * at.RECORD + at.MEMORY]
-    pull = scratch[start + at.PULL : start + at.PULL + 9]
-    for before in range(k, -1, -1):
-        record = at.HEADER + before * at.RECORD
-        memory, joint = integers[record + at.MEMORY], integers[record + at.JOINT]
-        link = scratch[memory : memory + at.VECTORS]
-        if before < k:
-            e, first = integers[record + at.MODES], integers[record + at.FIRST_MODE]
-            outward = integers[record + at.OUT]
-            for j in range(e):
-                total = 0.0
-                for m in range(6):
-                    total += reals[outward + 6 * j + m] * pull[m]
-                out[first + j, place] = out[place, first + j] = total
-        if joint >= 0:
-            if before < k:
-                joint_path(reals, integers, record, link)
-            total = 0.0
-            for m in range(9):
-                total += link[at.PATH + m] * pull[m]
-            out[joint, place] = out[place, joint] = total
-        carry9_back(link, pull, 0, 1, pull, 0, 1)

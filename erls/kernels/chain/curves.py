@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 PIECEWISE, HARMONIC = 0, 1
 PART = 4
 
 
-@helper
+@part
 def _passed(reals: Array, start: int, count: int, t: float) -> int:
     """Number of knots at or before ``t``, within the tolerance for events."""
     limit = t + (1e-13 + 1e-14 * abs(t))
@@ -30,12 +30,12 @@ def _passed(reals: Array, start: int, count: int, t: float) -> int:
     return low
 
 
-@helper
+@part
 def curve(integers: IntArray, reals: Array, at: int, t: float) -> tuple[float, float, float]:
     """Value, first and second derivative at ``t``; at a breakpoint the limit from the right."""
     value = rate = acceleration = 0.0
-    for part in range(integers[at]):
-        record = at + 1 + PART * part
+    for number in range(integers[at]):
+        record = at + 1 + PART * number
         start, knots, order = integers[record + 1], integers[record + 2], integers[record + 3]
         piece = _passed(reals, start, knots, t)
         if integers[record] == PIECEWISE:

@@ -9,10 +9,10 @@ from erls.kernels.chain.curves import curve
 from erls.kernels.chain.linear import add_bracket, add_transport, carry, carry_back, dot6
 from erls.kernels.chain.motion import step_pose
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 
-@helper
+@part
 def feed_forward(reals: Array, integers: IntArray, scratch: Array, t: float) -> None:
     """Torques that the rigid chain needs for the wanted motion of all joints, into EFFECTIVE of each link's memory.
 
@@ -65,7 +65,7 @@ def feed_forward(reals: Array, integers: IntArray, scratch: Array, t: float) -> 
                 scratch[start + at.WRENCH + i] += link[at.POINT + i]
 
 
-@helper
+@part
 def effort(reals: Array, integers: IntArray, record: int, t: float, link: Array) -> float:
     """Force on a free joint; with feed-forward prepared by `feed_forward`."""
     joint = integers[record + at.FORCES]
@@ -86,7 +86,7 @@ def effort(reals: Array, integers: IntArray, record: int, t: float, link: Array)
     return float(torque)
 
 
-@helper
+@part
 def gains(reals: Array, integers: IntArray, record: int, rate: float) -> tuple[float, float]:
     """-∂effort/∂angle and -∂effort/∂rate of a free joint."""
     joint = integers[record + at.FORCES]

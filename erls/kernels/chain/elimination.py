@@ -7,17 +7,19 @@ elastic coordinates of the link follow from its own motion m = (w, ω) as C ẍ_
 
 from __future__ import annotations
 
+from erls.kernels import contract
 from erls.kernels.chain import layout as at
+from erls.kernels.chain.balance import residual
 from erls.kernels.chain.forces import vector
 from erls.kernels.chain.inertia import carry9, carry9_back, carry_inertia_back, joint_path, link_inertia
 from erls.kernels.chain.linear import add_columns, dot
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import kernel, part
 
 _SINGULAR = 1e-14  # inertia along a joint against what it was before the elimination of the rest
 
 
-@helper
+@part
 def solve_six(a: Array, columns: int) -> None:
     """Replace the right sides in a (6, columns), behind its six first columns, by the solutions."""
     for k in range(6):
@@ -38,7 +40,7 @@ def solve_six(a: Array, columns: int) -> None:
                     a[i * columns + j] -= factor * a[k * columns + j]
 
 
-@helper
+@part
 def relax(reals: Array, integers: IntArray, scratch: Array, record: int, out: Array) -> None:
     """Take the elastic coordinates of a link out of its INERTIA and LOADING, as if nothing hung on it.
 
@@ -55,15 +57,16 @@ def relax(reals: Array, integers: IntArray, scratch: Array, record: int, out: Ar
         integers[record + at.INVERSE],
     )
     inertia, loading = link[at.INERTIA : at.INERTIA + 81], link[at.LOADING : at.LOADING + 9]
-    forces, relaxed = out[first : first + e], vector(scratch, memory, n, at.RELAXED)[6:]
+    start = vector(memory, n, at.RELAXED)
+    forces, relaxed = out[first : first + e], scratch[start : start + e]
     for i in range(6):
         for j in range(6):
             inertia[9 * i + j] -= reals[share + 6 * i + j]
         loading[i] += dot(reals[towards + i * e : towards + (i + 1) * e], forces, 0, e)
     if integers[at.FIRST_ORDER]:
         for a in range(axes):
-            xq = vector(scratch, memory, n, at.X_Q + a)[6:]
-            column = vector(scratch, memory, n, at.COLUMN + a)[6:]
+            start, start_column = vector(memory, n, at.X_Q + a) + 6, vector(memory, n, at.COLUMN + a)
+            xq, column = scratch[start : start + e], scratch[start_column : start_column + e]
             column[:] = 0.0
             add_columns(reals, inverse, e, xq, e, 1.0, column)
             load = dot(column, forces, 0, e)
@@ -75,7 +78,8 @@ def relax(reals: Array, integers: IntArray, scratch: Array, record: int, out: Ar
                     inertia[9 * i + 6 + j] -= both * reals[axis + 3 * a + j]
                     inertia[54 + 9 * j + i] -= both * reals[axis + 3 * a + j]
             for b in range(a + 1):
-                both = dot(column, vector(scratch, memory, n, at.X_Q + b)[6:], 0, e)
+                start = vector(memory, n, at.X_Q + b) + 6
+                both = dot(column, scratch[start : start + e], 0, e)
                 for i in range(3):
                     for j in range(3):
                         turns = reals[axis + 3 * a + i] * reals[axis + 3 * b + j]
@@ -88,7 +92,7 @@ def relax(reals: Array, integers: IntArray, scratch: Array, record: int, out: Ar
         forces[i] = relaxed[i]
 
 
-@helper
+@part
 def burden(reals: Array, integers: IntArray, scratch: Array, record: int, out: Array) -> None:
     """Add what hangs on a relaxed link, BORNE and PASSED, to its INERTIA and LOADING.
 
@@ -122,11 +126,11 @@ def burden(reals: Array, integers: IntArray, scratch: Array, record: int, out: A
             square[16 * i + 15] += reals[outward + 6 * j + i] * relaxed[j]
     if integers[at.FIRST_ORDER]:
         for a in range(axes):
-            column = vector(scratch, memory, n, at.COLUMN + a)[6:]
+            start = vector(memory, n, at.COLUMN + a)
             for i in range(6):
                 both = 0.0
                 for j in range(e):
-                    both += reals[outward + 6 * j + i] * column[j]
+                    both += reals[outward + 6 * j + i] * scratch[start + j]
                 for j in range(3):
                     bound[9 * i + 6 + j] += both * reals[axis + 3 * a + j]
     for i in range(6):
@@ -162,9 +166,77 @@ def burden(reals: Array, integers: IntArray, scratch: Array, record: int, out: A
         link[at.OUTPUT_FREE + i] = square[16 * i + 15]
 
 
-@helper
-def solve(reals: Array, integers: IntArray, scratch: Array, out: Array) -> int:
-    """Replace the forces f in ``out`` by the solution of M x = f, at the frames in memory; status as in `contract`."""
+@part
+def _quadratic(link: Array, start: int) -> float:
+    """sᵀ I s for the inertia that starts there."""
+    total = 0.0
+    for i in range(9):
+        for j in range(9):
+            total += link[at.PATH + i] * link[start + 9 * i + j] * link[at.PATH + j]
+    return total
+
+
+@part
+def _move_link(reals: Array, integers: IntArray, scratch: Array, k: int, out: Array) -> None:
+    """Joint and elastic accelerations of a link whose predecessor's are known."""
+    record = at.HEADER + k * at.RECORD
+    e, first = integers[record + at.MODES], integers[record + at.FIRST_MODE]
+    memory, axes, axis = integers[record + at.MEMORY], integers[record + at.AXES], integers[record + at.AXIS]
+    link = scratch[memory : memory + at.VECTORS]
+    move = link[at.MOVE : at.MOVE + 9]
+    if k == 0:
+        move[:] = 0.0
+    else:
+        start = integers[record - at.RECORD + at.MEMORY]
+        before = scratch[start : start + at.VECTORS]
+        for i in range(9):  # of the interface
+            move[i] = before[at.MOVE + i]
+        for i in range(6):
+            move[i] += before[at.OUTPUT_FREE + i]
+            for j in range(9):
+                move[i] += before[at.OUTPUT + 9 * i + j] * before[at.MOVE + j]
+        carry9(link, link, at.MOVE, link, at.MOVE)
+    joint = integers[record + at.JOINT]
+    if joint >= 0:
+        left = out[joint]
+        for i in range(9):
+            left -= link[at.PULL + i] * move[i]
+        left /= link[at.EFFECTIVE]
+        out[joint] = left
+        for i in range(9):
+            move[i] += link[at.PATH + i] * left
+    forces = out[first : first + e]
+    towards = integers[record + at.TOWARDS]
+    for i in range(6):
+        row = reals[towards + i * e : towards + (i + 1) * e]
+        for j in range(e):
+            forces[j] -= move[i] * row[j]
+    if integers[at.FIRST_ORDER]:
+        for a in range(axes):
+            turn = 0.0
+            for i in range(3):
+                turn += reals[axis + 3 * a + i] * move[6 + i]
+            start = vector(memory, 6 + e, at.COLUMN + a)
+            column = scratch[start : start + e]
+            for j in range(e):
+                forces[j] -= turn * column[j]
+    if k + 1 < integers[at.LINKS]:
+        lead = integers[record + at.OUT_TOWARDS]
+        for i in range(6):  # f_w: what the links after it put on the interface
+            load = link[at.PASSED + i]
+            for j in range(9):
+                load += link[at.PRODUCT + 9 * i + j] * move[j]
+            row = reals[lead + i * e : lead + (i + 1) * e]
+            for j in range(e):
+                forces[j] -= load * row[j]
+
+
+@kernel(contract.ACCELERATION, counted=False)
+def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> int:
+    """M⁻¹ f; see `erls.kernels.contract`."""
+    residual(reals, integers, scratch, t, y, v, scratch[0:0], out)
+    for i in range(len(out)):
+        out[i] = -out[i]
     links = integers[at.LINKS]
     for k in range(links - 1, -1, -1):
         record = at.HEADER + k * at.RECORD
@@ -211,67 +283,3 @@ def solve(reals: Array, integers: IntArray, scratch: Array, out: Array) -> int:
     for k in range(links):
         _move_link(reals, integers, scratch, k, out)
     return 0
-
-
-@helper
-def _quadratic(link: Array, start: int) -> float:
-    """sᵀ I s for the inertia that starts there."""
-    total = 0.0
-    for i in range(9):
-        for j in range(9):
-            total += link[at.PATH + i] * link[start + 9 * i + j] * link[at.PATH + j]
-    return total
-
-
-@helper
-def _move_link(reals: Array, integers: IntArray, scratch: Array, k: int, out: Array) -> None:
-    """Joint and elastic accelerations of a link whose predecessor's are known."""
-    record = at.HEADER + k * at.RECORD
-    e, first = integers[record + at.MODES], integers[record + at.FIRST_MODE]
-    memory, axes, axis = integers[record + at.MEMORY], integers[record + at.AXES], integers[record + at.AXIS]
-    link = scratch[memory : memory + at.VECTORS]
-    move = link[at.MOVE : at.MOVE + 9]
-    if k == 0:
-        move[:] = 0.0
-    else:
-        start = integers[record - at.RECORD + at.MEMORY]
-        before = scratch[start : start + at.VECTORS]
-        for i in range(9):  # of the interface
-            move[i] = before[at.MOVE + i]
-        for i in range(6):
-            move[i] += before[at.OUTPUT_FREE + i]
-            for j in range(9):
-                move[i] += before[at.OUTPUT + 9 * i + j] * before[at.MOVE + j]
-        carry9(link, link, at.MOVE, link, at.MOVE)
-    joint = integers[record + at.JOINT]
-    if joint >= 0:
-        left = out[joint]
-        for i in range(9):
-            left -= link[at.PULL + i] * move[i]
-        left /= link[at.EFFECTIVE]
-        out[joint] = left
-        for i in range(9):
-            move[i] += link[at.PATH + i] * left
-    forces = out[first : first + e]
-    towards = integers[record + at.TOWARDS]
-    for i in range(6):
-        row = reals[towards + i * e : towards + (i + 1) * e]
-        for j in range(e):
-            forces[j] -= move[i] * row[j]
-    if integers[at.FIRST_ORDER]:
-        for a in range(axes):
-            turn = 0.0
-            for i in range(3):
-                turn += reals[axis + 3 * a + i] * move[6 + i]
-            column = vector(scratch, memory, 6 + e, at.COLUMN + a)[6:]
-            for j in range(e):
-                forces[j] -= turn * column[j]
-    if k + 1 < integers[at.LINKS]:
-        lead = integers[record + at.OUT_TOWARDS]
-        for i in range(6):  # f_w: what the links after it put on the interface
-            load = link[at.PASSED + i]
-            for j in range(9):
-                load += link[at.PRODUCT + 9 * i + j] * move[j]
-            row = reals[lead + i * e : lead + (i + 1) * e]
-            for j in range(e):
-                forces[j] -= load * row[j]

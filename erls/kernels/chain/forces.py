@@ -9,51 +9,53 @@ from __future__ import annotations
 from erls.kernels.chain import layout as at
 from erls.kernels.chain.linear import add_columns, add_transport, dot
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 
-@helper
-def vector(scratch: Array, memory: int, n: int, number: int) -> Array:
-    """Vector (n,) of a link's memory, by its number in `layout`."""
-    start = memory + at.VECTORS + number * n
-    return scratch[start : start + n]
+@part
+def vector(memory: int, n: int, number: int) -> int:
+    """Where a vector (n,) of a link's memory starts, by its number in `layout`."""
+    return memory + at.VECTORS + number * n
 
 
-@helper
+@part
 def along(reals: Array, axis: int, x: Array, place: int) -> float:
     """Component of a vector (3,) along an axis."""
     return float(reals[axis] * x[place] + reals[axis + 1] * x[place + 1] + reals[axis + 2] * x[place + 2])
 
 
-@helper
+@part
 def pair_of(axes: int, i: int, j: int) -> int:
     """Number of a pair of axes i, j."""
     return i if i == j or axes == 1 else i + j + 2
 
 
-@helper
+@part
 def deform_inertia(reals: Array, integers: IntArray, scratch: Array, record: int) -> None:
     """X q and Z q of a link for its axes, as far as an effect needs them."""
     n = 6 + integers[record + at.MODES]
     memory, axes = integers[record + at.MEMORY], integers[record + at.AXES]
     skip = 6 if record == at.HEADER else 0  # u = 0 on the ground
-    q = vector(scratch, memory, n, at.Q)[skip:]
+    start = vector(memory, n, at.Q)
+    q = scratch[start + skip : start + n]
     if integers[at.FIRST_ORDER]:
         for i in range(axes):
-            xq = vector(scratch, memory, n, at.X_Q + i)
+            start = vector(memory, n, at.X_Q + i)
+            xq = scratch[start : start + n]
             xq[:] = 0.0
             add_columns(reals, integers[record + at.X] + (i * n + skip) * n, n, q, n - skip, 1.0, xq)
     if integers[at.SECOND_ORDER] or integers[at.SOFTENING]:
         link = scratch[memory : memory + at.VECTORS]
         for pair in range(1 if axes == 1 else 6):
-            zq = vector(scratch, memory, n, at.Z_Q + pair)
+            start = vector(memory, n, at.Z_Q + pair)
+            zq = scratch[start : start + n]
             zq[:] = 0.0
             add_columns(reals, integers[record + at.Z] + (pair * n + skip) * n, n, q, n - skip, 1.0, zq)
             if integers[at.SECOND_ORDER]:
                 link[at.TURN_MOMENTS + pair] = dot(zq[skip:], q, 0, n - skip)
 
 
-@helper
+@part
 def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, accelerated: bool) -> None:
     """WRENCH, FORCE and the elastic part of MODAL of a link that moves as its memory says.
 
@@ -68,8 +70,12 @@ def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, a
     first, second = integers[at.FIRST_ORDER], integers[at.SECOND_ORDER]
     coriolis, centrifugal = integers[at.CORIOLIS], integers[at.CENTRIFUGAL]
     mass, axis = integers[record + at.MASS], integers[record + at.AXIS]
-    q, qd, qdd = vector(scratch, memory, n, 0), vector(scratch, memory, n, 1), vector(scratch, memory, n, 2)
-    modal, wrench, spare = vector(scratch, memory, n, at.MODAL), link[at.WRENCH : at.WRENCH + 6], link[at.POINT :]
+    q, qd = scratch[vector(memory, n, 0) : vector(memory, n, 1)], scratch[vector(memory, n, 1) : vector(memory, n, 2)]
+    qdd, modal = (
+        scratch[vector(memory, n, 2) : vector(memory, n, 3)],
+        scratch[vector(memory, n, 3) : vector(memory, n, 4)],
+    )
+    wrench, spare = link[at.WRENCH : at.WRENCH + 6], link[at.POINT : at.POINT + 6]
 
     # m ṡ, with the weight as an acceleration of the frame
     for i in range(6):
@@ -106,7 +112,8 @@ def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, a
         omega = along(reals, axis + 3 * a, link, at.TWIST + 3)
         alpha = along(reals, axis + 3 * a, link, at.TWIST_RATE + 3)
         x = integers[record + at.X] + a * n * n
-        xq, xqd = vector(scratch, memory, n, at.X_Q + a), vector(scratch, memory, n, at.X_RATE + a)
+        start, start_rate = vector(memory, n, at.X_Q + a), vector(memory, n, at.X_RATE + a)
+        xq, xqd = scratch[start : start + n], scratch[start_rate : start_rate + n]
         if first or coriolis:
             xqd[:] = 0.0
             add_columns(reals, x + skip * n, n, qd[skip:], n - skip, 1.0, xqd)
@@ -142,7 +149,8 @@ def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, a
         if second or integers[at.SOFTENING]:
             for b in range(axes):
                 pair = pair_of(axes, a, b)
-                zq = vector(scratch, memory, n, at.Z_Q + pair)
+                start = vector(memory, n, at.Z_Q + pair)
+                zq = scratch[start : start + n]
                 other = along(reals, axis + 3 * b, link, at.TWIST + 3)
                 if second:
                     moment = link[at.TURN_MOMENTS + pair]

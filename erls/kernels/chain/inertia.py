@@ -5,10 +5,10 @@ from __future__ import annotations
 from erls.kernels.chain import layout as at
 from erls.kernels.chain.forces import pair_of, vector
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 
-@helper
+@part
 def link_inertia(reals: Array, integers: IntArray, scratch: Array, record: int) -> None:
     """INERTIA of a link alone, with its elastic coordinates held; `deform_inertia` comes first."""
     n = 6 + integers[record + at.MODES]
@@ -22,12 +22,12 @@ def link_inertia(reals: Array, integers: IntArray, scratch: Array, record: int) 
             inertia[9 * i + j] = reals[mass + j * n + i]
     for a in range(axes):
         if integers[at.FIRST_ORDER]:
-            xq = vector(scratch, memory, n, at.X_Q + a)
+            start = vector(memory, n, at.X_Q + a)
             for j in range(3):
                 turn = reals[axis + 3 * a + j]
                 for i in range(6):
-                    inertia[9 * i + 6 + j] += xq[i] * turn
-                    inertia[54 + 9 * j + i] += xq[i] * turn
+                    inertia[9 * i + 6 + j] += scratch[start + i] * turn
+                    inertia[54 + 9 * j + i] += scratch[start + i] * turn
         if integers[at.SECOND_ORDER]:
             for b in range(axes):
                 moment = link[at.TURN_MOMENTS + pair_of(axes, a, b)]
@@ -36,7 +36,7 @@ def link_inertia(reals: Array, integers: IntArray, scratch: Array, record: int) 
                         inertia[60 + 9 * i + j] += moment * reals[axis + 3 * a + i] * reals[axis + 3 * b + j]
 
 
-@helper
+@part
 def joint_path(reals: Array, integers: IntArray, record: int, link: Array) -> None:
     """PATH of a link: s = (S - ad(S) u, S_ω), the motion of (w, ω) per unit of θ̇."""
     screw = integers[record + at.SCREW]
@@ -63,7 +63,7 @@ def joint_path(reals: Array, integers: IntArray, record: int, link: Array) -> No
     s[5] += a0 * w1 - a1 * w0
 
 
-@helper
+@part
 def carry9(link: Array, x: Array, start: int, out: Array, to: int) -> None:
     """T x for a motion (w, ω) of the frame before; both may be the same."""
     x0, x1, x2, w0, w1, w2 = x[start], x[start + 1], x[start + 2], x[start + 3], x[start + 4], x[start + 5]
@@ -76,7 +76,7 @@ def carry9(link: Array, x: Array, start: int, out: Array, to: int) -> None:
         out[to + 6 + i] = link[i] * o0 + link[3 + i] * o1 + link[6 + i] * o2
 
 
-@helper
+@part
 def carry9_back(link: Array, f: Array, start: int, stride: int, out: Array, to: int, out_stride: int) -> None:
     """Tᵀ f for a force on (w, ω); nine numbers ``stride`` apart; both may be the same."""
     f0, f1, f2 = f[start], f[start + stride], f[start + 2 * stride]
@@ -95,7 +95,7 @@ def carry9_back(link: Array, f: Array, start: int, stride: int, out: Array, to: 
     out[to + 8 * out_stride] = link[6] * o0 + link[7] * o1 + link[8] * o2
 
 
-@helper
+@part
 def carry_inertia_back(link: Array, start: int, out: Array, to: int) -> None:
     """Tᵀ I T: an inertia (9, 9) of the link on the frame before."""
     for j in range(9):  # columns of Tᵀ I

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 
-@helper
+@part
 def add_columns(matrix: Array, at: int, size: int, x: Array, count: int, factor: float, out: Array) -> None:
     """Add to out (size,) the factor times a matrix (size, count), column after column from ``at``, times x."""
     for j in range(count):
@@ -16,7 +16,7 @@ def add_columns(matrix: Array, at: int, size: int, x: Array, count: int, factor:
             out[i] += weight * column[i]
 
 
-@helper
+@part
 def add_transposed(matrix: Array, at: int, size: int, x: Array, count: int, out: Array) -> None:
     """Add to out (count,) the transpose of a matrix (size, count), column after column from ``at``, times x."""
     for j in range(count):
@@ -26,7 +26,7 @@ def add_transposed(matrix: Array, at: int, size: int, x: Array, count: int, out:
         out[j] += total
 
 
-@helper
+@part
 def dot(x: Array, y: Array, start: int, size: int) -> float:
     """Product of x[start:size] and y[start:size]; four partial sums, which run beside each other."""
     a = b = c = d = 0.0
@@ -43,7 +43,7 @@ def dot(x: Array, y: Array, start: int, size: int) -> float:
     return (a + b) + (c + d)
 
 
-@helper
+@part
 def carry(link: Array, x: Array, at: int, out: Array, to: int) -> None:
     """T x: a motion of the frame before as one of the link's frame, whose pose starts ``link`` (`layout.TURN`)."""
     x0, x1, x2, w0, w1, w2 = x[at], x[at + 1], x[at + 2], x[at + 3], x[at + 4], x[at + 5]
@@ -54,7 +54,7 @@ def carry(link: Array, x: Array, at: int, out: Array, to: int) -> None:
         out[to + 3 + i] = link[i] * w0 + link[3 + i] * w1 + link[6 + i] * w2
 
 
-@helper
+@part
 def carry_back(link: Array, f: Array, at: int, out: Array, to: int) -> None:
     """Tᵀ f: a force and moment on the link's frame as those on the frame before."""
     f0, f1, f2, m0, m1, m2 = f[at], f[at + 1], f[at + 2], f[at + 3], f[at + 4], f[at + 5]
@@ -68,7 +68,7 @@ def carry_back(link: Array, f: Array, at: int, out: Array, to: int) -> None:
     out[to + 5] = link[6] * m0 + link[7] * m1 + link[8] * m2 + p0 * a1 - p1 * a0
 
 
-@helper
+@part
 def add_bracket(x: Array, at: int, y: Array, of: int, factor: float, out: Array, to: int) -> None:
     """Add ``factor`` times the Lie bracket ad(x) y of two motions [v; ω]."""
     v0, v1, v2, a0, a1, a2 = x[at], x[at + 1], x[at + 2], x[at + 3], x[at + 4], x[at + 5]
@@ -81,7 +81,7 @@ def add_bracket(x: Array, at: int, y: Array, of: int, factor: float, out: Array,
     out[to + 5] += factor * (a0 * b1 - a1 * b0)
 
 
-@helper
+@part
 def add_transport(x: Array, at: int, p: Array, of: int, out: Array, to: int) -> None:
     """Add -ad(x)ᵀ p: what a momentum p in a frame that moves with x adds to its rate."""
     v0, v1, v2, a0, a1, a2 = x[at], x[at + 1], x[at + 2], x[at + 3], x[at + 4], x[at + 5]
@@ -94,7 +94,7 @@ def add_transport(x: Array, at: int, p: Array, of: int, out: Array, to: int) -> 
     out[to + 5] += a0 * m1 - a1 * m0 + v0 * p1 - v1 * p0
 
 
-@helper
+@part
 def dot6(x: Array, at: int, y: Array, of: int) -> float:
     """Product of six numbers each."""
     return float(

@@ -8,10 +8,10 @@ from erls.kernels.chain import layout as at
 from erls.kernels.chain.curves import curve
 from erls.kernels.chain.linear import add_bracket, add_columns, carry
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 
-@helper
+@part
 def step_pose(reals: Array, start: int, slides: int, coordinate: float, link: Array) -> None:
     """Pose of a link's frame in that before: rotation row after row, then place."""
     if slides:
@@ -23,7 +23,7 @@ def step_pose(reals: Array, start: int, slides: int, coordinate: float, link: Ar
             link[at.TURN + i] = reals[start + i] + c * reals[start + 12 + i] + s * reals[start + 24 + i]
 
 
-@helper
+@part
 def joint_motion(
     reals: Array, integers: IntArray, record: int, t: float, y: Array, v: Array, a: Array, link: Array
 ) -> None:
@@ -38,7 +38,7 @@ def joint_motion(
         link[at.ANGLE], link[at.ANGLE + 1], link[at.ANGLE + 2] = angle, rate, acceleration
 
 
-@helper
+@part
 def displace(
     reals: Array, integers: IntArray, record: int, before: Array, x: Array, start: int, link: Array, out: int
 ) -> None:
@@ -50,7 +50,7 @@ def displace(
     carry(link, point, 0, link, out)
 
 
-@helper
+@part
 def place_frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array) -> None:
     """Poses and displacements of all link frames, with the modal coordinates u, q_d of each link beside each other."""
     for k in range(integers[at.LINKS]):
@@ -77,7 +77,7 @@ def place_frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: 
                 q[i] = link[at.U + i]
 
 
-@helper
+@part
 def move_frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array) -> None:
     """Twists and displacement rates of all link frames; without accelerations when ``a`` is empty.
 

@@ -185,7 +185,7 @@ def _scale(model: Model, work: Work, period: float) -> None:
             table[i, j - i + width] *= left * work.right[model.order[j]]
 
 
-@kernel(FACTOR)
+@kernel(FACTOR, counted=False)
 def iteration_matrix(model: Model, work: Work, sample: Array, to_a: float, to_v: float, period: float) -> int:
     """Factor [[β' M + γ' C + K T, Bᵀ], [B T, 0]]; 0, or 1 + the number of the unknown that is to blame.
 

@@ -253,7 +253,7 @@ def _store(model: Model, work: Work, knots: Knots, at: int) -> None:
 
 
 
-@kernel(ADVANCE)
+@kernel(ADVANCE, counted=False)
 def advance(
     forces: Forces,
     factor: Factor,

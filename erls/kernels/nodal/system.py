@@ -54,7 +54,7 @@ def set_twists(model: Model, work: Work) -> None:
         put(work.rate, at + 3, three(work.a, at + 3))
 
 
-@kernel(FORCES)
+@kernel(FORCES, counted=False)
 def forces(model: Model, work: Work, before: State, sample: Array) -> None:
     """Residual and Bᵀλ (n,), violations (m,) of the state that ``work`` tries."""
     set_twists(model, work)

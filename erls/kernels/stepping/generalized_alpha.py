@@ -12,7 +12,7 @@ from typing import Any
 
 from erls.kernels import contract
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import ENABLED, helper, kernel
+from erls.kernels.jit import ENABLED, kernel, part
 
 # known: settings of a run, then the formulas of a step (see set_step), then what the last iteration found
 START, SPAN, LAST, END = 0, 1, 2, 3  # of the leg; its last time for forces
@@ -53,7 +53,7 @@ if ENABLED:
     )
 
 
-@helper
+@part
 def set_step(known: Array, counts: IntArray, h: float) -> None:
     """Formulas for steps of ``h``; a step that differs only by rounding keeps the matrix."""
     if abs(h - known[H]) > 1e-6 * h:
@@ -69,7 +69,7 @@ def set_step(known: Array, counts: IntArray, h: float) -> None:
     known[V_OLD], known[V_NEW] = h * (1 - gamma), h * gamma
 
 
-@helper
+@part
 def change_step(known: Array, counts: IntArray, state: Array) -> None:
     """Set the step of the present halvings, with a₀ moved along and nothing to foretell the next ÿ from."""
     before = known[H]
@@ -81,7 +81,7 @@ def change_step(known: Array, counts: IntArray, state: Array) -> None:
         state[CHANGE, i] = state[GUESS, i] = 0.0
 
 
-@helper
+@part
 def factor(a: Array, pivots: IntArray) -> int:
     """LU factors, with row exchanges, of a matrix whose columns are the rows of ``a``; status as of dgetrf."""
     n = a.shape[0]
@@ -111,7 +111,7 @@ def factor(a: Array, pivots: IntArray) -> int:
     return status
 
 
-@helper
+@part
 def back_solve(a: Array, pivots: IntArray, b: Array) -> None:
     """Replace ``b`` by the solution, with what `factor` left."""
     n = a.shape[0]
@@ -130,7 +130,7 @@ def back_solve(a: Array, pivots: IntArray, b: Array) -> None:
             b[i] -= weight * column[i]
 
 
-@helper
+@part
 def predict(known: Array, state: Array) -> None:
     """Y1, V1, ACC1 from the guess of the change of ÿ."""
     h, y_old, y_new, v_old, v_new = known[H], known[Y_OLD], known[Y_NEW], known[V_OLD], known[V_NEW]
@@ -143,7 +143,7 @@ def predict(known: Array, state: Array) -> None:
         state[V1, i] = state[V, i] + v_old * alg + v_new * alg1
 
 
-@helper
+@part
 def refresh(
     mass_matrix: Callable[..., None],
     stiffness_and_damping: Callable[..., None],
@@ -178,7 +178,7 @@ def refresh(
     return info == 0
 
 
-@helper
+@part
 def iterate(
     residual: Callable[..., None],
     reals: Array,
@@ -246,7 +246,7 @@ def iterate(
     return False
 
 
-@helper
+@part
 def solve(
     residual: Callable[..., None],
     mass_matrix: Callable[..., None],
@@ -276,7 +276,7 @@ def solve(
         fresh = True
 
 
-@helper
+@part
 def accept(known: Array, state: Array) -> None:
     """Move on to the end of the step, and foretell the next change of ÿ.
 
@@ -291,7 +291,7 @@ def accept(known: Array, state: Array) -> None:
         state[Y, i], state[V, i], state[ACC, i] = state[Y1, i], state[V1, i], acc1
 
 
-@kernel(_ADVANCE)
+@kernel(_ADVANCE, counted=False)
 def advance(
     residual: Callable[..., None],
     mass_matrix: Callable[..., None],
@@ -315,6 +315,8 @@ def advance(
         Number of knots made; -1 - that number when the step after them fails at the smallest size.
     """
     made, n = 0, state.shape[1]
+    if counts[AT] == 0:
+        set_step(known, counts, known[SPAN] / (counts[TOTAL] // counts[UNIT]))
     while made < len(times) and counts[AT] < counts[TOTAL]:
         target = counts[AT] + (counts[UNIT] >> counts[HALVINGS])
         t = known[END] if target == counts[TOTAL] else known[START] + known[SPAN] * (target / counts[TOTAL])

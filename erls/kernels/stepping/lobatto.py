@@ -22,10 +22,10 @@ LARGEST, SMALLEST, TOLERANCE, GOAL, ROUNDING = 4, 5, 6, 7, 8
 T, H, BEFORE, RATE, ERROR, SIZE, NEXT = range(9, 16)  # BEFORE: the last step; NEXT: the one to try
 KNOWN = 16
 # counts
-FACTORED, USUAL, EXCESS, REASON, HISTORY, SUSPECT = range(6)
-MAX_ITERATIONS, REFRESH_COST = 6, 7
-RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED, STEPS = range(8, 13)
-COUNTS = 13
+FACTORED, USUAL, EXCESS, REASON, HISTORY, SUSPECT, DIAGONAL = range(7)  # DIAGONAL: stiffness and damping
+MAX_ITERATIONS, REFRESH_COST = 7, 8
+RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED, STEPS = range(9, 14)
+COUNTS = 14
 SINGULAR, NOT_FINITE, SLOW, INACCURATE = 1, 2, 3, 4  # reasons
 # blocks of coefficients (stages + 1, stages + 1): row 0 of the last one holds the nodes, then see the names
 RATES, PLACES, FROM_RE, FROM_IM, TO_RE, TO_IM, FORETELL, ROWS = range(8)
@@ -90,13 +90,17 @@ def foretell(known: Array, counts: IntArray, coefficients: Array, stages: Array,
         out = vectors[RESIDUALS + i - 1]
         out[:] = 0.0
         for part in range(3):
-            now = stages[i, 2 - part]
-            for q in range(n):
-                total = now[q]
-                for j in range(m + 1):
-                    total -= basis[i, j] * last[j, 2 - part, q]
-                difference[q] = total
-            add_product(matrices[part], difference, out)
+            difference[:] = stages[i, 2 - part]
+            for j in range(m + 1):
+                weight, before = basis[i, j], last[j, 2 - part]
+                for q in range(n):
+                    difference[q] -= weight * before[q]
+            if part > 0 and counts[DIAGONAL]:
+                matrix = matrices[part]
+                for q in range(n):
+                    out[q] += matrix[q, q] * difference[q]
+            else:
+                add_product(matrices[part], difference, out)
     correct(h, coefficients, stages, matrices, vectors)
     return 0
 
@@ -136,7 +140,10 @@ def correct(h: float, coefficients: Array, stages: Array, matrices: Array, vecto
             for i in range(n):
                 re[i] += p * out[i]
                 im[i] += q * out[i]
-        solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
+        if coefficients[ROWS, LAMBDA_IM, k] == 0.0:
+            solve_real(matrices[SOLVERS + 2 * k], re)
+        else:
+            solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
         for j in range(m):
             p, q, change = to_re[j, k], to_im[j, k], changes[j]
             for i in range(n):
@@ -181,8 +188,18 @@ def factor(h: float, coefficients: Array, matrices: Array) -> int:
             for j in range(n):
                 re[i, j] = mass[i, j] + p * damping[i, j] + pp * stiffness[i, j]
                 im[i, j] = q * damping[i, j] + qq * stiffness[i, j]
-        status = max(status, factor_complex(re, im))
+        status = max(status, factor_real(re) if q == 0.0 else factor_complex(re, im))
     return status
+
+
+@helper
+def is_diagonal(matrix: Array) -> bool:
+    """Whether all entries off the diagonal are zero."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            if matrix[i, j] != 0.0 or matrix[j, i] != 0.0:
+                return False
+    return True
 
 
 @helper
@@ -344,6 +361,8 @@ def advance(
                 transpose(matrices[MASS])
                 transpose(matrices[STIFFNESS])
                 transpose(matrices[DAMPING])
+                diagonal = is_diagonal(matrices[STIFFNESS]) and is_diagonal(matrices[DAMPING])
+                counts[DIAGONAL] = 1 if diagonal else 0
                 status = factor(h, coefficients, matrices)
                 counts[FACTORIZATIONS] += 1
                 known[RATE], counts[USUAL], counts[EXCESS] = SLOWEST, counts[MAX_ITERATIONS], 0

@@ -1,0 +1,27 @@
+"""Stiffness and damping of a chain: all on the diagonals."""
+
+from __future__ import annotations
+
+from erls.kernels import contract
+from erls.kernels.chain import layout as at
+from erls.kernels.chain.drives import gains
+from erls.kernels.contract import Array, IntArray
+from erls.kernels.jit import kernel
+
+
+@kernel(contract.STIFFNESS_AND_DAMPING, counted=False)
+def stiffness_and_damping(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, k: Array, c: Array
+) -> None:
+    """Of modes, joint springs, dampers, friction and controllers; see `erls.kernels.contract`."""
+    k[:, :] = 0.0
+    c[:, :] = 0.0
+    for link in range(integers[at.LINKS]):
+        record = at.HEADER + link * at.RECORD
+        first = integers[record + at.FIRST_MODE]
+        for i in range(integers[record + at.MODES]):
+            k[first + i, first + i] = reals[integers[record + at.STIFFNESS] + i]
+            c[first + i, first + i] = reals[integers[record + at.DAMPING] + i]
+        joint = integers[record + at.JOINT]
+        if joint >= 0 and integers[record + at.EFFORT]:
+            k[joint, joint], c[joint, joint] = gains(reals, integers, record, v[joint])

@@ -1,0 +1,274 @@
+"""Effects chosen by a coarse look and certified afterwards: the error equation, choices, certificates, the table."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scenes
+from effect_scenes import random_chain
+from small_systems import Modes
+
+import erls
+from erls.build import build_mechanism
+from erls.cli import main
+from erls.effects import DEFAULT, EFFECTS, Certificate
+from erls.errors import Cause, SimulationError
+from erls.integrators.base import Options
+from erls.integrators.generalized_alpha import generalized_alpha
+from erls.mechanism.chain import Mechanism
+from erls.run import Run
+from erls.scene import Scene, load_scene
+from erls.selection import automatic as automatic_module
+from erls.selection.automatic import automatic
+from erls.selection.certify import certify
+from erls.selection.choice import Choice, affordable
+from erls.selection.error_motion import Knots, error_motion
+from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
+from erls.selection.probe import EffectSize
+
+WITHIN = 3.0  # actual error over certified one, from the specification
+
+
+@pytest.mark.parametrize("stride", [1, 4])
+def test_error_motion_is_the_difference_of_two_motions(stride: int) -> None:
+    """Two oscillators that differ in frequency and damping, with jumps of the force on the way; their motions in closed
+    form stay apart by e(t). Steps of generalized-α: second order, a fraction of the distance over 100 s of 1 rad/s.
+    """
+    jumps = (3.0, 7.5)
+    force = {0.0: 1.0, 3.0: -2.0, 7.5: 0.5}
+
+    def push(t: float) -> float:
+        return next(value for start, value in reversed(force.items()) if t >= start)
+
+    ours = Modes([1.0, 2.0], 0.0, push, jumps)
+    other = Modes([1.02, 2.0], 0.01, push, jumps)
+    options, start = Options(0.01), np.array([0.3, -0.1])
+    first, second = (
+        generalized_alpha(system, (0.0, 12.0), start, 0 * start, options, None) for system in (ours, other)
+    )
+    parts = np.split(np.arange(len(first.t)), np.flatnonzero(np.diff(first.t) == 0) + 1)
+    legs = [Knots.inside(first.t[p], first.y[p], first.v[p], first.a[p]) for p in parts]
+    assert len(legs) == 3
+    found = error_motion(other, legs, (np.zeros(2), np.zeros(2)), ours.residual, stride, 1e-9)
+    expected = np.array([np.interp(d.t, second.t, second.y[:, k]) for d in found for k in (0, 1)]).reshape(-1, 2)
+    apart = np.abs(second.y - first.y).max()
+    assert apart > 0.05
+    assert np.abs(np.array([d.other_y for d in found]) - expected).max() < 2e-3 * apart
+    assert len(found) < len(first.t) / stride + 6
+
+
+def _distance(run: Run, reference: Run) -> float:
+    times = np.linspace(0.0, reference.end, 301)
+    watched = watched_nodes(reference.formulation.mechanism)
+    sides = [[Outputs(r.scene, r.formulation, watched).positions(s) for s in r.states(times)] for r in (run, reference)]
+    return largest_distance(*sides)
+
+
+@pytest.mark.parametrize("seed", [1, 4, 6])
+def test_certified_errors_hold_on_random_chains(tmp_path: Path, seed: int) -> None:
+    """What auto leaves out, and one effect that is not small; benchmarks/effects_certified.py does many."""
+    path = random_chain(tmp_path, seed)
+    changes = ["simulation.duration=0.25"]
+    reference = erls.simulate(load_scene(path, changes))
+    mechanism = reference.formulation.mechanism
+    run = erls.simulate(load_scene(path, [*changes, "effects=auto", "simulation.effects_tolerance=2e-3"]))
+    assert run.certificate is not None
+    assert _distance(run, reference) <= max(WITHIN * run.certificate.error, 1e-8)
+    less = erls.simulate(load_scene(path, [*changes, "effects=-centrifugal_load"]))
+    actual, certified = _distance(less, reference), certify(less, mechanism).error
+    assert actual / WITHIN <= certified <= actual * WITHIN or max(actual, certified) < 1e-7
+
+
+@pytest.fixture(scope="module")
+def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The steel L with few modes."""
+    folder = tmp_path_factory.mktemp("pendulum")
+    scenes.l_link(folder, reduction={"elastic_modes": 5})
+    return scenes.l_scene(folder, simulation={"duration": 0.5, "step": 1e-3})
+
+
+def _auto(path: Path, *changes: str, **options: Any) -> tuple[Run, list[str]]:
+    told: list[str] = []
+    return erls.simulate(load_scene(path, ["effects=auto", *changes]), tell=told.append, **options), told
+
+
+def test_auto_leaves_out_what_the_tolerance_allows(pendulum: Path) -> None:
+    """More with a looser one, down to rigid links; the run says what, and its JSON holds names and the certificate."""
+    kept = []
+    for tolerance in (1e-9, 1e-3, 1.0):
+        run, told = _auto(pendulum, f"simulation.effects_tolerance={tolerance}")
+        certificate = run.certificate
+        assert certificate is not None
+        assert certificate.ok
+        assert certificate.effort_error is None  # nothing drives it
+        assert any(text.startswith("effects: auto leaves") for text in told)
+        summary = run.summary()
+        assert summary["effects"] == [n for n in EFFECTS if n in run.formulation.mechanism.effects]
+        assert summary["certified_error"] == certificate.error <= tolerance
+        assert summary["effects_wall_s"] > 0
+        kept.append(run.formulation.mechanism.effects)
+    assert kept[0] == DEFAULT
+    assert kept[1] == DEFAULT - {"coriolis", "inertia_second_order", "spin_softening"}
+    assert not {"flexibility", "modal_damping", *(n for n in EFFECTS if EFFECTS[n].in_equations)} & kept[2]
+    assert run.summary()["elastic_coordinates"] == 0
+
+
+def test_run_files_keep_certificate_and_effects(pendulum: Path, tmp_path: Path) -> None:
+    """A run that is read again has the equations that it was made with."""
+    run, _ = _auto(pendulum, "simulation.effects_tolerance=1e-3")
+    erls.save_run(tmp_path / "run.h5", run)
+    again = erls.load_run(tmp_path / "run.h5")
+    assert again.certificate == run.certificate
+    assert again.formulation.mechanism.effects == run.formulation.mechanism.effects
+    assert np.array_equal(again.position("tip", 0.3), run.position("tip", 0.3))
+    assert again.summary()["effects"] == run.summary()["effects"]
+    lost = replace(run, certificate=Certificate(np.inf, None, 1e-3, 1e-2))
+    erls.save_run(tmp_path / "lost.h5", lost)
+    found = erls.load_run(tmp_path / "lost.h5").certificate
+    assert found is not None
+    assert not np.isfinite(found.error)
+    assert not found.ok
+
+
+def _misjudged(off: frozenset[str], error: float) -> Any:
+    sizes = tuple(EffectSize(name, True, 1.0, error) for name in off)
+    return lambda scene, mechanism: Choice(off, sizes)
+
+
+def test_a_wrong_choice_is_noticed(pendulum: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The certificate does not depend on what was expected: a warning, or another run with the effect on."""
+    off = frozenset({"centrifugal_load", "coriolis"})
+    monkeypatch.setattr(automatic_module, "choose_effects", _misjudged(off, 1e-7))
+    run, told = _auto(pendulum)
+    assert run.certificate is not None
+    assert not run.certificate.ok
+    assert run.formulation.mechanism.effects == DEFAULT - off
+    assert any("use --strict" in w for w in run.warnings)
+    assert any(text.startswith("warning: effects") for text in told)
+    run, told = _auto(pendulum, strict=True)
+    assert run.certificate is not None
+    assert run.certificate.ok
+    assert "centrifugal_load" in run.formulation.mechanism.effects
+    assert not run.warnings
+    assert any("repeated with" in text for text in told)
+
+
+def test_a_run_that_fails_is_repeated_with_all(pendulum: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leaving out inertia may leave a mass matrix indefinite; interrupts are not repeated."""
+    off = frozenset({"inertia_second_order"})
+    monkeypatch.setattr(automatic_module, "choose_effects", _misjudged(off, 1e-7))
+    scene = load_scene(pendulum, ["effects=auto"])
+    whole = build_mechanism(scene).mechanism
+    told: list[str] = []
+
+    def failing(cause: Cause) -> Any:
+        def integrate(scene: Scene, mechanism: Mechanism) -> Run:
+            if mechanism.effects != whole.effects:
+                raise SimulationError(cause, "as the test wants")
+            return erls.simulate(replace(scene))
+
+        return integrate
+
+    run = automatic(scene, whole, failing(Cause.SINGULAR_MASS), told.append, False)
+    assert run.formulation.mechanism.effects == whole.effects
+    assert run.certificate is not None
+    assert run.certificate.error == 0.0
+    assert any("repeated with all" in text for text in told)
+    with pytest.raises(SimulationError) as caught:
+        automatic(scene, whole, failing(Cause.INTERRUPTED), told.append, False)
+    assert caught.value.cause == Cause.INTERRUPTED
+
+
+def test_an_error_that_cannot_be_followed_is_not_certified(pendulum: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Infinite, with a warning."""
+    monkeypatch.setattr(automatic_module, "choose_effects", _misjudged(frozenset({"coriolis"}), 1e-7))
+
+    def lost(run: Run, whole: Mechanism) -> Certificate:
+        raise SimulationError(Cause.NEWTON_FAILED, "as the test wants")
+
+    monkeypatch.setattr(automatic_module, "certify", lost)
+    run, _ = _auto(pendulum)
+    assert run.certificate is not None
+    assert run.certificate.error == np.inf
+    assert any("effects: what auto left out" in w for w in run.warnings)
+
+
+def test_the_error_equation_gives_up_with_a_cause() -> None:
+    """Equations that are not finite near the motion."""
+
+    class Broken(Modes):
+        def residual(self, t: float, y: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+            return np.full(1, np.nan) if t > 0.5 else super().residual(t, y, v, a)
+
+    t = np.linspace(0.0, 1.0, 11)
+    leg = Knots.inside(t, *np.zeros((3, 11, 1)))
+    with pytest.raises(SimulationError) as caught:
+        error_motion(Broken([1.0]), [leg], (np.zeros(1), np.zeros(1)), lambda *state: np.zeros(1), 4, 1e-6)
+    assert caught.value.cause == Cause.NEWTON_FAILED
+    assert "t = 0.6" in caught.value.where
+
+
+SIZES = [EffectSize(n, True, 1.0, e, effort) for n, e, effort in (
+    ("centrifugal_load", 1e-2, None),
+    ("coriolis", 1e-5, 1e-4),
+    ("inertia_second_order", 1.5e-5, 1e-4),
+    ("spin_softening", 1e-5, 0.02),
+)]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "effort_tolerance", "expected"),
+    [
+        (1e-5, 1e-2, set()),
+        (4e-5, 1e-2, {"coriolis"}),
+        (1e-4, 1e-2, {"coriolis", "inertia_second_order"}),
+        (1e-4, 1e-1, {"coriolis", "spin_softening"}),  # together with the third one, above 3e-5 m
+        (1.0, 1e-2, {"centrifugal_load", "coriolis", "inertia_second_order"}),
+    ],
+)
+def test_errors_of_what_is_left_out_add_up(tolerance: float, effort_tolerance: float, expected: set[str]) -> None:
+    """To three tenths of either tolerance, smallest first."""
+    assert affordable(SIZES, tolerance, effort_tolerance) == expected
+
+
+def test_efforts_count_by_their_peak() -> None:
+    """And are nothing where no drive reacts."""
+    found = effort_error([np.array([2.0]), np.array([-4.0])], [np.array([2.1]), np.array([-4.0])])
+    assert found == pytest.approx(0.025)
+    assert effort_error([], []) is None
+    assert effort_error([np.zeros(1)], [np.zeros(1)]) == 0.0
+
+
+def test_nodal_leaves_nothing_out(pendulum: Path) -> None:
+    """Its elements have no such parts."""
+    run, told = _auto(pendulum, "simulation.formulation=nodal", "simulation.duration=0.01")
+    assert run.formulation.mechanism.effects == DEFAULT
+    assert any("auto leaves nothing out of 'nodal'" in text for text in told)
+
+
+def test_table(pendulum: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`erls effects`: every effect that the scene asks for, on, off or not there, with sizes."""
+    changes = ["effects=-modal_damping", "simulation.effects_tolerance=1e-3"]
+    arguments = ["effects", str(pendulum), *(part for change in changes for part in ("--set", change))]
+    assert main([*arguments, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["left_out"][0] == "modal_damping"
+    rows = {row["name"]: row for row in found["effects"]}
+    assert list(rows) == [n for n in EFFECTS if n in DEFAULT - {"modal_damping"}]
+    assert not rows["payload"]["present"]
+    assert not rows["coriolis"]["auto"]
+    assert rows["centrifugal_load"]["auto"]
+    weight = 9.81 * 7800 * 0.01 * 0.03 * 1.0  # of a metre of steel, in N
+    assert 0.9 * weight < rows["gravity"]["force"] <= weight  # six coordinates feel less than all the mass
+    assert rows["gravity"]["error"] == pytest.approx(0.5, rel=0.1)  # the tip falls by its arm
+    assert 0.0 <= rows["flexibility"]["share"] <= 1.0
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    assert "not there" in text
+    assert "tolerance of 0.001 m" in text
+    assert all(name in text for name in rows)
