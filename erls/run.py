@@ -260,7 +260,7 @@ class Run:
             **self.formulation.describe(),
             "effects": in_order(self.formulation.mechanism.effects),
             **({} if self.certificate is None else self.certificate.summary()),
-            "integrator": self.scene.record.simulation.integrator,
+            "integrator": self.solution.choice or self.scene.record.simulation.integrator,
             "duration": self.end,
             "steps": work.steps,
             "rhs_calls": work.rhs_calls,

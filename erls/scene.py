@@ -47,11 +47,14 @@ class Simulation(_Record, frozen=True):
     elements_per_member : int, optional
         Of ``nodal``: elements of each member of a link, instead of the number in its description.
     integrator : str
-        ``generalized_alpha`` or one of SciPy's: ``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``.
+        ``generalized_alpha``, ``lobatto``, one of SciPy's (``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``), or
+        ``auto``: the one that fits.
     step : float, optional
         Step of generalized-α [s], largest step of the others.
     rtol, atol : float
         Tolerances of SciPy's integrators, ``atol`` in metres.
+    tolerance : float
+        Error of any point over the whole run [m] that ``lobatto`` and ``auto`` aim at.
     spectral_radius : float
         ρ∞ of generalized-α: 1 no numerical damping, 0 the most.
     effects : str or list of str
@@ -70,6 +73,7 @@ class Simulation(_Record, frozen=True):
     step: float | None = None
     rtol: float = 1e-8
     atol: float = 1e-12
+    tolerance: float = 1e-5
     spectral_radius: float = 0.8
     effects: str | list[str] = "all"
     effects_tolerance: float = 1e-4

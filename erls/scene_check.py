@@ -115,7 +115,7 @@ def _check_simulation(s: Simulation, place: str) -> None:
     if s.elements_per_member is not None and s.elements_per_member < 1:
         message = "a member needs at least one element"
         raise _bad(f"{place}.elements_per_member", message, s.elements_per_member, "give 1 or more")
-    for name in ("duration", "step", "atol", "effects_tolerance", "effects_effort_tolerance"):
+    for name in ("duration", "step", "atol", "tolerance", "effects_tolerance", "effects_effort_tolerance"):
         value = getattr(s, name)
         if value is not None and not value > 0:
             raise _bad(f"{place}.{name}", f"{name} must be positive", value, "give a number above 0")

@@ -11,7 +11,7 @@ import numpy as np
 
 from erls.build import Message, build_mechanism
 from erls.errors import SceneError, SimulationError
-from erls.formulations import FORMULATIONS, formulate, integrator
+from erls.formulations import FORMULATIONS, TREES, formulate, integrator
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
@@ -20,6 +20,7 @@ from erls.run import Run, node_positions
 from erls.run_file import self_contained, write_run
 from erls.scene import Scene, load_scene
 from erls.selection.automatic import automatic
+from erls.spin_stability import missing_stiffening, planned_spin_warnings, spin_warnings
 from fe_import.toml_file import choose
 
 Progress = Callable[[float, float], None]  # (time, duration)
@@ -109,11 +110,16 @@ def _integrated(
 ) -> Run:
     """Run a mechanism as the scene says."""
     settings = scene.record.simulation
+    modal = settings.formulation in TREES
+    planned = planned_spin_warnings(mechanism, settings.duration) if modal else []
+    warn((*missing_stiffening(mechanism), *planned) if modal else ())
     formulation = formulate(mechanism, settings)
     y, v = formulation.initial_state()
     if isinstance(chain := solved(formulation), ClosedChain):
         warn(chain.warnings)
-    options = Options(settings.step, settings.rtol, settings.atol, settings.spectral_radius)
+    options = Options(
+        settings.step, settings.rtol, settings.atol, settings.spectral_radius, tolerance=settings.tolerance
+    )
     begun = saved = time.perf_counter()
 
     def make_run(solution: Solution) -> Run:
@@ -137,8 +143,13 @@ def _integrated(
 
     times = (0.0, settings.duration)
     solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
+    if solution.choice:
+        warn.tell(f"integrator: {solution.choice}")
     run = make_run(solution)
     warn((*solution.warnings, *range_warnings(run)))
+    if modal and not planned and any(j.drive.reference(0.0) is None for j in mechanism.joints):
+        times_seen = np.linspace(float(run.solution.t[0]), run.end, 101)
+        warn(spin_warnings(mechanism, ((s.time, s.coordinates, s.rates) for s in run.states(times_seen))))
     run = replace(run, warnings=tuple(warn.told))
     if solution.failure is not None:
         solution.failure.run = run

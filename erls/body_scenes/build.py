@@ -15,6 +15,7 @@ from erls.body_scenes.scene import BodyScene
 from erls.body_scenes.schema import GROUND as GROUND_NAME
 from erls.body_scenes.schema import Beam as BeamRecord
 from erls.body_scenes.schema import BodySceneRecord, Connection, Load
+from erls.body_scenes.springs import springs
 from erls.errors import Cause, SceneError
 from erls.lie.groups import R3_SO3, SE3
 from erls.lie.motion_maps import inverse
@@ -27,6 +28,7 @@ from erls.nodal.beam import Beam, Beams
 from erls.nodal.elements import Elements
 from erls.nodal.joints import GROUND, Joint, Motion
 from erls.nodal.loads import NodalLoad, NodalLoads
+from erls.nodal.redundant import without_redundant
 from erls.nodal.rigid_body import RigidBodies, RigidBody
 from erls.nodal.section import BeamSection, beam_section
 from fe_import.build.model import inertia_matrix
@@ -40,7 +42,11 @@ class Assembly:
     Attributes
     ----------
     system : NodalSystem
-        Its joints are the connections, in their order.
+        Its joints are the connections, in their order, with redundant conditions left out.
+    full : NodalSystem
+        The same with all conditions.
+    left_out : tuple of str
+        Names of the redundant ones.
     numbers : dict
         Of all nodes by name.
     reported : tuple of str
@@ -52,6 +58,8 @@ class Assembly:
     """
 
     system: NodalSystem
+    full: NodalSystem
+    left_out: tuple[str, ...]
     numbers: dict[str, int]
     reported: tuple[str, ...]
     velocity: Array
@@ -87,13 +95,18 @@ def assemble(scene: BodyScene) -> Assembly:
         elements.append(RigidBodies(bodies, gravity))
     if loads:
         elements.append(NodalLoads(loads))
+    elements += springs(record, numbers, built, file)
     joints = [
         _joint(x, numbers, built, scene.folder, f"{file}: connections[{k}]") for k, x in enumerate(record.connections)
     ]
     world = isinstance(record.simulation, Dynamics) and record.simulation.group != "SE(3)"
-    system = NodalSystem(built, elements, joints, R3_SO3 if world else SE3)
+    group = R3_SO3 if world else SE3
+    full = NodalSystem(built, elements, joints, group)
+    joints, left_out = without_redundant(full)
+    system = NodalSystem(built, elements, joints, group) if left_out else full
     reported = tuple(dict.fromkeys([*record.nodes, *(b.name for b in record.bodies), *record.report]))
-    return Assembly(system, numbers, reported, _velocity(record, numbers, built, world), len(beams))
+    velocity = _velocity(record, numbers, built, world)
+    return Assembly(system, full, left_out, numbers, reported, velocity, len(beams))
 
 
 def _elements(

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from erls.body_scenes.analyses import GROUPS, AtRest, Buckling, Dynamics, Frequencies
-from erls.body_scenes.schema import GROUND, Beam, BodySceneRecord, Connection, Load
+from erls.body_scenes.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
 from erls.errors import Cause, SceneError
 from erls.integrators.constrained import MATRICES
 from erls.mechanism.place import LARGEST, LATEST
@@ -52,6 +52,8 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
         _not_negative(f"{file}: masses[{k}].mass", mass.mass)
     for k, connection in enumerate(scene.connections):
         _check_connection(connection, nodes, f"{file}: connections[{k}]")
+    for k, spring in enumerate(scene.springs):
+        _check_spring(spring, nodes, f"{file}: springs[{k}]")
     for k, load in enumerate(scene.loads):
         _check_load(load, nodes, f"{file}: loads[{k}]")
     for k, name in enumerate(scene.report):
@@ -150,6 +152,22 @@ def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
     if joint.motion is not None and joint.type not in ("revolute", "prismatic"):
         message = "its motion cannot be prescribed"
         raise _bad(f"{place}.motion", message, joint.type, "let the joint be revolute or prismatic")
+
+
+def _check_spring(spring: Spring, nodes: list[str], place: str) -> None:
+    choose(spring.node, nodes, f"{place}.node", SceneError)
+    choose(spring.to, [GROUND, *nodes], f"{place}.to", SceneError)
+    if spring.node == spring.to:
+        raise _bad(f"{place}.to", "a spring needs two ends", spring.to, "name another node, or the ground")
+    _not_negative(f"{place}.stiffness", spring.stiffness)
+    _not_negative(f"{place}.damping", spring.damping)
+    if isinstance(spring, TurningSpring):
+        if not any(spring.axis):
+            raise _bad(f"{place}.axis", "an axis needs a direction", spring.axis, "give three numbers, not all zero")
+        return
+    _not_negative(f"{place}.length", spring.length or 0.0)
+    if spring.to == GROUND and spring.to_position is None:
+        raise _bad(f"{place}.to_position", "where on the ground", None, "give its position in the world")
 
 
 def _check_load(load: Load, nodes: list[str], place: str) -> None:

@@ -17,6 +17,7 @@ from erls.integrators.constrained import ConstrainedSolution
 from erls.lie import motion_maps as motions
 from erls.lie.so3 import Array
 from erls.nodal.assembly import Nodes
+from erls.nodal.redundant import smallest_multipliers
 from erls.nodal.statics import Statics
 from fe_import.toml_file import choose
 
@@ -91,6 +92,11 @@ class Motion(Result):
         result: Array = poses[:, self.assembly.numbers[name], :3, 3].reshape(*np.shape(t), 3)
         return result
 
+    def some_poses(self, count: int = 21) -> tuple[list[float], Array]:
+        """Even times, and poses (count, nodes, 4, 4) there."""
+        times = np.linspace(float(self.solution.t[0]), self.end, count)
+        return times.tolist(), self._poses(times)
+
     def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
         """Nodes and connections at given times."""
         at, s = np.asarray(times, dtype=float), self.solution
@@ -116,7 +122,8 @@ class Motion(Result):
     def conservative(self) -> bool:
         """Whether total energy should stay constant."""
         record = self.scene.record
-        return not record.loads and all(c.motion is None for c in record.connections)
+        damped = any(s.damping for s in record.springs)
+        return not record.loads and not damped and all(c.motion is None for c in record.connections)
 
     def summary(self, times: Sequence[float] = ()) -> dict[str, Any]:
         """The JSON of ``erls simulate``."""
@@ -228,9 +235,14 @@ def frames_and_twists(y: Array, v: Array, nodes: int) -> tuple[Array, Array]:
 
 
 def connection_forces(assembly: Assembly, t: float, poses: Array, multipliers: Array) -> dict[str, tuple[Array, Array]]:
-    """Force [N] and moment [N m] of each connection on its node, at the node, in the world's axes."""
-    system = assembly.system
-    rows = system.constraint_matrix(t, Nodes(poses, system.start.memory))
+    """Force [N] and moment [N m] of each connection on its node, at the node, in the world's axes; of redundant ones the
+    smallest.
+    """
+    system, q = assembly.full, Nodes(poses, assembly.full.start.memory)
+    if assembly.left_out:
+        force = np.asarray(assembly.system.constraint_matrix(t, q).T @ multipliers).ravel()
+        multipliers = smallest_multipliers(system, t, q, force)
+    rows = system.constraint_matrix(t, q)
     found = {}
     for k, joint in enumerate(system.rows.joints):
         own = np.flatnonzero(system.rows.joint_of_row == k)

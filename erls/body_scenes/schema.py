@@ -83,6 +83,36 @@ class Connection(_Record, frozen=True):
     motion: Motion | None = None
 
 
+class LineSpring(_Record, frozen=True, tag_field="type", tag="line"):
+    """A spring [N/m] and damper [N s/m] along the line from ``to_position`` on the ground or the node ``to`` to
+    ``position`` on ``node``; where the nodes are unless given. ``length`` without force: as built unless given.
+    """
+
+    node: str
+    to: str = GROUND
+    position: Vector | None = None
+    to_position: Vector | None = None
+    stiffness: float = 0.0
+    damping: float = 0.0
+    length: float | None = None
+
+
+class TurningSpring(_Record, frozen=True, tag_field="type", tag="turning"):
+    """A torsion spring [N m/rad] and damper [N m s/rad] about an ``axis``, between a ``node`` and the ground or ``to``;
+    without moment at ``rest_deg`` from where it is built.
+    """
+
+    node: str
+    axis: Vector
+    to: str = GROUND
+    stiffness: float = 0.0
+    damping: float = 0.0
+    rest_deg: float = 0.0
+
+
+Spring = LineSpring | TurningSpring
+
+
 class Load(_Record, frozen=True):
     """A force [N] and a moment [N m] at a node, in the world's axes, or with ``follower`` in those of the node's frame.
 
@@ -113,5 +143,6 @@ class BodySceneRecord(_Record, frozen=True):
     beams: list[Beam] = []
     masses: list[PointMass] = []
     connections: list[Connection] = []
+    springs: list[Spring] = []
     loads: list[Load] = []
     report: list[str] = []

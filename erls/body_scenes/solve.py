@@ -13,6 +13,8 @@ from erls.body_scenes.result import Motion, Rest, work
 from erls.body_scenes.scene import BodyScene, load_body_scene
 from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
+from erls.nodal.assembly import Nodes
+from erls.nodal.redundant import refuse_open
 from erls.nodal.spectrum import buckling_loads, natural_frequencies
 from erls.nodal.statics import TANGENTS, Statics, solve_statics
 
@@ -75,7 +77,12 @@ def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, progress: 
     times = (0.0, analysis.duration)
     system = assembly.system
     found = lie_generalized_alpha(system, times, system.start, assembly.velocity, options, observe)  # type: ignore[arg-type]
-    return Motion(scene, assembly, time.perf_counter() - begun, found.warnings, found)
+    wall = time.perf_counter() - begun
+    result = Motion(scene, assembly, wall, (*_redundancy(assembly), *found.warnings), found)
+    if assembly.left_out and found.failure is None:
+        for t, poses in zip(*result.some_poses(), strict=True):
+            refuse_open(assembly.full, t, Nodes(poses, system.start.memory), assembly.left_out)
+    return result
 
 
 def _rest(scene: BodyScene, assembly: Assembly, analysis: AtRest) -> Rest:
@@ -91,7 +98,20 @@ def _rest(scene: BodyScene, assembly: Assembly, analysis: AtRest) -> Rest:
                 found if name == analysis.tangent else solve_statics(system, system.start, analysis.load_steps, name)
             )
             tangents[name] = work(other)
-    return Rest(scene, assembly, wall, (), found, modes, tangents)
+    for e in found.path if assembly.left_out else ():
+        refuse_open(assembly.full, e.t, e.q, assembly.left_out)
+    return Rest(scene, assembly, wall, _redundancy(assembly), found, modes, tangents)
+
+
+def _redundancy(assembly: Assembly) -> tuple[str, ...]:
+    """A warning that names what was left out."""
+    if not assembly.left_out:
+        return ()
+    names = "; ".join(assembly.left_out)
+    return (
+        f"{len(assembly.left_out)} conditions follow from the others and are left out: {names}; forces of connections "
+        "are the smallest that do the same",
+    )
 
 
 def _modes(assembly: Assembly, analysis: AtRest, found: Statics) -> tuple[dict[str, Any], ...]:

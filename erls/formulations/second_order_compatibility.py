@@ -198,7 +198,9 @@ def _joint_terms(revolute: bool, free: bool, inner: Jet, outer: Jet, joint: tupl
         along.slope[2, number] = 1.0
         slide = phi.crossed(phi.crossed(along, -0.5), 1.0)
         if free:
-            slide = slide + phi.crossed(Jet(*(a[:3] - b[:3] for a, b in zip(outer.parts, inner.parts, strict=True))), -1.0)
+            slide = slide + phi.crossed(
+                Jet(*(a[:3] - b[:3] for a, b in zip(outer.parts, inner.parts, strict=True))), -1.0
+            )
     elif free:
         turn = phi.crossed(Jet(*(part[3:] for part in outer.parts)), -0.5)
     return Jet(*(np.concatenate(parts) for parts in zip(slide.parts, turn.parts, strict=True)))

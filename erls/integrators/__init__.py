@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from erls.integrators.automatic import automatic
 from erls.integrators.base import Integrator
 
-# the underscore keeps the module of that name reachable
+# the underscores keep the modules of those names reachable
 from erls.integrators.generalized_alpha import generalized_alpha as _generalized_alpha
+from erls.integrators.lobatto import lobatto as _lobatto
 from erls.integrators.scipy_ivp import scipy_method
 
 INTEGRATORS: dict[str, Integrator] = {
     "generalized_alpha": _generalized_alpha,
+    "lobatto": _lobatto,
+    "auto": automatic,
     "rk45": scipy_method("rk45"),
     "dop853": scipy_method("dop853"),
     "radau": scipy_method("radau"),
@@ -21,6 +25,8 @@ DEFAULT = "generalized_alpha"
 
 DESCRIPTIONS: dict[str, str] = {
     "generalized_alpha": "implicit, order 2, fixed steps, numerical damping of unresolved modes",
+    "lobatto": "implicit, order 6, adaptive to `tolerance`, no numerical damping: for accuracy at low cost",
+    "auto": "lobatto for stiff and for compiled systems, dop853 for soft ones; says which",
     "rk45": "explicit, order 5, adaptive: for soft mechanisms and moderate accuracy",
     "dop853": "explicit, order 8, adaptive: for soft mechanisms and references",
     "radau": "implicit, order 5, adaptive, damps unresolved modes: for references of stiff mechanisms",

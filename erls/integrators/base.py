@@ -119,7 +119,7 @@ class Options:
         Newton iterations stop when the remaining error is estimated below this [m]; at steps below 1 ms it
         falls with the cube of the step, so that convergence keeps its order.
     tolerance : float
-        Error over the whole run [m] that the Lobatto methods aim at.
+        Error over the whole run [m] that ``lobatto`` and ``auto`` aim at.
 
     Raises
     ------
@@ -154,7 +154,10 @@ class Options:
 
 @dataclass(frozen=True)
 class Solution:
-    """Knots of the motion: times (k,) in rising order (twice at a jump), y, v, a (k, n)."""
+    """Knots of the motion: times (k,) in rising order (twice at a jump), y, v, a (k, n).
+
+    ``choice`` names the method that ``auto`` chose, and why.
+    """
 
     t: Array
     y: Array
@@ -163,6 +166,7 @@ class Solution:
     work: Work = field(default_factory=Work)
     failure: SimulationError | None = None
     warnings: tuple[str, ...] = ()
+    choice: str = ""
 
 
 Observer = Callable[[float, Callable[[], Solution]], None]

@@ -86,6 +86,7 @@ class ConstrainedSystem(Protocol):
 
 
 MATRICES = ("auto", "update", "frozen")
+STARTS = ("zero", "last")
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,8 @@ class ConstrainedOptions(Options):
     project_velocity : bool
         Move velocities onto the constraints after every step; otherwise they keep to them within the accuracy of
         the method.
+    start_from : str
+        Newton iterations start from ``zero`` accelerations and multipliers or from the ``last`` ones, which lie nearer.
     error_tolerance : float or None
         Largest local error of a step [m]: steps adapt to it, ``step`` being the largest. None for equal steps.
     compiled : bool or None
@@ -116,6 +119,7 @@ class ConstrainedOptions(Options):
     iteration_matrix: str = "auto"
     residual_tolerance: float = 1e-10
     project_velocity: bool = False
+    start_from: str = "zero"
     error_tolerance: float | None = None
     compiled: bool | None = None
 
@@ -134,6 +138,7 @@ class ConstrainedOptions(Options):
                 0 <= self.residual_tolerance < 1,
                 "zero or more, and below 1",
             ),
+            ("start_from", self.start_from, self.start_from in STARTS, f"one of {', '.join(STARTS)}"),
             (
                 "error_tolerance",
                 self.error_tolerance,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math, os
+import math
 import time
 from typing import Any, Protocol
 
@@ -12,6 +12,7 @@ from erls.errors import SimulationError
 from erls.integrators.base import Array, Leg, metre_scales
 from erls.integrators.constrained import (
     MATRICES,
+    STARTS,
     Configuration,
     ConstrainedOptions,
     ConstrainedState,
@@ -26,6 +27,7 @@ from erls.integrators.lie_formulas import (
     ROUNDING,
     SINGULAR,
     SLOWEST_KNOWN,
+    TOLERATED,
     Formulas,
     Limit,
     newton_failure,
@@ -159,12 +161,13 @@ class CompiledSteps:
             slowest=SLOWEST_KNOWN,
             fastest=FASTEST_TRUSTED,
             patience=float(REFRESH_COST),
+            tolerated=float(TOLERATED),
             error_limit=limit.error,
             error_factor=use.error,
             growth=GROWTH if limit.can_grow else 0.0,
             mode=MATRICES.index(options.iteration_matrix),
             iterations=MAX_ITERATIONS,
-            predict=int(os.environ.get('PRED','0')),
+            predict=STARTS.index(options.start_from),
         )
 
     def _count(self) -> int:

@@ -24,6 +24,7 @@ from erls.integrators.lie_formulas import (
     SINGULAR,
     SLOWEST_KNOWN,
     TIMID,
+    TOLERATED,
     Formulas,
     Limit,
     newton_failure,
@@ -115,27 +116,33 @@ class NumpySteps:
         use = self.formulas
         known = use.pull * before.a + use.keep * algorithmic  # part of a₁ that the iteration leaves alone
         h, beta, gamma = use.h, use.beta, use.gamma
-        increment = h * before.v + h * h * ((0.5 - beta) * algorithmic + beta * known)
-        v = before.v + h * ((1 - gamma) * algorithmic + gamma * known)
+        guess = 0 * before.a, 0 * before.multipliers
+        if self.options.start_from == "last":
+            guess = before.a, before.multipliers
+        first = known + use.share * guess[0]
+        increment = h * before.v + h * h * ((0.5 - beta) * algorithmic + beta * first)
+        v = before.v + h * ((1 - gamma) * algorithmic + gamma * first)
         fresh = self.saddle is None or mode == "update" or (mode == "auto" and self.excess >= REFRESH_COST)
         while True:
-            found = self.iterate(t, before.q, increment.copy(), v.copy(), fresh)
+            found = self.iterate(t, before.q, increment.copy(), v.copy(), guess, fresh)
             if found is not None:
                 return found, known + use.share * found.a
             if fresh or mode == "frozen":
                 return None
             fresh = True
 
-    def iterate(self, t: float, q0: Configuration, d: Array, v: Array, fresh: bool) -> ConstrainedState | None:
-        """Newton or chord iteration from v̇ = 0, λ = 0; None when it does not converge.
+    def iterate(
+        self, t: float, q0: Configuration, d: Array, v: Array, guess: tuple[Array, Array], fresh: bool
+    ) -> ConstrainedState | None:
+        """Newton or chord iteration; None when it does not converge.
 
         It has converged when the residual is small against its terms, or when the remaining error is estimated within
         tolerance: rate/(1 − rate) |Δ|, with the rate of earlier steps at first (Hairer & Wanner, Solving ODEs II,
         sec. IV.8), which counts for less the older it gets.
         """
         system, mode = self.system, self.options.iteration_matrix
-        a, multipliers = np.zeros(len(d)), np.zeros(system.constraints)
-        rate, before, largest = max(self.rate, FASTEST_TRUSTED) ** 0.8, 0.0, 0.0
+        a, multipliers = guess
+        rate, before, earlier, largest = max(self.rate, FASTEST_TRUSTED) ** 0.8, 0.0, 0.0, 0.0
         rounding = ROUNDING * self.reach
         goal = self.formulas.tolerance + rounding
         for k in range(MAX_ITERATIONS + 1):
@@ -169,7 +176,7 @@ class NumpySteps:
             a = a - self.formulas.to_a * move
             multipliers = multipliers - change
             if k > 0:
-                rate = size / before
+                rate = size / before if k == 1 else math.sqrt(size / earlier)  # they rise and fall in turns
             if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
                 q = system.compose(q0, d)
                 return self.accepted(ConstrainedState(q, v, a, multipliers), k + 1, rate)
@@ -179,7 +186,7 @@ class NumpySteps:
             if rate > 2 or (k > 1 and left > MAX_ITERATIONS - k and not stale):
                 break
             fresh = mode == "update" or (mode == "auto" and left > REFRESH_COST)
-            before = size
+            before, earlier = size, before
         self.suspect = correction
         self.reason = too_slow(before, size, goal)
         return None
@@ -196,8 +203,7 @@ class NumpySteps:
         """Note how fast iteration was."""
         self.rate = min(rate, SLOWEST_KNOWN)
         self.usual = min(self.usual, iterations)
-        if iterations > 1 and rate > FASTEST_TRUSTED:  # otherwise the last iteration just confirmed
-            self.excess += iterations - self.usual
+        self.excess = max(0, self.excess + iterations - max(self.usual, 2) - TOLERATED)
         return state
 
 

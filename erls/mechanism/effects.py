@@ -37,6 +37,12 @@ def without(mechanism: Mechanism, off: Set[str]) -> Mechanism:
     )
 
 
+def with_rigid(mechanism: Mechanism, links: Set[str]) -> Mechanism:
+    """The mechanism with the links of these names rigid."""
+    rigid = {"flexibility"}
+    return replace(mechanism, links=tuple(_link_without(k, rigid) if k.name in links else k for k in mechanism.links))
+
+
 def present(mechanism: Mechanism) -> frozenset[str]:
     """Effects that are on and of which the mechanism holds anything; what turning and deformation add to inertia is
     taken to be there whenever a link is flexible.

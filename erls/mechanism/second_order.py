@@ -67,7 +67,7 @@ class LinkSecondOrder:
         pairs = q[6:][first] * q[6:][second] * np.where(first == second, 0.5, 1.0)
         place = np.searchsorted(field.nodes, nodes).clip(0, max(len(field.nodes) - 1, 0))
         result = np.zeros((len(nodes), 3))
-        known = field.nodes[place] == nodes
+        known = np.isin(nodes, field.nodes)
         result[known] = field.translation[place[known]] @ pairs
         u0, phi = (shape @ q for shape in _rigid_shape(model, start))
         arm = model.nodes[nodes] - model.nodes[start]
@@ -129,9 +129,7 @@ def _node(model: ModalModel, field: SecondOrder, node: int) -> Array:
     if len(place):
         pairs = pair_numbers(n)
         relative[0], relative[1] = field.translation[place[0]][:, pairs], field.rotation[place[0]][:, pairs]
-    return np.concatenate(
-        [composed(relative[0], moved, phi, arm), composed_rotation(relative[1], turned, phi)]
-    )
+    return np.concatenate([composed(relative[0], moved, phi, arm), composed_rotation(relative[1], turned, phi)])
 
 
 def _rigid(model: ModalModel) -> SecondOrder:

@@ -44,6 +44,8 @@ def has_kernels(system: NodalSystem) -> bool:
         return False
     if any(kinds.count(kind) > 1 for kind in (Beams, RigidBodies, NodalLoads)) or type(system.rows) is not JointRows:
         return False
+    if any(kind is Actuators for kind in kinds) and not hasattr(system, "actuators"):
+        return False  # it does not store joint coordinates, as `ChainSystem` of `erls.formulations.nodal.chain` does
     acting = [j for e in system.elements if isinstance(e, Actuators) for j in e.joints]
     return all(type(j.drive) is Drive and type(j.forces) is JointForces for j in acting)
 
@@ -75,9 +77,9 @@ class CompiledSystem:
         joints = len(system.rows.joints)
         loads = self._loads.loads if self._loads is not None else ()
         result = np.zeros((len(times), joints + len(loads) + 3 * len(self.model.actuators)))
-        for k, joint in enumerate(system.rows.joints):
-            if joint.motion is not None:
-                result[:, k] = [joint.motion(t)[0] for t in times.tolist()]
+        for k, tie in enumerate(system.rows.joints):
+            if tie.motion is not None:
+                result[:, k] = [tie.motion(t)[0] for t in times.tolist()]
         for k, load in enumerate(loads, joints):
             result[:, k] = [load.factor(t) for t in times.tolist()]
         column = joints + len(loads)
@@ -109,7 +111,8 @@ class CompiledSystem:
         poses = np.zeros((self.system.count, 4, 4))
         poses[:, :3, 3], poses[:, :3, :3] = state.poses[:, :3], state.poses[:, 3:].reshape(-1, 3, 3)
         poses[:, 3, 3] = 1.0
-        near, first = [], 0
+        near: list[Any] = []
+        first = 0
         for element, memory in zip(self.system.elements, self.system.start.memory, strict=True):
             if element is self._beams:
                 near.append(_Near(state.bent))
@@ -123,25 +126,21 @@ class CompiledSystem:
     def work(self) -> Work:
         """Memory for steps."""
         n, m, k = self.system.size, self.system.constraints, self.system.count
-        blocks = np.zeros((3, 12, 12))
-        return Work(
-            np.zeros((k, 12)),
-            np.zeros_like(self.model.beam_built),
-            np.zeros(len(self.model.actuators)),
-            *np.zeros((2, n)),
-            np.zeros(m),
-            *np.zeros((5, n)),
-            np.zeros(m),
-            *np.zeros((2, n + m)),
-            *blocks,
-            *np.zeros((2, 6, 12)),
-            np.zeros((m, 12)),
-            np.zeros((k, 3, 6, 6)),
-            np.zeros(n),
-            np.zeros((n + m, 3 * self.width + 1)),
-            np.zeros(n + m, dtype=np.int64),
-            *np.zeros((2, n + m)),
-        )
+        per_velocity = ("v", "a", "increment", "twist", "rate", "force", "reaction", "inertia")
+        shapes = {
+            "poses": (k, 12),
+            "bent": self.model.beam_built.shape,
+            "turned": (len(self.model.actuators),),
+            **dict.fromkeys(per_velocity, (n,)),
+            **dict.fromkeys(("multipliers", "violation"), (m,)),
+            **dict.fromkeys(("correction", "ordered", "left", "right"), (n + m,)),
+            **dict.fromkeys(("mass", "damping", "stiffness"), (12, 12)),
+            **dict.fromkeys(("rows", "shape"), (6, 12)),
+            "gradient": (m, 12),
+            "factors": (k, 3, 6, 6),
+            "band": (n + m, 3 * self.width + 1),
+        }
+        return Work(**{name: np.zeros(shape) for name, shape in shapes.items()}, pivots=np.zeros(n + m, dtype=np.int64))
 
     def _model(self) -> Model:
         system, rows = self.system, self.system.rows
@@ -152,21 +151,22 @@ class CompiledSystem:
         firsts = np.searchsorted(rows.joint_of_row, np.arange(len(rows.joints) + 1))
         order = np.argsort(self.places)
         return Model(
-            int(system.local),
-            gravity,
-            *_of_beams(self._beams),
-            *((bodies.nodes[:, 0].copy(), bodies.matrices) if bodies else (_none(int), np.zeros((0, 6, 6)))),
-            *_of_loads(self._loads),
-            *_of_actuators(self._actuators),
-            rows.nodes,
-            _pairs(*rows.frames),
-            driven,
-            signs,
-            firsts.astype(np.int64),
-            np.ascontiguousarray(np.concatenate([rows.c, rows.entries.reshape(-1, 9)], axis=1)),
-            metre_scales(system),
-            self.places,
-            order.astype(np.int64),
+            local=int(system.local),
+            gravity=gravity,
+            **_of_beams(self._beams),
+            body_nodes=bodies.nodes[:, 0].copy() if bodies else _none(int),
+            bodies=bodies.matrices if bodies else np.zeros((0, 6, 6)),
+            **_of_loads(self._loads),
+            **_of_actuators(self._actuators),
+            joint_nodes=rows.nodes,
+            joint_frames=_pairs(*rows.frames),
+            joint_driven=driven,
+            joint_sign=signs,
+            joint_rows=firsts.astype(np.int64),
+            conditions=np.ascontiguousarray(np.concatenate([rows.c, rows.entries.reshape(-1, 9)], axis=1)),
+            metres=metre_scales(system),
+            place=self.places,
+            order=order.astype(np.int64),
         )
 
 
@@ -200,23 +200,31 @@ def _pairs(first: Array, second: Array) -> Array:
     return np.ascontiguousarray(np.concatenate([_rows(first), _rows(second)], axis=-1).reshape(-1, 24))
 
 
-def _of_beams(beams: Beams | None) -> tuple[Any, ...]:
+def _of_beams(beams: Beams | None) -> dict[str, Any]:
     if beams is None:
-        return _none(int, 2), _none(float, 24), _none(float, 6), _none(float, 6, 6), _none(float, 6, 6), _none(int)
-    moving = np.array([m.any() for m in beams.inertia], dtype=np.int64)
-    frames = _pairs(beams.frames[:, 0], beams.frames[:, 1])
-    return beams.nodes, frames, beams.built, beams.stiffness, beams.inertia, moving
+        beams = Beams([], np.zeros((0, 4, 4)), np.zeros(3))
+    return {
+        "beam_nodes": beams.nodes,
+        "beam_frames": _pairs(beams.frames[:, 0], beams.frames[:, 1]),
+        "beam_built": beams.built,
+        "beam_stiffness": beams.stiffness,
+        "beam_inertia": beams.inertia,
+        "beam_moving": beams.inertia.any(axis=(1, 2)).astype(np.int64),
+    }
 
 
-def _of_loads(loads: NodalLoads | None) -> tuple[Any, ...]:
-    if loads is None:
-        return _none(int), _none(float, 6), _none(int)
-    wrenches = np.array([[*x.force, *x.moment] for x in loads.loads], dtype=float).reshape(-1, 6)
-    return loads.nodes[:, 0].copy(), wrenches, np.array([not x.follower for x in loads.loads], dtype=np.int64)
+def _of_loads(known: NodalLoads | None) -> dict[str, Any]:
+    loads = NodalLoads([]) if known is None else known
+    return {
+        "load_nodes": loads.nodes[:, 0].copy(),
+        "loads": np.array([[*x.force, *x.moment] for x in loads.loads], dtype=float).reshape(-1, 6),
+        "load_dead": np.array([not x.follower for x in loads.loads], dtype=np.int64),
+    }
 
 
-def _of_actuators(groups: Sequence[Actuators]) -> tuple[Any, ...]:
-    nodes, frames, along, active, laws = [], [], [], [], []
+def _of_actuators(groups: Sequence[Actuators]) -> dict[str, Any]:
+    nodes: list[list[int]] = []
+    frames, along, active, laws = [], [], [], []
     for group in groups:
         for k, joint in enumerate(group.joints):
             ends = group.nodes[k]
@@ -228,13 +236,13 @@ def _of_actuators(groups: Sequence[Actuators]) -> tuple[Any, ...]:
             gains = drive.gains if k in group.acting else (0.0, 0.0)
             law = (own.stiffness, own.rest, own.damping, own.friction, own.transition_rate, *gains, drive.torque_limit)
             laws.append([joint.rotor_inertia, *law])
-    integers = (np.array(x, dtype=np.int64) for x in (along, active))
-    return (
-        np.array(nodes, dtype=np.int64).reshape(-1, 2),
-        np.array(frames).reshape(-1, 24),
-        *integers,
-        np.array(laws, dtype=float).reshape(-1, 9),
-    )
+    return {
+        "actuator_nodes": np.array(nodes, dtype=np.int64).reshape(-1, 2),
+        "actuator_frames": np.array(frames, dtype=float).reshape(-1, 24),
+        "actuator_along": np.array(along, dtype=np.int64),
+        "actuator_active": np.array(active, dtype=np.int64),
+        "actuators": np.array(laws, dtype=float).reshape(-1, 9),
+    }
 
 
 def _order(system: NodalSystem) -> tuple[IntArray, int]:
@@ -249,7 +257,8 @@ def _order(system: NodalSystem) -> tuple[IntArray, int]:
     rows = np.concatenate([np.repeat(g, len(g)) for g in groups] or [_none(int)])
     columns = np.concatenate([np.tile(g, len(g)) for g in groups] or [_none(int)])
     graph = sp.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count + joints, count + joints))
-    sizes = np.concatenate([np.full(count, 6), np.bincount(system.rows.joint_of_row, minlength=joints)]).astype(np.int64)
+    of_joints = np.bincount(system.rows.joint_of_row, minlength=joints)
+    sizes = np.concatenate([np.full(count, 6), of_joints]).astype(np.int64)
     own = np.concatenate([[0], np.cumsum(sizes)])
     places = np.zeros(own[-1], dtype=np.int64)
     last = 0

@@ -79,6 +79,8 @@ class Joint:
         Prescribed coordinate of a revolute or prismatic joint.
     breakpoints : tuple
         Times at which its acceleration jumps.
+    left_out : frozenset of str
+        Names of conditions that other joints see to (`erls.nodal.redundant`).
 
     Raises
     ------
@@ -94,6 +96,7 @@ class Joint:
     outer_frame: Array = field(default_factory=lambda: np.eye(4))
     motion: Motion | None = None
     breakpoints: tuple[float, ...] = ()
+    left_out: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         where = f"joint {self.name!r}"
@@ -110,8 +113,9 @@ class Joint:
 
     @property
     def conditions(self) -> list[Condition]:
-        """Conditions of the type; all of them when the last freedom is prescribed."""
-        return CONDITIONS["fixed" if self.motion else self.type]
+        """Conditions of the type; all of them when the last freedom is prescribed; those left out aside."""
+        every = CONDITIONS["fixed" if self.motion else self.type]
+        return [c for c in every if c[0] not in self.left_out]
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,10 @@
 At a load parameter t, which loads and prescribed motions read as the time, forces balance: g(t, q) + Bᵀ λ = 0, Φ = 0.
 A load step that does not converge is halved. The tangent is
 
-- ``full``: the exact derivative, under trust control. Beams that turn far stretch on the way, and forces of that stretch
-  would then enter the derivative by their change of direction. Where the next correction with the same matrix is not
-  half as long (the natural monotonicity test of P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 3.3),
-  that part counts less, down to nothing; where it is much shorter, more again. The last steps are Newton's;
+- ``full``: the exact derivative, under trust control. Beams that turn far in one correction stretch as well, and the
+  forces of that stretch would spoil the next derivative by their change of direction. Where the next correction with
+  the same matrix would not be half as long (the natural monotonicity test of P. Deuflhard, Newton Methods for
+  Nonlinear Problems, 2004, sec. 3.3), one with the material tangent takes the stretch out; the last ones are Newton's;
 - ``material``: without the change of the directions of internal forces. It converges linearly, from farther away;
 - ``frozen``: the material tangent at the start of each load step, factored once for it. Slender beams in coarse meshes
   need many small load steps.
@@ -25,9 +25,7 @@ from erls.nodal.assembly import NodalSystem, Nodes
 
 TANGENTS = ("full", "material", "frozen")
 MAX_ITERATIONS = 60
-SHRINK, WELL = 0.5, 0.25  # of a correction: what the next one may be, and what is much shorter
-RETRY = 0.1  # of the correction with which the exact tangent failed
-LEAST_SHARE = 0.1  # of the part of the tangent that is not material
+SHRINK = 0.5  # of a correction: what the next one may be for the exact tangent to be trusted
 SMALLEST_STEP = 1e-4  # of the load parameter
 
 
@@ -43,8 +41,8 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class Statics:
-    """Equilibria in the order of load parameters, what they took, and why there are no more; ``cut_steps`` counts
-    corrections that were made again with less of the exact tangent.
+    """Equilibria in the order of load parameters, what they took, and why there are no more; ``cut_steps`` counts load
+    steps that had to be halved.
     """
 
     path: tuple[Equilibrium, ...]
@@ -107,7 +105,7 @@ def solve_statics(
             result = solver.balance(target, q, multipliers)
         used += solver.iterations
         if result is None:
-            step /= 2
+            step, solver.cuts = step / 2, solver.cuts + 1
             if step < SMALLEST_STEP * end:
                 failure = solver.failure(target)
                 break
@@ -136,35 +134,26 @@ class _Solver:
         """Equilibrium at ``t``, or None."""
         saddle: Saddle | None = None
         self.iterations = 0
-        share, failed = 1.0 if self.tangent == "full" else 0.0, np.inf
+        exact = self.tangent == "full"
         right = self.imbalance(t, q, multipliers)
         while self.iterations < MAX_ITERATIONS:
             if saddle is None or self.tangent != "frozen":
-                saddle = self.factor(t, q, multipliers, share)
+                saddle = self.factor(t, q, multipliers, exact)
             if saddle.singular is not None:
                 return None
+            self.iterations += 1
             correction = saddle.solve(saddle.scaled(*right))
-            size = float(np.linalg.norm(correction))
-            if not np.isfinite(size):
+            self.size = float(np.linalg.norm(correction))
+            if not np.isfinite(self.size):
                 return None
             move, change = saddle.unscaled(correction)
-            new_q, new_multipliers = self.system.compose(q, -move), multipliers - change
-            new_right = self.imbalance(t, new_q, new_multipliers)
-            if self.tangent == "full" and size > self.goal:
-                left = float(np.linalg.norm(saddle.solve(saddle.scaled(*new_right))))
-                if share and not left <= SHRINK * size:
-                    share, failed = share / 4 if share > LEAST_SHARE else 0.0, size
-                    self.cuts += 1
-                    continue
-                if left < WELL * size:
-                    share = min(1.0, max(4 * share, LEAST_SHARE))
-                elif not share and size < RETRY * failed:
-                    share = 1.0
-            self.iterations += 1
-            q, multipliers, right = new_q, new_multipliers, new_right
-            self.size = size
+            q, multipliers = self.system.compose(q, -move), multipliers - change
+            right = self.imbalance(t, q, multipliers)
             if float(np.abs(correction[: self.system.size]).max(initial=0.0)) <= self.goal:
                 return q, multipliers
+            if self.tangent == "full":
+                left = float(np.linalg.norm(saddle.solve(saddle.scaled(*right)))) / self.size
+                exact = left <= (SHRINK if exact else 1.0)
         return None
 
     def imbalance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Array, Array]:
@@ -172,14 +161,9 @@ class _Solver:
         forces = self.system.residual(t, q, self.rest, self.rest)
         return forces + self.system.constraint_matrix(t, q).T @ multipliers, self.system.constraint(t, q)
 
-    def factor(self, t: float, q: Nodes, multipliers: Array, share: float) -> Saddle:
-        """The tangent with a ``share`` of what is not material, in metres and units of its own stiffness."""
-        ends = [
-            weight * self.system.stiffness_and_damping(t, q, self.rest, self.rest, multipliers, material=material)[0]
-            for weight, material in ((share, False), (1 - share, True))
-            if weight
-        ]
-        stiffness = ends[0] if len(ends) == 1 else ends[0] + ends[1]
+    def factor(self, t: float, q: Nodes, multipliers: Array, exact: bool) -> Saddle:
+        """The exact or the material tangent, in metres and units of its own stiffness."""
+        stiffness, _ = self.system.stiffness_and_damping(t, q, self.rest, self.rest, multipliers, material=not exact)
         rows = self.system.constraint_matrix(t, q)
         self.factorizations += 1
         return Saddle(stiffness, rows.T, rows, Scales(self.metres, abs(stiffness), rows), 1.0)

@@ -56,5 +56,5 @@ def _work(name: str, w: dict[str, Any]) -> str:
     end = "" if w["converged"] else ", NOT converged"
     return (
         f"{name}: {w['iterations']} iterations in {w['load_steps']} load steps, {w['factorizations']} factorizations, "
-        f"{w['cut_steps']} corrections cut{end}"
+        f"{w['cut_steps']} load steps halved{end}"
     )

@@ -23,7 +23,8 @@ def effects_summary(found: Survey) -> dict[str, Any]:
                 "name": s.name,
                 "summary": EFFECTS[s.name].summary,
                 "present": s.present,
-                "auto": s.name not in found.off,
+                "link": s.link or None,
+                "auto": found.keeps(s),
                 "force": s.force,
                 "error": s.error,
                 "effort_error": s.effort_error,
@@ -39,10 +40,10 @@ def effects_text(found: Survey) -> str:
     """The table with a short explanation."""
     settings = found.scene.record.simulation
     drives = any(s.effort_error is not None for s in found.sizes)
-    header = ("effect", "auto", "force [N]", "error [m]", *(("drives",) if drives else ()), "time", "")
+    header = ("effect", "auto", "force [N]", "error [m]", *(("drives",) if drives else ()), "time")
     rows = [
         (
-            s.name,
+            s.name if not s.link else f"  of {s.link}",
             _state(s, found),
             *((f"{s.force:.2g}", f"{s.error:.2g}") if s.present else ("-", "-")),
             *((_percent(s.effort_error),) if drives else ()),
@@ -50,8 +51,11 @@ def effects_text(found: Survey) -> str:
         )
         for s in found.sizes
     ]
-    widths = [(*row, EFFECTS[row[0]].summary) for row in rows]
-    parts = [f"{found.scene.name} ({settings.formulation}): physical effects", _left(table(header, widths), header)]
+    lines = table(header, rows).split("\n")
+    summaries = ["", *("" if s.link else EFFECTS[s.name].summary for s in found.sizes)]
+    width = max(len(line) for line in lines)
+    shown = "\n".join(f"{a.ljust(width)}  {b}".rstrip() for a, b in zip(lines, summaries, strict=True))
+    parts = [f"{found.scene.name} ({settings.formulation}): physical effects", shown]
     if found.left:
         parts.append(f"not asked for by the scene: {', '.join(found.left)}")
     parts.append(
@@ -67,20 +71,8 @@ def effects_text(found: Survey) -> str:
 def _state(size: EffectSize, found: Survey) -> str:
     if not size.present:
         return "not there"
-    return "off" if size.name in found.off else "on"
+    return "on" if found.keeps(size) else "off"
 
 
 def _percent(value: float | None) -> str:
     return "-" if value is None else f"{100 * value:.2g} %"
-
-
-def _left(text: str, header: tuple[str, ...]) -> str:
-    """The last column aligned to the left."""
-    lines = text.split("\n")
-    width = max(len(line) for line in lines)
-    column = max(len(EFFECTS[name].summary) for name in EFFECTS if any(EFFECTS[name].summary in line for line in lines))
-    result = []
-    for line in lines:
-        line = line.ljust(width)
-        result.append((line[: width - column] + line[width - column :].strip()).rstrip())
-    return "\n".join(result)

@@ -104,7 +104,12 @@ def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
     )
     text += "\n\npoints: " + (", ".join(p.name for p in record.points) or "none")
     if record.loops:
-        joined = (f"{x.name} ({x.type}, {x.link} to {x.to_link or 'ground'})" for x in record.loops)
+        kinds = [msgspec.to_builtins(x.drive)["type"] for x in record.loops]
+        driven = ["" if kind == "free" else f", {kind}" for kind in kinds]
+        joined = (
+            f"{x.name} ({x.type}, {x.link} to {x.to_link or 'ground'}{kind})"
+            for x, kind in zip(record.loops, driven, strict=True)
+        )
         text += "\nloops: " + ", ".join(joined)
     text += "\nsimulation: " + ", ".join(f"{k} = {v}" for k, v in simulation.items() if v is not None)
     return {"file": "scene", "scene": scene.name, **msgspec.to_builtins(record)}, text

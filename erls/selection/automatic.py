@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Set
+from collections.abc import Callable
 from dataclasses import replace
 
 import msgspec
@@ -11,7 +11,7 @@ import msgspec
 from erls.effects import Certificate, in_order
 from erls.errors import Cause, SimulationError
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import present, without
+from erls.mechanism.effects import present
 from erls.run import Run
 from erls.scene import Scene
 from erls.selection.certify import certify
@@ -51,40 +51,41 @@ def automatic(
     spent = time.perf_counter() - begun
     for note in choice.notes:
         tell(note)
-    off = choice.off
     while True:
         try:
-            run = integrate(_named(scene, whole, off), without(whole, off))
+            run = integrate(_named(scene, whole, choice), choice.applied(whole))
         except SimulationError as problem:
-            if not off or problem.cause == Cause.INTERRUPTED:
+            if not (choice.off or choice.rigid) or problem.cause == Cause.INTERRUPTED:
                 raise
-            tell(f"effects: the run failed without {', '.join(in_order(off))} ({problem}); repeated with all")
-            off = frozenset()
+            tell(f"effects: the run failed without {', '.join(in_order(choice.off))} ({problem}); repeated with all")
+            choice = Choice(frozenset())
             continue
         begun = time.perf_counter()
-        certificate = _certified(run, whole, off)
+        certificate = _certified(run, whole, choice)
         spent += time.perf_counter() - begun
         if certificate.ok or not strict:
             break
-        off = _less(choice, off, certificate)
-        tell(f"effects: estimated error {certificate.error:.2g} m; repeated with {_on(whole, off)}")
+        choice = _less(choice, certificate)
+        tell(f"effects: estimated error {certificate.error:.2g} m; repeated with {_on(choice)}")
     warnings = run.warnings if certificate.ok else (*run.warnings, _warning(certificate))
     for text in warnings[len(run.warnings) :]:
         tell(f"warning: {text}")
     return replace(run, warnings=warnings, certificate=replace(certificate, wall_s=spent))
 
 
-def _named(scene: Scene, whole: Mechanism, off: Set[str]) -> Scene:
-    """The scene with the names of the effects that are on, so that a run file says what was computed."""
-    settings = msgspec.structs.replace(scene.record.simulation, effects=in_order(whole.effects - off))
-    return replace(scene, record=msgspec.structs.replace(scene.record, simulation=settings))
+def _named(scene: Scene, whole: Mechanism, choice: Choice) -> Scene:
+    """The scene with the names of what is on, so that a run file says what was computed."""
+    record = scene.record
+    settings = msgspec.structs.replace(record.simulation, effects=in_order(whole.effects - choice.off))
+    links = [msgspec.structs.replace(k, flexible=k.flexible and k.name not in choice.rigid) for k in record.links]
+    return replace(scene, record=msgspec.structs.replace(record, simulation=settings, links=links))
 
 
-def _certified(run: Run, whole: Mechanism, off: Set[str]) -> Certificate:
+def _certified(run: Run, whole: Mechanism, choice: Choice) -> Certificate:
     """The certificate; infinite where the error cannot be followed."""
     settings = run.scene.record.simulation
     tolerances = settings.effects_tolerance, settings.effects_effort_tolerance
-    if off.isdisjoint(present(whole)):
+    if not choice.rigid and choice.off.isdisjoint(present(whole)):
         return Certificate(0.0, None, *tolerances)
     try:
         return certify(run, whole)
@@ -94,20 +95,20 @@ def _certified(run: Run, whole: Mechanism, off: Set[str]) -> Certificate:
         return Certificate(float("inf"), None, *tolerances)
 
 
-def _less(choice: Choice, off: Set[str], certificate: Certificate) -> frozenset[str]:
-    """Fewer effects to leave out: those whose estimates, scaled to what was found, stay far below the tolerance."""
+def _less(choice: Choice, certificate: Certificate) -> Choice:
+    """A choice to leave out less: what by its estimate, scaled to what was found, stays far below the tolerance."""
     estimates = choice.estimates
-    together = sum(estimates[name] for name in off & estimates.keys())
+    together = sum(estimates.values())
     scale = certificate.error / together if together else float("inf")
     bad_effort = (certificate.effort_error or 0.0) > certificate.effort_tolerance
-    if "flexibility" in off or bad_effort or not scale < float("inf"):
-        return frozenset()
-    kept = [n for n in off if estimates.get(n, 0.0) * scale <= _KEPT * certificate.tolerance]
-    return frozenset(kept) if len(kept) < len(off) else frozenset()
+    if choice.rigid or "flexibility" in choice.off or bad_effort or not scale < float("inf"):
+        return Choice(frozenset())
+    kept = frozenset(n for n in choice.off if estimates.get(n, 0.0) * scale <= _KEPT * certificate.tolerance)
+    return replace(choice, off=kept if len(kept) < len(choice.off) else frozenset())
 
 
-def _on(whole: Mechanism, off: Set[str]) -> str:
-    return f"all but {', '.join(in_order(off))}" if off else "all effects"
+def _on(choice: Choice) -> str:
+    return f"all but {', '.join(in_order(choice.off))}" if choice.off else "all effects"
 
 
 def _warning(certificate: Certificate) -> str:

@@ -10,6 +10,7 @@ from erls.formulations.substructures import solved
 from erls.integrators.base import Array, hermite
 from erls.mechanism.chain import Mechanism
 from erls.run import Run
+from erls.selection.coordinates import embedded, kept_places
 from erls.selection.error_motion import Knots, error_motion
 from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
 from erls.selection.quick import quick
@@ -35,33 +36,30 @@ def certify(run: Run, whole: Mechanism) -> Certificate:
     settings = run.scene.record.simulation
     formulation = formulate(whole, settings)
     system, reduced = quick(solved(formulation)), quick(solved(run.formulation))
-    kept = reduced.size  # coordinates of elastic modes, where only the whole has them, come last
+    kept = kept_places(whole, run.formulation.mechanism, system.size)
 
-    def embedded(values: Array) -> Array:
-        result = np.zeros((*values.shape[:-1], system.size))
-        result[..., :kept] = values
-        return result
+    def widened(values: Array) -> Array:
+        return embedded(values, kept, system.size)
 
     def balance(t: float, y: Array, v: Array, a: Array) -> Array:
-        return embedded(reduced.residual(t, y[:kept], v[:kept], a[:kept]))
+        return widened(reduced.residual(t, y[kept], v[kept], a[kept]))
 
-    legs = _legs(run)
+    legs = [Knots(k.t, widened(k.y), widened(k.v), widened(k.a)) for k in _legs(run)]
     begin, begun = formulation.initial_state(), run.formulation.initial_state()
-    start = (begin[0] - embedded(begun[0]), begin[1] - embedded(begun[1]))
-    embedded_legs = [Knots(k.t, embedded(k.y), embedded(k.v), embedded(k.a)) for k in legs]
+    start = (begin[0] - widened(begun[0]), begin[1] - widened(begun[1]))
     stride = max(1, round(sum(len(k.t) for k in legs) / STEPS))
-    found = error_motion(system, embedded_legs, start, balance, stride, 1e-2 * settings.effects_tolerance)
+    found = error_motion(system, legs, start, balance, stride, 1e-2 * settings.effects_tolerance)
     watched = watched_nodes(whole)
     ours = Outputs(run.scene, run.formulation, watched)
     others = Outputs(run.scene, formulation, watched)
     places = [found[k] for k in np.unique(np.linspace(0, len(found) - 1, _PLACES).astype(int))]
-    here = [ours.positions(run.formulation.state(d.t, d.y[:kept], d.v[:kept])) for d in places]
+    here = [ours.positions(run.formulation.state(d.t, d.y[kept], d.v[kept])) for d in places]
     there = [others.positions(formulation.state(d.t, d.other_y, d.other_v)) for d in places]
     efforts: tuple[list[Array], list[Array]] = ([], [])
     if ours.driven:
         for d in found[:: max(1, len(found) // _EFFORTS)]:
             efforts[0].append(others.efforts(d.t, d.other_y, d.other_v))
-            efforts[1].append(ours.efforts(d.t, d.y[:kept], d.v[:kept]))
+            efforts[1].append(ours.efforts(d.t, d.y[kept], d.v[kept]))
     return Certificate(
         largest_distance(here, there),
         effort_error(*efforts),

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from erls.effects import EFFECTS, in_order
 from erls.errors import SimulationError
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.effects import with_rigid, without
 from erls.mechanism.substructures import is_split
 from erls.scene import Scene
-from erls.selection.probe import EffectSize, effect_sizes, of_links
+from erls.selection.probe import EffectSize, effect_sizes
 
 BUDGET = 0.3  # of the tolerance: what a coarse run may overlook is in the rest
 
@@ -23,6 +24,8 @@ class Choice:
     ----------
     off : frozenset of str
         Effects to leave out.
+    rigid : frozenset of str
+        Links to make rigid.
     sizes : tuple of EffectSize
         Of all effects that were considered.
     notes : tuple of str
@@ -30,13 +33,18 @@ class Choice:
     """
 
     off: frozenset[str]
-    sizes: tuple[EffectSize, ...]
+    sizes: tuple[EffectSize, ...] = ()
     notes: tuple[str, ...] = ()
+    rigid: frozenset[str] = frozenset()
 
     @property
     def estimates(self) -> dict[str, float]:
         """Estimated error of each effect that is left out [m]."""
-        return {s.name: s.error for s in self.sizes if s.name in self.off}
+        return {s.name: s.error for s in self.sizes if s.name in self.off and not s.link}
+
+    def applied(self, whole: Mechanism) -> Mechanism:
+        """The mechanism with what was decided."""
+        return with_rigid(without(whole, self.off), self.rigid)
 
 
 def candidates(mechanism: Mechanism, formulation: str) -> list[str]:
@@ -60,36 +68,51 @@ def choose_effects(scene: Scene, mechanism: Mechanism) -> Choice:
     settings = scene.record.simulation
     names = candidates(mechanism, settings.formulation)
     if not names:
-        return Choice(frozenset(), (), (f"effects: auto leaves nothing out of {settings.formulation!r}",))
+        return Choice(frozenset(), notes=(f"effects: auto leaves nothing out of {settings.formulation!r}",))
     try:
         sizes = effect_sizes(scene, mechanism, names)
     except SimulationError as problem:
-        return Choice(frozenset(), (), (f"effects: auto leaves nothing out, the coarse run failed ({problem})",))
-    off = affordable(sizes, settings.effects_tolerance, settings.effects_effort_tolerance)
-    return Choice(off, sizes, (_told(sizes, off, settings.effects_tolerance),))
+        return Choice(frozenset(), notes=(f"effects: auto leaves nothing out, the coarse run failed ({problem})",))
+    off, rigid = affordable(sizes, settings.effects_tolerance, settings.effects_effort_tolerance)
+    return Choice(off, sizes, (_told(sizes, off, rigid, settings.effects_tolerance),), rigid)
 
 
-def affordable(sizes: Iterable[EffectSize], tolerance: float, effort_tolerance: float) -> frozenset[str]:
-    """Effects whose errors add up to no more than a share of the tolerance; of rigid links, all that deforms them."""
-    sizes = tuple(sizes)
-    room, effort_room = BUDGET * tolerance, BUDGET * effort_tolerance
-    for s in sizes:
-        if s.name == "flexibility" and s.error <= room and (s.effort_error or 0.0) <= effort_room:
-            return frozenset(n for n in EFFECTS if of_links(n))
-    off = []
-    for s in sorted(sizes, key=lambda s: s.error):
-        if s.name == "flexibility" or s.error > room or (s.effort_error or 0.0) > effort_room:
-            continue
-        room, effort_room = room - s.error, effort_room - (s.effort_error or 0.0)
-        off.append(s.name)
-    return frozenset(off)
+def affordable(
+    sizes: Iterable[EffectSize], tolerance: float, effort_tolerance: float
+) -> tuple[frozenset[str], frozenset[str]]:
+    """Effects, and links to make rigid, whose errors add up to no more than a share of the tolerance.
+
+    Flexibility comes first, since it costs most: that of all links, with all that acts on their deformation, or that of
+    single links. Then the other effects follow, smallest first.
+    """
+    room = _Room(BUDGET * tolerance, BUDGET * effort_tolerance)
+    ordered = sorted(sizes, key=lambda s: s.error)
+    if any(s.name == "flexibility" and not s.link and room.take(s) for s in ordered):
+        return frozenset(n for n in EFFECTS if n == "flexibility" or EFFECTS[n].of_links), frozenset()
+    rigid = frozenset(s.link for s in ordered if s.link and room.take(s))
+    return frozenset(s.name for s in ordered if s.name != "flexibility" and room.take(s)), rigid
 
 
-def _told(sizes: tuple[EffectSize, ...], off: frozenset[str], tolerance: float) -> str:
-    if not off:
-        return "effects: auto leaves nothing out"
-    gone = [s for s in sizes if s.name in off and s.present]
-    if any(s.name == "flexibility" for s in gone):
-        gone = [s for s in gone if s.name == "flexibility"]
-    parts = ", ".join(f"{s.name} ({s.error:.2g} m)" for s in gone) or "what the scene does not hold"
+class _Room:
+    """What is left of the tolerances."""
+
+    def __init__(self, error: float, effort_error: float) -> None:
+        self.error, self.effort_error = error, effort_error
+
+    def take(self, size: EffectSize) -> bool:
+        """Whether there is room; takes it if so."""
+        effort = size.effort_error or 0.0
+        if size.error > self.error or effort > self.effort_error:
+            return False
+        self.error, self.effort_error = self.error - size.error, self.effort_error - effort
+        return True
+
+
+def _told(sizes: tuple[EffectSize, ...], off: frozenset[str], rigid: frozenset[str], tolerance: float) -> str:
+    gone = [s for s in sizes if s.present and (s.link in rigid if s.link else s.name in off)]
+    if any(s.name == "flexibility" and not s.link for s in gone):
+        gone = [s for s in gone if s.name == "flexibility" and not s.link]
+    if not gone:
+        return "effects: auto leaves nothing out that the scene holds"
+    parts = ", ".join(f"{s.name}{f' of {s.link!r}' if s.link else ''} ({s.error:.2g} m)" for s in gone)
     return f"effects: auto leaves out {parts}; tolerance {tolerance:.2g} m"

@@ -14,16 +14,18 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from erls.effects import EFFECTS, in_order
+from erls.effects import in_order
 from erls.errors import Cause
 from erls.formulations import formulate, integrator
 from erls.formulations.substructures import solved
-from erls.integrators.base import Array, Options
+from erls.integrators.base import Array, Options, hermite
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import present, without
+from erls.mechanism.effects import present, with_rigid, without
 from erls.mechanism.links import link_mass_properties
+from erls.mechanism.substructures import is_split
 from erls.run import Run
 from erls.scene import Scene
+from erls.selection.coordinates import kept_places
 from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
 from erls.selection.quick import quick
 
@@ -51,6 +53,8 @@ class EffectSize:
         Largest difference of drive forces without it, relative to their peak; None where no drive reacts.
     share : float or None
         Part of the time of an evaluation of the equations of motion that leaving it out saves; None unless measured.
+    link : str
+        Of ``flexibility``: the one link that it is about; empty for all of them.
     """
 
     name: str
@@ -59,12 +63,13 @@ class EffectSize:
     error: float = 0.0
     effort_error: float | None = None
     share: float | None = None
+    link: str = ""
 
 
 def effect_sizes(
     scene: Scene, mechanism: Mechanism, names: Iterable[str], measure: bool = False
 ) -> tuple[EffectSize, ...]:
-    """Sizes of effects in a scene.
+    """Sizes of effects in a scene; flexibility also link by link, where several are flexible.
 
     Parameters
     ----------
@@ -90,17 +95,25 @@ def effect_sizes(
         if name not in there:
             result.append(EffectSize(name, False))
             continue
-        less = without(mechanism, {name})
-        run = coarse_run(scene, less)
-        share = _share(whole, run) if measure else None
-        force = _force(whole, run)
-        if run.failure is not None:
-            result.append(EffectSize(name, True, force, np.inf, None, share))
-            continue
-        found = _Curves(scene, run)
-        distance = largest_distance(expected.positions, found.positions)
-        result.append(EffectSize(name, True, force, distance, effort_error(expected.efforts, found.efforts), share))
+        cuts = [("", without(mechanism, {name}))]
+        if name == "flexibility":
+            cuts += [(link, with_rigid(mechanism, {link})) for link in flexible_links(mechanism)]
+        for link, less in cuts:
+            run = coarse_run(scene, less)
+            share = _share(whole, run) if measure else None
+            force, error, effort = _force(whole, run), np.inf, None
+            if run.failure is None:
+                found = _Curves(scene, run)
+                error = largest_distance(expected.positions, found.positions)
+                effort = effort_error(expected.efforts, found.efforts)
+            result.append(EffectSize(name, True, force, float(error), effort, share, link))
     return tuple(result)
+
+
+def flexible_links(mechanism: Mechanism) -> list[str]:
+    """Links that may be made rigid alone: the flexible ones of several, none of which is split."""
+    names = [link.name for link in mechanism.links if link.elastic_modes]
+    return names if len(names) > 1 and not is_split(mechanism) else []
 
 
 def coarse_run(scene: Scene, mechanism: Mechanism) -> Run:
@@ -127,8 +140,9 @@ class _Curves:
         self.positions = [outputs.positions(state) for state in run.states(times)]
         self.efforts: list[Array] = []
         if outputs.driven:
-            names = run.joint_names
-            self.efforts = list(np.array([run.joint_effort(names[k], times[1::3]) for k in outputs.driven]).T)
+            at, s = times[2::4], run.solution
+            states = zip(at.tolist(), *hermite(s.t, s.y, s.v, s.a, at), strict=True)
+            self.efforts = [outputs.efforts(*state) for state in states]
 
 
 def _force(whole: Run, less: Run) -> float:
@@ -141,16 +155,18 @@ def _force(whole: Run, less: Run) -> float:
     if not hasattr(system, "residual") or not system.size:
         return 0.0
     mass = sum(link_mass_properties(link).mass for link in whole.formulation.mechanism.links)
-    s, rigid = whole.solution, other.size
+    s = whole.solution
+    kept = kept_places(whole.formulation.mechanism, less.formulation.mechanism, system.size)
+    rigid = np.setdiff1d(np.arange(system.size), kept)
     largest = 0.0
     for k in np.unique(np.linspace(1, len(s.t) - 1, _FORCES).astype(int)):
         t, y, v, a = float(s.t[k]), s.y[k].copy(), s.v[k].copy(), s.a[k].copy()
-        if rigid == system.size:
-            force = system.residual(t, y, v, a) - other.residual(t, y, v, a)
-        else:
-            y[rigid:], v[rigid:], a[rigid:] = 0.0, 0.0, 0.0
+        if len(rigid):
+            y[rigid], v[rigid], a[rigid] = 0.0, 0.0, 0.0
             force = system.residual(t, y, v, a)
-            force[:rigid] = 0.0
+            force[kept] = 0.0
+        else:
+            force = system.residual(t, y, v, a) - other.residual(t, y, v, a)
         largest = max(largest, float(force @ np.linalg.solve(system.mass_matrix(t, y), force)))
     return float(np.sqrt(max(mass, 0.0) * largest))
 
@@ -170,10 +186,3 @@ def _share(whole: Run, less: Run) -> float:
                 system.residual(t, y, v, a)
             best[k] = min(best[k], time.perf_counter() - begun)
     return max(0.0, 1 - best[1] / best[0])
-
-
-def of_links(name: str) -> bool:
-    """Whether an effect is nothing while links are rigid, flexibility itself included."""
-    return name == "flexibility" or EFFECTS[name].of_links
-
-

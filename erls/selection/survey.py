@@ -22,13 +22,18 @@ class Survey:
     scene : Scene
     sizes : tuple of EffectSize
         Of the effects that the scene asks for.
-    off : frozenset of str
-        What ``auto`` would leave out of these.
+    off, rigid : frozenset of str
+        What ``auto`` would leave out of these, and the links that it would make rigid.
     """
 
     scene: Scene
     sizes: tuple[EffectSize, ...]
     off: frozenset[str]
+    rigid: frozenset[str]
+
+    def keeps(self, size: EffectSize) -> bool:
+        """Whether ``auto`` would keep an effect."""
+        return size.link not in self.rigid if size.link else size.name not in self.off
 
     @property
     def left(self) -> list[str]:
@@ -51,7 +56,7 @@ def survey(path: Path | str, overrides: Iterable[str] = (), tell: Callable[[str]
     sizes = effect_sizes(scene, mechanism, in_order(mechanism.effects), measure=True)
     settings = scene.record.simulation
     possible = set(candidates(mechanism, settings.formulation))
-    chosen = affordable(
+    off, rigid = affordable(
         [s for s in sizes if s.name in possible], settings.effects_tolerance, settings.effects_effort_tolerance
     )
-    return Survey(scene, sizes, chosen)
+    return Survey(scene, sizes, off, rigid)

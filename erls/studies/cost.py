@@ -345,7 +345,7 @@ def _ladders(scene: Scene, grid: Grid, tolerance: float, most: int) -> list[tupl
 
 
 def _default_integrators(scene: Scene) -> tuple[str, ...]:
-    own = [name for name in INTEGRATORS if name not in _SCIPY]
+    own = [name for name in INTEGRATORS if name not in (*_SCIPY, "auto")]
     return (*own, "dop853")
 
 

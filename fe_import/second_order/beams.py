@@ -114,11 +114,12 @@ def line_fields(beams: BeamLines, element: int, ends: Array) -> LineFields:
         nodal = np.stack([local[0, across], sign * local[1, about], local[2, across], sign * local[3, about]])
         deflection, slope = bending_shapes(POINTS, length, phi)
         bend, drop = _slopes(POINTS, length, phi)
-        u[:, across], turned = deflection @ nodal, slope @ nodal
-        theta[:, about], curvature[:, about] = sign * turned, sign * (bend @ nodal)
-        strain[:, across] = drop @ nodal - turned
+        u[:, across], turn = deflection @ nodal, slope @ nodal
+        theta[:, about], curvature[:, about] = sign * turn, sign * (bend @ nodal)
+        strain[:, across] = drop @ nodal - turn
     back = axes.T
-    return LineFields(*(np.einsum("ij,pjm->pim", back, f) for f in (u, theta, curvature, strain)), axes[0])
+    turned = [np.asarray(np.einsum("ij,pjm->pim", back, f)) for f in (u, theta, curvature, strain)]
+    return LineFields(turned[0], turned[1], turned[2], turned[3], axes[0])
 
 
 def _slopes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:

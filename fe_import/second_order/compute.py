@@ -9,6 +9,7 @@ from fe_import.second_order.data import SecondOrder
 from fe_import.second_order.frame import frame_second_order
 
 MOST_MODES = 64  # elastic; the field has as many columns as pairs of them
+MOST_MODES_OF_SOLIDS = 24  # 300 systems of equations
 _STORED_VALUES = 1_000_000  # of the fields of nodes: 8 MB
 
 
@@ -27,6 +28,19 @@ def second_order(model: FEModel, shapes: Array, reference: int) -> tuple[SecondO
     count = shapes.shape[1] - 6
     if count > MOST_MODES:
         return None, f"not available: more than {MOST_MODES} elastic modes; keep fewer (reduction.elastic_modes)"
+    if model.kind == "solid":
+        if count > MOST_MODES_OF_SOLIDS:
+            return None, (
+                f"not available: more than {MOST_MODES_OF_SOLIDS} elastic modes of a solid; keep fewer "
+                "(reduction.elastic_modes)"
+            )
+        from fe_import.elements.solid_stress import SolidStress  # scikit-fem is heavy
+        from fe_import.second_order.solid import solid_second_order
+
+        assert isinstance(model.stress, SolidStress)
+        return solid_second_order(
+            model, model.stress, shapes, reference, _named_nodes(model)
+        ), "from its solid elements"
     if model.beams is not None:
         if not model.beams.is_tree:
             return None, (
@@ -44,5 +58,9 @@ def _stored_nodes(model: FEModel, elastic_modes: int) -> IntArray:
     per_node = 3 * elastic_modes * (elastic_modes + 1)
     if per_node * len(model.nodes) <= _STORED_VALUES:
         return np.arange(len(model.nodes), dtype=np.int64)
+    return _named_nodes(model)
+
+
+def _named_nodes(model: FEModel) -> IntArray:
     named = [node for name, node in model.node_names.items() if "/" not in name]
     return np.unique(np.array([*(i.node for i in model.interface_nodes), *named], dtype=np.int64))

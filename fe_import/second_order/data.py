@@ -47,11 +47,11 @@ class SecondOrder:
         number = pair_numbers(self.momentum.shape[1] - 6)
         first, second = np.triu_indices(len(elastic))
         pairs = number[elastic[first], elastic[second]]
-        every = np.ix_(modes, modes)
+        rows, columns = np.ix_(modes, modes)
         return replace(
             self,
-            momentum=np.ascontiguousarray(self.momentum[:, *every]),
-            spin=np.ascontiguousarray(self.spin[:, :, *every]),
+            momentum=np.ascontiguousarray(self.momentum[:, rows, columns]),
+            spin=np.ascontiguousarray(self.spin[:, :, rows, columns]),
             translation=np.ascontiguousarray(self.translation[:, :, pairs]),
             rotation=np.ascontiguousarray(self.rotation[:, :, pairs]),
         )

@@ -36,10 +36,10 @@ def five_bar(first: dict[str, Any], closing: dict[str, Any], *, from_right: bool
 
     The chain goes from the left motor to the right one, or the other way.
     """
-    elbows = (-97.0, -75.0, -98.0)
-    guess, start, end = (45.0, 98.0, 75.0, 97.0), GROUND, 0.0
-    if not from_right:
-        guess, start, end = (135.0, *elbows), 0.0, GROUND
+    up = float(np.degrees(np.arccos((GROUND / 2 + INNER * np.cos(np.pi / 4)) / OUTER)))  # of the left outer arm
+    guess, start, end = (135.0, up - 135.0, -2 * up, up - 135.0), 0.0, GROUND
+    if from_right:
+        guess, start, end = (45.0, 135.0 - up, 2 * up, 135.0 - up), GROUND, 0.0
     masses = (0.3, 0.2, 0.25, 0.35)
     names = NAMES[::-1] if from_right else NAMES
     starts = zip(LENGTHS, guess, strict=True)
@@ -112,7 +112,7 @@ def _work(run: Run, *joints: str) -> float:
     nodes, weights = np.polynomial.legendre.leggauss(24)
     t = run.end * (nodes + 1) / 2
     closing = float(weights @ (run.loop_effort("motor", t) * run.loop_rate("motor", t))) * run.end / 2
-    return closing + loop_scenes.work(run, *joints)
+    return closing + (loop_scenes.work(run, *joints) if joints else 0.0)
 
 
 @pytest.mark.parametrize("name", ["erls", "ffr"])
@@ -244,24 +244,26 @@ def test_a_driven_slider_turns_the_crank(tmp_path: Path) -> None:
 
 
 def test_force_and_damper_on_a_slider(tmp_path: Path) -> None:
-    """Work of a force, a spring and a damper along the guide is the energy of the linkage, 1e-8 J; rtol 1e-10.
+    """Work of a force, a spring and a damper along the guide is kinetic and gravity energy, 1e-8 J; rtol 1e-10.
 
     ``coordinate`` moves the zero: the spring rests where the slider begins.
     """
-    acting = {"drive": burst(5.0, 5.0), "stiffness": 20.0, "damping": 3.0, "motor": {"rotor_inertia": 0.2}, "coordinate": 0.0}
-    run = loop_scenes.run(tmp_path, _slider(**acting), integrator="dop853", duration=0.15, rtol=1e-10, atol=1e-12)
+    acting = {"drive": burst(5.0, 5.0), "stiffness": 20.0, "damping": 3.0, "motor": {"rotor_inertia": 0.2}}
+    settings = {"integrator": "dop853", "duration": 0.15, "rtol": 1e-10, "atol": 1e-12}
+    run = loop_scenes.run(tmp_path, _slider(**acting, coordinate=0.0), **settings)
     assert float(run.loop_coordinate("motor", 0.0)) == pytest.approx(0.0, abs=0.1)  # the chain's guess is not closed
-    energy = run.energy([0.0, run.end]).total
+    found = run.energy([0.0, run.end])
+    energy = found.total - found.springs
     assert abs(_work(run) - (energy[1] - energy[0])) < 1e-8
     assert abs(energy[1] - energy[0]) > 1e-2
 
 
 def test_formulations_agree_to_second_order(tmp_path: Path) -> None:
     """Shipped robot, slower, static start: twice the stiffness quarters the distance of ERLS and FFR, within 5 %."""
-    t = np.array([0.0, 0.05, 0.1])
+    t = np.array([0.0, 0.03])
     distances, deflections = [], []
     path = scenes.ROOT / "data/five_bar"
-    for softness in (2.0, 1.0):
+    for softness in (1.0, 0.5):
         (tmp_path / "links").mkdir(exist_ok=True)
         for link in ("inner", "outer"):
             text = (path / f"links/{link}.toml").read_text(encoding="utf-8")
@@ -272,7 +274,7 @@ def test_formulations_agree_to_second_order(tmp_path: Path) -> None:
         shutil.copy(path / "parallel_robot.toml", tmp_path / "robot.toml")
         runs = []
         for name, rigid in (("erls", False), ("ffr", False), ("erls", True)):
-            changes = ["simulation.duration=0.1", "simulation.step=5e-3", f"simulation.formulation={name}"]
+            changes = ["simulation.duration=0.03", "simulation.step=5e-3", f"simulation.formulation={name}"]
             changes += ["joints.left_motor.drive.motion.duration=2.0", "loops.right_motor.drive.motion.duration=2.0"]
             changes += [f"links.{link}.flexible=false" for link in NAMES if rigid]
             runs.append(simulate(load_scene(tmp_path / "robot.toml", changes)).position("hand", t))
@@ -286,7 +288,7 @@ def test_formulations_agree_to_second_order(tmp_path: Path) -> None:
     ("changes", "where", "words"),
     [
         ({"type": "spherical"}, "coordinate_deg", "no single coordinate"),
-        ({"type": "planar", "axis": [0.0, 1.0, 0.0], "coordinate_deg": None, "stiffness": 1.0}, "stiffness", "no single"),
+        ({"type": "planar", "axis": [0.0, 1.0, 0.0], "coordinate_deg": None, "damping": 1.0}, "damping", "no single"),
         ({"coordinate": 0.5}, "coordinate", "both coordinate and coordinate_deg"),
         ({"stiffness": -1.0}, "stiffness", "negative"),
         ({"motor": {"rotor_inertia": -1.0}}, "motor.rotor_inertia", "negative"),
@@ -309,9 +311,8 @@ def test_what_cannot_act_is_refused(tmp_path: Path, changes: dict[str, Any], whe
 
 def test_jumps_of_a_closing_motion_are_told(tmp_path: Path) -> None:
     """As for any other joint."""
-    jump = {"shape": "polynomial", "from_deg": 45.0, "to_deg": 46.0, "duration": 0.004, "degree": 3}
-    table = {"shape": "table", "times": [0.0, 0.01, 0.03], "values_deg": [45.0, 45.0, 46.0], "rates_deg": [0.0, 0.0]}
-    for motion, told in ((jump, False), (table, True)):
+    sine = {"shape": "sine", "amplitude_deg": 2.0, "frequency_hz": 1.0, "offset_deg": 45.0}
+    for motion, told in ((sine | {"start": 0.005}, True), (sine | {"start": 0.5}, False)):
         data = five_bar({"drive": move(LEFT)}, {"drive": {"type": "motion", "motion": motion}})
         run = loop_scenes.run(tmp_path, data, duration=0.02)
         assert any("loop 'motor': the prescribed rate jumps" in w for w in run.warnings) == told

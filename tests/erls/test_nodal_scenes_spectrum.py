@@ -124,7 +124,7 @@ def test_a_buckled_column_vibrates(tmp_path: Path) -> None:
     bent["loads"][0]["factor"] = press
     bent["loads"].append({"node": "c/8", "force": [0.0, 0.0, 0.02 * EULER], "factor": push})
     found = _found(tmp_path, {**bent, "report": ["c/8"]})
-    assert found.position("c/8")[2] > 0.05
+    assert found.position("c/8")[2] > 0.1
     assert growth < 0
     assert found.modes[0]["frequency_hz"] == pytest.approx(-np.sqrt(2) * growth, rel=0.03)
 

@@ -6,9 +6,9 @@ Beside the blocks of T = ½ νᵀ M ν + νᵀ C η̇ + ½ η̇ᵀ M_e η̇ the 
     C₂(η) = [S_ab η; ηᵀ P],   H(η) = [0, -S̃; 0, ½ ηᵀ W η],   S = ½ ηᵀ S_ab η
 
 (O. Wallrapp and R. Schwertassek, Int. J. Numer. Methods Eng. 32 (1991) 1833-1850). Added to C and M as C₂ and H + Hᵀ
-they could make the mass matrix indefinite where elastic motion cancels that of the frame. The frame's twist is corrected
-instead, ν' = ν + M₀⁻¹ (C₂ η̇ + H ν), which gives the same to second order in η and stays positive. The forces on η and
-on the frame are those of Lagrange and of Boltzmann and Hamel in the uncorrected twist.
+they could make the mass matrix indefinite where elastic motion cancels that of the frame. The frame's twist is
+corrected instead, ν' = ν + M₀⁻¹ (C₂ η̇ + H ν), which gives the same to second order in η and stays positive. The forces
+on η and on the frame are those of Lagrange and of Boltzmann and Hamel in the uncorrected twist.
 """
 
 from __future__ import annotations
@@ -57,9 +57,7 @@ class SecondOrderData(StandardData):
         block_rate = self._block(coupling[:3] @ rate, spin @ rate)
         corrected = twist + self._per_mass @ (coupling @ rate + block @ twist)
         added = coupling @ acceleration + coupling_rate @ rate + block @ twist_rate + block_rate @ twist
-        wrench, elastic = self.linear.forces(
-            corrected, twist_rate + self._per_mass @ added, eta, rate, acceleration
-        )
+        wrench, elastic = self.linear.forces(corrected, twist_rate + self._per_mass @ added, eta, rate, acceleration)
         momentum = self.linear.momentum(corrected, eta, rate)
         change = wrench + twist_cross(corrected).T @ momentum  # d/dt of the momentum: ad* = -adᵀ
         carried, carried_rate = self._per_mass @ momentum, self._per_mass @ change

@@ -153,8 +153,9 @@ class Settings(NamedTuple):
         γ', β', and h √(β · share).
     tolerance, rounding, reach, balance : float
         Newton iterations end with an error below these [m] or a residual below ``balance`` times its terms.
-    slowest, fastest, patience : float
-        Bounds on a rate of convergence carried over from earlier steps; cost of a fresh matrix in iterations.
+    slowest, fastest, patience, tolerated : float
+        Bounds on a rate of convergence carried over from earlier steps; cost of a fresh matrix in iterations;
+        iterations beyond the fewest that do not call for one.
     error_limit, error_factor, growth : float
         Largest local error [m], 0 for no limit; what turns |v̇₁ − v̇₀| into it; ratio of steps worth a change.
     mode, iterations : int
@@ -179,6 +180,7 @@ class Settings(NamedTuple):
     slowest: float
     fastest: float
     patience: float
+    tolerated: float
     error_limit: float
     error_factor: float
     growth: float
@@ -226,7 +228,7 @@ if ENABLED:
         (*_tried, *(_r1,) * 7, *(_r2,) * 5, _r2, _r4, _r1, _r2, _i1, _r1, _r1), Work
     )
     KNOTS = _t.NamedTuple((_r3, _r2, _r2), Knots)
-    SETTINGS = _t.NamedTuple((*(_t.float64,) * 19, *(_t.int64,) * 3), Settings)
+    SETTINGS = _t.NamedTuple((*(_t.float64,) * 20, *(_t.int64,) * 3), Settings)
     PROGRESS = _t.NamedTuple((_r1, _i1), Progress)
     FORCES = _t.void(MODEL, WORK, STATE, _r1)
     FACTOR = _t.int64(MODEL, WORK, _r1, _t.float64, _t.float64, _t.float64)

@@ -97,7 +97,7 @@ def _iterate(
     n, m = len(work.v), len(work.multipliers)
     rate = max(rates[RATE], settings.fastest) ** 0.8
     goal = settings.tolerance + settings.rounding
-    before = largest = size = 0.0
+    before = earlier = largest = size = 0.0
     for k in range(settings.iterations + 1):
         compose(model, state.poses, work.increment, work.poses)
         forces(model, work, state, sample)
@@ -142,7 +142,7 @@ def _iterate(
             counts[REASON] = INFINITE
             return False
         if k > 0:
-            rate = size / before
+            rate = size / before if k == 1 else math.sqrt(size / earlier)  # they rise and fall in turns
         if size <= settings.rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
             _settle(model, state, work)
             _note(settings, progress, k + 1, rate)
@@ -155,6 +155,7 @@ def _iterate(
         if rate > 2 or (k > 1 and left > settings.iterations - k and not stale):
             break
         fresh = settings.mode == UPDATE or (settings.mode == AUTO and left > settings.patience)
+        earlier = before
         before = size
     rates[BEFORE], rates[SIZE], rates[GOAL] = before, size, goal
     counts[REASON] = SLOW
@@ -205,8 +206,7 @@ def _note(settings: Settings, progress: Progress, iterations: int, rate: float) 
     rates, counts = progress.rates, progress.counts
     rates[RATE] = min(rate, settings.slowest)
     counts[USUAL] = min(counts[USUAL], iterations)
-    if iterations > 1 and rate > settings.fastest:  # otherwise the last iteration just confirmed
-        rates[SPENT] += iterations - counts[USUAL]
+    rates[SPENT] = max(0.0, rates[SPENT] + iterations - max(counts[USUAL], 2) - settings.tolerated)
 
 
 @inlined

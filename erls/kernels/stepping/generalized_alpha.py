@@ -214,13 +214,13 @@ def iterate(
         for i in range(n):
             size = max(size, abs(correction[i]))
             total += correction[i]
-        if not (math.isfinite(size) and math.isfinite(total)):
+        # forces square what they are given: a size whose square overflows is as good as infinite
+        if not math.isfinite(size * size + total * total):
             finite = True
             for i in range(n):
                 finite = finite and math.isfinite(out[i])
-            if not finite:
-                for i in range(n):
-                    correction[i] = out[i]
+            for i in range(n):
+                correction[i] = correction[i] * abs(correction[i]) if finite else out[i]
             counts[REASON] = NOT_FINITE
             return False
         for i in range(n):

@@ -24,15 +24,15 @@ KNOWN = 16
 # counts
 FACTORED, USUAL, EXCESS, REASON, HISTORY, SUSPECT, DIAGONAL = range(7)  # DIAGONAL: stiffness and damping
 MAX_ITERATIONS, REFRESH_COST = 7, 8
-RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED, STEPS = range(9, 14)
-COUNTS = 14
+RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED = range(9, 13)
+COUNTS = 13
 SINGULAR, NOT_FINITE, SLOW, INACCURATE = 1, 2, 3, 4  # reasons
-# blocks of coefficients (stages + 1, stages + 1): row 0 of the last one holds the nodes, then see the names
-RATES, PLACES, FROM_RE, FROM_IM, TO_RE, TO_IM, FORETELL, ROWS = range(8)
+# blocks of coefficients (4, 4), of `erls.integrators.lobatto`; the last one has the rows below it
+RATES, PLACES, INTO_RE, INTO_IM, BACK_RE, BACK_IM, FORETELL, ROWS = range(8)
 NODES, DIFFERENCE, LAMBDA_RE, LAMBDA_IM = range(4)
 # blocks of matrices (n, n), transposed
 MASS, DAMPING, STIFFNESS, FILTER, SOLVERS = range(5)
-# rows of vectors (n,)
+# rows of vectors (n,); the residuals of the stages are followed by the changes of their accelerations
 METRES, PART_RE, PART_IM, RESIDUALS = range(4)
 
 SLOWEST, FASTEST = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
@@ -64,8 +64,9 @@ if ENABLED:
 
 
 @helper
-def foretell(known: Array, counts: IntArray, coefficients: Array, stages: Array, last: Array, matrices: Array,
-             vectors: Array) -> int:
+def foretell(
+    known: Array, counts: IntArray, coefficients: Array, stages: Array, last: Array, matrices: Array, vectors: Array
+) -> None:
     """Stages from the polynomial through the last ones, made to fulfil the linear part of the equations.
 
     What is extrapolated is M a + C v + K y: smooth also where vibrations are not resolved.
@@ -102,7 +103,6 @@ def foretell(known: Array, counts: IntArray, coefficients: Array, stages: Array,
             else:
                 add_product(matrices[part], difference, out)
     correct(h, coefficients, stages, matrices, vectors)
-    return 0
 
 
 @helper
@@ -128,15 +128,15 @@ def correct(h: float, coefficients: Array, stages: Array, matrices: Array, vecto
     """One iteration from the residuals of the stages; the largest change of a position, and of h v [metres]."""
     m, n = stages.shape[0] - 1, stages.shape[2]
     re, im = vectors[PART_RE], vectors[PART_IM]
-    from_re, from_im = coefficients[FROM_RE], coefficients[FROM_IM]
-    to_re, to_im = coefficients[TO_RE], coefficients[TO_IM]
+    into_re, into_im = coefficients[INTO_RE], coefficients[INTO_IM]
+    back_re, back_im = coefficients[BACK_RE], coefficients[BACK_IM]
     changes = vectors[RESIDUALS + m :]
     changes[:m] = 0.0
     for k in range((matrices.shape[0] - SOLVERS) // 2):
         re[:] = 0.0
         im[:] = 0.0
         for j in range(m):
-            p, q, out = from_re[k, j], from_im[k, j], vectors[RESIDUALS + j]
+            p, q, out = into_re[k, j], into_im[k, j], vectors[RESIDUALS + j]
             for i in range(n):
                 re[i] += p * out[i]
                 im[i] += q * out[i]
@@ -145,7 +145,7 @@ def correct(h: float, coefficients: Array, stages: Array, matrices: Array, vecto
         else:
             solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
         for j in range(m):
-            p, q, change = to_re[j, k], to_im[j, k], changes[j]
+            p, q, change = back_re[j, k], back_im[j, k], changes[j]
             for i in range(n):
                 change[i] -= p * re[i] - q * im[i]
     rates, places, metres = coefficients[RATES], coefficients[PLACES], vectors[METRES]
@@ -203,6 +203,13 @@ def is_diagonal(matrix: Array) -> bool:
 
 
 @helper
+def halfway(h: float, stages: Array) -> None:
+    """Place half a step ahead, into the first stage."""
+    for q in range(stages.shape[2]):
+        stages[1, 0, q] = stages[0, 0, q] + h / 2 * stages[0, 1, q]
+
+
+@helper
 def transpose(matrix: Array) -> None:
     """In place."""
     for i in range(matrix.shape[0]):
@@ -214,7 +221,8 @@ def transpose(matrix: Array) -> None:
 def judge(h: float, coefficients: Array, stages: Array, matrices: Array, vectors: Array) -> float:
     """Estimated error of a step [metres]: (M + h C + h² K)⁻¹ M h² times the highest difference of the accelerations."""
     m, n = stages.shape[0] - 1, stages.shape[2]
-    weights, metres, difference, error = coefficients[ROWS, DIFFERENCE], vectors[METRES], vectors[PART_RE], vectors[PART_IM]
+    weights, metres = coefficients[ROWS, DIFFERENCE], vectors[METRES]
+    difference, error = vectors[PART_RE], vectors[PART_IM]
     for q in range(n):
         total = 0.0
         for j in range(m + 1):
@@ -249,15 +257,16 @@ def choose_step(known: Array) -> None:
 
 
 @helper
-def rate_of(k: int, size: float, before: float, rate: float) -> float:
-    """Convergence rate after iteration ``k``, until the second one the one expected."""
-    return size / before if k > 1 else rate
-
-
-@helper
-def progress(known: Array, counts: IntArray, k: int, size: float, before: float, goal: float, rounding: float) -> int:
-    """After iteration ``k``: 1 done, 0 go on, -1 give up (R. Hairer & G. Wanner, Solving ODEs II, sec. IV.8)."""
-    rate = rate_of(k, size, before, max(known[RATE], FASTEST) ** 0.8)
+def progress(
+    known: Array, counts: IntArray, k: int, size: float, before: float, earlier: float, goal: float, rounding: float
+) -> int:
+    """After iteration ``k``: 1 done, 0 go on, -1 give up (E. Hairer & G. Wanner, Solving ODEs II, sec. IV.8)."""
+    if k == 1:
+        rate = max(known[RATE], FASTEST) ** 0.8
+    elif k == 2:
+        rate = size / before
+    else:
+        rate = math.sqrt(size / earlier)
     if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
         known[RATE] = min(rate, SLOWEST)
         counts[USUAL] = min(counts[USUAL], k)
@@ -265,8 +274,9 @@ def progress(known: Array, counts: IntArray, k: int, size: float, before: float,
             counts[EXCESS] += k - counts[USUAL]
         return 1
     left = counts[MAX_ITERATIONS] - k
-    slow = k > 2 and (rate >= 1 or size * rate ** (left + 1) > goal * (1 - rate))
-    return -1 if rate > 2 or slow or left == 0 else 0
+    # a correction may grow once, where coordinates follow one another; over two iterations they must lead to the goal
+    slow = k > 2 and (rate >= 1 or size * rate**left > goal)
+    return -1 if slow or left == 0 else 0
 
 
 @helper
@@ -289,30 +299,30 @@ def largest_entry(values: Array, metres: Array) -> int:
 
 
 @helper
-def accept(known: Array, counts: IntArray, stages: Array, last: Array, times: Array, knots: Array, made: int,
-           coefficients: Array) -> int:
+def accept(
+    known: Array, counts: IntArray, nodes: Array, stages: Array, last: Array, times: Array, knots: Array, made: int
+) -> int:
     """Store the knots of a step and move on to its end; how many knots there are now."""
     m = stages.shape[0] - 1
     t, h = known[T], known[H]
     end = known[END] if h >= known[END] - t else t + h
     for i in range(1, m + 1):
-        times[made] = end if i == m else t + h * coefficients[ROWS, NODES, i]
+        times[made] = end if i == m else t + h * nodes[i]
         knots[made] = stages[i]
         made += 1
     last[:] = stages
     stages[0] = last[m]
     known[T], known[BEFORE] = end, h
     counts[HISTORY] = 1
-    counts[STEPS] += 1
     return made
 
 
 @helper
-def retry(known: Array, counts: IntArray, reason: int, factor_of_step: float) -> bool:
+def retry(known: Array, counts: IntArray, reason: int, share: float) -> bool:
     """Try a smaller step; False when it would be too small."""
     counts[REASON] = reason
     counts[REJECTED] += 1
-    known[NEXT] = known[H] * factor_of_step
+    known[NEXT] = known[H] * share
     known[RATE] = SLOWEST
     return bool(known[NEXT] >= known[SMALLEST])
 
@@ -342,10 +352,8 @@ def advance(
     int
         Number of knots made; -1 - that number when no step is small enough to go on.
     """
-    made, m = 0, stages.shape[0] - 1
-    factored = 0.0  # the step of the present factors
-    if counts[FACTORED]:
-        factored = known[BEFORE]
+    made, m, nodes = 0, stages.shape[0] - 1, coefficients[ROWS, NODES]
+    factored = known[BEFORE] if counts[FACTORED] else 0.0  # the step of the present factors
     while made + m <= len(times) and known[T] < known[END]:
         choose_step(known)
         t, h = known[T], known[H]
@@ -353,10 +361,11 @@ def advance(
         status = verdict = 0
         while True:
             if fresh:
-                at = min(max(t, known[FIRST]), known[LAST])
-                mass_matrix(reals, integers, scratch, at, stages[0, 0], matrices[MASS])
+                at = min(max(t + h / 2, known[FIRST]), known[LAST])
+                halfway(h, stages)
+                mass_matrix(reals, integers, scratch, at, stages[1, 0], matrices[MASS])
                 stiffness_and_damping(
-                    reals, integers, scratch, at, stages[0, 0], stages[0, 1], matrices[STIFFNESS], matrices[DAMPING]
+                    reals, integers, scratch, at, stages[1, 0], stages[0, 1], matrices[STIFFNESS], matrices[DAMPING]
                 )
                 transpose(matrices[MASS])
                 transpose(matrices[STIFFNESS])
@@ -372,13 +381,12 @@ def advance(
                     break
             foretell(known, counts, coefficients, stages, last, matrices, vectors)
             rounding = known[ROUNDING] * farthest(stages, vectors[METRES])
-            goal, before, verdict = known[GOAL] + rounding, 0.0, 0
+            goal, before, earlier, verdict = known[GOAL] + rounding, 0.0, 0.0, 0
             for k in range(1, counts[MAX_ITERATIONS] + 1):
                 for i in range(1, m + 1):
-                    at = min(max(t + h * coefficients[ROWS, NODES, i], known[FIRST]), known[LAST])
-                    residual(
-                        reals, integers, scratch, at, stages[i, 0], stages[i, 1], stages[i, 2], vectors[RESIDUALS + i - 1]
-                    )
+                    at = min(max(t + h * nodes[i], known[FIRST]), known[LAST])
+                    y, v, a = stages[i, 0], stages[i, 1], stages[i, 2]
+                    residual(reals, integers, scratch, at, y, v, a, vectors[RESIDUALS + i - 1])
                     counts[RHS_CALLS] += 1
                 counts[ITERATIONS] += 1
                 size = correct(h, coefficients, stages, matrices, vectors)
@@ -386,10 +394,10 @@ def advance(
                     verdict = -2
                     break
                 known[SIZE] = size
-                verdict = progress(known, counts, k, size, before, goal, rounding)
+                verdict = progress(known, counts, k, size, before, earlier, goal, rounding)
                 if verdict != 0:
                     break
-                before = size
+                before, earlier = size, before
             if verdict == 1 or fresh:
                 break
             fresh = True
@@ -412,7 +420,7 @@ def advance(
                 going = retry(known, counts, INACCURATE, min(scale, 0.8))
             else:
                 known[NEXT] = h * scale
-                made = accept(known, counts, stages, last, times, knots, made, coefficients)
+                made = accept(known, counts, nodes, stages, last, times, knots, made)
                 going = True
         if not going:
             return -1 - made

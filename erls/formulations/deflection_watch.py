@@ -1,0 +1,140 @@
+"""How far off a link is that is linear in its own frame: what its computed motion says about second order.
+
+Two things are left out. Points do not come nearer when the link bends: the second-order displacement u₂ = ½ qᵀΨq
+(foreshortening, ½∫w'²dx of a beam). And loads do no work on it, so that compression does not soften nor tension stiffen:
+with G the stiffness that interface loads F, inertia and weight make of it,
+
+    G = -Σ F·Ψ + (a - g)·S + α·P - ω_c ω_d W_cd        (S, P, W: `fe_import.second_order.data.SecondOrder`),
+
+r = qᵀGq / qᵀΩ²q is the load relative to the one that would buckle the link in the shape that it has. A deflection δ is
+then wrong by δ |r|, and vibrations run out of step by ½ ω ∫r dt, that is by at most 2 δ. With ω times the share of δ that
+vibrates, σ² = max |q̇|² / max |q|², the estimate is
+
+    max |u₂| + δ (max |r| + min(2, ½ σ max |∫r dt|)).
+
+It is an estimate of size: errors of one link, not what levers beyond it or loops make of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from erls.lie.so3 import Array, skew
+from erls.mechanism.links import Link, node_shape6
+from erls.mechanism.second_order import LinkSecondOrder
+
+_SMALL = 1e-3  # of the largest strain energy: r means nothing below it
+
+
+@dataclass(frozen=True)
+class LinkMotion:
+    """Motion of a link at k times, in the axes of its frame.
+
+    Attributes
+    ----------
+    times : (k,) array
+        [s]
+    modal, rates : (k, m) arrays
+        Modal coordinates q, and q̇.
+    omega, alpha, pull : (k, 3) arrays
+        Angular velocity and acceleration of the frame, acceleration of its origin less that of gravity.
+    loads : (k, 6 i) array
+        Forces [N] and moments [N m] of joints on the interfaces.
+    """
+
+    times: Array
+    modal: Array
+    rates: Array
+    omega: Array
+    alpha: Array
+    pull: Array
+    loads: Array
+
+
+@dataclass(frozen=True)
+class DeflectionError:
+    """What second order is estimated to make of a link's motion.
+
+    Attributes
+    ----------
+    error : float
+        Estimated error of its points [m].
+    deflection : float
+        Largest displacement of a node against the mean of the link [m].
+    shortening : float
+        Largest second-order displacement of a node against the inboard interface [m].
+    load : float
+        Largest load relative to the one that would buckle the link in its shape; 0.1 is 10 %.
+    drift : float
+        Largest phase by which vibrations run out of step, in rad.
+    """
+
+    error: float
+    deflection: float
+    shortening: float
+    load: float
+    drift: float
+
+
+def deflection_error(link: Link, motion: LinkMotion, closed: bool, reach: float) -> DeflectionError | None:
+    """Estimate of the error of a link; None for a rigid one, and where its modal model knows no second order.
+
+    Parameters
+    ----------
+    link : Link
+    motion : LinkMotion
+    closed : bool
+        Whether a loop holds its outer end too: it then deflects against its mean, else against its inboard interface.
+    reach : float
+        Largest distance from its inboard interface to what it carries [m].
+    """
+    second = link.second_order
+    if not link.elastic_modes or second is None:
+        return None
+    elastic, model = motion.modal[:, 6:], link.model
+    clamped = elastic @ _tangent(link).T
+    held = np.hstack([np.zeros((len(elastic), 6)), elastic]) if closed else clamped
+    lever = max(1.0, reach / max(float(np.linalg.norm(np.ptp(model.nodes, axis=0))), 1e-9))
+    deflection = lever * float(np.linalg.norm(model.translation_shapes @ held.T, axis=1).max())
+    nodes = np.array(sorted({*second.field.nodes.tolist(), link.inboard.node}), dtype=np.int64)
+    shortening = max(float(np.linalg.norm(second.displacements(nodes, q), axis=1).max(initial=0.0)) for q in clamped)
+    shortening *= lever
+    strain = elastic**2 @ link.stiffness
+    frames = motion.modal[:, :6] - held[:, :6]
+    work = np.einsum("ka,kab,kb->k", held, _load_stiffness(link, second, motion, frames), held)
+    ratio = work / np.maximum(strain, _SMALL * strain.max(initial=0.0) + 1e-300)
+    steps = np.diff(motion.times)
+    area = np.concatenate([[0.0], np.cumsum((ratio[1:] + ratio[:-1]) / 2 * steps)])
+    amplitude = np.sqrt((elastic**2).sum(axis=1).max()) or 1.0
+    sigma = float(np.sqrt((motion.rates[:, 6:] ** 2).sum(axis=1).max()) / amplitude)
+    load, drift = float(np.abs(ratio).max()), 0.5 * sigma * float(np.ptp(area))
+    error = shortening + deflection * (load + min(2.0, drift))
+    return DeflectionError(error, deflection, shortening, load, drift)
+
+
+def _tangent(link: Link) -> Array:
+    """(m, n) modal coordinates per elastic one, with the inboard interface at rest."""
+    rows = np.vstack(node_shape6(link.model, link.inboard.node))
+    return np.vstack([-np.linalg.solve(rows[:, :6], rows[:, 6:]), np.eye(link.elastic_modes)])
+
+
+def _load_stiffness(link: Link, second: LinkSecondOrder, motion: LinkMotion, frames: Array) -> Array:
+    """(k, m, m) G, in axes that are turned against the link's frame by rigid-body coordinates (k, 6)."""
+    rotation = node_shape6(link.model, link.inboard.node)[1][:, :6]
+    turn = np.eye(3) + np.stack([skew(rotation @ q) for q in frames])
+
+    def turned(vectors: Array) -> Array:
+        return np.einsum("kji,kj->ki", turn, vectors)
+
+    slide, spin = second.momentum[:3], second.momentum[3:]
+    omega = turned(motion.omega)
+    result = np.einsum("kc,cab->kab", turned(motion.pull), slide) + np.einsum("kc,cab->kab", turned(motion.alpha), spin)
+    result -= np.einsum("kc,kd,cdab->kab", omega, omega, second.spin)
+    for number, interface in enumerate(link.model.interface_nodes):
+        load = motion.loads[:, 6 * number : 6 * number + 6]
+        if interface.node != link.inboard.node and load.any():
+            wrench = np.hstack([turned(load[:, :3]), turned(load[:, 3:])])
+            result -= np.einsum("kc,cab->kab", wrench, second.node(interface.node))
+    return np.asarray(result)

@@ -1,0 +1,38 @@
+"""Where the coordinates of a mechanism without some modes stand among those of the whole one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from erls.lie.so3 import Array
+from erls.mechanism.chain import Mechanism
+from fe_import.model import IntArray
+
+
+def kept_places(whole: Mechanism, less: Mechanism, size: int) -> IntArray:
+    """Places of the coordinates that both have: joints first, then the elastic modes link by link.
+
+    Parameters
+    ----------
+    whole, less : Mechanism
+        ``less`` with some links rigid.
+    size : int
+        Number of coordinates of ``whole``.
+    """
+    counts = [link.elastic_modes for link in whole.links]
+    if counts == [link.elastic_modes for link in less.links]:
+        return np.arange(size)
+    at = size - sum(counts)
+    kept = [np.arange(at)]
+    for count, link in zip(counts, less.links, strict=True):
+        if link.elastic_modes:
+            kept.append(np.arange(at, at + count))
+        at += count
+    return np.concatenate(kept)
+
+
+def embedded(values: Array, places: IntArray, size: int) -> Array:
+    """(..., size) values at their places, zeros elsewhere."""
+    result = np.zeros((*values.shape[:-1], size))
+    result[..., places] = values
+    return result

@@ -1,0 +1,182 @@
+"""Second-order field of a solid: modal derivatives that keep the strains of Green and Lagrange linear in the modes.
+
+With modes u = φ_a q_a those strains hold, in second order, ε(u₂) + ½ ∇uᵀ∇u. They cannot vanish everywhere; the field
+that makes them smallest in energy, the reference interface at rest, solves for each pair of modes
+
+    K Ψ_ab = -∫ ε(δ) : C : sym(∇φ_aᵀ ∇φ_b) dV
+
+so that the energy stays quadratic in q up to and including third order (material of Saint-Venant and Kirchhoff; on
+modal derivatives see S. R. Idelsohn and A. Cardona, Comput. Methods Appl. Mech. Eng. 49 (1985) 253-279).
+Nodes that follow an interface are turned finitely with it: ½ (θ_a × (θ_b × r) + θ_b × (θ_a × r)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fe_import.elements.solid_assembly import chunks
+from fe_import.elements.solid_stress import SolidStress
+from fe_import.model import Array, FEModel, IntArray
+from fe_import.reduction.base import expanded
+from fe_import.second_order.composition import composed_rotation, twice_turned
+from fe_import.second_order.data import SecondOrder
+from fe_import.second_order.moments import of_inertia, of_moments
+from fe_import.sparse import factorize
+
+_BLOCK_VALUES = 20_000_000  # entries of second-order fields held at a time
+
+
+def solid_second_order(
+    model: FEModel, solid: SolidStress, shapes: Array, reference: int, nodes: IntArray
+) -> SecondOrder:
+    """Solve for all pairs of elastic modes, a few at a time.
+
+    Parameters
+    ----------
+    model : FEModel
+        In SI.
+    solid : SolidStress
+        Its elements.
+    shapes : (d, m) array
+        Modes, the six rigid-body ones first.
+    reference : int
+        Interface.
+    nodes : (k,) int array
+        Rising; whose fields are stored.
+
+    Raises
+    ------
+    FEImportError
+        NOT_DEFINITE: some part can move without strain; TOO_LARGE.
+    """
+    start = model.interface_nodes[reference].node
+    motions = model.rigid_body_modes()
+    rows = model.dof_map[start]
+    relative = shapes[:, 6:] - motions @ np.linalg.solve(motions[rows], shapes[rows, 6:])
+    n, m = relative.shape[1], shapes.shape[1]
+    first, second = np.triu_indices(n)
+    stored = np.zeros((2, len(nodes), 3, len(first)))
+    weights = _weights(model)
+    linear, moment = np.zeros((3, m, m)), np.zeros((3, 3, m, m))
+    turned = model.dof_map[nodes][:, 3] >= 0
+    for some, fields in _solved(model, solid, relative, rows, first, second):
+        stored[0][:, :, some] = fields[model.dof_map[nodes, :3]]
+        stored[1][turned, :, some] = fields[model.dof_map[nodes[turned], 3:]]
+        found = weights.T @ fields  # S, then ∫ρ x ⊗ Ψ
+        for a, b in ((first[some], second[some]), (second[some], first[some])):
+            linear[:, 6 + a, 6 + b] = found[:3]
+            moment[:, :, 6 + a, 6 + b] = found[3:].reshape(3, 3, -1)
+    phi = shapes[rows[3:]]
+    _add_rigid(model, relative, phi, start, weights, linear, moment)
+    momentum, spin = of_moments(linear, moment)
+    for node, inertia in _turning_masses(model):
+        moved = np.zeros((3, m))
+        moved[:, 6:] = relative[model.dof_map[node, 3:]]
+        place = int(np.searchsorted(nodes, node))
+        own = np.zeros((3, n, n))
+        own[:, first, second] = own[:, second, first] = stored[1, place]
+        terms = of_inertia(inertia, phi + moved, composed_rotation(own, moved, phi))
+        momentum, spin = momentum + terms[0], spin + terms[1]
+    return SecondOrder(reference, momentum, spin, nodes, stored[0], stored[1])
+
+
+def _solved(
+    model: FEModel, solid: SolidStress, relative: Array, clamped: IntArray, first: IntArray, second: IntArray
+) -> Iterator[tuple[slice, Array]]:
+    """Fields (d, some) of consecutive pairs."""
+    _, stiffness = model.reduced_matrices()
+    independent = np.arange(len(relative)) if model.coupling is None else model.independent
+    free = np.flatnonzero(~np.isin(independent, clamped))
+    solve = factorize(
+        stiffness[free][:, free].tocsc(), "stiffness of the link held at its inboard interface",
+        model.dof_positions()[free],
+    )  # fmt: skip
+    step = max(1, _BLOCK_VALUES // len(relative))
+    for begin in range(0, len(first), step):
+        some = slice(begin, begin + step)
+        given = _followed(model, relative, first[some], second[some])
+        force = -_membrane_forces(solid, relative, model.dof_map, first[some], second[some]) - model.stiffness @ given
+        reduced = force if model.coupling is None else model.coupling.T @ force
+        fields = np.zeros((len(independent), force.shape[1]))
+        fields[free] = solve(np.ascontiguousarray(reduced[free]))
+        yield slice(begin, begin + force.shape[1]), expanded(model, fields) + given
+
+
+def _followed(model: FEModel, relative: Array, first: IntArray, second: IntArray) -> Array:
+    """(d, pairs) finite turning of the nodes that follow an interface."""
+    result = np.zeros((len(relative), len(first)))
+    for interface in model.interface_nodes:
+        others = interface.coupled_nodes[interface.coupled_nodes != interface.node]
+        theta = relative[model.dof_map[interface.node, 3:]]
+        for node in others:
+            arm = model.nodes[node] - interface.position
+            result[model.dof_map[node, :3]] += twice_turned(theta, arm)[:, first, second]
+    return result
+
+
+def _membrane_forces(solid: SolidStress, fields: Array, dof_map: IntArray, first: IntArray, second: IntArray) -> Array:
+    """(d, pairs) ∫ ε(δ) : C : sym(∇φ_aᵀ ∇φ_b) dV."""
+    mesh, element = solid.mesh, solid.mesh.element
+    points, weights = element.quadrature(element.stiffness_order)
+    gradients = element.shape_gradients(points)
+    result = np.zeros((len(fields), len(first)))
+    for some in chunks(mesh, np.arange(len(mesh.elements))):
+        nodes = mesh.elements[some]
+        jacobian = np.einsum("eka,kbq->eqab", mesh.nodes[nodes], gradients)
+        slopes = np.einsum("kbq,eqba->eqak", gradients, np.linalg.inv(jacobian))  # ∂_a of shape k
+        volume = weights * np.linalg.det(jacobian)
+        moved = fields[dof_map[nodes, :3]]  # (e, k, 3, n)
+        gradient = np.einsum("eqak,ekcn->eqacn", slopes, moved)  # ∂_a u_c
+        for begin in range(0, len(first), 64):
+            pairs = slice(begin, begin + 64)
+            product = np.einsum("eqacp,eqbcp->eqabp", gradient[..., first[pairs]], gradient[..., second[pairs]])
+            strain = (product + product.swapaxes(2, 3)) / 2
+            lam, mu = (part[:, None, None] for part in solid.lame[some].T)
+            stress = 2 * mu[..., None, None] * strain
+            trace = lam * np.einsum("eqaap->eqp", strain)
+            for a in range(3):
+                stress[:, :, a, a] += trace
+            forces = np.einsum("eqak,eqacp,eq->ekcp", slopes, stress, volume, optimize=True)
+            np.add.at(result[:, pairs], dof_map[nodes, :3].ravel(), forces.reshape(-1, forces.shape[-1]))
+    return result
+
+
+def _weights(model: FEModel) -> Array:
+    """(d, 12) such that their product with a field is ∫ρ u, then ∫ρ x ⊗ u (axis of x first)."""
+    rows = model.dof_map[:, :3]
+    fields = np.zeros((model.mass.shape[0], 12))
+    for d in range(3):
+        fields[rows[:, d], d] = 1.0
+        for c in range(3):
+            fields[rows[:, d], 3 + 3 * c + d] = model.nodes[:, c]
+    return np.asarray(model.mass @ fields)
+
+
+def _add_rigid(
+    model: FEModel, relative: Array, phi: Array, start: int, weights: Array, linear: Array, moment: Array
+) -> None:
+    """Add what the rotation φ of the reference does to displacements and to the undeformed link; see `composed`."""
+    rows, m = model.dof_map[:, :3], phi.shape[1]
+    arms = np.zeros(len(relative))
+    arms[rows.ravel()] = (model.nodes - model.nodes[start]).ravel()
+    first = np.zeros((12, m))
+    first[:, 6:] = weights.T @ relative
+    arm = weights.T @ arms
+    for block, out in ((slice(0, 3), linear[None]), (slice(3, 12), moment)):
+        u, d = first[block].reshape(-1, 3, m), arm[block].reshape(-1, 3)
+        for k in range(len(u)):
+            once = np.cross(phi[:, :, None], u[k][:, None, :], axis=0)
+            out[k] += once + once.transpose(0, 2, 1) + twice_turned(phi, d[k])
+
+
+def _turning_masses(model: FEModel) -> list[tuple[int, Array]]:
+    """Nodes with an inertia of their own."""
+    result = []
+    for interface in model.interface_nodes:
+        dofs = model.dof_map[interface.node, 3:]
+        block = model.mass[dofs][:, dofs].toarray()
+        if block.any():
+            result.append((interface.node, block))
+    return result

@@ -1,0 +1,156 @@
+"""Compiled chains: against the NumPy equations, against the same source uncompiled, and under generalized-α."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import chain_cases
+import numpy as np
+import pytest
+import scenes
+
+from erls.formulations.erls import Erls
+from erls.integrators.base import Options
+from erls.integrators.generalized_alpha import generalized_alpha
+
+LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
+LIKE_TWIN = 1e-12
+
+
+def _distance(found: np.ndarray, expected: np.ndarray) -> float:
+    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
+
+
+@pytest.mark.parametrize("name", chain_cases.CASES)
+def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
+    """Residual (joints and modes apart), mass, stiffness, damping; the acceleration leaves no residual."""
+    chain = chain_cases.equations(tmp_path, name)
+    assert chain.compiled is not None
+    f = len(chain.free_joints)
+    for at in chain_cases.states(chain, name):
+        found = chain_cases.evaluate(chain.compiled, at)
+        residual = chain.residual(at.t, at.y, at.v, at.a)
+        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
+        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
+        assert _distance(found["mass"], chain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        stiffness, damping = chain.stiffness_and_damping(at.t, at.y, at.v)
+        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert _distance(found["damping"], damping) <= LIKE_NUMPY
+        left = chain.residual(at.t, at.y, at.v, found["acceleration"])
+        forces = chain.residual(at.t, at.y, at.v, 0 * at.a)
+        assert np.abs(left).max() <= LIKE_NUMPY * np.abs(forces).max()
+
+
+def test_modes_alone_feel_what_the_elastic_forces_hide(tmp_path: Path) -> None:
+    """Undeformed, without the stiffness that dwarfs them, inertia forces on the modes agree too."""
+    for name in ("axes that part", "parallel axes", "controllers"):
+        chain = chain_cases.equations(tmp_path, name)
+        assert chain.compiled is not None
+        at = chain_cases.states(chain, name)[0]
+        f = len(chain.free_joints)
+        y = np.concatenate([at.y[:f], 0 * at.y[f:]])
+        found = chain_cases.evaluate(chain.compiled, chain_cases.State(at.t, y, at.v, at.a))["residual"]
+        assert _distance(found[f:], chain.residual(at.t, y, at.v, at.a)[f:]) <= LIKE_NUMPY
+
+
+def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
+    """The same source as plain Python (``ERLS_JIT=0``) in a process of its own."""
+    output = tmp_path / "twin.npz"
+    folder = Path(__file__).parent
+    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
+    subprocess.run(
+        [sys.executable, str(folder / "chain_cases.py"), str(tmp_path), str(output)], env=environment, check=True
+    )
+    found = chain_cases.all_results(tmp_path)
+    with np.load(output) as twin:
+        assert set(twin) == set(found)
+        for key, values in found.items():
+            # the acceleration solves a system with a condition up to 1e5
+            limit = 1e5 * LIKE_TWIN if key.endswith("acceleration") else LIKE_TWIN
+            assert _distance(values, twin[key]) <= limit, key
+
+
+def test_no_compiled_form_in_the_minimum_norm_gauge(tmp_path: Path) -> None:
+    """It is not recursive; the NumPy equations serve it."""
+    scenes.l_link(tmp_path)
+    assert scenes.equations(scenes.l_scene(tmp_path), "minimum-norm").compiled is None
+
+
+def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
+    """The status counts the joint whose motion no inertia opposes: a massless link behind a flexible one."""
+    scenes.arm_link(tmp_path)
+    rigid = {"mass": 0.0, "inertia": [0.0, 0.0, 0.0], "centre_of_mass": [0.0, 0.0, 0.0]}
+    data = {
+        "simulation": {"duration": 1.0},
+        "joints": [
+            {"name": n, "dh": {"convention": "standard", "a": 0.4, "alpha_deg": a}}
+            for n, a in (("a", 30.0), ("b", 0.0))
+        ],
+        "links": [
+            {"name": "a", "model": "arm.toml", "mesh_pose": {"frame": "joint"}},
+            {"name": "b", "rigid": rigid},
+        ],
+    }
+    chain = scenes.equations(scenes.write_toml(tmp_path / "light.toml", data))
+    system = chain.compiled
+    assert system is not None
+    y, v = chain.initial_state()
+    status = system.acceleration(system.reals, system.integers, system.scratch, 0.0, y, v, np.empty(chain.size))
+    assert status == 1 + 1
+
+
+class _Plain:
+    """A system without its compiled form."""
+
+    def __init__(self, chain: Erls) -> None:
+        self.chain = chain
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "compiled":
+            raise AttributeError(name)
+        return getattr(self.chain, name)
+
+
+@pytest.mark.parametrize("name", ["one link, payload, spring", "controllers", "prescribed in the middle"])
+def test_generalized_alpha_takes_the_same_steps(name: str, tmp_path: Path) -> None:
+    """Compiled loop and NumPy algorithm: the same knots and the same work over breakpoints of drives."""
+    chain = chain_cases.equations(tmp_path, name)
+    y, v = chain.initial_state()
+    options = Options(step=2e-3)
+    fast = generalized_alpha(chain, (0.0, 0.2), y, v, options)
+    slow = generalized_alpha(_Plain(chain), (0.0, 0.2), y, v, options)
+    assert fast.failure is None
+    np.testing.assert_array_equal(fast.t, slow.t)
+    np.testing.assert_allclose(fast.y, slow.y, atol=1e-10 * np.abs(slow.y).max())
+    assert fast.work.steps == slow.work.steps
+    # where an estimate meets the tolerance to rounding, one iteration more or less
+    assert fast.work.rhs_calls == pytest.approx(slow.work.rhs_calls, rel=0.02)
+    assert fast.work.factorizations == pytest.approx(slow.work.factorizations, abs=4)
+
+
+def test_generalized_alpha_halves_and_fails_alike(tmp_path: Path) -> None:
+    """Friction that sticks at once: halved steps, and at the end the same cause."""
+    scenes.l_link(tmp_path)
+    hard = {"friction": {"force": 3e4, "transition_rate": 1e-7}, "initial": {"rate": 2.0}}
+    chain = scenes.equations(scenes.l_scene(tmp_path, joints=[{**scenes.L_SCENE["joints"][0], **hard}]))
+    y, v = chain.initial_state()
+    fast = generalized_alpha(chain, (0.0, 0.01), y, v, Options(step=1e-3))
+    slow = generalized_alpha(_Plain(chain), (0.0, 0.01), y, v, Options(step=1e-3))
+    assert fast.work.rejected_steps == slow.work.rejected_steps > 0
+    assert fast.failure is not None
+    assert slow.failure is not None
+    assert (fast.failure.cause, fast.failure.where) == (slow.failure.cause, slow.failure.where)
+
+
+def test_work_of_the_l(tmp_path: Path) -> None:
+    """Budget: at h = 1 ms at most 2.4 residuals a step and a factorization every 15 steps (measured 2.3 and 16.4)."""
+    chain = scenes.equations(scenes.ROOT / "data/l_shape/steel_flat.toml")
+    y, v = chain.initial_state()
+    work = generalized_alpha(chain, (0.0, 2.0), y, v, Options(step=1e-3)).work
+    assert (work.steps, work.rejected_steps) == (2000, 0)
+    assert work.rhs_calls <= 2.4 * work.steps
+    assert work.factorizations <= work.steps / 15
