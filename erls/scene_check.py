@@ -109,9 +109,9 @@ def _check_simulation(s: Simulation, place: str) -> None:
             if value != right:
                 message = "absolute coordinates do not go with this"
                 raise _bad(f"{place}.{name}", message, value, f"use {right}, or coordinates = 'independent'")
-    if s.formulation == "nodal" and s.integrator != DEFAULT:
+    if s.formulation == "nodal" and s.integrator not in (DEFAULT, "auto"):
         message = "nodal frames need an integrator for constraints"
-        raise _bad(f"{place}.integrator", message, s.integrator, f"use {DEFAULT}")
+        raise _bad(f"{place}.integrator", message, s.integrator, f"use {DEFAULT}, or auto")
     if s.elements_per_member is not None and s.elements_per_member < 1:
         message = "a member needs at least one element"
         raise _bad(f"{place}.elements_per_member", message, s.elements_per_member, "give 1 or more")

@@ -15,7 +15,9 @@ from erls.formulations import FORMULATIONS, TREES, formulate, integrator
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
+from erls.kernels.jit import announcing
 from erls.mechanism.chain import Mechanism
+from erls.range_watch import deflection_warnings
 from erls.run import Run, node_positions
 from erls.run_file import self_contained, write_run
 from erls.scene import Scene, load_scene
@@ -142,11 +144,12 @@ def _integrated(
             saved = time.perf_counter()
 
     times = (0.0, settings.duration)
-    solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
+    with announcing(warn.tell):
+        solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
     if solution.choice:
         warn.tell(f"integrator: {solution.choice}")
     run = make_run(solution)
-    warn((*solution.warnings, *range_warnings(run)))
+    warn((*solution.warnings, *range_warnings(run), *deflection_warnings(run)))
     if modal and not planned and any(j.drive.reference(0.0) is None for j in mechanism.joints):
         times_seen = np.linspace(float(run.solution.t[0]), run.end, 101)
         warn(spin_warnings(mechanism, ((s.time, s.coordinates, s.rates) for s in run.states(times_seen))))

@@ -14,6 +14,7 @@ import numpy as np
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism, kinematics
 from erls.mechanism.links import Link, node_shape6
+from erls.mechanism.substructures import is_split, split
 
 _NOTABLE = 0.2  # share of the stiffness that is lost; the deflection is then wrong by more than a tenth
 _SAMPLES = 401
@@ -59,6 +60,9 @@ def spin_warnings(mechanism: Mechanism, motion: Iterable[tuple[float, Array, Arr
     """
     if "spin_softening" not in mechanism.effects:
         return []
+    if is_split(mechanism):
+        pieces = split(mechanism)
+        return spin_warnings(pieces.pieces, ((t, pieces.expanded(q), pieces.expanded(qd)) for t, q, qd in motion))
     stiffened = "geometric_stiffening" in mechanism.effects
     softened = {
         k: _softening(link)

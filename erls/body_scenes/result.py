@@ -235,8 +235,8 @@ def frames_and_twists(y: Array, v: Array, nodes: int) -> tuple[Array, Array]:
 
 
 def connection_forces(assembly: Assembly, t: float, poses: Array, multipliers: Array) -> dict[str, tuple[Array, Array]]:
-    """Force [N] and moment [N m] of each connection on its node, at the node, in the world's axes; of redundant ones the
-    smallest.
+    """Force [N] and moment [N m] of each connection on its node, at the node, in the world's axes; the smallest where
+    connections are redundant.
     """
     system, q = assembly.full, Nodes(poses, assembly.full.start.memory)
     if assembly.left_out:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from erls.formulations.base import Formulation, TreeFormulation
 from erls.formulations.closed_chain import ClosedChain
@@ -47,7 +48,7 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Callable[..., Solu
     if settings.formulation in TREES and is_split(mechanism):
         return of_pieces(integrator(split(mechanism).pieces, settings))
     if settings.formulation == "nodal":
-        return nodal_generalized_alpha
+        return partial(nodal_generalized_alpha, adaptive=settings.integrator == "auto")
     if settings.coordinates == "absolute":
         return absolute_generalized_alpha
     return loop_integrator(settings.integrator) if mechanism.loops else INTEGRATORS[settings.integrator]

@@ -1,18 +1,19 @@
 """How far off a link is that is linear in its own frame: what its computed motion says about second order.
 
 Two things are left out. Points do not come nearer when the link bends: the second-order displacement u₂ = ½ qᵀΨq
-(foreshortening, ½∫w'²dx of a beam). And loads do no work on it, so that compression does not soften nor tension stiffen:
-with G the stiffness that interface loads F, inertia and weight make of it,
+(foreshortening, ½∫w'²dx of a beam). And loads do no work on it, so that compression does not soften nor tension
+stiffen: with G the stiffness that interface loads F, inertia and weight make of it,
 
     G = -Σ F·Ψ + (a - g)·S + α·P - ω_c ω_d W_cd        (S, P, W: `fe_import.second_order.data.SecondOrder`),
 
 r = qᵀGq / qᵀΩ²q is the load relative to the one that would buckle the link in the shape that it has. A deflection δ is
-then wrong by δ |r|, and vibrations run out of step by ½ ω ∫r dt, that is by at most 2 δ. With ω times the share of δ that
-vibrates, σ² = max |q̇|² / max |q|², the estimate is
+then wrong by δ |r|, and vibrations run out of step by ½ ω ∫r dt, which moves them by 2 δ at most. With σ for ω times
+the share of δ that vibrates, σ² = max |q̇|² / max |q|², the estimate is
 
-    max |u₂| + δ (max |r| + min(2, ½ σ max |∫r dt|)).
+    max |u₂| + δ (max |r| + min(2, ½ σ max |∫r dt|)),
 
-It is an estimate of size: errors of one link, not what levers beyond it or loops make of them.
+times the lever that links beyond make of it. It tells the size: on the L-shaped pendulums, the two-link robot and the
+fast slider-crank in 1 to 8 pieces it lies within a factor of 2.5 of the distance from exact beams.
 """
 
 from __future__ import annotations
@@ -62,9 +63,10 @@ class DeflectionError:
     error : float
         Estimated error of its points [m].
     deflection : float
-        Largest displacement of a node against the mean of the link [m].
+        Largest displacement of a node, against the inboard interface, or the mean of a link that loops hold, times the
+        lever of the links beyond [m].
     shortening : float
-        Largest second-order displacement of a node against the inboard interface [m].
+        Largest second-order displacement of a node against the inboard interface, times the same lever [m].
     load : float
         Largest load relative to the one that would buckle the link in its shape; 0.1 is 10 %.
     drift : float
@@ -110,7 +112,7 @@ def deflection_error(link: Link, motion: LinkMotion, closed: bool, reach: float)
     amplitude = np.sqrt((elastic**2).sum(axis=1).max()) or 1.0
     sigma = float(np.sqrt((motion.rates[:, 6:] ** 2).sum(axis=1).max()) / amplitude)
     load, drift = float(np.abs(ratio).max()), 0.5 * sigma * float(np.ptp(area))
-    error = shortening + deflection * (load + min(2.0, drift))
+    error = float(shortening + deflection * (load + min(2.0, drift)))
     return DeflectionError(error, deflection, shortening, load, drift)
 
 
@@ -126,7 +128,7 @@ def _load_stiffness(link: Link, second: LinkSecondOrder, motion: LinkMotion, fra
     turn = np.eye(3) + np.stack([skew(rotation @ q) for q in frames])
 
     def turned(vectors: Array) -> Array:
-        return np.einsum("kji,kj->ki", turn, vectors)
+        return np.asarray(np.einsum("kji,kj->ki", turn, vectors))
 
     slide, spin = second.momentum[:3], second.momentum[3:]
     omega = turned(motion.omega)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from erls.errors import Cause, SimulationError
 from erls.formulations.loop_rows import Closure

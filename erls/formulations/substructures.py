@@ -82,9 +82,12 @@ class Substructured:
         places, turns = np.empty((len(where), 3)), np.empty((len(where), 3, 3))
         for k in self.parts.links[number]:
             here = np.flatnonzero(where[:, 0] == k)
-            own, model = where[here, 1], self.parts.pieces.links[k].model
-            frame, q = found.poses[k], found.modal[k]
-            places[here] = (model.nodes[own] + model.translation_shapes[own] @ q) @ frame[:3, :3].T + frame[:3, 3]
+            own, link = where[here, 1], self.parts.pieces.links[k]
+            model, frame, q = link.model, found.poses[k], found.modal[k]
+            moved = model.translation_shapes[own] @ q
+            if "foreshortening" in self.mechanism.effects and link.second_order is not None:
+                moved = moved + link.second_order.displacements(own, q)
+            places[here] = (model.nodes[own] + moved) @ frame[:3, :3].T + frame[:3, 3]
             turned = np.zeros((len(model.nodes), 3))
             turned[model.rotation_nodes] = model.rotation_shapes @ q
             turns[here] = frame[:3, :3] @ rotation_maps.exp(turned[own])

@@ -44,7 +44,7 @@ class Recorder:
         self._count = k + 1  # last, so that an interrupt never leaves half a knot
 
     def extend(self, t: Array, knots: Array, steps: int | None = None) -> None:
-        """Add knots (k, 3, n) of y, v, a at ``t`` (k,), of as many accepted steps unless given, and tell the observer."""
+        """Add knots (k, 3, n) of y, v, a at ``t`` (k,), by default one per accepted step, and tell the observer."""
         start, count = self._count, len(t)
         while start + count > len(self._t):
             self._t = np.concatenate([self._t, np.empty(len(self._t))])

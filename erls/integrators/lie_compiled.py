@@ -79,13 +79,14 @@ class CompiledSteps:
         options: ConstrainedOptions,
         recorder: ConstrainedRecorder,
     ) -> None:
-        from erls.kernels.nodal import matrix, step
+        from erls.kernels.nodal import contract, matrix, step
         from erls.kernels.nodal import system as sums
 
         self._kernel, self._functions = step, (sums.forces, matrix.iteration_matrix)
+        self._contract = contract
         self.system, self.compiled, self.options, self.recorder = system, compiled, options, recorder
         self.memory = compiled.work()
-        self.progress = step.Progress(np.zeros(6), np.zeros(8, dtype=np.int64))
+        self.progress = contract.Progress(np.zeros(6), np.zeros(8, dtype=np.int64))
         self.progress.rates[step.RATE] = SLOWEST_KNOWN
         self.progress.counts[step.USUAL] = MAX_ITERATIONS
         self.h, self.error = 0.0, 0.0
@@ -113,7 +114,7 @@ class CompiledSteps:
         while done < len(times) and status == kernel.DONE:
             part = times[done : done + self.steps]
             sizes = self.system.size, self.system.constraints
-            knots = kernel.Knots(
+            knots = self._contract.Knots(
                 np.empty((len(part), 3, self.compiled.stored)), *(np.empty((len(part), size)) for size in sizes)
             )
             begun = time.perf_counter()
@@ -150,7 +151,7 @@ class CompiledSteps:
 
     def _settings(self, limit: Limit) -> Any:
         use, options = Formulas.of(self.options, self.h), self.options
-        return self._kernel.Settings(
+        return self._contract.Settings(
             **{
                 name: getattr(use, name)
                 for name in ("h", "beta", "gamma", "share", "pull", "keep", "to_v", "to_a", "period", "tolerance")

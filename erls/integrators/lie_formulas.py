@@ -15,7 +15,7 @@ from erls.integrators.driver import not_finite
 
 MAX_HALVINGS = 12
 MAX_ITERATIONS = 10
-REFRESH_COST = 4  # of a fresh iteration matrix, in iterations
+REFRESH_COST = 6  # of a fresh iteration matrix, in iterations
 TOLERATED = 2  # iterations beyond the fewest, or beyond two, on average, before a fresh matrix is worth its cost
 ROUNDING = 16 * np.finfo(float).eps
 SLOWEST_KNOWN, FASTEST_TRUSTED = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
@@ -32,8 +32,8 @@ class Formulas:
     period : float
         Square root of 1/β'.
     tolerance : float
-        Error at which Newton iterations end [m]. An error e of the increment is one of e β' in v̇: it falls with h³, like
-        the truncation error of a step.
+        Error at which Newton iterations end [m]. An error e of the increment is one of e β' in v̇: it falls with h³,
+        like the truncation error of a step.
     error : float
         Truncation error of the increment over |v̇₁ − v̇₀|: a₀ stands for v̇ at t₀ + (α_m − α_f) h.
     """
@@ -110,7 +110,7 @@ class Steps(Protocol):
         """Change the step; a₀ moves with it."""
 
     def stretch(self, times: Array, last: float, limit: Limit) -> tuple[int, int]:
-        """Steps to ``times``; how many were made and recorded, and what ended them. Forces are asked for up to ``last``."""
+        """Steps to ``times``, with forces up to ``last``; how many were made and recorded, and what ended them."""
 
     def end(self) -> tuple[Configuration, Array]:
         """Configuration and velocity."""

@@ -64,10 +64,11 @@ def lie_generalized_alpha(
             steps = compiled_steps(system, options, recorder) or NumpySteps(system, options, recorder)
             for leg in walk:
                 steps.begin(leg, q, v)
-                if leg.end > leg.start and options.error_tolerance is None:
-                    _equal_steps(steps, leg, step, options, recorder)
-                elif leg.end > leg.start:
-                    _adaptive_steps(steps, leg, step, options.error_tolerance, recorder)
+                if leg.end > leg.start:
+                    if options.error_tolerance is None:
+                        _equal_steps(steps, leg, step, options, recorder)
+                    else:
+                        _adaptive_steps(steps, leg, step, options.error_tolerance, recorder)
                 q, v = steps.end()
         except KeyboardInterrupt:
             failure = SimulationError(

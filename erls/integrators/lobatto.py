@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from erls.kernels.contract import CompiledSystem
 
 NODES = (0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0)
-WEIGHT = 0.06  # κ
+WEIGHT = 0.08  # κ
 _ITERATED = 0.01  # of the tolerance: where iterations stop
 _FIRST_STEP = 1e-4  # s, at most
 _MAX_ITERATIONS = 10
@@ -95,7 +95,8 @@ class _Run:
         self.vectors = np.zeros((loop.RESIDUALS + 6, n))
         self.vectors[loop.METRES] = metre_scales(system)
         self.known, self.counts = np.zeros(loop.KNOWN), np.zeros(loop.COUNTS, dtype=np.int64)
-        self.counts[loop.MAX_ITERATIONS], self.counts[loop.REFRESH_COST] = _MAX_ITERATIONS, _REFRESH_COST
+        settings = {loop.MAX_ITERATIONS: _MAX_ITERATIONS, loop.REFRESH_COST: _REFRESH_COST, loop.CALM: loop.PATIENCE}
+        self.counts[list(settings)] = list(settings.values())
         span = times[1] - times[0]
         largest = min(options.step or math.inf, span / 20)
         self.known[[loop.LARGEST, loop.NEXT]] = largest, min(largest, _FIRST_STEP, 1e-3 * span)

@@ -24,7 +24,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
 
 from erls.errors import Cause, SimulationError
 from erls.integrators.base import (
@@ -65,18 +64,25 @@ Knot = tuple[float, Array, Array, Array]
 
 
 class _Method(NamedTuple):
-    solver: Any
+    name: str  # in SciPy
     stable_to: float = math.inf  # largest y with |R(iy)| <= 1 for the stability function R, times ω h
     refine: bool = False  # the interpolant is as accurate as the steps
     has_rates: bool = False  # at the end of each step
 
+    @property
+    def solver(self) -> Any:
+        """SciPy's class."""
+        import scipy.integrate  # here: slow to import
+
+        return getattr(scipy.integrate, self.name)
+
 
 METHODS = {
-    "rk45": _Method(RK45, stable_to=0.997, has_rates=True),
-    "dop853": _Method(DOP853, stable_to=5.960, refine=True, has_rates=True),
-    "radau": _Method(Radau, has_rates=True),
-    "bdf": _Method(BDF),
-    "lsoda": _Method(LSODA),
+    "rk45": _Method("RK45", stable_to=0.997, has_rates=True),
+    "dop853": _Method("DOP853", stable_to=5.960, refine=True, has_rates=True),
+    "radau": _Method("Radau", has_rates=True),
+    "bdf": _Method("BDF"),
+    "lsoda": _Method("LSODA"),
 }
 
 
@@ -134,7 +140,7 @@ def scipy_method(name: str) -> Integrator:
 
     integrate.__name__ = name
     integrate.__doc__ = (
-        f"Integrate with SciPy's {method.solver.__name__}; ``options.step`` is its largest step."
+        f"Integrate with SciPy's {method.name}; ``options.step`` is its largest step."
     )
     return integrate
 

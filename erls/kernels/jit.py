@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +16,8 @@ import platformdirs
 F = TypeVar("F", bound=Callable[..., Any])
 
 _PART = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+_SUBJECTS = {"chain": "the equations of motion", "nodal": "the equations of motion", "stepping": "the integrators"}
+_listeners: list[Callable[[str], None]] = []
 ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
 
 
@@ -30,6 +33,16 @@ def folder(subpackage: str) -> Path:
     given = os.environ.get("ERLS_CACHE")
     base = Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
     return base / f"kernels-{subpackage}-{digest.hexdigest()[:16]}"
+
+
+@contextmanager
+def announcing(tell: Callable[[str], None]) -> Iterator[None]:
+    """Have ``tell`` called when something is compiled for the first time, which takes some seconds."""
+    _listeners.append(tell)
+    try:
+        yield
+    finally:
+        _listeners.remove(tell)
 
 
 def compiled_before(subpackage: str) -> bool:
@@ -65,6 +78,9 @@ def _njit(function: Any, *signature: Any, **options: bool) -> Any:
 
     before = numba.config.CACHE_DIR
     subpackage = function.__module__.removeprefix(f"{__package__}.").partition(".")[0]
+    if not compiled_before(subpackage):
+        for tell in _listeners:
+            tell(f"compiling {_SUBJECTS.get(subpackage, subpackage)} (once on this machine)")
     numba.config.CACHE_DIR = str(folder(subpackage))
     try:
         return numba.njit(*signature, cache=True, error_model="numpy", nogil=True, **options)(function)

@@ -14,7 +14,7 @@ from fe_import.modal.model import ModalModel
 from fe_import.model import IntArray
 from fe_import.second_order.composition import composed, composed_rotation, twice_turned
 from fe_import.second_order.data import SecondOrder, pair_numbers
-from fe_import.second_order.moments import of_inertia, of_masses, of_moments
+from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_masses, of_moments
 
 if TYPE_CHECKING:
     from erls.mechanism.links import Link
@@ -93,8 +93,9 @@ def link_second_order(link: Link) -> LinkSecondOrder | None:
         slide = lift[:3] + np.einsum("ij,jab->iab", skew(link.inboard.position), lift[3:])
         momentum -= np.einsum("ij,jab->iab", rigid, np.concatenate([slide, lift[3:]]))
         first = np.array([rigid[5, 1], rigid[3, 2], rigid[4, 0]])
-        spin -= of_moments(slide, np.einsum("c,dab->cdab", first, slide))[1]
-        spin -= of_inertia(rigid[3:, 3:], np.zeros((3, model.modes)), lift[3:])[1]
+        second = np.trace(rigid[3:, 3:]) / 2 * np.eye(3) - rigid[3:, 3:]  # ∫ρ x ⊗ x
+        moment = np.einsum("c,dab->cdab", first, slide) + np.einsum("ce,dfe,fab->cdab", second, LEVI_CIVITA, lift[3:])
+        spin -= of_moments(slide, moment)[1]
     for payload in link.payloads:
         _, phi = _rigid_shape(model, payload.node)
         motion = found.node(payload.node)

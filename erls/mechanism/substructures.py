@@ -46,6 +46,12 @@ class Split:
         """Number in ``pieces`` of each joint of the whole links: it carries their first piece."""
         return [own.start for own in self.links]
 
+    def expanded(self, values: Array) -> Array:
+        """(joints of the pieces,) values of the whole links' joints, and 0 for welds."""
+        result = np.zeros(len(self.pieces.joints))
+        result[self.joints] = values
+        return result
+
 
 def is_split(mechanism: Mechanism) -> bool:
     """Whether any link is split."""

@@ -202,7 +202,7 @@ class NodalSystem:
         return sum(k for k, _ in pairs), sum(p for _, p in pairs)
 
     def compiled(self) -> Any:
-        """The system as arrays for compiled steps (`erls.nodal.compiled.CompiledSystem`), None where it has no kernels."""
+        """The system as arrays (`erls.nodal.compiled.CompiledSystem`), None where it has no kernels."""
         from erls.nodal.compiled import CompiledSystem, has_kernels
 
         return CompiledSystem(self) if has_kernels(self) else None

@@ -40,8 +40,9 @@ def smallest_multipliers(full: NodalSystem, t: float, q: Nodes, force: Array) ->
     metres = metre_scales(full)
     scales = Scales(metres, np.eye(1), rows)
     matrix = (dense(rows) / metres * scales.constraint[:, None]).T
-    unknowns: Array = np.linalg.lstsq(matrix, force / metres, rcond=1e-9)[0]
-    return unknowns * scales.constraint
+    unknowns = np.linalg.lstsq(matrix, force / metres, rcond=1e-9)[0]
+    result: Array = np.asarray(unknowns, dtype=float) * scales.constraint
+    return result
 
 
 def refuse_open(full: NodalSystem, t: float, q: Nodes, left_out: tuple[str, ...]) -> None:

@@ -59,11 +59,11 @@ def effects_text(found: Survey) -> str:
     if found.left:
         parts.append(f"not asked for by the scene: {', '.join(found.left)}")
     parts.append(
-        "auto: on or off with effects = \"auto\" at a tolerance of "
-        f"{settings.effects_tolerance:.2g} m; force: largest generalized force,\n"
-        "as one on the whole mechanism; error: largest distance of named points without the effect, in coarse runs;\n"
-        + ("drives: change of drive forces\nrelative to their peak; " if drives else "")
-        + "time: part of an evaluation of the equations that leaving it\nout saves. Effects that save nothing stay on."
+        f'auto: on or off with effects = "auto" at a tolerance of {settings.effects_tolerance:.2g} m. '
+        "force: largest generalized force, as one\n"
+        "on all mass alike. error: largest distance of named points without the effect, in coarse runs. "
+        + ("drives: change\nof drive forces, relative to their peak. time: part" if drives else "time: part\n")
+        + " of an evaluation of the equations that leaving it out saves.\nEffects that save nothing stay on."
     )
     return "\n\n".join(parts)
 

@@ -16,6 +16,7 @@ from erls.selection.outputs import Outputs, effort_error, largest_distance, watc
 from erls.selection.quick import quick
 
 STEPS = 1000
+FEWEST = 200  # knots of a run; with fewer of them, states between are taken
 _PLACES, _EFFORTS = 120, 40  # knots at which points and drive forces are compared
 
 
@@ -70,17 +71,17 @@ def certify(run: Run, whole: Mechanism) -> Certificate:
 
 def _legs(run: Run) -> list[Knots]:
     """Knots of a run between jumps; where they are few, states between them with accelerations of their own."""
-    s, system = run.solution, solved(run.formulation)
+    s, system = run.solution, quick(solved(run.formulation))
     jumps = np.flatnonzero(np.diff(s.t) == 0) + 1
     result = []
     for part in np.split(np.arange(len(s.t)), jumps):
         t = s.t[part]
         if len(part) < 2:
             continue
-        wanted = int(np.ceil(STEPS * (t[-1] - t[0]) / (s.t[-1] - s.t[0])))
-        if len(part) > wanted:
+        if len(s.t) >= FEWEST:
             result.append(Knots.inside(t, s.y[part], s.v[part], s.a[part]))
             continue
+        wanted = int(np.ceil(STEPS * (t[-1] - t[0]) / (s.t[-1] - s.t[0])))
         times = np.linspace(t[0], t[-1], max(wanted, 2) + 1)
         y, v = hermite(t, s.y[part], s.v[part], s.a[part], times)
         knots = Knots.inside(times, y, v, np.zeros_like(y))

@@ -15,14 +15,20 @@ class Quick:
     def __init__(self, system: Any) -> None:
         self.size: int = system.size
         self.length_scales, self.breakpoints = system.length_scales, system.breakpoints
-        self.acceleration = system.acceleration
-        self._functions = system.compiled
+        self._functions, self._system = system.compiled, system
         self._constants = self._functions.reals, self._functions.integers, self._functions.scratch
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
         """(n,) M a - f."""
         out = np.empty(self.size)
         self._functions.residual(*self._constants, t, y, v, a, out)
+        return out
+
+    def acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """(n,) M⁻¹ f."""
+        out = np.empty(self.size)
+        if self._functions.acceleration(*self._constants, t, y, v, out):
+            return np.asarray(self._system.acceleration(t, y, v))  # which names the coordinate that nothing resists
         return out
 
     def mass_matrix(self, t: float, y: Array) -> Array:

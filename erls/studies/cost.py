@@ -276,10 +276,10 @@ _REFERENCES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
         ),
     ),
     "tight": (
-        "all modes and effects, radau at rtol 1e-9 beside 1e-7",
+        "all modes and effects, lobatto at a tolerance of 1e-8 m beside 1e-7 m",
         (
-            ("simulation.integrator=radau", "simulation.rtol=1e-9", "simulation.atol=1e-12"),
-            ("simulation.integrator=radau", "simulation.rtol=1e-7", "simulation.atol=1e-10"),
+            ("simulation.integrator=lobatto", "simulation.tolerance=1e-8"),
+            ("simulation.integrator=lobatto", "simulation.tolerance=1e-7"),
         ),
     ),
 }

@@ -17,7 +17,10 @@ from erls.kernels.contract import CompiledSystem
 INERTIAL = [name for name, effect in EFFECTS.items() if effect.in_equations]
 SINE = {"shape": "sine", "amplitude": 0.5, "frequency_hz": 1.0, "phase_deg": 30.0}
 QUINTIC = {"shape": "polynomial", "degree": 5, "from": 0.1, "to": 0.7, "start": 0.1, "duration": 0.8}
-PROFILES = [{"shape": "step", "start": 0.05, "value": 0.7}, {"shape": "sine", "amplitude": 0.3, "frequency_hz": 2.0}]
+PROFILES = [
+    {"shape": "step", "start": 0.05, "value": 0.7},
+    {"shape": "sine_burst", "start": 0.02, "amplitude": 0.3, "frequency_hz": 20.0, "cycles": 3},
+]
 TORQUE = {"type": "torque", "profiles": PROFILES}
 PD: dict[str, Any] = {"type": "pd", "motion": QUINTIC, "proportional_gain": 30.0, "derivative_gain": 2.0}
 SPRING: dict[str, Any] = {

@@ -27,7 +27,7 @@ def _distance(found: np.ndarray, expected: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", chain_cases.CASES)
 def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
-    """Residual (joints and modes apart), mass, stiffness, damping; the acceleration leaves no residual."""
+    """Residual (joints and modes apart), mass, stiffness, damping, acceleration (condition up to 1e8)."""
     chain = chain_cases.equations(tmp_path, name)
     assert chain.compiled is not None
     f = len(chain.free_joints)
@@ -40,9 +40,7 @@ def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
         stiffness, damping = chain.stiffness_and_damping(at.t, at.y, at.v)
         assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
         assert _distance(found["damping"], damping) <= LIKE_NUMPY
-        left = chain.residual(at.t, at.y, at.v, found["acceleration"])
-        forces = chain.residual(at.t, at.y, at.v, 0 * at.a)
-        assert np.abs(left).max() <= LIKE_NUMPY * np.abs(forces).max()
+        assert _distance(found["acceleration"], chain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
 
 
 def test_modes_alone_feel_what_the_elastic_forces_hide(tmp_path: Path) -> None:
@@ -69,8 +67,8 @@ def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     with np.load(output) as twin:
         assert set(twin) == set(found)
         for key, values in found.items():
-            # the acceleration solves a system with a condition up to 1e5
-            limit = 1e5 * LIKE_TWIN if key.endswith("acceleration") else LIKE_TWIN
+            # rounding of the forces counts with the condition of the mass matrix, up to 1e8
+            limit = LIKE_NUMPY if key.endswith("acceleration") else LIKE_TWIN
             assert _distance(values, twin[key]) <= limit, key
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
+import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
 
-from erls.body_scenes import solve
+from erls.body_scenes import analyses, schema, solve
 from erls.body_scenes.result import Motion, Rest
 
 EI_Y, EI_Z = 1e6 * 0.1 * 0.02**3 / 12, 1e6 * 0.02 * 0.1**3 / 12
@@ -157,3 +159,19 @@ def test_two_nodes_in_one_place_are_hinged(tmp_path: Path) -> None:
     stiffness = np.array([3 * EI_Y / 1.0, 3 * EI_Y / 1.0])  # a cantilever, and one whose tip is clamped
     share = wrenches["clamp"]["force"][2] / -1e-3
     assert share == pytest.approx(stiffness[0] / stiffness.sum(), rel=1e-6)
+
+
+def test_the_scene_of_the_readme_shows_every_field(tmp_path: Path) -> None:
+    """It runs as printed, and with the fields that it shows as comments no field of the schema is missing."""
+    text = (scenes.ROOT / "README.md").read_text(encoding="utf-8")
+    (block,) = (b for b in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if 'name = "door on a beam"' in b)
+    path = tmp_path / "door.toml"
+    path.write_text(block, encoding="utf-8")
+    found = solve(path)
+    assert isinstance(found, Motion)
+    assert found.end == 0.2
+    records = (schema.BodySceneRecord, schema.Body, schema.Beam, schema.PointMass, schema.Connection, schema.LineSpring,
+               schema.TurningSpring, schema.Load, *get_args(analyses.Analysis))  # fmt: skip
+    for record in records:
+        for name in record.__struct_encode_fields__:
+            assert re.search(rf"\b{name}\b", block), f"{record.__name__}.{name}"

@@ -40,7 +40,7 @@ def _shafts() -> dict[str, Any]:
 
 
 def test_hookes_joint(tmp_path: Path) -> None:
-    """Twelve freedoms, fifteen conditions, of which three follow: tan α₂ = tan α₁ cos 30° or its inverse, by the start."""
+    """Twelve freedoms, fifteen conditions, of which three follow; tan α₂ = tan α₁ cos 30°."""
     found = solve(body_scene(tmp_path, _shafts()))
     assert isinstance(found, Motion)
     assert len(found.assembly.left_out) == 3
@@ -54,7 +54,7 @@ def test_hookes_joint(tmp_path: Path) -> None:
     carried = y[:, 1] @ across
     second = np.unwrap(np.arctan2(carried[:, 2], carried @ across))
     assert first[-1] == pytest.approx(np.radians(150.0), abs=1e-6)
-    middle = np.abs(first - np.radians(60)).argmin()  # the cross arm that the first shaft carries starts along z
+    middle = np.abs(first - np.radians(60)).argmin()
     expected = np.arctan(np.tan(first[middle]) * np.cos(BEND))
     assert second[middle] == pytest.approx(expected, abs=1e-5)
     assert second[middle] != pytest.approx(first[middle], abs=1e-2)

@@ -183,6 +183,20 @@ def test_rest_to_rest(degree, vanishing, peak):
     assert (abs(jerk) < 1e-3) == (degree == 7)
 
 
+def test_spin_up_reaches_its_rate():
+    """Degree 7, by integration; a sine, psi = (w/T)(t^2/2 + (T/2pi)^2 (cos(2 pi t/T) - 1))."""
+    smooth = motion("shape = 'spin_up'\nrate = 150\nduration = 0.02")
+    for x in (0.0, 0.3, 0.8, 1.0):
+        wanted = 3.0 * (7 * x**5 - 14 * x**6 + 10 * x**7 - 2.5 * x**8)
+        assert smooth.value(0.02 * x) == pytest.approx(wanted, abs=1e-14)
+    assert smooth.derivatives(0.05) == pytest.approx((150 * 0.04, 150.0, 0.0))
+    wave = motion("shape = 'spin_up'\nrate = 6\nduration = 15\nramp = 'sine'")
+    for t in (0.0, 2.0, 7.5, 14.0, 15.0):
+        wanted = 6 / 15 * (t**2 / 2 + (15 / (2 * math.pi)) ** 2 * (math.cos(2 * math.pi * t / 15) - 1))
+        assert wave.value(t) == pytest.approx(wanted, abs=1e-13)
+    assert wave.derivatives(20.0) == pytest.approx((6 * 20 - 6 * 15 / 2, 6.0, 0.0))
+
+
 def test_waypoints_stop_at_each_point():
     curve = motion(MOTIONS["waypoints"])
     for t, degrees in zip((0.0, 0.3, 0.5, 0.9), (0.0, 40.0, 40.0, -10.0), strict=True):

@@ -153,9 +153,8 @@ def test_large_deflections_are_warned_of(tmp_path: Path) -> None:
     down = {"duration": 0.1, "step": 1e-3}
     now, later = told(scene(tmp_path, simulation=down, gravity=[0, 0, -2000.0]))
     assert now == later
-    assert len(now) == 1
-    assert "link 'l' moves by up to" in now[0]
-    assert "small displacements" in now[0]
+    for text in ("link 'l' moves by up to", "small displacements", "link 'l': expect errors of about"):
+        assert any(text in w for w in now)
     assert told(scene(tmp_path, simulation=down, gravity=[0, 0, -20.0])) == ([], [])
 
 

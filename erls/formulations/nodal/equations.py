@@ -49,7 +49,8 @@ class Nodal:
                 "the nodal formulation closes no loops",
                 where=f"loop {loop.name!r} on link {mechanism.links[carried].name!r}",
                 value="nodal",
-                remedy="use formulation erls or ffr",
+                remedy="use formulation erls or ffr, or a scene of beams and connections, as "
+                "data/slider_crank/fast_beams.toml",
             )
         self.mechanism = mechanism
         parts = [link_parts(link, elements_per_member) for link in mechanism.links]

@@ -16,7 +16,7 @@ from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
 from erls.lie.so3 import Array
 
-
+_LOCAL = 1e-3
 _SHARE = 1e-2  # of the Newton tolerance: errors of a step add up, over 2 s of 1 ms steps to a million times as much
 
 
@@ -27,15 +27,18 @@ def nodal_generalized_alpha(
     v: Array,
     options: Options,
     observer: Observer | None = None,
-    tolerance: float | None = None,
+    adaptive: bool = False,
 ) -> Solution:
-    """Integrate a `Nodal`; see `lie_generalized_alpha`. With ``tolerance`` [m] steps adapt to their local error."""
+    """Integrate a `Nodal`; see `lie_generalized_alpha`.
+
+    With ``adaptive``, steps follow their local error, a share `_LOCAL` of ``options.tolerance``.
+    """
     settings = ConstrainedOptions(
         options.step,
         spectral_radius=options.spectral_radius,
         newton_tolerance=_SHARE * options.newton_tolerance,
         start_from="last",
-        error_tolerance=tolerance,
+        error_tolerance=_LOCAL * options.tolerance if adaptive else None,
     )
 
     def complete(found: ConstrainedSolution) -> Solution:

@@ -14,6 +14,7 @@ from erls.kernels.nodal.vectors import (
     Twist,
     Vector,
     add,
+    dot,
     nine,
     plus,
     product,
@@ -66,8 +67,7 @@ def _along(row: Twist, values: Array, node: int) -> float:
     if node < 0:
         return 0.0
     v, w = three(values, 6 * node), three(values, 6 * node + 3)
-    linear = row[0][0] * v[0] + row[0][1] * v[1] + row[0][2] * v[2]
-    return linear + row[1][0] * w[0] + row[1][1] * w[1] + row[1][2] * w[2]
+    return dot(row[0], v) + dot(row[1], w)
 
 
 @inlined
@@ -93,7 +93,7 @@ def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> f
     """What drive, spring, damper and friction give."""
     at = len(model.joint_nodes) + len(model.load_nodes) + 3 * k
     law = model.actuators
-    torque = sample[at + 2] + law[k, 6] * (sample[at] - angle) + law[k, 7] * (sample[at + 1] - rate)
+    torque: float = sample[at + 2] + law[k, 6] * (sample[at] - angle) + law[k, 7] * (sample[at + 1] - rate)
     torque = max(-law[k, 8], min(law[k, 8], torque))
     torque -= law[k, 1] * (angle - law[k, 2]) + law[k, 3] * rate
     if law[k, 4] != 0.0:

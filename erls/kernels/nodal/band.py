@@ -1,7 +1,7 @@
 """LU factors of a band matrix with row exchanges, in place.
 
-Row i of the table holds the entries of columns i − w to i + 2 w; w of them on either side belong to the matrix, the last w
-make room for what row exchanges fill. (G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed., sec. 4.3.)
+Row i of the table holds the entries of columns i − w to i + 2 w; w on either side belong to the matrix, the last
+w make room for what row exchanges fill. (G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed., sec. 4.3.)
 """
 
 from __future__ import annotations

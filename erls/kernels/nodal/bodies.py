@@ -6,7 +6,20 @@ from erls.kernels.contract import Array
 from erls.kernels.jit import inlined, part
 from erls.kernels.nodal.contract import Model, Work
 from erls.kernels.nodal.motions import cobracket, pair_minus, pair_plus
-from erls.kernels.nodal.vectors import Twist, Vector, add, cross, minus, nine, of_matrix, scaled, three, turned, unit, vector
+from erls.kernels.nodal.vectors import (
+    Twist,
+    Vector,
+    add,
+    cross,
+    minus,
+    nine,
+    of_matrix,
+    scaled,
+    three,
+    turned,
+    unit,
+    vector,
+)
 
 _ZERO = (0.0, 0.0, 0.0)
 

@@ -40,10 +40,10 @@ def _node_factors(model: Model, work: Work, to_a: float, to_v: float) -> None:
     for node in range(len(work.poses)):
         at = 6 * node
         out = work.factors[node]
-        for part in range(3):
+        for kind in range(3):
             for i in range(6):
                 for j in range(6):
-                    out[part, i, j] = 0.0
+                    out[kind, i, j] = 0.0
         u, psi = three(work.increment, at), three(work.increment, at + 3)
         f, g = tangent_coefficients(stumpff(dot(psi, psi)))
         turn = nine(work.poses, node, 3)
@@ -130,9 +130,8 @@ def _own(work: Work, row: int, column: int, to_a: float, to_v: float) -> Vector:
 
 @inlined
 def _mixed(work: Work, row: int, column: int, right: Array, k: int, j: int) -> Vector:
-    found = plus(
-        scaled(right[0, k, j], _three(work.mass, row, column)), scaled(right[1, k, j], _three(work.damping, row, column))
-    )
+    mass, damping = _three(work.mass, row, column), _three(work.damping, row, column)
+    found = plus(scaled(right[0, k, j], mass), scaled(right[1, k, j], damping))
     return plus(found, scaled(right[2, k, j], _three(work.stiffness, row, column)))
 
 

@@ -1,7 +1,7 @@
 """Operators of one rigid motion, applied to twists and wrenches: the formulas of `erls.lie.motion_maps`.
 
-A power series in ad ξ, ξ = [u; ψ], is [[A, B], [0, A]] with the same series A of rotations and its derivative B along u.
-Coefficients f, g of A come from `erls.kernels.nodal.rotations`.
+A power series in ad ξ, ξ = [u; ψ], is [[A, B], [0, A]] with the same series A of rotations and its derivative B along
+u. Coefficients f, g of A come from `erls.kernels.nodal.rotations`.
 """
 
 from __future__ import annotations

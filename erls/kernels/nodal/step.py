@@ -1,4 +1,4 @@
-"""Steps of Lie-group generalized-α: the algorithm of `erls.integrators.lie_generalized_alpha`, whole stretches at once."""
+"""Steps of Lie-group generalized-α, many at once: the algorithm of `erls.integrators.lie_steps`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import inlined, kernel, part
+from erls.kernels.jit import inlined, kernel
 from erls.kernels.nodal import band
 from erls.kernels.nodal.actuators import set_coordinates, store_coordinates
 from erls.kernels.nodal.beam import bend
@@ -172,7 +172,7 @@ def _correct(model: Model, work: Work, settings: Settings) -> float:
         right = work.force[unknown] + work.reaction[unknown] if unknown < n else work.violation[unknown - n]
         ordered[i] = work.left[unknown] * right
     band.solve(work.band, work.pivots, ordered)
-    size = 0.0
+    size: float = 0.0
     for i in range(len(ordered)):
         unknown = model.order[i]
         work.correction[unknown] = ordered[i]

@@ -7,7 +7,7 @@ The conventions are those of `erls.nodal.assembly`. On R³×SO(3) a node's veloc
 from __future__ import annotations
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import inlined, kernel, part
+from erls.kernels.jit import inlined, kernel
 from erls.kernels.nodal.actuators import actuator_forces
 from erls.kernels.nodal.beam import beam_forces
 from erls.kernels.nodal.bodies import body_forces, load_forces

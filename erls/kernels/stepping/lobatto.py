@@ -24,8 +24,8 @@ KNOWN = 16
 # counts
 FACTORED, USUAL, EXCESS, REASON, HISTORY, SUSPECT, DIAGONAL = range(7)  # DIAGONAL: stiffness and damping
 MAX_ITERATIONS, REFRESH_COST = 7, 8
-RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED = range(9, 13)
-COUNTS = 13
+RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED, CALM = range(9, 14)  # CALM: steps since one was rejected
+COUNTS = 14
 SINGULAR, NOT_FINITE, SLOW, INACCURATE = 1, 2, 3, 4  # reasons
 # blocks of coefficients (4, 4), of `erls.integrators.lobatto`; the last one has the rows below it
 RATES, PLACES, INTO_RE, INTO_IM, BACK_RE, BACK_IM, FORETELL, ROWS = range(8)
@@ -37,6 +37,7 @@ METRES, PART_RE, PART_IM, RESIDUALS = range(4)
 
 SLOWEST, FASTEST = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
 GROWTH, SHRINK, SAFETY = 2.0, 0.2, 0.9  # of steps
+PATIENCE = 8  # steps without growth after one that was rejected
 KEPT, WORTH = 0.95, 1.2  # bounds on a change of the step that is not worth new factors
 
 _ADVANCE: Any = None
@@ -322,6 +323,7 @@ def retry(known: Array, counts: IntArray, reason: int, share: float) -> bool:
     """Try a smaller step; False when it would be too small."""
     counts[REASON] = reason
     counts[REJECTED] += 1
+    counts[CALM] = 0
     known[NEXT] = known[H] * share
     known[RATE] = SLOWEST
     return bool(known[NEXT] >= known[SMALLEST])
@@ -419,7 +421,8 @@ def advance(
                 known[ERROR] = error
                 going = retry(known, counts, INACCURATE, min(scale, 0.8))
             else:
-                known[NEXT] = h * scale
+                counts[CALM] += 1
+                known[NEXT] = h * (scale if counts[CALM] > PATIENCE else min(scale, 1.0))
                 made = accept(known, counts, nodes, stages, last, times, knots, made)
                 going = True
         if not going:

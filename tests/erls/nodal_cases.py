@@ -1,0 +1,127 @@
+"""A nodal system with elements and joints of all kinds that have kernels, far from rest, and what they make of it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from erls.integrators.base import Array
+from erls.integrators.constrained import ConstrainedOptions, ConstrainedState
+from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
+from erls.lie import motion_maps as motions
+from erls.lie.groups import R3_SO3, SE3, Group
+from erls.nodal.assembly import NodalSystem
+from erls.nodal.beam import Beam, Beams
+from erls.nodal.compiled import CompiledSystem
+from erls.nodal.joints import GROUND, Joint
+from erls.nodal.loads import NodalLoad, NodalLoads
+from erls.nodal.rigid_body import RigidBodies, RigidBody
+from erls.nodal.section import BeamSection
+
+GROUPS: dict[str, Group] = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
+TIME, TO_A, TO_V, PERIOD = 0.7, 30.0, 4.0, 0.1
+WEIGHT = np.array([0.3, -0.5, -9.0])
+
+
+def system(group: str) -> NodalSystem:
+    """Three curved, twisted beams with full section matrices, two bodies, loads, four joints, two of them driven."""
+    rng = np.random.default_rng(3)
+    poses = motions.exp(0.6 * rng.standard_normal((5, 6)))
+    sections = []
+    for _ in range(3):
+        first, second = rng.standard_normal((2, 6, 6))
+        sections.append(BeamSection(np.eye(6) + first @ first.T, np.eye(6) + second @ second.T))
+    ends = motions.exp(0.4 * rng.standard_normal((3, 2, 6)))
+    beams = [Beam((k, k + 1), poses[k : k + 2] @ ends[k], sections[k]) for k in range(3)]
+    bodies = [RigidBody(k, 2.0 + k, np.diag([1.0, 1.2, 1.3]), rng.standard_normal(3)) for k in (1, 4)]
+    loads = [NodalLoad(k, *rng.standard_normal((2, 3)), follower=k == 1) for k in range(3)]
+
+    def somewhere() -> Array:
+        found: Array = motions.exp(0.5 * rng.standard_normal(6))
+        return found
+
+    joints = [
+        Joint("hinge", "revolute", GROUND, 0, somewhere(), somewhere()),
+        Joint("cross", "universal", 3, 4, somewhere(), somewhere()),
+        Joint("turned", "revolute", 1, 4, somewhere(), somewhere(), lambda t: (0.3 + t, 1.0, 0.0)),
+        Joint("pushed", "prismatic", 2, GROUND, somewhere(), somewhere(), lambda t: (0.3 + t, 1.0, 0.0)),
+    ]
+    elements = [Beams(beams, poses, WEIGHT), RigidBodies(bodies, WEIGHT), NodalLoads(loads)]
+    return NodalSystem(poses, elements, joints, GROUPS[group])
+
+
+def state(known: NodalSystem) -> tuple[Array, Array, Array, Array]:
+    """Increment, velocity, acceleration, multipliers."""
+    rng = np.random.default_rng(4)
+    v, a = rng.standard_normal((2, known.size))
+    return 0.2 * rng.standard_normal(known.size), v, a, rng.standard_normal(known.constraints)
+
+
+def evaluate(known: NodalSystem) -> dict[str, Array]:
+    """By kernels at `state`: forces (n,), reactions (n,), violations (m,), and the factored iteration matrix with
+    its scales, in the order of the unknowns.
+    """
+    from erls.kernels.nodal import matrix
+    from erls.kernels.nodal import system as sums
+
+    compiled = CompiledSystem(known)
+    work = compiled.work()
+    increment, v, a, multipliers = state(known)
+    start = compiled.state(ConstrainedState(known.start, v, a, multipliers), a)
+    moved = known.compose(known.start, increment).poses
+    work.poses[:, :3], work.poses[:, 3:] = moved[:, :3, 3], moved[:, :3, :3].reshape(-1, 9)
+    work.increment[:], work.v[:], work.a[:], work.multipliers[:] = increment, v, a, multipliers
+    sample = compiled.samples(np.array([TIME]))[0]
+    sums.forces(compiled.model, work, start, sample)
+    found = {"force": work.force.copy(), "reaction": work.reaction.copy(), "violation": work.violation.copy()}
+    broken = matrix.iteration_matrix(compiled.model, work, sample, TO_A, TO_V, PERIOD)
+    return {
+        **found,
+        "status": np.array([float(broken)]),
+        "band": work.band,
+        "pivots": work.pivots.astype(float),
+        "left": work.left,
+        "right": work.right,
+        "order": compiled.model.order.astype(float),
+        "inertia": work.inertia,
+    }
+
+
+def solved(found: dict[str, Array], right: Array) -> Array:
+    """Unknowns (N,) of the factored system for a right-hand side, in NumPy."""
+    order, band = found["order"].astype(int), found["band"]
+    n, width = len(band), (band.shape[1] - 1) // 3
+    x = (found["left"] * right)[order]
+    for k in range(n):
+        best = int(found["pivots"][k])
+        x[[k, best]] = x[[best, k]]
+        for i in range(k + 1, min(k + width, n - 1) + 1):
+            x[i] -= band[i, k - i + width] * x[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, min(k + 2 * width, n - 1) + 1):
+            x[k] -= band[k, j - k + width] * x[j]
+        x[k] /= band[k, width]
+    result = np.empty(n)
+    result[order] = x
+    return result * found["right"]
+
+
+def twin(path: Path) -> None:
+    """All of it into a file, with a short run of the slow heavy top."""
+    import heavy_top
+
+    found = {f"{group} {k}": x for group in GROUPS for k, x in evaluate(system(group)).items()}
+    top = heavy_top.heavy_top("SE(3)")
+    spin = heavy_top.SPINS["slow"]
+    start = np.concatenate([np.cross(spin, heavy_top.ARM), spin])
+    run = lie_generalized_alpha(
+        top, (0, 0.02), top.start, start, ConstrainedOptions(step=2e-3, compiled=True)
+    )
+    assert run.failure is None
+    np.savez(path, **found, run=run.y)
+
+
+if __name__ == "__main__":
+    twin(Path(sys.argv[1]))
