@@ -21,8 +21,7 @@ from typing import Any
 
 import numpy as np
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "erls"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "erls"))
 
 import heavy_top  # the systems of the tests
 import test_nodal_dynamics as l_shape
@@ -48,14 +47,13 @@ def timed(run: Callable[[], ConstrainedSolution]) -> tuple[ConstrainedSolution, 
 def tops(steps: list[float], repeat: int, exudyn: Any) -> None:
     """Largest error of the fast top over 2 s, and microseconds per step."""
     print("heavy top      step [s]   error [m]   µs/step")
-    exact = heavy_top.reference()
+    exact, alike = heavy_top.reference(), (np.inf, np.inf)
     for step in steps:
-        costs = {}
         for group in heavy_top.GROUPS:
             options = ConstrainedOptions(step=step)
             found, spent = least(repeat, partial(timed, partial(heavy_top.spin, group, 2.0, options)))
-            costs[group] = 1e6 * spent / found.work.steps
-            print(f"{group:12s}  {step:.2e}  {heavy_top.errors(found)[0]:.3e}  {costs[group]:8.2f}", flush=True)
+            cost = 1e6 * spent / found.work.steps
+            print(f"{group:12s}  {step:.2e}  {heavy_top.errors(found)[0]:.3e}  {cost:8.2f}", flush=True)
         if exudyn is None:
             continue
         for name, modified in (("full", False), ("modified", True)):
@@ -68,9 +66,22 @@ def tops(steps: list[float], repeat: int, exudyn: Any) -> None:
             near = np.searchsorted(rows[:, 0], exact["t"] - 1e-9).clip(max=len(rows) - 1)
             met = np.abs(rows[near, 0] - exact["t"]) < 1e-9
             error = np.linalg.norm(rows[near[met], 1:4] - exact["fast_x"][met], axis=1).max()
-            cost = 1e6 * spent * step / 2.0
-            ratio = cost / costs["R³×SO(3)"]
-            print(f"exudyn {name:8s} {step:.2e}  {error:.3e}  {cost:8.2f}   {ratio:.1f} times R³×SO(3)", flush=True)
+            print(f"exudyn {name:8s} {step:.2e}  {error:.3e}  {1e6 * spent * step / 2.0:8.2f}", flush=True)
+            alike = min(alike, (spent, error), key=lambda x: x[0])
+    if exudyn is not None and alike[0] < np.inf:
+        _equal_error(repeat, *alike)
+
+
+def _equal_error(repeat: int, spent: float, error: float) -> None:
+    """R³×SO(3) with the step that gives exudyn's error, from 1.07 mm at 0.25 ms with second order."""
+    step = 2.5e-4 * np.sqrt(error / 1.071e-3)
+    options = ConstrainedOptions(step=step, start_from="last", newton_tolerance=1e-9)
+    found, own = least(repeat, partial(timed, partial(heavy_top.spin, "R³×SO(3)", 2.0, options)))
+    print(
+        f"R³×SO(3)      {step:.2e}  {heavy_top.errors(found)[0]:.3e}  {1e6 * own / found.work.steps:8.2f}   "
+        f"2 s in {1e3 * own:.1f} ms, exudyn at that error {1e3 * spent:.1f} ms: {spent / own:.1f} times",
+        flush=True,
+    )
 
 
 def pendulums(elements: list[int], repeat: int, exudyn: Any) -> None:

@@ -61,8 +61,7 @@ def piece_links(record: LinkRecord, whole: Link, models: Sequence[ModalModel], w
         MODAL_FILE: models that do not make up the link.
     """
     result = []
-    known = set().union(*(model.node_names for model in models))
-    if len(whole.model.node_names) < len(whole.model.nodes) or not known.issuperset(whole.model.node_names):
+    if not _same_nodes(whole.model, models):
         raise _unfit(whole, "its nodes are not those of its substructures", where)
     for number, model in enumerate(models):
         ends = model.interface_nodes
@@ -91,6 +90,15 @@ def piece_links(record: LinkRecord, whole: Link, models: Sequence[ModalModel], w
             )
         )
     return tuple(result)
+
+
+def _same_nodes(whole: ModalModel, models: Sequence[ModalModel]) -> bool:
+    """Whether every node has a name, and under it a place on one of the pieces."""
+    found = {name: model.nodes[node] for model in models for name, node in model.node_names.items()}
+    if len(set(whole.node_names.values())) < len(whole.nodes) or not found.keys() >= whole.node_names.keys():
+        return False
+    away = [found[name] - whole.nodes[node] for name, node in whole.node_names.items()]
+    return bool(np.abs(away).max() <= 1e-9 * np.ptp(whole.nodes, axis=0).max())
 
 
 def _unfit(link: Link, message: str, where: str) -> FEImportError:

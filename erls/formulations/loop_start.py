@@ -141,6 +141,8 @@ def _gap(chain: ClosedChain, found: Closure) -> tuple[float, str]:
 
 def _closed(chain: ClosedChain, guess: Array, moving: IntArray) -> Array:
     """(n,) the joints ``moving`` turned until the loops are closed as well as may be."""
+    from scipy.optimize import least_squares  # here: slow to import
+
     if not len(moving):
         return guess
     y, still = guess.copy(), np.zeros(chain.size)

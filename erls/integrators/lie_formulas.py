@@ -16,7 +16,7 @@ from erls.integrators.driver import not_finite
 MAX_HALVINGS = 12
 MAX_ITERATIONS = 10
 REFRESH_COST = 6  # of a fresh iteration matrix, in iterations
-TOLERATED = 2  # iterations beyond the fewest, or beyond two, on average, before a fresh matrix is worth its cost
+TOLERATED = 3  # iterations beyond the fewest, or beyond two, on average, before a fresh matrix is worth its cost
 ROUNDING = 16 * np.finfo(float).eps
 SLOWEST_KNOWN, FASTEST_TRUSTED = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
 

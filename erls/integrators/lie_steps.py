@@ -183,9 +183,9 @@ class NumpySteps:
             # a first correction may be small by luck; later ones must lead to the goal in time
             left = iterations_left(size, goal * (1 - rate), rate) if k > 0 else 0.0
             stale = mode == "auto" and not fresh
-            if rate > 2 or (k > 1 and left > MAX_ITERATIONS - k and not stale):
+            if k > 1 and (rate > 2 or (left > MAX_ITERATIONS - k and not stale)):
                 break
-            fresh = mode == "update" or (mode == "auto" and left > REFRESH_COST)
+            fresh = mode == "update" or (mode == "auto" and k > 1 and left > REFRESH_COST)
             before, earlier = size, before
         self.suspect = correction
         self.reason = too_slow(before, size, goal)

@@ -83,36 +83,37 @@ class _Run:
     ) -> None:
         from erls.integrators.uncompiled import uncompiled  # here: they import the compiler
         from erls.kernels.stepping import lobatto as loop
+        from erls.kernels.stepping import stages as at
 
-        self.loop, self.recorder, n = loop, recorder, system.size
+        self.at, self.recorder, n = at, recorder, system.size
         compiled: CompiledSystem | None = getattr(system, "compiled", None)
         self.system = compiled or uncompiled(system)
         self.step = loop.advance if compiled else getattr(loop.advance, "py_func", loop.advance)
         self.chunk, self.largest_chunk = (8, 4096) if compiled else (1, 1)  # steps
         self.coefficients = _coefficients()
         self.stages, self.last = np.zeros((4, 3, n)), np.zeros((4, 3, n))
-        self.matrices = np.zeros((loop.SOLVERS + 4, n, n))
-        self.vectors = np.zeros((loop.RESIDUALS + 6, n))
-        self.vectors[loop.METRES] = metre_scales(system)
-        self.known, self.counts = np.zeros(loop.KNOWN), np.zeros(loop.COUNTS, dtype=np.int64)
-        settings = {loop.MAX_ITERATIONS: _MAX_ITERATIONS, loop.REFRESH_COST: _REFRESH_COST, loop.CALM: loop.PATIENCE}
+        self.matrices = np.zeros((at.SOLVERS + 4, n, n))
+        self.vectors = np.zeros((at.RESIDUALS + 6, n))
+        self.vectors[at.METRES] = metre_scales(system)
+        self.known, self.counts = np.zeros(at.KNOWN), np.zeros(at.COUNTS, dtype=np.int64)
+        settings = {at.MAX_ITERATIONS: _MAX_ITERATIONS, at.REFRESH_COST: _REFRESH_COST, at.CALM: at.PATIENCE}
         self.counts[list(settings)] = list(settings.values())
         span = times[1] - times[0]
         largest = min(options.step or math.inf, span / 20)
-        self.known[[loop.LARGEST, loop.NEXT]] = largest, min(largest, _FIRST_STEP, 1e-3 * span)
-        self.known[[loop.TOLERANCE, loop.GOAL]] = options.tolerance, _ITERATED * options.tolerance
-        self.known[[loop.ROUNDING, loop.RATE]] = _ROUNDING, loop.SLOWEST
+        self.known[[at.LARGEST, at.NEXT]] = largest, min(largest, _FIRST_STEP, 1e-3 * span)
+        self.known[[at.TOLERANCE, at.GOAL]] = options.tolerance, _ITERATED * options.tolerance
+        self.known[[at.ROUNDING, at.RATE]] = _ROUNDING, at.SLOWEST
 
     def advance(self, leg: Leg, y: Array, v: Array, a: Array, recorder: Recorder) -> tuple[Array, Array]:
         """Adaptive steps over a leg."""
-        loop, known = self.loop, self.known
-        known[[loop.START, loop.END, loop.FIRST, loop.LAST]] = leg
-        known[loop.T], known[loop.BEFORE] = leg.start, leg.end - leg.start
-        known[loop.SMALLEST] = 64 * np.spacing(max(abs(leg.start), abs(leg.end)))
-        self.counts[[loop.FACTORED, loop.HISTORY]] = 0
+        at, known = self.at, self.known
+        known[[at.START, at.END, at.FIRST, at.LAST]] = leg
+        known[at.T], known[at.BEFORE] = leg.start, leg.end - leg.start
+        known[at.SMALLEST] = 64 * np.spacing(max(abs(leg.start), abs(leg.end)))
+        self.counts[[at.FACTORED, at.HISTORY]] = 0
         self.stages[0] = y, v, a
         self.last[:] = self.stages[0]
-        while known[loop.T] < leg.end:
+        while known[at.T] < leg.end:
             begun = time.perf_counter()
             going = self.make_steps()
             spent = time.perf_counter() - begun
@@ -124,7 +125,7 @@ class _Run:
 
     def make_steps(self) -> bool:
         """A chunk of steps; False when no step is small enough to go on."""
-        loop, system, counts = self.loop, self.system, self.counts
+        at, system, counts = self.at, self.system, self.counts
         times, knots = np.empty(3 * self.chunk), np.empty((3 * self.chunk, 3, system.size))
         made = 0
         try:
@@ -147,34 +148,34 @@ class _Run:
             )
         finally:
             work = self.recorder.work
-            work.rhs_calls += int(counts[loop.RHS_CALLS])
-            work.newton_iterations += int(counts[loop.ITERATIONS])
-            work.factorizations += int(counts[loop.FACTORIZATIONS])
-            work.rejected_steps += int(counts[loop.REJECTED])
-            counts[[loop.RHS_CALLS, loop.ITERATIONS, loop.FACTORIZATIONS, loop.REJECTED]] = 0
+            work.rhs_calls += int(counts[at.RHS_CALLS])
+            work.newton_iterations += int(counts[at.ITERATIONS])
+            work.factorizations += int(counts[at.FACTORIZATIONS])
+            work.rejected_steps += int(counts[at.REJECTED])
+            counts[[at.RHS_CALLS, at.ITERATIONS, at.FACTORIZATIONS, at.REJECTED]] = 0
         stored = made if made >= 0 else -1 - made
         self.recorder.extend(times[:stored], knots[:stored], stored // 3)
         return made >= 0
 
     def failure(self) -> SimulationError:
         """Why no step is small enough."""
-        loop, known = self.loop, self.known
-        reason, suspect, t = self.counts[loop.REASON], int(self.counts[loop.SUSPECT]), float(known[loop.T])
-        if reason == loop.NOT_FINITE and suspect >= 0:
-            rows = self.vectors[loop.RESIDUALS : loop.RESIDUALS + 3]
+        at, known = self.at, self.known
+        reason, suspect, t = self.counts[at.REASON], int(self.counts[at.SUSPECT]), float(known[at.T])
+        if reason == at.NOT_FINITE and suspect >= 0:
+            rows = self.vectors[at.RESIDUALS : at.RESIDUALS + 3]
             return not_finite(t, rows[int(np.argmin(np.isfinite(rows).all(axis=1)))])
         why = {
-            loop.SINGULAR: "the iteration matrix is singular in",
-            loop.NOT_FINITE: "Newton's iterations grow without bound, first in",
-            loop.SLOW: "Newton's method does not converge in",
-            loop.INACCURATE: "the error of a step is largest in",
+            at.SINGULAR: "the iteration matrix is singular in",
+            at.NOT_FINITE: "Newton's iterations grow without bound, first in",
+            at.SLOW: "Newton's method does not converge in",
+            at.INACCURATE: "the error of a step is largest in",
         }[int(reason)]
         return SimulationError(
             Cause.STEP_TOO_SMALL,
             f"no step is small enough: {why} coordinate {max(suspect, 0)} (counted from 0)",
             where=f"t = {t:.9g} s",
-            value=f"step {known[loop.H]:.3g} s",
-            limit=f"tolerance {known[loop.TOLERANCE]:.3g} m",
+            value=f"step {known[at.H]:.3g} s",
+            limit=f"tolerance {known[at.TOLERANCE]:.3g} m",
             remedy="check forces that act on this coordinate, for jumps without breakpoint and growth without bound "
             "first; then try a larger tolerance, or generalized_alpha",
         )
@@ -183,23 +184,23 @@ class _Run:
 @cache
 def _coefficients() -> Array:
     """Blocks of coefficients as the loop reads them."""
-    from erls.kernels.stepping import lobatto as loop
+    from erls.kernels.stepping import stages as at
 
-    result = np.zeros((loop.ROWS + 1, 4, 4))
+    result = np.zeros((at.ROWS + 1, 4, 4))
     rates, places = tableau()
-    result[loop.RATES], result[loop.PLACES] = rates, places
+    result[at.RATES], result[at.PLACES] = rates, places
     values, vectors = np.linalg.eig(rates[1:, 1:])
     inverse = np.linalg.inv(vectors)
     kept = sorted(np.flatnonzero(values.imag > -1e-9), key=lambda k: float(values[k].imag))
     for row, k in enumerate(kept):
         real = abs(values[k].imag) < 1e-9
         back = vectors[:, k] * (1 if real else 2)  # a conjugate counts with its partner
-        result[loop.INTO_RE, row, :3], result[loop.INTO_IM, row, :3] = inverse[k].real, inverse[k].imag
-        result[loop.BACK_RE, :3, row], result[loop.BACK_IM, :3, row] = back.real, back.imag
-        result[loop.ROWS, loop.LAMBDA_RE, row] = values[k].real
-        result[loop.ROWS, loop.LAMBDA_IM, row] = 0.0 if real else values[k].imag
+        result[at.INTO_RE, row, :3], result[at.INTO_IM, row, :3] = inverse[k].real, inverse[k].imag
+        result[at.BACK_RE, :3, row], result[at.BACK_IM, :3, row] = back.real, back.imag
+        result[at.ROWS, at.LAMBDA_RE, row] = values[k].real
+        result[at.ROWS, at.LAMBDA_IM, row] = 0.0 if real else values[k].imag
     nodes = np.array(NODES)
-    result[loop.ROWS, loop.NODES] = nodes
+    result[at.ROWS, at.NODES] = nodes
     gaps = nodes[:, None] - nodes + np.eye(4)
-    result[loop.ROWS, loop.DIFFERENCE] = WEIGHT / gaps.prod(axis=1)
+    result[at.ROWS, at.DIFFERENCE] = WEIGHT / gaps.prod(axis=1)
     return result

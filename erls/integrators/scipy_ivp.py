@@ -139,9 +139,7 @@ def scipy_method(name: str) -> Integrator:
         return integrate_legs(system, times, y, v, recorder, run.advance)
 
     integrate.__name__ = name
-    integrate.__doc__ = (
-        f"Integrate with SciPy's {method.name}; ``options.step`` is its largest step."
-    )
+    integrate.__doc__ = f"Integrate with SciPy's {method.name}; ``options.step`` is its largest step."
     return integrate
 
 

@@ -23,7 +23,7 @@ th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #888
 th:first-child, td:first-child { text-align: left; }
 figure { margin: 1.5rem 0; }
 figure div { overflow-x: auto; background: white; border-radius: 4px; }
-figure svg { width: 100%; min-width: 34rem; height: auto; display: block; }
+figure svg { width: 100%; min-width: 22rem; height: auto; display: block; }
 figcaption { padding-bottom: .3rem; font-weight: 600; }
 .good::before { content: "\\2713  "; color: #2a7d2a; } .bad::before { content: "\\2717  "; color: #b3261e; }
 .note { font-size: .9rem; opacity: .85; }
@@ -74,7 +74,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def figure(plot: Plot) -> str:
     """A plot as inline SVG, text kept as text."""
-    canvas = Figure(figsize=(7.2, 3.4), layout="constrained")
+    canvas = Figure(figsize=(6.0, 3.1), layout="constrained")
     axes = canvas.subplots()
     for curve in plot.curves:
         line = "" if curve.points else "--" if curve.dashed else "-"

@@ -17,6 +17,7 @@ from erls.report.tables import table
 from erls.studies.mode_count import SUCCESSIVE, ModeStudy, Point
 
 _LARGEST_FILE = 1_000_000
+_READING = "largest change of each figure over the run from the row above"
 _COLUMN = re.compile(r"joint .+|point .+ [xyz]")
 
 
@@ -136,7 +137,7 @@ def _figure(point: Point, column: str, time: float) -> str:
 def mode_study_text(study: ModeStudy, printed: Printed | None = None) -> str:
     """Changes from count to count, and the verdict, for the terminal."""
     what = f"modes of link {study.link!r}" if study.link else "elastic modes, all links alike"
-    parts = [f"{study.scene}: {what}", table(*_change_rows(study)), verdict(study)]
+    parts = [f"{study.scene}: {what}; {_READING}", table(*_change_rows(study)), verdict(study)]
     if printed is not None:
         parts.append(f"Published figures at t = {printed.time:g} s: {printed.note}\n" + table(*beside(study, printed)))
     return "\n\n".join(parts)
@@ -155,7 +156,8 @@ def verdict(study: ModeStudy) -> str:
         text += f"; the last step still moved {c.output} by {c.value:.2g} {c.unit}"
     if study.remaining:
         kind, share = study.remaining[0]
-        text += f"; of the modes it added, '{kind}' ones hold the largest share, {share:.1e} of the elastic energy"
+        most = f"{100 * share:.2g} % of the elastic energy"
+        text += f"; of the modes it added, '{kind}' ones hold the largest share, {most}"
     if not study.complete:
         text += "; the study was interrupted"
     return text
@@ -164,7 +166,8 @@ def verdict(study: ModeStudy) -> str:
 def mode_study_page(study: ModeStudy, printed: Printed | None = None) -> str:
     """One self-contained HTML page."""
     parts = [paragraph(verdict(study), "good" if study.converged is not None else "bad")]
-    parts += [heading("Changes from one count to the next"), html_table(*_change_rows(study))]
+    parts += [heading("Changes from one count to the next"), paragraph(_READING, "note")]
+    parts.append(html_table(*_change_rows(study)))
     if printed is not None:
         parts += [heading(f"Published figures at t = {printed.time:g} s"), html_table(*beside(study, printed))]
         parts.append(paragraph(printed.note, "note"))
@@ -175,17 +178,18 @@ def mode_study_page(study: ModeStudy, printed: Printed | None = None) -> str:
 
 
 def _change_rows(study: ModeStudy) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    names = sorted({c.output for p in study.points for c in p.changes})
+    units = {c.output: c.unit for p in study.points for c in p.changes}
+    names = sorted(units)
     rows = []
     for p in study.points:
         if p.outputs is None:
             rows.append((str(p.modes), "failed", *("" for _ in names), ""))
             continue
         values = {c.output: f"{c.value:.2g}" for c in p.changes}
-        state = "" if not p.changes else "below" if p.unchanged else "above"
+        state = "" if not p.changes else "yes" if p.unchanged else "no"
         wall = f"{p.outputs.summary['wall_s']:.2f}"
         rows.append((str(p.modes), wall, *(values.get(n, "") for n in names), state))
-    return ("elastic modes", "time [s]", *names, "tolerance"), rows
+    return ("elastic modes", "time [s]", *(f"{n} [{units[n]}]" for n in names), "all within tolerance"), rows
 
 
 def _plots(study: ModeStudy) -> list[Plot]:

@@ -67,6 +67,8 @@ def automatic(
             break
         choice = _less(choice, certificate)
         tell(f"effects: estimated error {certificate.error:.2g} m; repeated with {_on(choice)}")
+    if certificate.ok and certificate.error:
+        tell(f"effects: what was left out changes named points by about {certificate.error:.2g} m")
     warnings = run.warnings if certificate.ok else (*run.warnings, _warning(certificate))
     for text in warnings[len(run.warnings) :]:
         tell(f"warning: {text}")

@@ -24,7 +24,8 @@ from erls.integrators.base import Array, SecondOrderSystem, metre_scales
 
 Balance = Callable[[float, Array, Array, Array], Array]
 RADIUS = 0.7  # numerical damping of what the steps do not resolve
-_ITERATIONS, _SLOW = 12, 4
+_ITERATIONS, _SLOW = 15, 6
+_LEFT, _ROUNDING = 0.05, 1e-14
 _HAIR = 2e-12  # of the run: forces jump at the ends of a leg
 
 
@@ -85,7 +86,7 @@ def error_motion(
     SimulationError
         NEWTON_FAILED, or SINGULAR_MASS of the other system.
     """
-    stepper = _Stepper(system, accuracy)
+    stepper = _Stepper(system, accuracy, float(legs[-1].t[-1] - legs[0].t[0]))
     e, rate = start
     result: list[Deviation] = []
     for leg in legs:
@@ -112,8 +113,8 @@ def error_motion(
 class _Stepper:
     """Formulas, iteration matrix and accelerations."""
 
-    def __init__(self, system: SecondOrderSystem, accuracy: float) -> None:
-        self.system, self.accuracy = system, accuracy
+    def __init__(self, system: SecondOrderSystem, accuracy: float, duration: float) -> None:
+        self.system, self.accuracy, self.duration = system, accuracy, duration
         self.metres = metre_scales(system)
         self.alpha_m, self.alpha_f = (2 * RADIUS - 1) / (RADIUS + 1), RADIUS / (RADIUS + 1)
         self.gamma = 0.5 + self.alpha_f - self.alpha_m
@@ -147,6 +148,9 @@ class _Stepper:
         known = (self.alpha_f * self.acc - self.alpha_m * alg) / (1 - self.alpha_m)
         to_v, to_a = self.gamma / (h * self.beta), 1 / (h * h * self.beta * share)
         r = balance(t, y, v, a)
+        # what iterations leave in e is an acceleration, 1/h² of it, that moves joints over the whole run
+        share_left = _LEFT * (h / self.duration) ** 2
+        rounding = _ROUNDING * float(np.abs(self.metres * y).max(initial=0.0))
         for fresh in (self.factor is None, True):
             acc = self.acc
             next_alg = known + share * acc
@@ -162,7 +166,8 @@ class _Stepper:
                 if not size < 2 * before:
                     break
                 next_e, next_rate, acc = next_e - move, next_rate - to_v * move, acc - to_a * move
-                if size <= 1e-3 * max(self.accuracy, self.largest):
+                left = size * min(1.0, size / before) if count else size
+                if left <= share_left * max(self.accuracy, self.largest) or size <= rounding:
                     self.largest = max(self.largest, float(np.abs(self.metres * next_e).max(initial=0.0)))
                     self.acc, self.alg = acc, known + share * acc
                     if count >= _SLOW:

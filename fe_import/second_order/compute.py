@@ -10,6 +10,7 @@ from fe_import.second_order.frame import frame_second_order
 
 MOST_MODES = 64  # elastic; the field has as many columns as pairs of them
 MOST_MODES_OF_SOLIDS = 24  # 300 systems of equations
+MOST_DOFS_OF_SOLIDS = 60_000  # beyond, one more factorization is a long computation that few links are reduced for
 _STORED_VALUES = 1_000_000  # of the fields of nodes: 8 MB
 
 
@@ -33,6 +34,11 @@ def second_order(model: FEModel, shapes: Array, reference: int) -> tuple[SecondO
             return None, (
                 f"not available: more than {MOST_MODES_OF_SOLIDS} elastic modes of a solid; keep fewer "
                 "(reduction.elastic_modes)"
+            )
+        if len(model.independent) > MOST_DOFS_OF_SOLIDS:
+            return None, (
+                f"not available: a solid of more than {MOST_DOFS_OF_SOLIDS} dofs; mesh it more coarsely, or split the "
+                "link into substructures"
             )
         from fe_import.elements.solid_stress import SolidStress  # scikit-fem is heavy
         from fe_import.second_order.solid import solid_second_order

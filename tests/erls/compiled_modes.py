@@ -1,4 +1,4 @@
-"""A stiff nonlinear system in compiled form, and its twin in Python."""
+"""A stiff nonlinear system in compiled form, and the same called from Python."""
 
 from __future__ import annotations
 
@@ -56,12 +56,24 @@ def acceleration(
     return 0
 
 
-class CompiledElasticPendulum(ElasticPendulum):
-    """The same motion through kernels."""
+class TwinPendulum(ElasticPendulum):
+    """The same equations, called one by one from Python: to the last digit those of the compiled loop."""
 
-    @property
-    def compiled(self) -> CompiledSystem:
+    def kernels(self) -> CompiledSystem:
         reals = np.array([self.omega, self.zeta])
         none: IntArray = np.zeros(0, dtype=np.int64)
         functions = (residual, mass_matrix, stiffness_and_damping, acceleration)
         return CompiledSystem(2, reals, none, np.zeros(0), *functions)
+
+    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        system, out = self.kernels(), np.zeros(2)
+        system.residual(system.reals, system.integers, system.scratch, t, y, v, a, out)
+        return out
+
+
+class CompiledElasticPendulum(TwinPendulum):
+    """In compiled form."""
+
+    @property
+    def compiled(self) -> CompiledSystem:
+        return self.kernels()

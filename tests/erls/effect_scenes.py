@@ -16,7 +16,7 @@ def random_chain(folder: Path, seed: int) -> Path:
     joints, links = [], []
     duration = float(rng.uniform(0.3, 0.8))
     for k in range(count):
-        length, stiff = float(rng.uniform(0.3, 0.7)), float(10 ** rng.uniform(-2.2, -1.5))
+        length, stiff = float(rng.uniform(0.3, 0.7)), float(10 ** rng.uniform(-1.9, -1.3))
         steel = bool(rng.integers(2))
         youngs_modulus, density = (2e11, 7800.0) if steel else (7e10, 2700.0)
         material = {"youngs_modulus": youngs_modulus, "poissons_ratio": 0.3, "density": density}
@@ -61,5 +61,5 @@ def _drive(rng: np.random.Generator, duration: float) -> dict[str, Any]:
     if kind == 2:
         profile = {"shape": "step", "start": 0.02, "end": 0.4 * duration, "value": float(rng.uniform(-4, 4))}
         return {"drive": {"type": "torque", "profiles": [profile]}, "damping": float(rng.uniform(0, 0.2))}
-    start = {"position_deg": float(rng.uniform(-60, 60)), "rate_deg": float(rng.uniform(-300, 300))}
+    start = {"position_deg": float(rng.uniform(-60, 60)), "rate_deg": float(rng.uniform(-200, 200))}
     return {"initial": start, "motor": {"rotor_inertia": float(10 ** rng.uniform(-5, -2))}}

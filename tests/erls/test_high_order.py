@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compiled_modes import CompiledElasticPendulum
+from compiled_modes import CompiledElasticPendulum, TwinPendulum
 from small_systems import DoublePendulum, ElasticPendulum, Law, Modes
 
 from erls import load_scene
@@ -103,7 +103,7 @@ def test_energy_of_a_stiff_pendulum_stays() -> None:
 @pytest.mark.parametrize("zeta", [0.0, 0.05])
 def test_compiled_and_uncompiled_loop_agree(zeta: float) -> None:
     start, options = np.array([1.0, 1e-3]), Options(tolerance=1e-6)
-    plain = run(ElasticPendulum(300.0, zeta), (0, 1), start, np.zeros(2), options)
+    plain = run(TwinPendulum(300.0, zeta), (0, 1), start, np.zeros(2), options)
     seen: list[float] = []
     compiled = run(
         CompiledElasticPendulum(300.0, zeta), (0, 1), start, np.zeros(2), options, lambda t, knots: seen.append(t)

@@ -48,7 +48,9 @@ def test_the_registry_is_described() -> None:
 
 @pytest.mark.parametrize("name", ADAPTIVE)
 def test_errors_scale_with_tolerances(name: str, exact: Callable) -> None:
-    """Within 10 rtol (SciPy's own tests allow 5 for 1 s; errors here grow threefold), and falling with it."""
+    """Within 10 rtol (SciPy's own tests allow 5 for 1 s; errors here grow threefold), and falling with it; steps of
+    lobatto follow the fifth root of a tolerance that is met with some room at 1e-5.
+    """
     errors = []
     for rtol in (1e-5, 1e-8):
         found = INTEGRATORS[name](
@@ -57,7 +59,7 @@ def test_errors_scale_with_tolerances(name: str, exact: Callable) -> None:
         assert found.failure is None
         errors.append(np.abs(found.y - exact(found.t)[0]).max())
         assert errors[-1] <= 10 * rtol
-    assert errors[1] <= errors[0] / 100
+    assert errors[1] <= errors[0] / (30 if name == "lobatto" else 100)
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)

@@ -40,7 +40,10 @@ def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
         stiffness, damping = chain.stiffness_and_damping(at.t, at.y, at.v)
         assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
         assert _distance(found["damping"], damping) <= LIKE_NUMPY
-        assert _distance(found["acceleration"], chain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
+        if np.linalg.eigvalsh(found["mass"])[0] > 0:  # inertia linear in the deformation alone need not be positive
+            assert _distance(found["acceleration"], chain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
+        else:
+            assert name in ("without inertia_second_order", "only inertia_first_order")
 
 
 def test_modes_alone_feel_what_the_elastic_forces_hide(tmp_path: Path) -> None:
@@ -81,7 +84,6 @@ def test_no_compiled_form_in_the_minimum_norm_gauge(tmp_path: Path) -> None:
 def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
     """The status counts the joint whose motion no inertia opposes: a massless link behind a flexible one."""
     scenes.arm_link(tmp_path)
-    rigid = {"mass": 0.0, "inertia": [0.0, 0.0, 0.0], "centre_of_mass": [0.0, 0.0, 0.0]}
     data = {
         "simulation": {"duration": 1.0},
         "joints": [
@@ -90,7 +92,7 @@ def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
         ],
         "links": [
             {"name": "a", "model": "arm.toml", "mesh_pose": {"frame": "joint"}},
-            {"name": "b", "rigid": rigid},
+            {"name": "b", "rigid": {"mass": 0.0, "points": {"start": [0, 0, 0], "end": [1, 0, 0]}}},
         ],
     }
     chain = scenes.equations(scenes.write_toml(tmp_path / "light.toml", data))
@@ -113,7 +115,7 @@ class _Plain:
         return getattr(self.chain, name)
 
 
-@pytest.mark.parametrize("name", ["one link, payload, spring", "controllers", "prescribed in the middle"])
+@pytest.mark.parametrize("name", ["one link, payload, spring", "parallel axes with a slide", "prescribed in the middle"])
 def test_generalized_alpha_takes_the_same_steps(name: str, tmp_path: Path) -> None:
     """Compiled loop and NumPy algorithm: the same knots and the same work over breakpoints of drives."""
     chain = chain_cases.equations(tmp_path, name)

@@ -54,7 +54,7 @@ def five_bar(first: dict[str, Any], closing: dict[str, Any], *, from_right: bool
     loop = {"name": "motor", "link": names[-1], "node": "tip", "position": [end, 0.0, 0.0]}
     loop["coordinate_deg"] = sum(guess) + (-180.0 if from_right else 180.0)
     return {
-        "simulation": {"duration": 0.4, "step": 5e-3},
+        "simulation": {"duration": 0.4, "step": 2e-2},  # where both motors move it nothing is left to integrate
         "base": {"rotation_deg": [90.0, 0.0, 0.0], "position": [start, 0.0, 0.0]},
         "joints": joints,
         "links": links,
@@ -115,12 +115,11 @@ def _work(run: Run, *joints: str) -> float:
     return closing + (loop_scenes.work(run, *joints) if joints else 0.0)
 
 
-@pytest.mark.parametrize("name", ["erls", "ffr"])
-def test_work_of_both_motors_is_the_energy(tmp_path: Path, name: str) -> None:
+def test_work_of_both_motors_is_the_energy(tmp_path: Path) -> None:
     """With a spring and a rotor on either motor: ∫ τ φ̇ dt of both = ΔE, 1e-8 of the energy that comes and goes."""
     acting = {"stiffness": 3.0, "rest_deg": 60.0, "motor": {"rotor_inertia": 2e-5, "gear_ratio": 20.0}}
     data = five_bar({"drive": move(LEFT), **acting}, {"drive": move(RIGHT), **acting})
-    run = loop_scenes.run(tmp_path, data, name, integrator="dop853", duration=0.3, rtol=1e-6, atol=1e-9)
+    run = loop_scenes.run(tmp_path, data, integrator="dop853", duration=0.3, rtol=1e-6, atol=1e-9)
     energy = run.energy(np.linspace(0, run.end, 21)).total
     assert abs(_work(run, "j0") - (energy[-1] - energy[0])) < 1e-8 * np.ptp(energy)
 
@@ -233,7 +232,7 @@ def test_a_driven_slider_turns_the_crank(tmp_path: Path) -> None:
     x0 = r * np.cos(np.radians(60.0)) + np.sqrt(l**2 - (r * np.sin(np.radians(60.0))) ** 2)
     motion = {"shape": "polynomial", "from": float(x0), "to": float(x0) - 0.1, "duration": 0.2, "degree": 5}
     data = _slider(drive={"type": "motion", "motion": motion})
-    run = loop_scenes.run(tmp_path, data, integrator="dop853", duration=0.15, rtol=1e-6, atol=1e-9)
+    run = loop_scenes.run(tmp_path, data, "ffr", integrator="dop853", duration=0.15, rtol=1e-6, atol=1e-9)
     t = np.linspace(0, run.end, 9)
     s = t / 0.2
     x = x0 - 0.1 * (10 * s**3 - 15 * s**4 + 6 * s**5)

@@ -11,7 +11,7 @@ import pytest
 import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
 
-from erls.body_scenes import analyses, schema, solve
+from erls.body_scenes import analyses, load_body_scene, schema, solve
 from erls.body_scenes.result import Motion, Rest
 
 EI_Y, EI_Z = 1e6 * 0.1 * 0.02**3 / 12, 1e6 * 0.02 * 0.1**3 / 12
@@ -162,14 +162,14 @@ def test_two_nodes_in_one_place_are_hinged(tmp_path: Path) -> None:
 
 
 def test_the_scene_of_the_readme_shows_every_field(tmp_path: Path) -> None:
-    """It runs as printed, and with the fields that it shows as comments no field of the schema is missing."""
+    """It runs as printed, for a while; with the fields that it shows as comments none of the schema is missing."""
     text = (scenes.ROOT / "README.md").read_text(encoding="utf-8")
     (block,) = (b for b in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if 'name = "door on a beam"' in b)
     path = tmp_path / "door.toml"
     path.write_text(block, encoding="utf-8")
-    found = solve(path)
+    found = solve(load_body_scene(path, ["simulation.duration=0.02"]))
     assert isinstance(found, Motion)
-    assert found.end == 0.2
+    assert found.end == 0.02
     records = (schema.BodySceneRecord, schema.Body, schema.Beam, schema.PointMass, schema.Connection, schema.LineSpring,
                schema.TurningSpring, schema.Load, *get_args(analyses.Analysis))  # fmt: skip
     for record in records:

@@ -49,9 +49,10 @@ def test_fast_top(group: str, matrix: str, iterations: float, largest: float) ->
 
 
 def test_fast_top_tends_to_the_reference() -> None:
-    """Steps of 2 and 1 ms, extrapolated, at 0.5 s; a frozen matrix fails on R3xSO(3)."""
-    coarse, fine = (_top("fast", f"step={h}", "duration=0.5").position("top", 0.5) for h in (2e-3, 1e-3))
-    np.testing.assert_allclose((4 * fine - coarse) / 3, _places([0.5], "fast_x")[0], atol=2e-4)
+    """Steps of 0.5 and 0.25 ms, extrapolated, at three times to 1e-5 m; a frozen matrix fails on R3xSO(3)."""
+    times, eased = [0.5, 1.0, 2.0], ("iteration_matrix=auto", "newton_tolerance=1e-11")
+    coarse, fine = (_top("fast", f"step={h}", *eased).position("top", times) for h in (5e-4, 2.5e-4))
+    np.testing.assert_allclose((4 * fine - coarse) / 3, _places(times, "fast_x"), atol=1e-5)
     with pytest.raises(SimulationError) as caught:
         _top("fast", "iteration_matrix=frozen")
     assert caught.value.cause is Cause.NEWTON_FAILED

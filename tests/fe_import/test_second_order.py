@@ -22,7 +22,7 @@ from fe_import.model import FEModel
 from fe_import.reduce import reduce_link
 from fe_import.second_order.beams import POINTS, line_fields
 from fe_import.second_order.composition import twice_turned
-from fe_import.second_order.compute import MOST_MODES, second_order
+from fe_import.second_order.compute import MOST_DOFS_OF_SOLIDS, MOST_MODES, MOST_MODES_OF_SOLIDS, second_order
 from fe_import.second_order.data import SecondOrder, pair_numbers
 from fe_import.second_order.frame import frame_second_order
 from fe_import.second_order.moments import of_inertia, of_masses
@@ -307,12 +307,14 @@ def test_what_has_no_field_says_so(tmp_path: Path, make: Callable[[Path], LinkFi
 
 
 def test_matrices_and_many_modes_have_no_field(tmp_path: Path) -> None:
-    """Bare matrices have no elements; too many modes have too many pairs."""
+    """Bare matrices have no elements; too many modes have too many pairs; large solids take too long."""
     model = build_model(frame_link(tmp_path))
     shapes = orthonormal(model, MOST_MODES + 1)
     for bare, count, reason in (
         (replace(model, beams=None, kind="matrices"), 2, "no elements"),
         (model, MOST_MODES + 1, "keep fewer"),
+        (replace(model, kind="solid"), MOST_MODES_OF_SOLIDS + 1, "modes of a solid"),
+        (replace(model, kind="solid", independent=np.arange(MOST_DOFS_OF_SOLIDS + 1)), 2, "mesh it more coarsely"),
     ):
         field, statement = second_order(bare, shapes[:, : 6 + count], 0)
         assert field is None

@@ -46,7 +46,7 @@ def deform_inertia(reals: Array, integers: IntArray, scratch: Array, record: int
             add_columns(reals, integers[record + at.X] + (i * n + skip) * n, n, q, n - skip, 1.0, xq)
     if integers[at.SECOND_ORDER] or integers[at.SOFTENING]:
         link = scratch[memory : memory + at.VECTORS]
-        for pair in range(1 if axes == 1 else 6):
+        for pair in range(axes * (axes + 1) // 2):
             start = vector(memory, n, at.Z_Q + pair)
             zq = scratch[start : start + n]
             zq[:] = 0.0

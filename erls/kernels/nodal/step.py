@@ -152,9 +152,9 @@ def _iterate(
         if k > 0:
             left = math.log(goal * (1 - rate) / size) / math.log(rate) if 0 < rate < 1 else math.inf
         stale = settings.mode == AUTO and not fresh
-        if rate > 2 or (k > 1 and left > settings.iterations - k and not stale):
+        if k > 1 and (rate > 2 or (left > settings.iterations - k and not stale)):
             break
-        fresh = settings.mode == UPDATE or (settings.mode == AUTO and left > settings.patience)
+        fresh = settings.mode == UPDATE or (settings.mode == AUTO and k > 1 and left > settings.patience)
         earlier = before
         before = size
     rates[BEFORE], rates[SIZE], rates[GOAL] = before, size, goal

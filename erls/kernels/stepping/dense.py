@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import helper
+from erls.kernels.jit import part
 
 
-@helper
+@part
 def factor_real(a: Array) -> int:
     """Replace ``a`` by L (unit diagonal) and U; 0, or 1 + the unknown at which elimination broke down."""
     n = a.shape[0]
@@ -33,7 +33,7 @@ def factor_real(a: Array) -> int:
     return 0
 
 
-@helper
+@part
 def solve_real(a: Array, b: Array) -> None:
     """Replace ``b`` (n,) by the solution, with the factors of `factor_real`."""
     n = a.shape[0]
@@ -49,7 +49,7 @@ def solve_real(a: Array, b: Array) -> None:
             b[i] -= weight * column[i]
 
 
-@helper
+@part
 def factor_complex(re: Array, im: Array) -> int:
     """`factor_real` of re + i im."""
     n = re.shape[0]
@@ -72,7 +72,7 @@ def factor_complex(re: Array, im: Array) -> int:
     return 0
 
 
-@helper
+@part
 def solve_complex(re: Array, im: Array, b: Array, c: Array) -> None:
     """Replace b + i c by the solution, with the factors of `factor_complex`."""
     n = re.shape[0]
@@ -92,7 +92,7 @@ def solve_complex(re: Array, im: Array, b: Array, c: Array) -> None:
             c[i] -= p * y[i] + q * x[i]
 
 
-@helper
+@part
 def add_product(a: Array, x: Array, out: Array) -> None:
     """Add A x to ``out`` (n,)."""
     for j in range(a.shape[0]):

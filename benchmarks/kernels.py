@@ -1,0 +1,135 @@
+"""Cost of the compiled equations of motion: a residual and an acceleration, against modes and against links.
+
+    python benchmarks/kernels.py [--quick]
+
+Chains of equal links on revolute joints in all directions; between two links of a spatial chain nothing can be told of
+the axis of rotation, so this is the general case. Then the shipped L and the two-link robot. Prints the least CPU time
+of several repetitions, the growth exponent from one row to the next, and how many times longer the NumPy equations take.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "tests/erls"))
+
+import scenes  # noqa: E402
+
+from erls.formulations.erls import Erls  # noqa: E402
+from erls.kernels.contract import ACCELERATION, INTEGERS, REALS, RESIDUAL, pointer  # noqa: E402
+
+QUICK = "--quick" in sys.argv[1:]
+MODES = (6, 12, 25, 50) if QUICK else (6, 12, 25, 50, 100, 200)
+LINKS = (1, 2, 5) if QUICK else (1, 2, 5, 10, 20)
+MODES_PER_LINK = 8
+REPEATS = 3 if QUICK else 7
+SLICE = 0.02  # s of one repetition
+
+
+def _loop(signature: Any) -> Callable[..., None]:
+    """Call a function of a compiled system many times from compiled code."""
+
+    @numba.njit(
+        numba.void(numba.int64, pointer(signature), REALS, INTEGERS, REALS, *[REALS] * (len(signature.args) - 4))
+    )
+    def loop(count, function, reals, integers, scratch, *vectors):  # type: ignore[no-untyped-def]
+        for _ in range(count):
+            function(reals, integers, scratch, 0.1, *vectors)
+
+    return loop  # type: ignore[no-any-return]
+
+
+RESIDUALS, ACCELERATIONS = _loop(RESIDUAL), _loop(ACCELERATION)
+
+
+def least_time(call: Callable[[int], object]) -> float:
+    """Seconds of CPU per call, at best."""
+    start = time.process_time()
+    call(1)
+    count = max(1, int(SLICE / max(time.process_time() - start, 1e-6)))
+    best = math.inf
+    for _ in range(REPEATS):
+        start = time.process_time()
+        call(count)
+        best = min(best, (time.process_time() - start) / count)
+    return best
+
+
+def costs(chain: Erls) -> tuple[float, float, float]:
+    """Seconds of a compiled residual and acceleration, and of a NumPy residual."""
+    system = chain.compiled
+    assert system is not None
+    y, v, a = np.random.default_rng(1).uniform(-1, 1, (3, chain.size)) * 1e-3
+    out = np.empty(chain.size)
+    constants = system.reals, system.integers, system.scratch
+    compiled = least_time(lambda n: RESIDUALS(n, system.residual, *constants, y, v, a, out))
+    solved = least_time(lambda n: ACCELERATIONS(n, system.acceleration, *constants, y, v, out))
+    plain = least_time(lambda n: [chain.residual(0.1, y, v, a) for _ in range(n)])
+    return compiled, solved, plain
+
+
+def chain_of(links: int, modes: int) -> Erls:
+    """A spatial chain of equal links."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        elements = max(3, math.ceil(modes / 5) + 1)
+        fixed = max(modes - 6, 1)
+        scenes.arm_link(
+            folder,
+            frame={"members": [{**scenes.ARM_LINK["frame"]["members"][0], "elements": elements}]},
+            reduction={"fixed_interface_modes": fixed, "elastic_modes": modes},
+        )
+        joints = [
+            {"name": f"j{k}", "dh": {"convention": "standard", "a": 0.4, "alpha_deg": 35.0 + 20 * (k % 3)}}
+            for k in range(links)
+        ]
+        arms = [{"name": f"l{k}", "model": "arm.toml", "mesh_pose": {"frame": "joint"}} for k in range(links)]
+        data = {"simulation": {"duration": 1.0}, "joints": joints, "links": arms}
+        return scenes.equations(scenes.write_toml(folder / "chain.toml", data))
+
+
+def table(title: str, what: str, cases: dict[int, Erls]) -> None:
+    """Print costs with growth exponents."""
+    print(f"\n{title}\n{what:>6} {'residual':>12} {'exponent':>9} {'acceleration':>13} {'exponent':>9} {'NumPy':>8}")
+    before: tuple[int, float, float] | None = None
+    for number, chain in cases.items():
+        residual, acceleration, plain = costs(chain)
+        growth = ["", ""]
+        if before is not None:
+            span = math.log(number / before[0])
+            growth = [
+                f"{math.log(now / then) / span:.2f}" for now, then in ((residual, before[1]), (acceleration, before[2]))
+            ]
+        print(
+            f"{number:6d} {residual * 1e6:9.2f} µs {growth[0]:>9} {acceleration * 1e6:10.2f} µs {growth[1]:>9} "
+            f"{plain / residual:7.0f}x"
+        )
+        before = number, residual, acceleration
+
+
+def main() -> None:
+    """Print all tables."""
+    table("two links, against elastic modes of each", "modes", {n: chain_of(2, n) for n in MODES})
+    table(
+        f"{MODES_PER_LINK} modes in each link, against links", "links", {n: chain_of(n, MODES_PER_LINK) for n in LINKS}
+    )
+    print("\nshipped scenes")
+    for name in ("l_shape/steel_flat.toml", "robot/two_link.toml"):
+        residual, acceleration, plain = costs(scenes.equations(ROOT / "data" / name))
+        print(
+            f"{name}: residual {residual * 1e6:.2f} µs, acceleration {acceleration * 1e6:.2f} µs, NumPy {plain / residual:.0f}x"
+        )
+
+
+if __name__ == "__main__":
+    main()
