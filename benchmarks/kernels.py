@@ -4,7 +4,7 @@
 
 Chains of equal links on revolute joints in all directions; between two links of a spatial chain nothing can be told of
 the axis of rotation, so this is the general case. Then the shipped L and the two-link robot. Prints the least CPU time
-of several repetitions, the growth exponent from one row to the next, and how many times longer the NumPy equations take.
+of several repetitions, the growth exponent from row to row, and how many times longer the NumPy equations take.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numba
 import numpy as np
@@ -36,20 +35,21 @@ REPEATS = 3 if QUICK else 7
 SLICE = 0.02  # s of one repetition
 
 
-def _loop(signature: Any) -> Callable[..., None]:
-    """Call a function of a compiled system many times from compiled code."""
-
-    @numba.njit(
-        numba.void(numba.int64, pointer(signature), REALS, INTEGERS, REALS, *[REALS] * (len(signature.args) - 4))
-    )
-    def loop(count, function, reals, integers, scratch, *vectors):  # type: ignore[no-untyped-def]
-        for _ in range(count):
-            function(reals, integers, scratch, 0.1, *vectors)
-
-    return loop  # type: ignore[no-any-return]
+_SYSTEM = (REALS, INTEGERS, REALS)
 
 
-RESIDUALS, ACCELERATIONS = _loop(RESIDUAL), _loop(ACCELERATION)
+@numba.njit(numba.void(numba.int64, pointer(RESIDUAL), *_SYSTEM, *[REALS] * 4))
+def residuals(count, function, reals, integers, scratch, y, v, a, out):  # type: ignore[no-untyped-def]
+    """Many residuals, called from compiled code."""
+    for _ in range(count):
+        function(reals, integers, scratch, 0.1, y, v, a, out)
+
+
+@numba.njit(numba.void(numba.int64, pointer(ACCELERATION), *_SYSTEM, *[REALS] * 3))
+def accelerations(count, function, reals, integers, scratch, y, v, out):  # type: ignore[no-untyped-def]
+    """Many accelerations, called from compiled code."""
+    for _ in range(count):
+        function(reals, integers, scratch, 0.1, y, v, out)
 
 
 def least_time(call: Callable[[int], object]) -> float:
@@ -72,8 +72,8 @@ def costs(chain: Erls) -> tuple[float, float, float]:
     y, v, a = np.random.default_rng(1).uniform(-1, 1, (3, chain.size)) * 1e-3
     out = np.empty(chain.size)
     constants = system.reals, system.integers, system.scratch
-    compiled = least_time(lambda n: RESIDUALS(n, system.residual, *constants, y, v, a, out))
-    solved = least_time(lambda n: ACCELERATIONS(n, system.acceleration, *constants, y, v, out))
+    compiled = least_time(lambda n: residuals(n, system.residual, *constants, y, v, a, out))
+    solved = least_time(lambda n: accelerations(n, system.acceleration, *constants, y, v, out))
     plain = least_time(lambda n: [chain.residual(0.1, y, v, a) for _ in range(n)])
     return compiled, solved, plain
 
@@ -127,7 +127,8 @@ def main() -> None:
     for name in ("l_shape/steel_flat.toml", "robot/two_link.toml"):
         residual, acceleration, plain = costs(scenes.equations(ROOT / "data" / name))
         print(
-            f"{name}: residual {residual * 1e6:.2f} µs, acceleration {acceleration * 1e6:.2f} µs, NumPy {plain / residual:.0f}x"
+            f"{name}: residual {residual * 1e6:.2f} µs, acceleration {acceleration * 1e6:.2f} µs, "
+            f"NumPy {plain / residual:.0f}x"
         )
 
 

@@ -37,6 +37,7 @@ from erls.integrators.lie_steps import NumpySteps
 
 _SAFETY, _LARGEST_CHANGE = 0.9, 4.0  # of an adaptive step
 _FIRST, _SMALLEST = 1 / 64, 1e-6  # adaptive steps, of the largest
+_AT_ONCE, _HELD = 4096, 8  # adaptive steps that are asked for, and those after a rejected one, which do not grow
 
 
 def lie_generalized_alpha(
@@ -117,13 +118,16 @@ def _adaptive_steps(
 
     The error of a step is of third order (M. Géradin, A. Cardona, Flexible Multibody Dynamics, 2001, ch. 14).
     """
-    t, h = leg.start, min(max(steps.h, _FIRST * largest), largest)
+    t, h, held = leg.start, min(max(steps.h, _FIRST * largest), largest), False
     while t < leg.end:
         count = max(1, math.ceil((leg.end - t) / h * (1 - 1e-9)))
         steps.set_step((leg.end - t) / count)
-        times = t + (leg.end - t) * np.arange(1, count + 1) / count
-        times[-1] = leg.end
-        made, status = steps.stretch(times, leg.last, Limit(tolerance, count > 1 and steps.h * GROWTH <= largest))
+        ahead = min(count, _HELD if held else _AT_ONCE)
+        times = t + (leg.end - t) * np.arange(1, ahead + 1) / count
+        if ahead == count:
+            times[-1] = leg.end
+        can_grow = not held and count > 1 and steps.h * GROWTH <= largest
+        made, status = steps.stretch(times, leg.last, Limit(tolerance, can_grow))
         if made:
             t = float(times[made - 1])
         ratio = _SAFETY * (tolerance / max(steps.error, 1e-300)) ** (1 / 3)
@@ -131,8 +135,8 @@ def _adaptive_steps(
             ratio = 1 / _LARGEST_CHANGE
         elif status == INACCURATE:
             ratio = min(ratio, 0.8)
-        if status in (FAILED, INACCURATE):
-            recorder.work.rejected_steps += 1
+        held = status in (FAILED, INACCURATE)
+        recorder.work.rejected_steps += held
         h = min(largest, steps.h * min(max(ratio, 1 / _LARGEST_CHANGE), _LARGEST_CHANGE))
         if h < _SMALLEST * largest:
             raise steps.failure(float(times[made])) if status == FAILED else _too_small(t, steps, tolerance)

@@ -115,7 +115,10 @@ class _Plain:
         return getattr(self.chain, name)
 
 
-@pytest.mark.parametrize("name", ["one link, payload, spring", "parallel axes with a slide", "prescribed in the middle"])
+RUNS = ("one link, payload, spring", "parallel axes with a slide", "prescribed in the middle")
+
+
+@pytest.mark.parametrize("name", RUNS)
 def test_generalized_alpha_takes_the_same_steps(name: str, tmp_path: Path) -> None:
     """Compiled loop and NumPy algorithm: the same knots and the same work over breakpoints of drives."""
     chain = chain_cases.equations(tmp_path, name)

@@ -20,7 +20,6 @@ from erls.kernels.stepping.stages import (
     DAMPING,
     DIAGONAL,
     END,
-    ERROR,
     EXCESS,
     FACTORED,
     FACTORIZATIONS,
@@ -53,7 +52,6 @@ from erls.kernels.stepping.stages import (
     SAFETY,
     SHRINK,
     SINGULAR,
-    SIZE,
     SLOW,
     SLOWEST,
     SMALLEST,
@@ -259,7 +257,6 @@ def advance(
                 if not math.isfinite(size):
                     verdict = -2
                     break
-                known[SIZE] = size
                 verdict = progress(known, counts, k, size, before, earlier, goal, rounding)
                 if verdict != 0:
                     break
@@ -282,7 +279,6 @@ def advance(
             scale = min(GROWTH, max(SHRINK, SAFETY * max(error, 1e-12) ** (-1.0 / (m + 2))))
             if error > 1.0:
                 counts[SUSPECT] = largest_entry(vectors[PART_IM], vectors[METRES])
-                known[ERROR] = error
                 going = retry(known, counts, INACCURATE, min(scale, 0.8))
             else:
                 counts[CALM] += 1

@@ -13,10 +13,10 @@ from erls.kernels.jit import helper, part
 from erls.kernels.stepping.dense import add_product, factor_complex, factor_real, solve_complex, solve_real
 
 # known: the leg, settings of a run, then what steps leave behind
-START, END, FIRST, LAST = 0, 1, 2, 3
-LARGEST, SMALLEST, TOLERANCE, GOAL, ROUNDING = 4, 5, 6, 7, 8
-T, H, BEFORE, RATE, ERROR, SIZE, NEXT = range(9, 16)  # BEFORE: the last step; NEXT: the one to try
-KNOWN = 16
+END, FIRST, LAST = 0, 1, 2
+LARGEST, SMALLEST, TOLERANCE, GOAL, ROUNDING = 3, 4, 5, 6, 7
+T, H, BEFORE, RATE, NEXT = range(8, 13)  # BEFORE: the last step; NEXT: the one to try
+KNOWN = 13
 # counts
 FACTORED, USUAL, EXCESS, REASON, HISTORY, SUSPECT, DIAGONAL = range(7)  # DIAGONAL: stiffness and damping
 MAX_ITERATIONS, REFRESH_COST = 7, 8
