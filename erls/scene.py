@@ -48,9 +48,9 @@ class Simulation(_Record, frozen=True):
         Of ``nodal``: elements of each member of a link, instead of the number in its description.
     integrator : str
         ``generalized_alpha``, ``lobatto``, one of SciPy's (``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``), or
-        ``auto``: the one that fits.
+        ``auto``: the one that fits; of ``nodal``, steps of generalized-α with a local error of ``tolerance`` / 1000.
     step : float, optional
-        Step of generalized-α [s], largest step of the others.
+        Step of generalized-α [s], largest step of SciPy's; ``lobatto`` and ``auto`` go by ``tolerance`` alone.
     rtol, atol : float
         Tolerances of SciPy's integrators, ``atol`` in metres.
     tolerance : float

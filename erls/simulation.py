@@ -23,6 +23,8 @@ from erls.run_file import self_contained, write_run
 from erls.scene import Scene, load_scene
 from erls.selection.automatic import automatic
 from erls.spin_stability import missing_stiffening, planned_spin_warnings, spin_warnings
+from fe_import.link import LinkDescription
+from fe_import.modal.file import ModalModel
 from fe_import.toml_file import choose
 
 Progress = Callable[[float, float], None]  # (time, duration)
@@ -41,6 +43,7 @@ def simulate(
     tell: Message = lambda text: None,
     checkpoint: Path | None = None,
     strict: bool = False,
+    like: Run | None = None,
 ) -> Run:
     """Simulate a scene.
 
@@ -55,6 +58,8 @@ def simulate(
         Run file to which a long run saves what it has, every 20 s of work.
     strict : bool
         With ``effects = "auto"``: whether to repeat the run where what was left out passes the tolerance.
+    like : Run, optional
+        A run of a scene with the same links, whose modal models serve again instead of being read.
 
     Returns
     -------
@@ -80,7 +85,7 @@ def simulate(
         scene = load_scene(scene)
     settings = scene.record.simulation
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
-    built = build_mechanism(scene, tell)
+    built = build_mechanism(scene, tell, *([] if like is None else _models(like)))
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
     warn = _Warnings(tell)
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
@@ -91,6 +96,11 @@ def simulate(
     if settings.effects == "auto":
         return automatic(scene, built.mechanism, run_with, tell, strict)
     return run_with(scene, built.mechanism)
+
+
+def _models(run: Run) -> tuple[list[ModalModel], list[LinkDescription | None]]:
+    links = run.formulation.mechanism.links
+    return [link.model for link in links], [link.description for link in links]
 
 
 class _Warnings:
@@ -119,8 +129,9 @@ def _integrated(
     y, v = formulation.initial_state()
     if isinstance(chain := solved(formulation), ClosedChain):
         warn(chain.warnings)
+    step = None if settings.integrator in ("lobatto", "auto") else settings.step  # what they need follows the tolerance
     options = Options(
-        settings.step, settings.rtol, settings.atol, settings.spectral_radius, tolerance=settings.tolerance
+        step, settings.rtol, settings.atol, settings.spectral_radius, tolerance=settings.tolerance
     )
     begun = saved = time.perf_counter()
 

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import tempfile
+from pathlib import Path
+
+import pytest
 
 # links are small matrices: threads of the linear algebra cost more than they bring, most of all on a busy machine
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -11,3 +16,18 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 # reductions made by tests go to a cache of their own, shared by the workers of one session
 os.environ.setdefault("ERLS_CACHE", os.path.join(tempfile.gettempdir(), f"erls-test-cache-{os.getuid()}"))
+# compiled code lies there even for tests that give reductions an empty cache
+os.environ.setdefault("ERLS_KERNELS", os.environ["ERLS_CACHE"])
+
+
+KERNELS = (
+    "import erls.kernels.nodal.matrix, erls.kernels.nodal.step, erls.kernels.nodal.system",
+    "import erls.kernels.chain.equations, erls.kernels.stepping.generalized_alpha, erls.kernels.stepping.lobatto",
+)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile before the workers of a session start, so that no test pays for it or tells of it."""
+    if not hasattr(config, "workerinput") and not config.option.collectonly:
+        jobs = [subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[1]) for code in KERNELS]
+        assert [job.wait() for job in jobs] == [0, 0]

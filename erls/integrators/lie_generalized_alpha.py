@@ -10,8 +10,9 @@ with the coefficients of `erls.integrators.generalized_alpha`. Corrections of d 
 
     [[β' M + γ' C + K T, Bᵀ], [B T, 0]],   β' = (1 − α_m)/(h² β (1 − α_f)),  γ' = γ/(h β),
 
-scaled as in `erls.integrators.saddle`. A step starts from v̇₁ = 0 and λ₁ = 0. A run starts with a₀ = v̇₀: that is wrong
-by O(h), once; multipliers, of first order there, are of second order when it has decayed.
+scaled as in `erls.integrators.saddle`. A step starts from v̇₁ = 0 and λ₁ = 0 unless told otherwise.
+A run starts with a₀ = v̇₀: that is wrong by O(h), once; multipliers, of first order there, are of second order when it
+has decayed.
 """
 
 from __future__ import annotations

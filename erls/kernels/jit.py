@@ -1,4 +1,7 @@
-"""Compilation by Numba, kept on disk; with ``ERLS_JIT=0`` the same functions run as plain Python."""
+"""Compilation by Numba, kept on disk; with ``ERLS_JIT=0`` the same functions run as plain Python.
+
+The code lies in the folder ``ERLS_KERNELS``, or ``ERLS_CACHE`` like reductions, or the user's cache folder.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ def folder(subpackage: str) -> Path:
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
     for path in [*sorted(here.glob("*.py")), *sorted((here / subpackage).rglob("*.py"))]:
         digest.update(path.read_bytes())
-    given = os.environ.get("ERLS_CACHE")
+    given = os.environ.get("ERLS_KERNELS") or os.environ.get("ERLS_CACHE")
     base = Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
     return base / f"kernels-{subpackage}-{digest.hexdigest()[:16]}"
 

@@ -16,7 +16,7 @@ from erls.selection.outputs import Outputs, effort_error, largest_distance, watc
 from erls.selection.quick import quick
 
 STEPS = 1000
-FEWEST = 200  # knots of a run; with fewer of them, states between are taken
+FEWEST = 100  # knots of a run; with fewer of them, states between are taken
 _PLACES, _EFFORTS = 120, 40  # knots at which points and drive forces are compared
 
 

@@ -29,7 +29,7 @@ REDUCE = {
 }  # fmt: skip
 OPTIONS = {
     "reduce": ["--output", "-o", "--method", "--modes", "--json"],
-    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--json"],
+    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--json"],
     "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--json"],
     "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
                     "--beside", "--set", "--workers", "--json"],

@@ -149,7 +149,7 @@ def test_generalized_alpha_halves_and_fails_alike(tmp_path: Path) -> None:
     assert (fast.failure.cause, fast.failure.where) == (slow.failure.cause, slow.failure.where)
 
 
-def test_work_of_the_l(tmp_path: Path) -> None:
+def test_work_of_the_l() -> None:
     """Budget: at h = 1 ms at most 2.4 residuals a step and a factorization every 15 steps (measured 2.3 and 16.4)."""
     chain = scenes.equations(scenes.ROOT / "data/l_shape/steel_flat.toml")
     y, v = chain.initial_state()

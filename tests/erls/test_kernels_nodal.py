@@ -196,7 +196,7 @@ def test_a_jump_stops_adaptive_steps() -> None:
             return super().residual(t, q, v, a) + (1e12 if t > 0.01234 else 0.0)
 
     system = Jump(good.start.poses, good.elements, good.rows.joints)
-    options = ConstrainedOptions(step=1e-3, error_tolerance=1e-5)
+    options = ConstrainedOptions(step=1e-3, error_tolerance=1e-9)
     found = lie_generalized_alpha(system, (0, 0.1), system.start, np.zeros(6), options)
     assert found.failure is not None
     assert found.failure.cause is Cause.STEP_TOO_SMALL
