@@ -148,7 +148,7 @@ def theirs(path: Path, times: np.ndarray, runs: int) -> tuple[np.ndarray, Ladder
     tight = fine + (fine - half) / 3  # second order
     print(f"  exudyn: tight runs with 25 and 50 microseconds differ by {error(fine, half):.1e} m")
     ladder = []
-    for step in (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4):
+    for step in (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 1e-4):
         done = [simulate(step) for _ in range(runs)]
         ladder.append((float(np.median([spent for _, spent in done])), error(done[0][0], tight)))
         spent, off = ladder[-1]

@@ -1,4 +1,4 @@
-"""Many variants of one scene in one call: parameters, drives, initial states; on all cores, what they share read once."""
+"""Many variants of one scene in one call: parameters, drives, initial states; what they share is read once."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def simulate_many(
     >>> turned = [[f"joints.0.initial.position_deg={a}", "simulation.duration=0.01"] for a in (0, 30)]
     >>> [round(float(run.position("tip", 0.01)[0]), 4) for run in erls.simulate_many(
     ...     "data/l_shape/steel_tall.toml", turned)]
-    [0.5, 0.4328]
+    [0.5, 0.4331]
     """
     if workers is not None and workers < 1:
         message = "the number of workers must be positive"

@@ -85,7 +85,7 @@ def simulate(
         scene = load_scene(scene)
     settings = scene.record.simulation
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
-    built = build_mechanism(scene, tell, *([] if like is None else _models(like)))
+    built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *_models(like))
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
     warn = _Warnings(tell)
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))

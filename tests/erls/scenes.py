@@ -10,7 +10,7 @@ from typing import Any
 from erls.build import build_mechanism
 from erls.formulations.erls import Erls
 from erls.mechanism.chain import Mechanism
-from erls.scene import load_scene
+from erls.scene import is_body_scene, load_scene
 
 ROOT = Path(__file__).parents[2]
 SHARED = ROOT.parent / "shared"
@@ -146,3 +146,9 @@ def three_links(folder: Path, kind: str = "revolute", **changes: Any) -> Path:
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file."""
     return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def shipped() -> list[Path]:
+    """Scenes of ``data/`` that are chains of links."""
+    found = ((p, tomllib.loads(p.read_text(encoding="utf-8"))) for p in sorted((ROOT / "data").rglob("*.toml")))
+    return [p for p, data in found if "simulation" in data and not is_body_scene(data)]

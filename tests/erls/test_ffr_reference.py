@@ -18,7 +18,7 @@ from erls.lie.so3 import Array, skew
 from erls.run import Run
 
 DATA = scenes.ROOT / "data"
-SHIPPED = sorted(str(p.relative_to(DATA)) for p in DATA.glob("*/*.toml") if "[simulation]" in p.read_text())
+SHIPPED = [str(p.relative_to(DATA)) for p in scenes.shipped()]
 HELD = '{ type = "motion", motion = { shape = "polynomial", from = 0.3, to = 0.3, duration = 1.0 } }'
 EULER = {"theory": "euler-bernoulli", "torsion": "polar"}
 

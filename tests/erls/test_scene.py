@@ -12,7 +12,7 @@ from erls.errors import Cause, SceneError
 from erls.mechanism.drives import FreeDrive, TorqueDrive
 from erls.scene import Scene, load_scene
 
-DATA = sorted(p for p in (scenes.ROOT / "data").rglob("*.toml") if "[simulation]" in p.read_text("utf-8"))
+DATA = scenes.shipped()
 
 
 def test_defaults(tmp_path: Path) -> None:

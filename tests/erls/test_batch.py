@@ -1,0 +1,61 @@
+"""Many variants of one scene: the same runs as one by one, faults and interrupts kept apart."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+import scenes
+
+import erls
+from erls.errors import Cause, SceneError
+from erls.run import Run
+
+TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"
+ROBOT = scenes.ROOT / "data/robot/two_link.toml"
+
+
+def test_variants_are_the_runs_one_by_one() -> None:
+    """Parameters, initial states, modes and formulations; to the bit, whatever they share."""
+    short = "simulation.duration=0.02"
+    variants = [
+        [short],
+        [short, "joints.0.initial.position_deg=30"],
+        [short, "links.l.elastic_modes=6"],
+        [short, "simulation.formulation=ffr", "gravity=[0.0, 0.0, -1.6]"],
+        [short, "simulation.integrator=lobatto"],
+    ]
+    runs = erls.simulate_many(TALL, variants)
+    for run, overrides in zip(runs, variants, strict=True):
+        assert isinstance(run, Run)
+        alone = erls.simulate(erls.load_scene(TALL, overrides))
+        np.testing.assert_array_equal(run.solution.y, alone.solution.y)
+        assert run.warnings == alone.warnings
+    assert runs[1].formulation.mechanism.links[0].model is runs[0].formulation.mechanism.links[0].model  # type: ignore[union-attr]
+
+
+def test_a_faulty_variant_spoils_no_other() -> None:
+    seen: list[tuple[float, float]] = []
+    variants = [["simulation.duration=x"], ["simulation.duration=0.01"], ["links.l.elastic_modes=999"]]
+    results = erls.simulate_many(TALL, variants, progress=lambda done, total: seen.append((done, total)))
+    assert [getattr(r, "cause", None) for r in results] == [Cause.BAD_FIELD, None, Cause.BAD_FIELD]
+    assert seen[-1] == (3, 3)
+    assert erls.simulate_many(TALL, []) == []
+    with pytest.raises(SceneError, match="workers"):
+        erls.simulate_many(TALL, variants, workers=0)
+
+
+def test_an_interrupt_keeps_what_was_computed() -> None:
+    """Ctrl-C while two long runs are on their way: the short ones are there, the long ones say where they stopped."""
+    long = ["simulation.duration=1000", "simulation.step=1e-3"]
+    timer = threading.Timer(3.0, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    results = erls.simulate_many(ROBOT, [["simulation.duration=0.01"], long, long], workers=2)
+    timer.cancel()
+    assert isinstance(results[0], Run)
+    for stopped in results[1:]:
+        assert stopped.cause == Cause.INTERRUPTED  # type: ignore[union-attr]
+        assert stopped.run.end > 0  # type: ignore[union-attr]

@@ -1,0 +1,28 @@
+"""Work that shipped scenes may take: a regression fails here without a clock."""
+
+from __future__ import annotations
+
+import pytest
+import scenes
+
+import erls
+
+# scene, overrides, and at most: right-hand sides, iterations, factorizations; a tenth above what they took
+BUDGETS = [
+    ("l_shape/steel_flat.toml", ["simulation.duration=0.5"], (2810, 2810, 107)),
+    ("l_shape/steel_tall.toml", ["simulation.duration=0.5", "simulation.integrator=lobatto"], (496, 165, 29)),
+    ("l_shape/torque.toml", ["simulation.duration=0.2"], (1970, 1970, 11)),
+    ("l_shape/steel_flat.toml", ["simulation.duration=0.1", "simulation.formulation=ffr"], (504, 504, 10)),
+    ("l_shape/aluminium.toml", ["simulation.duration=0.2", "simulation.formulation=nodal"], (1655, 1655, 2)),
+    ("robot/two_link.toml", ["simulation.duration=0.5"], (2920, 2920, 135)),
+    ("robot/two_link.toml", ["simulation.duration=0.5", "simulation.integrator=lobatto"], (1440, 480, 94)),
+    ("four_bar/flexible.toml", ["simulation.duration=0.02", "simulation.step=1e-4"], (675, 675, 3)),
+]
+
+
+@pytest.mark.parametrize(("scene", "overrides", "most"), BUDGETS)
+def test_work(scene: str, overrides: list[str], most: tuple[int, int, int]) -> None:
+    """Right-hand sides, iterations and factorizations."""
+    work = erls.simulate(erls.load_scene(scenes.ROOT / "data" / scene, overrides)).solution.work
+    found = (work.rhs_calls, work.newton_iterations, work.factorizations)
+    assert all(0 < have <= allowed for have, allowed in zip(found, most, strict=True)), found
