@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,9 @@ from erls.integrators.base import (
     metre_scales,
 )
 from erls.integrators.driver import Recorder, integrate_legs, not_finite
+
+if TYPE_CHECKING:
+    from erls.kernels.contract import CompiledSystem
 
 VELOCITY_PER_METRE = 10.0  # 1/s, of the absolute tolerance
 _WORST = np.array([0.5, 0.5 + 0.05**0.5])  # where quintic Hermite interpolation errs most in y and in v
@@ -143,6 +146,22 @@ def scipy_method(name: str) -> Integrator:
     return integrate
 
 
+def _acceleration_of(system: SecondOrderSystem) -> Callable[[float, Array, Array], Array]:
+    """The accelerations of a system, from its compiled form where there is one."""
+    compiled: CompiledSystem | None = getattr(system, "compiled", None)
+    if compiled is None:
+        return system.acceleration
+    constants = (compiled.reals, compiled.integers, compiled.scratch)
+
+    def acceleration(t: float, y: Array, v: Array) -> Array:
+        out = np.empty(len(y))
+        if compiled.acceleration(*constants, t, np.ascontiguousarray(y), np.ascontiguousarray(v), out):
+            return system.acceleration(t, y, v)  # says which coordinate nothing resists
+        return out
+
+    return acceleration
+
+
 class _Run:
     """One run with one of SciPy's solvers."""
 
@@ -160,6 +179,7 @@ class _Run:
         if not self.explicit:
             self.settings["jac"] = self.jacobian
         self.leg = Leg(0.0, 0.0, 0.0, 0.0)
+        self.accelerate = _acceleration_of(system)
         self.suspect: tuple[float, Array] | None = None  # last evaluation, when it was not finite
 
     def inside(self, t: float) -> float:
@@ -169,7 +189,7 @@ class _Run:
     def derivative(self, t: float, x: Array) -> Array:
         """(2n,) rates of x = [y, v]."""
         self.work.rhs_calls += 1
-        a = self.system.acceleration(self.inside(t), x[: self.n], x[self.n :])
+        a = self.accelerate(self.inside(t), x[: self.n], x[self.n :])
         self.suspect = None if math.isfinite(a.sum()) else (t, a)
         return np.concatenate([x[self.n :], a])
 
@@ -216,7 +236,7 @@ class _Run:
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """M⁻¹ f, counted."""
         self.work.rhs_calls += 1
-        return self.system.acceleration(self.inside(t), y, v)
+        return self.accelerate(self.inside(t), y, v)
 
     def add_knots(self, dense: Any, old: Knot, new: Knot, recorder: Recorder) -> None:
         """Add three knots inside a step where quintic interpolation between its ends misses the tolerance."""

@@ -46,9 +46,9 @@ sys.exit(main())
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A scene that would take minutes: a million steps."""
+    """A scene that would take minutes: a hundred million steps."""
     scenes.l_link(tmp_path)
-    scenes.l_scene(tmp_path, simulation={"duration": 1.0, "step": 1e-6})
+    scenes.l_scene(tmp_path, simulation={"duration": 100.0, "step": 1e-6})
     return tmp_path
 
 
