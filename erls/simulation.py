@@ -11,7 +11,7 @@ import numpy as np
 
 from erls.build import Message, build_mechanism
 from erls.errors import SceneError, SimulationError
-from erls.formulations import FORMULATIONS, TREES, formulate, integrator
+from erls.formulations import FORMULATIONS, TREES, compile_kernels, formulate, integrator
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
@@ -133,6 +133,8 @@ def _integrated(
     options = Options(
         step, settings.rtol, settings.atol, settings.spectral_radius, tolerance=settings.tolerance
     )
+    with announcing(warn.tell):
+        compile_kernels(formulation, settings)
     begun = saved = time.perf_counter()
 
     def make_run(solution: Solution) -> Run:
@@ -155,8 +157,7 @@ def _integrated(
             saved = time.perf_counter()
 
     times = (0.0, settings.duration)
-    with announcing(warn.tell):
-        solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
+    solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
     if solution.choice:
         warn.tell(f"integrator: {solution.choice}")
     run = make_run(solution)

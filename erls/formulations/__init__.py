@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 
 from erls.formulations.base import Formulation, TreeFormulation
 from erls.formulations.closed_chain import ClosedChain
@@ -13,7 +14,7 @@ from erls.formulations.ffr import Ffr
 from erls.formulations.ffr.absolute import absolute_generalized_alpha
 from erls.formulations.nodal import Nodal, nodal_generalized_alpha
 from erls.formulations.substructures import Substructured, of_pieces
-from erls.integrators import INTEGRATORS
+from erls.integrators import INTEGRATORS, KERNELS
 from erls.integrators.base import Solution
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split, split
@@ -54,4 +55,13 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Callable[..., Solu
     return loop_integrator(settings.integrator) if mechanism.loops else INTEGRATORS[settings.integrator]
 
 
-__all__ = ["FORMULATIONS", "TREES", "Formulation", "formulate", "integrator"]
+def compile_kernels(formulation: Formulation, settings: Simulation) -> None:
+    """Compile what a run will call, by importing it: before the clock of the run starts."""
+    if settings.formulation == "nodal":
+        for name in ("system", "matrix", "step"):
+            import_module(f"erls.kernels.nodal.{name}")
+    elif getattr(formulation, "compiled", None) is not None and settings.integrator in KERNELS:
+        import_module(KERNELS[settings.integrator])
+
+
+__all__ = ["FORMULATIONS", "TREES", "Formulation", "compile_kernels", "formulate", "integrator"]

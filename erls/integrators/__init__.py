@@ -23,6 +23,13 @@ INTEGRATORS: dict[str, Integrator] = {
 
 DEFAULT = "generalized_alpha"
 
+KERNELS: dict[str, str] = {
+    "generalized_alpha": "erls.kernels.stepping.generalized_alpha",
+    "lobatto": "erls.kernels.stepping.lobatto",
+    "auto": "erls.kernels.stepping.lobatto",
+}
+"""Modules with the compiled loops of integrators that have one."""
+
 DESCRIPTIONS: dict[str, str] = {
     "generalized_alpha": "implicit, order 2, fixed steps, numerical damping of unresolved modes",
     "lobatto": "implicit, order 6, adaptive to `tolerance`, no numerical damping: for accuracy at low cost",
