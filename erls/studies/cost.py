@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -240,13 +241,19 @@ def study_cost(
         for ladder in rungs
     ]
     before = total - len(rungs)
-    finished, complete = run_all(_climb, tasks, lambda done, _: progress(before + done, total), workers)
+    advance = partial(_advanced, progress, before, total)
+    # what is compiled comes first: the budget may not last for the others
+    finished, complete = run_all(_climb, tasks, advance, workers, longest_last=False)
     runs = tuple(run for one in finished for run in _runs(one, tasks[one.number]))
     front = pareto_front(runs)
     met = [run for run in runs if run.failure is None and run.error + truth.error <= tolerance]
     best = min(met, key=lambda run: run.wall_s, default=None)
     how = () if best is None else overrides_of(best.setting, fields)
     return CostStudy(loaded.name, chosen, norm, tolerance, truth, runs, front, best, how, complete)
+
+
+def _advanced(progress: Callable[[float, float], None], before: int, total: int, done: float, _: float) -> None:
+    progress(before + done, total)
 
 
 def _check(value: float, name: str) -> None:

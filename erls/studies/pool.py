@@ -32,6 +32,7 @@ def run_all(
     tasks: Sequence[A],
     progress: Callable[[float, float], None] = lambda done, total: None,
     workers: int | None = None,
+    longest_last: bool = True,
 ) -> tuple[list[Finished], bool]:
     """Results of ``work`` for every task, in the order of the tasks.
 
@@ -44,6 +45,8 @@ def run_all(
         Called with (finished, all).
     workers : int, optional
         Processes; as many as cores unless given. One runs in this process.
+    longest_last : bool
+        Whether the last tasks take longest, so that several processes start with them.
 
     Returns
     -------
@@ -62,7 +65,7 @@ def run_all(
     count = min(workers or os.cpu_count() or 1, len(tasks))
     finished: list[Finished] = []
     try:
-        for one in _here(work, tasks) if count <= 1 else _spread(work, tasks, count):
+        for one in _here(work, tasks) if count <= 1 else _spread(work, tasks, count, longest_last):
             finished.append(one)
             progress(len(finished), len(tasks))
     except KeyboardInterrupt:
@@ -80,14 +83,14 @@ def _here(work: Callable[[A], R], tasks: Sequence[A]) -> Iterator[Finished]:
             yield Finished(number, None, problem)
 
 
-def _spread(work: Callable[[A], R], tasks: Sequence[A], count: int) -> Iterator[Finished]:
-    """Longest tasks are expected last, so they are started first."""
+def _spread(work: Callable[[A], R], tasks: Sequence[A], count: int, longest_last: bool) -> Iterator[Finished]:
     numbers: dict[Future[tuple[R | None, ReportedError | None]], int] = {}
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # read by the workers when they load their libraries
     pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_deaf)
     try:
-        for number, task in reversed(list(enumerate(tasks))):
+        numbered = list(enumerate(tasks))
+        for number, task in reversed(numbered) if longest_last else numbered:
             numbers[pool.submit(_caught, work, task)] = number
         waiting = set(numbers)
         while waiting:
