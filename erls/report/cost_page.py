@@ -11,7 +11,8 @@ from erls.lie.so3 import Array
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
 from erls.report.tables import table
-from erls.studies.cost import CostPoint, CostStudy, recommendation
+from erls.studies.cost import CostStudy, recommendation
+from erls.studies.ladder import CostPoint
 
 _HEADER = ("setting", "accuracy", "time [s]", "error [m]", "steps", "right-hand sides", "factorizations")
 

@@ -13,92 +13,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from erls.errors import Cause, SceneError, SimulationError
+from erls.errors import Cause, SceneError
 from erls.integrators import INTEGRATORS
-from erls.lie.so3 import Array
-from erls.run import Run
 from erls.scene import Scene, load_scene
-from erls.simulation import simulate
+from erls.studies.ladder import CostPoint, Ladder, Norm, Setting, climb, failed, overrides_of
 from erls.studies.mode_overrides import available_modes, count_field
 from erls.studies.pool import Finished, run_all
-from fe_import.errors import ReportedError
+from erls.studies.reference import REFERENCES, Reference, default_reference, make_reference
 from fe_import.toml_file import choose
 
-Norm = Literal["max", "rms"]
-_SAMPLES = 400
 _SCIPY = ("rk45", "dop853", "radau", "bdf", "lsoda")
 _RELATIVE = tuple(10.0**-k for k in range(3, 11))
 _STEP_SHARES = tuple(2.0**-k for k in range(-3, 6))  # of the scene's own step
 _TOLERANCE_SHARES = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)  # of the tolerance asked for
-
-
-@dataclass(frozen=True)
-class Setting:
-    """One way to run the scene.
-
-    Attributes
-    ----------
-    formulation, integrator, effects : str
-    modes : int or None
-        Elastic modes of every link; all of the model when None.
-    knob : str
-        The field that sets the accuracy: ``step``, ``rtol`` or ``tolerance``.
-    value : float
-    """
-
-    formulation: str
-    integrator: str
-    effects: str
-    modes: int | None
-    knob: str
-    value: float
-
-    @property
-    def name(self) -> str:
-        """In words, without its accuracy."""
-        modes = "all modes" if self.modes is None else f"{self.modes} modes"
-        return f"{self.formulation}, {modes}, {self.integrator}, effects {self.effects}"
-
-
-@dataclass(frozen=True)
-class CostPoint:
-    """One run: what it took and how far it was off.
-
-    Attributes
-    ----------
-    setting : Setting
-    wall_s : float
-        Median over ``runs`` of the integration alone; nan when it failed.
-    error : float
-        In the norm of the study [m]; nan when it failed.
-    steps, rhs_calls, factorizations : int
-    runs : int
-    failure : ReportedError or None
-        Failed runs stay in the report with their cause.
-    """
-
-    setting: Setting
-    wall_s: float
-    error: float
-    steps: int
-    rhs_calls: int
-    factorizations: int
-    runs: int
-    failure: ReportedError | None = None
-
-
-@dataclass(frozen=True)
-class Reference:
-    """Positions (k, points, 3) at ``times`` (k,), how they were made, and their own error [m]."""
-
-    times: Array
-    positions: Array
-    made_by: str
-    error: float
 
 
 @dataclass(frozen=True)
@@ -153,22 +84,6 @@ class Grid:
     integrators: tuple[str, ...] = ()
     effects: tuple[str, ...] = ()
     modes: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class _Ladder:
-    """Task of one worker process."""
-
-    path: str
-    overrides: tuple[str, ...]
-    fields: tuple[str, ...]
-    rungs: tuple[Setting, ...]
-    points: tuple[str, ...]
-    norm: Norm
-    reference: Reference
-    tolerance: float
-    slowest: float
-    until: float
 
 
 def study_cost(
@@ -228,14 +143,14 @@ def study_cost(
     chosen = tuple(points) or tuple(named)
     modes = available_modes(loaded)
     begun = time.monotonic()
-    kind = reference or _default_reference(loaded)
+    kind = reference or default_reference(loaded)
     choose(kind, ("nodal", "tight"), "reference", SceneError)
     rungs = _ladders(loaded, grid or Grid(), tolerance, min(modes.values(), default=0))
-    total = len(_REFERENCES[kind][1]) + len(rungs)
-    truth = _reference(path, loaded, tuple(overrides), kind, chosen, workers, lambda done, _: progress(done, total))
+    total = len(REFERENCES[kind][1]) + len(rungs)
+    truth = make_reference(path, loaded, tuple(overrides), kind, chosen, workers, lambda done, _: progress(done, total))
     fields = tuple(count_field(loaded, name) for name in modes)
     tasks = [
-        _Ladder(
+        Ladder(
             str(path), tuple(overrides), fields, ladder, chosen, norm, truth, tolerance, budget / 10, begun + budget
         )
         for ladder in rungs
@@ -243,7 +158,7 @@ def study_cost(
     before = total - len(rungs)
     advance = partial(_advanced, progress, before, total)
     # what is compiled comes first: the budget may not last for the others
-    finished, complete = run_all(_climb, tasks, advance, workers, longest_last=False)
+    finished, complete = run_all(climb, tasks, advance, workers, longest_last=False)
     runs = tuple(run for one in finished for run in _runs(one, tasks[one.number]))
     front = pareto_front(runs)
     met = [run for run in runs if run.failure is None and run.error + truth.error <= tolerance]
@@ -260,73 +175,6 @@ def _check(value: float, name: str) -> None:
     if not 0 < value < np.inf:
         message, remedy = f"the {name} must be a positive number", "give metres" if name == "tolerance" else "seconds"
         raise SceneError(Cause.BAD_FIELD, message, where=name, value=value, remedy=remedy)
-
-
-def _default_reference(scene: Scene) -> str:
-    """The nodal formulation is the judge wherever it can run."""
-    from fe_import.link import load_link
-
-    beams = all(
-        link.rigid is not None
-        or (link.model and load_link(scene.folder / link.model).description.frame is not None)
-        for link in scene.record.links
-    )
-    return "nodal" if beams and not scene.record.loops else "tight"
-
-
-_REFERENCES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
-    "nodal": (
-        "nodal formulation, 16 and 8 elements per member with steps in the same ratio, extrapolated",
-        (
-            ("simulation.formulation=nodal", "simulation.elements_per_member=16", "simulation.step=5e-4"),
-            ("simulation.formulation=nodal", "simulation.elements_per_member=8", "simulation.step=1e-3"),
-        ),
-    ),
-    "tight": (
-        "all modes and effects, lobatto at a tolerance of 1e-8 m beside 1e-7 m",
-        (
-            ("simulation.integrator=lobatto", "simulation.tolerance=1e-8"),
-            ("simulation.integrator=lobatto", "simulation.tolerance=1e-7"),
-        ),
-    ),
-}
-
-
-def _reference(
-    path: Path,
-    scene: Scene,
-    overrides: tuple[str, ...],
-    kind: str,
-    points: tuple[str, ...],
-    workers: int | None,
-    progress: Callable[[float, float], None],
-) -> Reference:
-    made_by, variants = _REFERENCES[kind]
-    times = np.linspace(0.0, scene.record.simulation.duration, _SAMPLES + 1)
-    tasks = [(str(path), (*overrides, "simulation.effects=all", *variant), points, times) for variant in variants]
-    finished, complete = run_all(_positions, tasks, progress, workers)
-    if not complete:
-        raise SimulationError(Cause.INTERRUPTED, "the reference was interrupted", remedy="nothing was kept")
-    for one in finished:
-        if one.error is not None:
-            one.error.remedy = f"this was the reference ({made_by}); choose another one, or: {one.error.remedy}"
-            raise one.error
-    fine, coarse = (one.result for one in finished)
-    change = fine - coarse
-    error = float(np.linalg.norm(change, axis=2).max())
-    if kind == "nodal":  # second order in mesh and step, both halved
-        return Reference(times, fine + change / 3, made_by, error / 3)
-    return Reference(times, fine, made_by, error)
-
-
-def _positions(task: tuple[str, tuple[str, ...], tuple[str, ...], Array]) -> Array:
-    path, overrides, points, times = task
-    return _sampled(simulate(load_scene(path, overrides)), points, times)
-
-
-def _sampled(run: Run, points: Sequence[str], times: Array) -> Array:
-    """(k, points, 3)"""
-    return np.stack([run.position(name, times) for name in points], axis=1)
 
 
 def _ladders(scene: Scene, grid: Grid, tolerance: float, most: int) -> list[tuple[Setting, ...]]:
@@ -366,91 +214,8 @@ def _rungs(scene: Scene, integrator: str, tolerance: float) -> list[tuple[str, f
     return [("tolerance", share * tolerance) for share in _TOLERANCE_SHARES]
 
 
-def overrides_of(setting: Setting, fields: Sequence[str]) -> tuple[str, ...]:
-    """``KEY=VALUE`` of a setting; ``fields`` take the number of modes."""
-    result = [
-        f"simulation.formulation={setting.formulation}",
-        f"simulation.integrator={setting.integrator}",
-        f"simulation.effects={setting.effects}",
-        f"simulation.{setting.knob}={setting.value:.6g}",
-    ]
-    if setting.knob == "rtol":
-        result.append(f"simulation.atol={1e-2 * setting.value:.6g}")
-    if setting.modes is not None:
-        result += [f"{field}={setting.modes}" for field in fields]
-    return tuple(result)
-
-
-class _TooSlow(Exception):
-    """Ends a run beyond its share of the budget."""
-
-
-def _climb(task: _Ladder) -> list[CostPoint]:
-    """The rungs of a ladder, until one is as good as the reference, gains nothing, or is too slow."""
-    found: list[CostPoint] = []
-    for setting in task.rungs:
-        left = task.until - time.monotonic()
-        if left <= 0:
-            found.append(_failed(setting, _over_budget("not run: the budget of the study was used up")))
-            break
-        point = _measured(task, setting, min(task.slowest, left))
-        found.append(point)
-        good = point.failure is None and point.error <= max(task.reference.error, 0.03 * task.tolerance)
-        slow = point.failure is not None and point.failure.cause == Cause.BUDGET
-        if good or slow or _stalled(found):
-            break
-    return found
-
-
-def _stalled(found: list[CostPoint]) -> bool:
-    """Whether the last two refinements changed the error by less than a tenth: the model is the limit then."""
-    errors = [point.error for point in found[-3:] if point.failure is None]
-    return len(errors) == 3 and max(errors) - min(errors) < 0.1 * errors[-1]
-
-
-def _measured(task: _Ladder, setting: Setting, longest: float) -> CostPoint:
-    """Runs of one setting: one, and two more where they are short."""
-    begun = time.perf_counter()
-
-    def watch(t: float, duration: float) -> None:
-        if time.perf_counter() - begun > longest:
-            raise _TooSlow
-
-    walls: list[float] = []
-    run: Run | None = None
-    try:
-        scene = load_scene(task.path, (*task.overrides, *overrides_of(setting, task.fields)))
-        while not walls or (len(walls) < 3 and walls[0] < 1.0):
-            begun = time.perf_counter()
-            run = simulate(scene, progress=watch)
-            walls.append(run.wall_s)
-    except _TooSlow:
-        return _failed(setting, _over_budget(f"stopped after {longest:.0f} s: too slow for this study"))
-    except ReportedError as problem:
-        if problem.cause == Cause.INTERRUPTED:
-            raise
-        return _failed(setting, problem)
-    assert run is not None
-    distance = np.linalg.norm(
-        _sampled(run, task.points, task.reference.times) - task.reference.positions, axis=2
-    )
-    error = float(distance.max() if task.norm == "max" else np.sqrt((distance**2).mean(axis=0)).max())
-    work = run.solution.work
-    wall = float(np.median(walls))
-    return CostPoint(setting, wall, error, work.steps, work.rhs_calls, work.factorizations, len(walls))
-
-
-def _over_budget(message: str) -> SimulationError:
-    remedy = "raise the budget (--budget), or leave such settings out"
-    return SimulationError(Cause.BUDGET, message, remedy=remedy)
-
-
-def _failed(setting: Setting, problem: ReportedError) -> CostPoint:
-    return CostPoint(setting, np.nan, np.nan, 0, 0, 0, 0, problem)
-
-
-def _runs(one: Finished, task: _Ladder) -> list[CostPoint]:
-    return one.result if one.error is None else [_failed(task.rungs[0], one.error)]
+def _runs(one: Finished, task: Ladder) -> list[CostPoint]:
+    return one.result if one.error is None else [failed(task.rungs[0], one.error)]
 
 
 def pareto_front(runs: Sequence[CostPoint]) -> tuple[CostPoint, ...]:

@@ -18,16 +18,14 @@ from erls.cli import main
 from erls.errors import Cause, SceneError, SimulationError
 from erls.report.cost_page import cost_csv, cost_page, cost_text
 from erls.studies.cost import (
-    CostPoint,
     CostStudy,
     Grid,
-    Setting,
     cost_summary,
-    overrides_of,
     pareto_front,
     recommendation,
     study_cost,
 )
+from erls.studies.ladder import CostPoint, Setting, overrides_of
 
 TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"
 SHORT = ("simulation.duration=0.04", "simulation.step=1e-3")
@@ -167,7 +165,7 @@ def test_bad_input(
     monkeypatch.chdir(tmp_path / "in")
     text = TALL.read_text(encoding="utf-8").replace("links/", f"{TALL.parent}/links/")
     Path("scene.toml").write_text(text, encoding="utf-8")
-    monkeypatch.setattr("erls.studies.cost._reference", lambda *a: pytest.fail("work before the check"))
+    monkeypatch.setattr("erls.studies.cost.make_reference", lambda *a: pytest.fail("work before the check"))
     assert main(["study", "cost", "scene.toml", *options]) == 2
     assert named in capsys.readouterr().err
     assert sorted(p.name for p in Path().iterdir()) == ["scene.toml"]

@@ -69,14 +69,17 @@ def change_transposed(
 
 @part
 def pair_plus(a: Twist, b: Twist) -> Twist:
+    """a + b."""
     return plus(a[0], b[0]), plus(a[1], b[1])
 
 
 @part
 def pair_minus(a: Twist, b: Twist) -> Twist:
+    """a - b."""
     return minus(a[0], b[0]), minus(a[1], b[1])
 
 
 @part
 def pair_scaled(s: float, a: Twist) -> Twist:
+    """s a."""
     return scaled(s, a[0]), scaled(s, a[1])

@@ -14,26 +14,31 @@ Rotation: TypeAlias = tuple[float, float, float, float, float, float, float, flo
 
 @part
 def plus(a: Vector, b: Vector) -> Vector:
+    """a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @part
 def minus(a: Vector, b: Vector) -> Vector:
+    """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @part
 def scaled(s: float, a: Vector) -> Vector:
+    """s a."""
     return s * a[0], s * a[1], s * a[2]
 
 
 @part
 def dot(a: Vector, b: Vector) -> float:
+    """a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @part
 def cross(a: Vector, b: Vector) -> Vector:
+    """a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
