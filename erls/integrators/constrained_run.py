@@ -51,7 +51,7 @@ class ConstrainedRecorder(Recorder):
 
     def _beside(self, count: int) -> Array:
         """Room for accelerations and multipliers of the next knots."""
-        end = self._count + count
+        end = self._kept[0] + count
         while end > len(self._more):
             self._more = np.concatenate([self._more, np.empty_like(self._more)])
-        return self._more[self._count : end]
+        return self._more[self._kept[0] : end]

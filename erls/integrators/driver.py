@@ -28,37 +28,46 @@ class Recorder:
         self.work = Work()
         self.warnings: list[str] = []
         self._size, self._observer = size, observer
-        self._count = 0
+        self._kept = 0, 0  # knots and accepted steps: one object, so that an interrupt finds both or neither
         self._t = np.empty(capacity)
         self._knots = np.empty((capacity, 3, size))
 
     def append(self, t: float, y: Array, v: Array, a: Array) -> None:
         """Add a copy of a knot."""
-        k = self._count
+        k, steps = self._kept
         if k == len(self._t):
             self._t = np.concatenate([self._t, np.empty(k)])
             self._knots = np.concatenate([self._knots, np.empty((k, 3, self._size))])
         knot = self._knots[k]
         knot[0], knot[1], knot[2] = y, v, a
         self._t[k] = t
-        self._count = k + 1  # last, so that an interrupt never leaves half a knot
+        self._kept = k + 1, steps  # last, so that an interrupt never leaves half a knot
 
     def extend(self, t: Array, knots: Array, steps: int | None = None) -> None:
         """Add knots (k, 3, n) of y, v, a at ``t`` (k,), by default one per accepted step, and tell the observer."""
-        start, count = self._count, len(t)
+        (start, before), count = self._kept, len(t)
         while start + count > len(self._t):
             self._t = np.concatenate([self._t, np.empty(len(self._t))])
             self._knots = np.concatenate([self._knots, np.empty_like(self._knots)])
         self._t[start : start + count], self._knots[start : start + count] = t, knots
-        self._count = start + count
+        self._kept = start + count, before + (count if steps is None else steps)
         if count:
-            self.accept(float(t[-1]), count if steps is None else steps)
+            self._tell(float(t[-1]))
 
-    def accept(self, t: float, steps: int = 1) -> None:
-        """Count accepted steps, whose knots were added, and tell the observer."""
-        self.work.steps += steps
+    def accept(self, t: float) -> None:
+        """Count an accepted step, whose knots were added, and tell the observer."""
+        knots, steps = self._kept
+        self._kept = knots, steps + 1
+        self._tell(t)
+
+    def _tell(self, t: float) -> None:
         if self._observer is not None:
             self._observer(t, self.solution)
+
+    @property
+    def steps(self) -> int:
+        """Accepted steps."""
+        return self._kept[1]
 
     @property
     def observed(self) -> bool:
@@ -68,13 +77,14 @@ class Recorder:
     @property
     def time(self) -> float | None:
         """Time of the last knot."""
-        return float(self._t[self._count - 1]) if self._count else None
+        knots = self._kept[0]
+        return float(self._t[knots - 1]) if knots else None
 
     def solution(self, failure: SimulationError | None = None) -> Solution:
         """The run so far; its arrays are views that later knots leave unchanged."""
-        k = self._count
+        k, steps = self._kept
         y, v, a = (self._knots[:k, i] for i in range(3))
-        return Solution(self._t[:k], y, v, a, replace(self.work), failure, tuple(self.warnings))
+        return Solution(self._t[:k], y, v, a, replace(self.work, steps=steps), failure, tuple(self.warnings))
 
 
 Advance = Callable[[Leg, Array, Array, Array, Recorder], tuple[Array, Array]]

@@ -51,7 +51,7 @@ class Chunks:
         state[[loop.CHANGE, loop.GUESS]] = 0.0
         functions = self.system.residual, self.system.mass_matrix, self.system.stiffness_and_damping
         while counts[loop.AT] < counts[loop.TOTAL]:
-            size = 1 if recorder.observed and recorder.work.steps < _SINGLE else self.steps
+            size = 1 if recorder.observed and recorder.steps < _SINGLE else self.steps
             times, knots = np.empty(size), np.empty((size, 3, self.system.size))
             begun = time.perf_counter()
             made = loop.advance(

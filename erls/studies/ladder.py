@@ -170,4 +170,5 @@ def _over_budget(message: str) -> SimulationError:
 
 
 def failed(setting: Setting, problem: ReportedError) -> CostPoint:
+    """Point of a setting that gave no motion, with its cause."""
     return CostPoint(setting, np.nan, np.nan, 0, 0, 0, 0, problem)

@@ -67,6 +67,26 @@ def make_reference(
     workers: int | None,
     progress: Callable[[float, float], None],
 ) -> Reference:
+    """Positions of points over the run that settings are judged against, with the error they have themselves.
+
+    Parameters
+    ----------
+    path, scene, overrides : Path, Scene, tuple of str
+        A scene file, as loaded, and changes of it ("table.key=value").
+    kind : str
+        One of `REFERENCES`.
+    points : tuple of str
+        Names of points.
+    workers : int or None
+        Processes (`erls.studies.pool.run_all`).
+    progress : callable
+        ``progress(done, total)`` in runs.
+
+    Raises
+    ------
+    SimulationError
+        A run of the reference failed (its cause, with the remedy), or was interrupted.
+    """
     made_by, variants = REFERENCES[kind]
     times = np.linspace(0.0, scene.record.simulation.duration, _SAMPLES + 1)
     tasks = [(str(path), (*overrides, "simulation.effects=all", *variant), points, times) for variant in variants]
@@ -91,5 +111,5 @@ def _positions(task: tuple[str, tuple[str, ...], tuple[str, ...], Array]) -> Arr
 
 
 def sampled(run: Run, points: Sequence[str], times: Array) -> Array:
-    """(k, points, 3)"""
+    """Positions (k, points, 3) [m] of named points at k times [s]."""
     return np.stack([run.position(name, times) for name in points], axis=1)
