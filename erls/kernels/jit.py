@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -31,11 +32,26 @@ def folder(subpackage: str) -> Path:
 
     here = Path(__file__).parent
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
-    for path in [*sorted(here.glob("*.py")), *sorted((here / subpackage).rglob("*.py"))]:
+    for path in [*sorted(here.glob("*.py")), *(p for name in _reads(here, subpackage) for p in _files(here, name))]:
         digest.update(path.read_bytes())
     given = os.environ.get("ERLS_KERNELS") or os.environ.get("ERLS_CACHE")
     base = Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
     return base / f"kernels-{subpackage}-{digest.hexdigest()[:16]}"
+
+
+def _files(here: Path, subpackage: str) -> list[Path]:
+    return sorted((here / subpackage).rglob("*.py"))
+
+
+def _reads(here: Path, subpackage: str) -> list[str]:
+    """A subpackage and those whose functions it calls."""
+    found, waiting = set(), {subpackage}
+    while waiting:
+        name = waiting.pop()
+        found.add(name)
+        for path in _files(here, name):
+            waiting |= set(re.findall(rf"^from {__package__}\.(\w+)", path.read_text(), re.M)) - found
+    return sorted(name for name in found if (here / name).is_dir())
 
 
 @contextmanager
