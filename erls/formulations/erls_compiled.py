@@ -197,7 +197,6 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
             layout.AXIS: pack.put(axes),
             layout.MASS: pack.put_columns(mass),
             layout.X: pack.put_columns(*x),
-            layout.X_BACK: pack.put(x),
             layout.Z: pack.put_columns(*z_pairs),
             layout.OUT: pack.put_columns(out),
             layout.STIFFNESS: pack.put(link.stiffness),

@@ -79,6 +79,11 @@ def part(function: F) -> F:
     return _njit(function, **_PART) if ENABLED else function
 
 
+def reordered(function: F) -> F:
+    """A `part` whose sums may be taken in any order, so that processors take several terms at once."""
+    return _njit(function, **_PART, fastmath={"reassoc", "contract"}) if ENABLED else function
+
+
 def inlined(function: F) -> F:
     """A `part` that becomes one with its caller: for what takes many arrays."""
     return _njit(function, **_PART, forceinline=True) if ENABLED else function
@@ -92,7 +97,7 @@ def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
     return lambda function: _njit(function, signature, _nrt=counted) if ENABLED else function
 
 
-def _njit(function: Any, *signature: Any, **options: bool) -> Any:
+def _njit(function: Any, *signature: Any, **options: Any) -> Any:
     import numba
 
     before = numba.config.CACHE_DIR

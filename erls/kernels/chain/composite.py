@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from erls.kernels import contract
 from erls.kernels.chain import layout as at
-from erls.kernels.chain.forces import deform_inertia, vector
+from erls.kernels.chain.forces import deform_first_order, deform_second_order, vector
 from erls.kernels.chain.inertia import carry9_back, carry_inertia_back, joint_path, link_inertia
 from erls.kernels.chain.motion import place_frames
 from erls.kernels.contract import Array, IntArray
@@ -73,7 +73,8 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
         n = 6 + e
         memory, outward = integers[record + at.MEMORY], integers[record + at.OUT]
         link = scratch[memory : memory + at.VECTORS]
-        deform_inertia(reals, integers, scratch, record)
+        deform_first_order(reals, integers, scratch, record)
+        deform_second_order(reals, integers, scratch, record)
         link_inertia(reals, integers, scratch, record)
         joint_path(reals, integers, record, link)
         constant = integers[record + at.MASS]

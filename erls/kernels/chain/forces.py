@@ -7,7 +7,7 @@ that axis only: no joint feels the others.
 from __future__ import annotations
 
 from erls.kernels.chain import layout as at
-from erls.kernels.chain.linear import add_columns, add_transport, dot
+from erls.kernels.chain.linear import add_columns, add_symmetric, add_transport, dot, dot6, pass_columns
 from erls.kernels.contract import Array, IntArray
 from erls.kernels.jit import part
 
@@ -31,8 +31,8 @@ def pair_of(axes: int, i: int, j: int) -> int:
 
 
 @part
-def deform_inertia(reals: Array, integers: IntArray, scratch: Array, record: int) -> None:
-    """X q and Z q of a link for its axes, as far as an effect needs them."""
+def deform_first_order(reals: Array, integers: IntArray, scratch: Array, record: int) -> None:
+    """X q of a link for its axes, where an effect needs it."""
     n = 6 + integers[record + at.MODES]
     memory, axes = integers[record + at.MEMORY], integers[record + at.AXES]
     skip = 6 if record == at.HEADER else 0  # u = 0 on the ground
@@ -44,15 +44,25 @@ def deform_inertia(reals: Array, integers: IntArray, scratch: Array, record: int
             xq = scratch[start : start + n]
             xq[:] = 0.0
             add_columns(reals, integers[record + at.X] + (i * n + skip) * n, n, q, n - skip, 1.0, xq)
+
+
+@part
+def deform_second_order(reals: Array, integers: IntArray, scratch: Array, record: int) -> None:
+    """Z q of a link for its pairs of axes, and qᵀ Z q, as far as an effect needs them."""
+    n = 6 + integers[record + at.MODES]
+    memory, axes = integers[record + at.MEMORY], integers[record + at.AXES]
+    skip = 6 if record == at.HEADER else 0
+    start = vector(memory, n, at.Q)
+    q = scratch[start : start + n]
     if integers[at.SECOND_ORDER] or integers[at.SOFTENING]:
         link = scratch[memory : memory + at.VECTORS]
         for pair in range(axes * (axes + 1) // 2):
             start = vector(memory, n, at.Z_Q + pair)
             zq = scratch[start : start + n]
             zq[:] = 0.0
-            add_columns(reals, integers[record + at.Z] + (pair * n + skip) * n, n, q, n - skip, 1.0, zq)
+            add_symmetric(reals, integers[record + at.Z] + pair * n * n, n, q, skip, zq)
             if integers[at.SECOND_ORDER]:
-                link[at.TURN_MOMENTS + pair] = dot(zq[skip:], q, 0, n - skip)
+                link[at.TURN_MOMENTS + pair] = dot(zq, q, skip, n)
 
 
 @part
@@ -83,7 +93,10 @@ def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, a
     for i in range(3):
         qdd[i] -= link[at.DOWN + i]
     modal[:] = 0.0
-    add_columns(reals, mass, n, qdd, n if accelerated else 6, 1.0, modal)
+    if accelerated:
+        add_symmetric(reals, mass, n, qdd, 0, modal)
+    else:
+        add_columns(reals, mass, n, qdd, 6, 1.0, modal)
     for i in range(6):
         wrench[i] = modal[i]
         qdd[i] = link[at.W_RATE + i]
@@ -107,7 +120,9 @@ def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, a
             for i in range(6):
                 spare[i] += reals[mass + j * n + i] * s
 
-    deform_inertia(reals, integers, scratch, record)
+    deform_second_order(reals, integers, scratch, record)
+    start = vector(memory, n, at.COLUMN)
+    speeds = scratch[start : start + n]
     for a in range(axes):
         omega = along(reals, axis + 3 * a, link, at.TWIST + 3)
         alpha = along(reals, axis + 3 * a, link, at.TWIST_RATE + 3)
@@ -115,8 +130,23 @@ def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, a
         start, start_rate = vector(memory, n, at.X_Q + a), vector(memory, n, at.X_RATE + a)
         xq, xqd = scratch[start : start + n], scratch[start_rate : start_rate + n]
         if first or coriolis:
+            xq[:] = 0.0
             xqd[:] = 0.0
+        if coriolis:  # -ω X_ωᵀ s with all velocities when the centrifugal load is on too, otherwise with those of q
+            for i in range(n):
+                speeds[i] = omega * qd[i]
+            if centrifugal:
+                for i in range(6):
+                    speeds[i] = omega * link[at.W + i]
+            pass_columns(reals, x, n, skip, q, qd, xq, xqd, speeds, modal)
+            for i in range(n):
+                modal[i] += omega * xqd[i]
+        elif first:
+            add_columns(reals, x + skip * n, n, q[skip:], n - skip, 1.0, xq)
             add_columns(reals, x + skip * n, n, qd[skip:], n - skip, 1.0, xqd)
+        if centrifugal and not coriolis:
+            for j in range(skip, n):
+                modal[j] -= omega * dot6(reals, x + j * n, link, at.TWIST)
         if first:
             for i in range(6):
                 wrench[i] += alpha * xq[i] + omega * xqd[i]
@@ -135,17 +165,6 @@ def link_forces(reals: Array, integers: IntArray, scratch: Array, record: int, a
             for i in range(3):
                 spare[3 + i] += spin * reals[axis + 3 * a + i]
                 wrench[3 + i] += spin_rate * reals[axis + 3 * a + i]
-        if coriolis:
-            for i in range(n):
-                modal[i] += omega * xqd[i]
-        back = integers[record + at.X_BACK] + a * n * n
-        if coriolis and centrifugal:  # both at once: X_ωᵀ s
-            add_columns(reals, back, n, link[at.W : at.W + 6], 6, -omega, modal)
-            add_columns(reals, back + 6 * n, n, qd[6:], e, -omega, modal)
-        elif coriolis:
-            add_columns(reals, back + skip * n, n, qd[skip:], n - skip, -omega, modal)
-        elif centrifugal:
-            add_columns(reals, back, n, link[at.TWIST : at.TWIST + 6], 6, -omega, modal)
         if second or integers[at.SOFTENING]:
             for b in range(axes):
                 pair = pair_of(axes, a, b)

@@ -10,7 +10,7 @@ from erls.kernels.jit import part
 
 @part
 def link_inertia(reals: Array, integers: IntArray, scratch: Array, record: int) -> None:
-    """INERTIA of a link alone, with its elastic coordinates held; `deform_inertia` comes first."""
+    """INERTIA of a link alone, with its elastic coordinates held; after `deform_first_order`, `deform_second_order`."""
     n = 6 + integers[record + at.MODES]
     memory, axes = integers[record + at.MEMORY], integers[record + at.AXES]
     link = scratch[memory : memory + at.VECTORS]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.kernels.contract import Array
-from erls.kernels.jit import part
+from erls.kernels.jit import part, reordered
 
 
 @part
@@ -14,6 +14,43 @@ def add_columns(matrix: Array, at: int, size: int, x: Array, count: int, factor:
         weight = factor * x[j]
         for i in range(size):
             out[i] += weight * column[i]
+
+
+@reordered
+def add_symmetric(matrix: Array, at: int, size: int, x: Array, start: int, out: Array) -> None:
+    """Add to out (size,) a symmetric matrix times x (size,) whose entries before ``start`` are zero.
+
+    Of the matrix half is read: what lies on and below the diagonal of columns from ``at``.
+    """
+    for j in range(start):
+        column = matrix[at + j * size : at + (j + 1) * size]
+        total = 0.0
+        for i in range(start, size):
+            total += column[i] * x[i]
+        out[j] += total
+    for j in range(start, size):
+        below, rest, result = matrix[at + j * size + j + 1 : at + (j + 1) * size], x[j + 1 : size], out[j + 1 : size]
+        weight = x[j]
+        total = weight * matrix[at + j * size + j]
+        for i in range(len(below)):  # from 0: otherwise it is not done on several numbers at once
+            total += below[i] * rest[i]
+            result[i] += weight * below[i]
+        out[j] += total
+
+
+@reordered
+def pass_columns(
+    matrix: Array, at: int, size: int, start: int, x: Array, y: Array, out_x: Array, out_y: Array, s: Array, back: Array
+) -> None:
+    """Add X x to out_x, X y to out_y and -Xᵀ s to back, reading the square matrix X once, from column ``start`` on."""
+    for j in range(start, size):
+        column = matrix[at + j * size : at + (j + 1) * size]
+        p, q, total = x[j], y[j], 0.0
+        for i in range(size):
+            total += column[i] * s[i]
+            out_x[i] += p * column[i]
+            out_y[i] += q * column[i]
+        back[j] -= total
 
 
 @part
