@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 from erls.build import Message, build_mechanism
 from erls.errors import SceneError, SimulationError
 from erls.formulations import FORMULATIONS, TREES, compile_kernels, formulate, integrator
+from erls.formulations.base import State
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
@@ -161,10 +162,10 @@ def _integrated(
     if solution.choice:
         warn.tell(f"integrator: {solution.choice}")
     run = make_run(solution)
-    warn((*solution.warnings, *range_warnings(run), *deflection_warnings(run)))
+    seen = run.states(np.linspace(float(run.solution.t[0]), run.end, 101))
+    warn((*solution.warnings, *range_warnings(run, seen), *deflection_warnings(run)))
     if modal and not planned and any(j.drive.reference(0.0) is None for j in mechanism.joints):
-        times_seen = np.linspace(float(run.solution.t[0]), run.end, 101)
-        warn(spin_warnings(mechanism, ((s.time, s.coordinates, s.rates) for s in run.states(times_seen))))
+        warn(spin_warnings(mechanism, ((s.time, s.coordinates, s.rates) for s in seen)))
     run = replace(run, warnings=tuple(warn.told))
     if solution.failure is not None:
         solution.failure.run = run
@@ -194,12 +195,12 @@ def impulse_warnings(mechanism: Mechanism, duration: float) -> list[str]:
     return result
 
 
-def range_warnings(run: Run) -> list[str]:
+def range_warnings(run: Run, states: Sequence[State]) -> list[str]:
     """Links whose displacement left the range of small displacements, in which a modal model holds."""
     mechanism: Mechanism = run.formulation.mechanism
     largest = np.zeros(len(mechanism.links))
     turned = np.zeros(len(mechanism.links))
-    for state in run.states(np.linspace(float(run.solution.t[0]), run.end, 101)):
+    for state in states:
         if state.nodes is not None:
             return []  # the links may deflect as they like
         for k, link in enumerate(mechanism.links):

@@ -38,6 +38,8 @@ def _reason(link: Link) -> str:
 
 def planned_spin_warnings(mechanism: Mechanism, duration: float) -> list[str]:
     """Of the motions that drives prescribe or follow, before anything is computed; other joints are taken at rest."""
+    if all(joint.drive.reference(0.0) is None for joint in mechanism.joints):
+        return []
     breaks = [b for joint in mechanism.joints for b in joint.drive.breakpoints if 0 < b < duration]
     times = np.unique(np.concatenate([np.linspace(0.0, duration, _SAMPLES), breaks]))
 
@@ -73,7 +75,11 @@ def spin_warnings(mechanism: Mechanism, motion: Iterable[tuple[float, Array, Arr
     bounds = {k: float(np.linalg.eigvalsh(np.einsum("aaij->ij", parts))[-1]) for k, parts in softened.items()}
     worst: dict[int, tuple[float, float]] = {}  # largest share lost, and its speed
     lost: dict[int, tuple[float, float]] = {}  # time and speed at which all of it is
+    turning = np.array([joint.type.revolute for joint in mechanism.joints])
+    largest = max(bounds.values(), default=0.0)
     for t, theta, rates in motion if softened else ():
+        if np.abs(rates[turning]).sum() ** 2 * largest <= _NOTABLE:
+            continue
         twists = kinematics(mechanism, screws, theta, rates).twists
         for k, parts in softened.items():
             omega = twists[k][3:]

@@ -101,8 +101,7 @@ def deflection_error(link: Link, motion: LinkMotion, closed: bool, reach: float)
     lever = max(1.0, reach / max(float(np.linalg.norm(np.ptp(model.nodes, axis=0))), 1e-9))
     deflection = lever * float(np.linalg.norm(model.translation_shapes @ held.T, axis=1).max())
     nodes = np.array(sorted({*second.field.nodes.tolist(), link.inboard.node}), dtype=np.int64)
-    shortening = max(float(np.linalg.norm(second.displacements(nodes, q), axis=1).max(initial=0.0)) for q in clamped)
-    shortening *= lever
+    shortening = lever * float(np.linalg.norm(second.displacements(nodes, clamped), axis=-1).max(initial=0.0))
     strain = elastic**2 @ link.stiffness
     frames = motion.modal[:, :6] - held[:, :6]
     work = np.einsum("ka,kab,kb->k", held, _load_stiffness(link, second, motion, frames), held)

@@ -21,6 +21,13 @@ def cross(a: Array, b: Array) -> Array:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
+def cross_all(a: Array, b: Array) -> Array:
+    """a × b of (..., 3) arrays that fit beside each other."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    p, q, r = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([y * r - z * q, z * p - x * r, x * q - y * p], axis=-1)
+
+
 def rotation_z(angle: float) -> Array:
     """(3, 3) rotation about z."""
     c, s = np.cos(angle), np.sin(angle)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.lie.so3 import Array, skew
+from erls.lie.so3 import Array, cross_all, skew
 from fe_import.inertia import mass_properties
 from fe_import.modal.model import ModalModel
 from fe_import.model import IntArray
@@ -57,26 +57,37 @@ class LinkSecondOrder:
         return _node(self.model, self.field, self.inboard)
 
     def displacements(self, nodes: IntArray, q: Array) -> Array:
-        """(k, 3) second-order displacement of nodes at modal coordinates (m,).
+        """(..., k, 3) second-order displacement of nodes at modal coordinates (..., m).
 
         Nodes without a stored field (inside solids) follow the rigid-body part only.
         """
         model, field = self.model, self.field
         start = model.interface_nodes[field.reference].node
-        first, second = np.triu_indices(len(q) - 6)
-        pairs = q[6:][first] * q[6:][second] * np.where(first == second, 0.5, 1.0)
+        pairs = q[..., 6:][..., self._pairs[0]] * q[..., 6:][..., self._pairs[1]] * self._halves
         place = np.searchsorted(field.nodes, nodes).clip(0, max(len(field.nodes) - 1, 0))
-        result = np.zeros((len(nodes), 3))
+        result = np.zeros((*q.shape[:-1], len(nodes), 3))
         known = np.isin(nodes, field.nodes)
-        result[known] = field.translation[place[known]] @ pairs
-        u0, phi = (shape @ q for shape in _rigid_shape(model, start))
+        result[..., known, :] = np.tensordot(pairs, field.translation[place[known]], ([-1], [2]))
+        u0, phi = (np.tensordot(q, shape, ([-1], [1]))[..., None, :] for shape in _rigid_shape(model, start))
         arm = model.nodes[nodes] - model.nodes[start]
-        moved = model.translation_shapes[nodes] @ q - u0 - np.cross(phi, arm)
-        result += np.cross(phi, moved + np.cross(phi, arm) / 2)
+        turned = cross_all(phi, arm)
+        moved = np.tensordot(q, model.translation_shapes[nodes], ([-1], [2])) - u0 - turned
+        result += cross_all(phi, moved + turned / 2)
         if self.inboard != start:
-            lift = 0.5 * self._inboard @ q @ q
-            result -= lift[:3] + np.cross(lift[3:], model.nodes[nodes] - model.nodes[self.inboard])
+            lift = 0.5 * np.einsum("cab,...a,...b->...c", self._inboard, q, q)[..., None, :]
+            arm = model.nodes[nodes] - model.nodes[self.inboard]
+            result -= lift[..., :3] + cross_all(lift[..., 3:], arm)
         return result
+
+    @cached_property
+    def _pairs(self) -> tuple[IntArray, IntArray]:
+        first, second = np.triu_indices(self.model.elastic_modes)
+        return first, second
+
+    @cached_property
+    def _halves(self) -> Array:
+        """Share of each pair in ½ qᵀ Ψ q."""
+        return np.where(self._pairs[0] == self._pairs[1], 0.5, 1.0)
 
 
 def link_second_order(link: Link) -> LinkSecondOrder | None:
