@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from erls.errors import SimulationError
+from erls.formulations import TREES
 from erls.formulations.base import State
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.deflection_watch import DeflectionError, LinkMotion, deflection_error
-from erls.formulations.nodal import Nodal
 from erls.formulations.substructures import Substructured, solved
 from erls.integrators.base import hermite
 from erls.lie.so3 import Array, cross
@@ -37,7 +37,7 @@ def deflection_errors(run: Run) -> dict[str, DeflectionError]:
     """
     formulation = solved(run.formulation)
     mechanism = formulation.mechanism
-    if isinstance(formulation, Nodal) or "geometric_stiffening" in mechanism.effects:
+    if run.scene.record.simulation.formulation not in TREES or "geometric_stiffening" in mechanism.effects:
         return {}
     links = [k for k, link in enumerate(mechanism.links) if link.elastic_modes and link.second_order is not None]
     start, end = float(run.solution.t[0]), run.end

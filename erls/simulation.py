@@ -22,7 +22,6 @@ from erls.range_watch import deflection_warnings
 from erls.run import Run, node_positions
 from erls.run_file import self_contained, write_run
 from erls.scene import Scene, load_scene
-from erls.selection.automatic import automatic
 from erls.spin_stability import missing_stiffening, planned_spin_warnings, spin_warnings
 from fe_import.link import LinkDescription
 from fe_import.modal.file import ModalModel
@@ -95,6 +94,8 @@ def simulate(
         return _integrated(scene, mechanism, warn, progress, checkpoint)
 
     if settings.effects == "auto":
+        from erls.selection.automatic import automatic  # here: most runs need none of it
+
         return automatic(scene, built.mechanism, run_with, tell, strict)
     return run_with(scene, built.mechanism)
 

@@ -8,11 +8,7 @@ from importlib import import_module
 
 from erls.formulations.base import Formulation, TreeFormulation
 from erls.formulations.closed_chain import ClosedChain
-from erls.formulations.closed_run import loop_integrator
 from erls.formulations.erls import Erls
-from erls.formulations.ffr import Ffr
-from erls.formulations.ffr.absolute import absolute_generalized_alpha
-from erls.formulations.nodal import Nodal, nodal_generalized_alpha
 from erls.formulations.substructures import Substructured, of_pieces
 from erls.integrators import INTEGRATORS, KERNELS
 from erls.integrators.base import Solution
@@ -20,15 +16,28 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split, split
 from erls.scene import Simulation
 
+
+def _ffr(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
+    from erls.formulations.ffr import Ffr  # here, like those below: a run imports what it needs
+
+    return Ffr(mechanism, settings.body_frame)
+
+
+def _nodal(mechanism: Mechanism, settings: Simulation) -> Formulation:
+    from erls.formulations.nodal import Nodal
+
+    return Nodal(mechanism, settings.elements_per_member)
+
+
 TREES: dict[str, Callable[[Mechanism, Simulation], TreeFormulation]] = {
     "erls": lambda mechanism, settings: Erls(mechanism, settings.gauge),
-    "ffr": lambda mechanism, settings: Ffr(mechanism, settings.body_frame),
+    "ffr": _ffr,
 }
 """In independent coordinates, on modal models."""
 
 FORMULATIONS: dict[str, Callable[[Mechanism, Simulation], Formulation]] = {
     **TREES,
-    "nodal": lambda mechanism, settings: Nodal(mechanism, settings.elements_per_member),
+    "nodal": _nodal,
 }
 
 
@@ -49,10 +58,18 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Callable[..., Solu
     if settings.formulation in TREES and is_split(mechanism):
         return of_pieces(integrator(split(mechanism).pieces, settings))
     if settings.formulation == "nodal":
+        from erls.formulations.nodal import nodal_generalized_alpha
+
         return partial(nodal_generalized_alpha, adaptive=settings.integrator == "auto")
     if settings.coordinates == "absolute":
+        from erls.formulations.ffr.absolute import absolute_generalized_alpha
+
         return absolute_generalized_alpha
-    return loop_integrator(settings.integrator) if mechanism.loops else INTEGRATORS[settings.integrator]
+    if mechanism.loops:
+        from erls.formulations.closed_run import loop_integrator
+
+        return loop_integrator(settings.integrator)
+    return INTEGRATORS[settings.integrator]
 
 
 def compile_kernels(formulation: Formulation, settings: Simulation) -> None:

@@ -13,10 +13,9 @@ with its pole at θ = 2π set apart; it solves 2x b' = 1/4 − 3b + x b².
 
 from __future__ import annotations
 
-from math import factorial
+from math import factorial, pi
 
 import numpy as np
-from scipy.special import zeta
 
 from erls.lie.so3 import Array
 
@@ -29,7 +28,11 @@ _SUFFICIENT = [  # squared angles up to which term 0, 1, ... may be the last one
 ]
 _POLE = 4 * np.pi**2
 _RATIO_BELOW = 0.5  # of x to the pole
-_ZETA = 2 * (zeta(2 * np.arange(19) + 2) - 1)  # falls by four from term to term
+
+# 2 ζ(s) - 2 of Riemann's function at s = 2, 4, 6, ..., which falls by four from term to term
+_ZETA = 2 * np.array(
+    [pi**2 / 6 - 1, pi**4 / 90 - 1, *((np.arange(2000.0, 1.0, -1.0) ** -s).sum() for s in range(6, 40, 2))]
+)
 
 
 def stumpff(x: Array, highest: int) -> Array:
