@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from erls.errors import Cause, SceneError
-from erls.integrators import DEFAULT as DEFAULT_INTEGRATOR
+from erls.integrators import FIXED_STEP
 from erls.mechanism.drives import DriveRecord, FreeDrive
 from erls.scene_check import check_scene
 from fe_import.link import Damping, Inertia, Vector
@@ -49,10 +49,15 @@ class Simulation(_Record, frozen=True):
     integrator : str
         ``generalized_alpha``, ``lobatto``, one of SciPy's (``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``), or
         ``auto``: the one that fits; of ``nodal``, steps of generalized-α with a local error of ``tolerance`` / 1000.
+        Unless given ``generalized_alpha`` where there is a ``step`` or where conditions tie the coordinates (loops,
+        ``nodal``, absolute coordinates), otherwise ``auto``; `load_scene` puts its name here.
     step : float, optional
         Step of generalized-α [s], largest step of SciPy's; ``lobatto`` and ``auto`` go by ``tolerance`` alone.
     rtol, atol : float
         Tolerances of SciPy's integrators, ``atol`` in metres.
+    output_step : float, optional
+        Of the steps only the first one in each stretch of this length [s] is kept, so that the memory and the file of a
+        long run stay small; between those, motion is interpolated. All are kept unless given.
     tolerance : float
         Error of any point over the whole run [m] that ``lobatto`` and ``auto`` aim at.
     spectral_radius : float
@@ -61,6 +66,9 @@ class Simulation(_Record, frozen=True):
         Physical effects (`erls.effects`) that are on: ``all``, ``auto`` (those that matter), or their names.
     effects_tolerance, effects_effort_tolerance : float
         Of ``auto``: error of the named points [m], and error of drive forces relative to their peak.
+    bandwidth : float, optional
+        Modes of the mechanism above this frequency [Hz] follow statically instead of being integrated; all vibrate
+        unless given.
     """
 
     duration: float
@@ -69,8 +77,9 @@ class Simulation(_Record, frozen=True):
     body_frame: str = "tangent"
     coordinates: str = "independent"
     elements_per_member: int | None = None
-    integrator: str = DEFAULT_INTEGRATOR
+    integrator: str = ""
     step: float | None = None
+    output_step: float | None = None
     rtol: float = 1e-8
     atol: float = 1e-12
     tolerance: float = 1e-5
@@ -78,6 +87,7 @@ class Simulation(_Record, frozen=True):
     effects: str | list[str] = "all"
     effects_tolerance: float = 1e-4
     effects_effort_tolerance: float = 1e-2
+    bandwidth: float | None = None
 
 
 class Base(_Record, frozen=True):
@@ -315,9 +325,19 @@ def load_scene(path: Path | str, overrides: Iterable[str] = ()) -> Scene:
         message = "a scene of bodies, beams and connections, which is no chain of joints and links"
         remedy = "use erls simulate, or erls.body_scenes.solve"
         raise SceneError(Cause.BAD_FIELD, message, where=str(path), remedy=remedy)
-    record = convert(data, SceneRecord, str(path), SceneError)
+    record = _with_integrator(convert(data, SceneRecord, str(path), SceneError))
     check_scene(record, str(path))
     return Scene(path, record)
+
+
+def _with_integrator(record: SceneRecord) -> SceneRecord:
+    """The record with the name of the integrator."""
+    s = record.simulation
+    if s.integrator:
+        return record
+    fixed = s.step is not None or record.loops or s.formulation == "nodal" or s.coordinates == "absolute"
+    settings = msgspec.structs.replace(s, integrator=FIXED_STEP if fixed else "auto")
+    return msgspec.structs.replace(record, simulation=settings)
 
 
 def is_body_scene(data: dict[str, Any]) -> bool:

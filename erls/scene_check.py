@@ -9,7 +9,7 @@ import msgspec
 
 from erls.effects import named_effects
 from erls.errors import Cause, SceneError
-from erls.integrators import DEFAULT, INTEGRATORS
+from erls.integrators import FIXED_STEP, INTEGRATORS
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joints import JOINT_TYPES
 from erls.mechanism.loops import LOOP_TYPES
@@ -76,6 +76,8 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         choose(payload.point, [p.name for p in scene.points], f"{file}: payloads[{k}].point", SceneError)
     for k, loop in enumerate(scene.loops):
         _check_loop(loop, scene, f"{file}: loops[{k}]")
+    if scene.simulation.bandwidth is not None:
+        _check_bandwidth(scene, f"{file}: simulation.bandwidth")
     if scene.loops:
         if scene.simulation.coordinates != "independent":
             message, right = "loops tie independent coordinates", "remove it, or the loops"
@@ -105,17 +107,18 @@ def _check_simulation(s: Simulation, place: str) -> None:
     choose(s.body_frame, BODY_FRAMES, f"{place}.body_frame", SceneError)
     choose(s.coordinates, COORDINATES, f"{place}.coordinates", SceneError)
     if s.coordinates == "absolute":
-        for name, value, right in (("formulation", s.formulation, "ffr"), ("integrator", s.integrator, DEFAULT)):
+        for name, value, right in (("formulation", s.formulation, "ffr"), ("integrator", s.integrator, FIXED_STEP)):
             if value != right:
                 message = "absolute coordinates do not go with this"
                 raise _bad(f"{place}.{name}", message, value, f"use {right}, or coordinates = 'independent'")
-    if s.formulation == "nodal" and s.integrator not in (DEFAULT, "auto"):
+    if s.formulation == "nodal" and s.integrator not in (FIXED_STEP, "auto"):
         message = "nodal frames need an integrator for constraints"
-        raise _bad(f"{place}.integrator", message, s.integrator, f"use {DEFAULT}, or auto")
+        raise _bad(f"{place}.integrator", message, s.integrator, f"use {FIXED_STEP}, or auto")
     if s.elements_per_member is not None and s.elements_per_member < 1:
         message = "a member needs at least one element"
         raise _bad(f"{place}.elements_per_member", message, s.elements_per_member, "give 1 or more")
-    for name in ("duration", "step", "atol", "tolerance", "effects_tolerance", "effects_effort_tolerance"):
+    tolerances = "atol", "tolerance", "effects_tolerance", "effects_effort_tolerance"
+    for name in ("duration", "step", "output_step", "bandwidth", *tolerances):
         value = getattr(s, name)
         if value is not None and not value > 0:
             raise _bad(f"{place}.{name}", f"{name} must be positive", value, "give a number above 0")
@@ -185,6 +188,20 @@ def _check_substructures(link: Link, formulation: str, place: str) -> None:
         )
         remedy = "use formulation = 'ffr', where the frames of the pieces turn with the deformation"
         raise _bad(place, message, link.substructures, remedy)
+
+
+def _check_bandwidth(scene: SceneRecord, place: str) -> None:
+    s = scene.simulation
+    for found, what in (
+        (bool(scene.loops), "loops"),
+        (any(link.substructures > 1 and link.flexible for link in scene.links), "substructures"),
+        (s.formulation == "nodal", "formulation = 'nodal'"),
+        (s.coordinates == "absolute", "coordinates = 'absolute'"),
+    ):
+        if found:
+            message = f"static correction of modes above a bandwidth does not go with {what}"
+            remedy = "remove the bandwidth, so that all modes are integrated"
+            raise _bad(place, message, s.bandwidth, remedy)
 
 
 def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:

@@ -133,7 +133,12 @@ def _integrated(
         warn(chain.warnings)
     step = None if settings.integrator in ("lobatto", "auto") else settings.step  # what they need follows the tolerance
     options = Options(
-        step, settings.rtol, settings.atol, settings.spectral_radius, tolerance=settings.tolerance
+        step,
+        settings.rtol,
+        settings.atol,
+        settings.spectral_radius,
+        tolerance=settings.tolerance,
+        output_step=settings.output_step,
     )
     with announcing(warn.tell):
         compile_kernels(formulation, settings)

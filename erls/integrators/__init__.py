@@ -21,7 +21,8 @@ INTEGRATORS: dict[str, Integrator] = {
     "lsoda": scipy_method("lsoda"),
 }
 
-DEFAULT = "generalized_alpha"
+FIXED_STEP = "generalized_alpha"
+"""The one for steps that the user gives, and for coordinates that conditions tie."""
 
 KERNELS: dict[str, str] = {
     "generalized_alpha": "erls.kernels.stepping.generalized_alpha",

@@ -120,6 +120,8 @@ class Options:
         falls with the cube of the step, so that convergence keeps its order.
     tolerance : float
         Error over the whole run [m] that ``lobatto`` and ``auto`` aim at.
+    output_step : float or None
+        Of the knots only the first one in each stretch of this length [s] is kept; None keeps all.
 
     Raises
     ------
@@ -133,11 +135,14 @@ class Options:
     spectral_radius: float = 0.8
     newton_tolerance: float = 1e-11
     tolerance: float = 1e-5
+    output_step: float | None = None
 
     def __post_init__(self) -> None:
+        apart = self.output_step
         # NaN fails every comparison, so that it is refused too
         checks = (
             ("step", self.step, self.step is None or self.step > 0, "a positive number of seconds"),
+            ("output_step", apart, apart is None or apart > 0, "a positive number of seconds"),
             ("rtol", self.rtol, 3e-14 <= self.rtol < 1, "between 3e-14 (rounding) and 1"),
             ("atol", self.atol, self.atol > 0, "a positive number of metres"),
             ("spectral_radius", self.spectral_radius, 0 <= self.spectral_radius <= 1, "between 0 and 1"),

@@ -12,7 +12,7 @@ from erls.integrators.base import Array, Leg, Observer, SecondOrderSystem, Solut
 
 
 class Recorder:
-    """Knots and work of a run so far, in arrays that grow.
+    """Knots and work of a run so far, in an array that grows.
 
     Parameters
     ----------
@@ -22,43 +22,80 @@ class Recorder:
         See rule 7 of `erls.integrators.base`.
     capacity : int
         Knots to reserve.
+    apart : float or None
+        Of the accepted knots keep the first one in each stretch of this length [s] beside the ends of all legs, so that
+        memory stays flat however many steps there are; None keeps all.
+    beside : int
+        Numbers to keep beside y, v, a of each knot.
     """
 
-    def __init__(self, size: int, observer: Observer | None, capacity: int = 1024) -> None:
+    def __init__(
+        self, size: int, observer: Observer | None, capacity: int = 1024, apart: float | None = None, beside: int = 0
+    ) -> None:
         self.work = Work()
         self.warnings: list[str] = []
-        self._size, self._observer = size, observer
-        self._kept = 0, 0  # knots and accepted steps: one object, so that an interrupt finds both or neither
-        self._t = np.empty(capacity)
-        self._knots = np.empty((capacity, 3, size))
+        self._size, self._observer, self._apart = size, observer, apart
+        self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
+        self._begun, self._stretch = 0.0, 0  # of ``apart``
+        # how many knots are kept, accepted steps, and the last knot where it may yet be dropped: one object, so that
+        # an interrupt finds all or nothing
+        self._kept: tuple[int, int, tuple[float, Array] | None] = 0, 0, None
 
-    def append(self, t: float, y: Array, v: Array, a: Array) -> None:
+    def begin(self, t: float, *parts: Array) -> None:
+        """Add a copy of the knot y, v, a (and what is kept beside it) at which a leg begins; the last leg ends."""
+        row = np.concatenate(parts)
+        self._settle()
+        if not self._kept[0]:
+            self._begun = t
+        self._store(np.array([t]), row[None], 0)
+
+    def append(self, t: float, *parts: Array) -> None:
         """Add a copy of a knot."""
-        k, steps = self._kept
-        if k == len(self._t):
-            self._t = np.concatenate([self._t, np.empty(k)])
-            self._knots = np.concatenate([self._knots, np.empty((k, 3, self._size))])
-        knot = self._knots[k]
-        knot[0], knot[1], knot[2] = y, v, a
-        self._t[k] = t
-        self._kept = k + 1, steps  # last, so that an interrupt never leaves half a knot
+        self._add(np.array([t]), np.concatenate(parts)[None], 0)
 
-    def extend(self, t: Array, knots: Array, steps: int | None = None) -> None:
-        """Add knots (k, 3, n) of y, v, a at ``t`` (k,), by default one per accepted step, and tell the observer."""
-        (start, before), count = self._kept, len(t)
-        while start + count > len(self._t):
-            self._t = np.concatenate([self._t, np.empty(len(self._t))])
-            self._knots = np.concatenate([self._knots, np.empty_like(self._knots)])
-        self._t[start : start + count], self._knots[start : start + count] = t, knots
-        self._kept = start + count, before + (count if steps is None else steps)
-        if count:
+    def extend(self, t: Array, knots: Array, steps: int | None = None, beside: Array | None = None) -> None:
+        """Add knots (k, 3, n) of y, v, a at ``t`` (k,), by default one per accepted step, and tell the observer.
+
+        ``beside`` (k, m) is kept beside them.
+        """
+        rows = knots.reshape(len(t), 3 * self._size)
+        self._add(t, rows if beside is None else np.hstack([rows, beside]), len(t) if steps is None else steps)
+        if len(t):
             self._tell(float(t[-1]))
 
     def accept(self, t: float) -> None:
         """Count an accepted step, whose knots were added, and tell the observer."""
-        knots, steps = self._kept
-        self._kept = knots, steps + 1
+        knots, steps, last = self._kept
+        self._kept = knots, steps + 1, last
         self._tell(t)
+
+    def _add(self, t: Array, rows: Array, steps: int) -> None:
+        if self._apart is None:
+            self._store(t, rows, steps)
+            return
+        stretches = np.floor((t - self._begun) / self._apart * (1 + 1e-12)).astype(np.int64)
+        first = np.diff(stretches, prepend=self._stretch) > 0
+        if first.any():
+            self._stretch = int(stretches[-1])
+            self._store(t[first], rows[first], 0)
+        knots, before, _ = self._kept
+        spare = None if not len(t) or first[-1] else (float(t[-1]), rows[-1].copy())
+        self._kept = knots, before + steps, spare
+
+    def _settle(self) -> None:
+        """Keep the last knot for good."""
+        last = self._kept[2]
+        if last is not None:
+            self._store(np.array([last[0]]), last[1][None], 0)
+
+    def _store(self, t: Array, rows: Array, steps: int) -> None:
+        start, before, _ = self._kept
+        end = start + len(t)
+        while end > len(self._t):
+            self._t = np.concatenate([self._t, np.empty(len(self._t))])
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._t[start:end], self._rows[start:end] = t, rows
+        self._kept = end, before + steps, None
 
     def _tell(self, t: float) -> None:
         if self._observer is not None:
@@ -77,14 +114,24 @@ class Recorder:
     @property
     def time(self) -> float | None:
         """Time of the last knot."""
-        knots = self._kept[0]
+        knots, _, last = self._kept
+        if last is not None:
+            return last[0]
         return float(self._t[knots - 1]) if knots else None
 
     def solution(self, failure: SimulationError | None = None) -> Solution:
-        """The run so far; its arrays are views that later knots leave unchanged."""
-        k, steps = self._kept
-        y, v, a = (self._knots[:k, i] for i in range(3))
-        return Solution(self._t[:k], y, v, a, replace(self.work, steps=steps), failure, tuple(self.warnings))
+        """The run so far; later knots leave its arrays unchanged."""
+        t, rows, steps = self._so_far()
+        y, v, a = (rows[:, i * self._size : (i + 1) * self._size] for i in range(3))
+        return Solution(t, y, v, a, replace(self.work, steps=steps), failure, tuple(self.warnings))
+
+    def _so_far(self) -> tuple[Array, Array, int]:
+        """Times, rows and steps."""
+        knots, steps, last = self._kept
+        t, rows = self._t[:knots], self._rows[:knots]
+        if last is not None:
+            t, rows = np.append(t, last[0]), np.vstack([rows, last[1]])
+        return t, rows, steps
 
 
 Advance = Callable[[Leg, Array, Array, Array, Recorder], tuple[Array, Array]]
@@ -129,7 +176,7 @@ def integrate_legs(
                 a = system.acceleration(leg.first, y, v)
                 if not np.isfinite(a).all():
                     raise not_finite(leg.start, a)
-                recorder.append(leg.start, y, v, a)
+                recorder.begin(leg.start, y, v, a)
                 if system.size == 0:  # every motion is prescribed and no link deforms: nothing to integrate
                     recorder.append(leg.end, y, v, a)
                     recorder.accept(leg.end)

@@ -67,7 +67,8 @@ def generalized_alpha(
     """
     step = options.step or min((times[1] - times[0]) / 1000, 1e-3)
     capacity = int(min((times[1] - times[0]) / step, 1e6)) + 2 if times[1] > times[0] else 2
-    recorder = Recorder(system.size, observer, capacity + 2 * len(system.breakpoints))
+    capacity = 1024 if options.output_step else capacity + 2 * len(system.breakpoints)
+    recorder = Recorder(system.size, observer, capacity, options.output_step)
     stepper = _Stepper(system, options, step, recorder)
     compiled = getattr(system, "compiled", None) if system.size else None
     advance = stepper.advance if compiled is None else _Compiled(stepper, compiled).advance

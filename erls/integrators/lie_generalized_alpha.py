@@ -58,7 +58,7 @@ def lie_generalized_alpha(
     step = options.step or min((times[1] - times[0]) / 1000, 1e-3) or 1e-3
     failure: SimulationError | None = None
     given = ConstrainedState(q, np.array(v, dtype=float), np.zeros(system.size), np.zeros(system.constraints))
-    recorder = ConstrainedRecorder(system, times[0], given, observer)
+    recorder = ConstrainedRecorder(system, times[0], given, observer, options.output_step)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
         try:
             refuse_redundant(system, walk[0].first, q)

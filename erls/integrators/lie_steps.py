@@ -217,7 +217,7 @@ def start_of_leg(
     if not np.isfinite(a).all():
         raise not_finite(leg.start, a)
     state = ConstrainedState(q, v, a, multipliers)
-    recorder.add(leg.start, state)
+    recorder.begin_with(leg.start, state)
     return state
 
 

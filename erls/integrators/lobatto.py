@@ -60,7 +60,7 @@ def lobatto(
 
     A system in compiled form runs in a compiled loop, whose observer is called some 20 times per second.
     """
-    recorder = Recorder(system.size, observer)
+    recorder = Recorder(system.size, observer, apart=options.output_step)
     if system.size == 0:  # nothing to integrate
         return integrate_legs(system, times, y, v, recorder, lambda leg, y, v, a, recorder: (y, v))
     return integrate_legs(system, times, y, v, recorder, _Run(system, times, options, recorder).advance)

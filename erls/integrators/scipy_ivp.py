@@ -135,7 +135,7 @@ def scipy_method(name: str) -> Integrator:
         options: Options,
         observer: Observer | None = None,
     ) -> Solution:
-        recorder = Recorder(system.size, observer)
+        recorder = Recorder(system.size, observer, apart=options.output_step)
         run = _Run(method, system, options, recorder)
         if math.isfinite(method.stable_to):
             recorder.warnings.extend(_warn_of_stiffness(name, system, times, np.asarray(y), np.asarray(v)))

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scenes
 from compiled_modes import CompiledElasticPendulum
 from small_systems import DoublePendulum, ElasticPendulum, Modes
 
 from erls import load_scene, simulate
 from erls.errors import Cause, SceneError
-from erls.integrators import DEFAULT, INTEGRATORS
+from erls.integrators import FIXED_STEP, INTEGRATORS
 from erls.integrators.automatic import choose
 from erls.integrators.base import Options, SecondOrderSystem
 
@@ -62,6 +63,29 @@ def test_a_tolerance_must_be_positive() -> None:
     assert "tolerance" in caught.value.where
 
 
-def test_generalized_alpha_is_the_default_unless_asked_otherwise() -> None:
-    assert DEFAULT == "generalized_alpha"
-    assert load_scene(DATA / "l_shape/steel_flat.toml").record.simulation.integrator == DEFAULT
+@pytest.mark.parametrize(
+    ("scene", "settings", "expected"),
+    [
+        ("l_shape/steel_flat.toml", (), FIXED_STEP),  # it gives a step
+        ("l_shape/steel_flat.toml", ("simulation.integrator=auto",), "auto"),
+        ("four_bar/flexible.toml", (), FIXED_STEP),  # a loop
+    ],
+)
+def test_a_scene_that_names_none(scene: str, settings: tuple[str, ...], expected: str) -> None:
+    assert load_scene(DATA / scene, settings).record.simulation.integrator == expected
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        ({}, "auto"),
+        ({"step": 1e-3}, FIXED_STEP),
+        ({"formulation": "ffr"}, "auto"),
+        ({"formulation": "ffr", "coordinates": "absolute"}, FIXED_STEP),
+        ({"formulation": "nodal"}, FIXED_STEP),
+        ({"step": 1e-3, "integrator": "lobatto"}, "lobatto"),
+    ],
+)
+def test_what_is_taken_unless_given(tmp_path: Path, settings: dict[str, object], expected: str) -> None:
+    scene = scenes.write_toml(tmp_path / "s.toml", {**scenes.L_SCENE, "simulation": {"duration": 1.0, **settings}})
+    assert load_scene(scene).record.simulation.integrator == expected

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from small_systems import DoublePendulum, Law, Modes
 
 from erls.errors import Cause, SceneError, SimulationError
-from erls.integrators import DEFAULT, DESCRIPTIONS, INTEGRATORS
+from erls.integrators import DESCRIPTIONS, FIXED_STEP, INTEGRATORS
 from erls.integrators.base import Array, Options, Solution, hermite
 
 ADAPTIVE = sorted(set(INTEGRATORS) - {"generalized_alpha"})
@@ -43,7 +43,7 @@ def exact() -> Callable[[Array], tuple[Array, Array]]:
 
 def test_the_registry_is_described() -> None:
     assert set(DESCRIPTIONS) == set(INTEGRATORS)
-    assert DEFAULT in INTEGRATORS
+    assert FIXED_STEP in INTEGRATORS
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)

@@ -29,7 +29,7 @@ def test_defaults(tmp_path: Path) -> None:
     assert (scene.name, scene.folder, record.name) == ("small", tmp_path, "")
     assert (simulation.duration, simulation.step, simulation.rtol, simulation.atol) == (1.0, None, 1e-8, 1e-12)
     assert (simulation.formulation, simulation.gauge) == ("erls", "joint-angle")
-    assert (simulation.integrator, simulation.spectral_radius) == ("generalized_alpha", 0.8)
+    assert (simulation.integrator, simulation.spectral_radius) == ("auto", 0.8)
     assert record.gravity == (0.0, 0.0, -9.81)
     assert record.base.position == record.base.rotation_deg == (0.0, 0.0, 0.0)
     assert (record.points, record.payloads, record.initial.deformation) == ([], [], "zero")

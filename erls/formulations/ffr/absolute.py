@@ -30,7 +30,12 @@ def absolute_generalized_alpha(
     assert isinstance(system, Ffr)
     absolute = ConstrainedFfr(system)
     settings = ConstrainedOptions(
-        options.step, options.rtol, options.atol, options.spectral_radius, options.newton_tolerance
+        options.step,
+        options.rtol,
+        options.atol,
+        options.spectral_radius,
+        options.newton_tolerance,
+        output_step=options.output_step,
     )
     frames = 12 * absolute.links  # entries of what is stored before the elastic coordinates and the joint angles
     angles = frames + system.elastic + system.free_joints

@@ -39,6 +39,7 @@ def nodal_generalized_alpha(
         newton_tolerance=_SHARE * options.newton_tolerance,
         start_from="last",
         error_tolerance=_LOCAL * options.tolerance if adaptive else None,
+        output_step=options.output_step,
     )
 
     def complete(found: ConstrainedSolution) -> Solution:
