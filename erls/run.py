@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from erls.effects import Certificate, conserves_energy, in_order
 from erls.errors import Cause, SceneError, SimulationError
+from erls.events import Happening, happenings
 from erls.formulations.base import Energy, Formulation, State
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.substructures import solved
@@ -80,6 +81,11 @@ class Run:
     def times(self) -> Array:
         """(k,) times of the integrator's steps, each once."""
         return np.unique(self.solution.t)
+
+    @cached_property
+    def events(self) -> tuple[Happening, ...]:
+        """Events of the scene that happened, in the order of time."""
+        return happenings(self)
 
     @property
     def point_names(self) -> tuple[str, ...]:
@@ -273,6 +279,7 @@ class Run:
                 "max_drift": float(np.ptp(totals)) if self.conservative else None,
             },
             "samples": self.samples(times),
+            **({"events": [asdict(happening) for happening in self.events]} if self.scene.record.events else {}),
             "warnings": list(self.warnings),
         }
 

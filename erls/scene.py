@@ -224,6 +224,21 @@ class Payload(_Record, frozen=True):
     offset: Vector = (0.0, 0.0, 0.0)
 
 
+class Event(_Record, frozen=True):
+    """A time at which a coordinate crosses a value: ``angle`` or ``rate`` of a joint, ``x``, ``y`` or ``z`` of a named
+    point in the world; ``direction`` is ``any``, ``rising`` or ``falling``; with ``stop`` the run ends there.
+    """
+
+    name: str
+    coordinate: str
+    joint: str = ""
+    point: str = ""
+    value: float | None = None
+    value_deg: float | None = None
+    direction: str = "any"
+    stop: bool = False
+
+
 class Initial(_Record, frozen=True):
     """``deformation``: links start undeformed (``zero``) or in static equilibrium, joints held (``static``)."""
 
@@ -275,6 +290,7 @@ class SceneRecord(_Record, frozen=True):
     payloads: list[Payload] = []
     initial: Initial = Initial()
     loops: list[Loop] = []
+    events: list[Event] = []
 
 
 @dataclass(frozen=True)

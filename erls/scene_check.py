@@ -9,6 +9,7 @@ import msgspec
 
 from erls.effects import named_effects
 from erls.errors import Cause, SceneError
+from erls.events import DIRECTIONS, OF_JOINTS, OF_POINTS
 from erls.integrators import FIXED_STEP, INTEGRATORS
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joints import JOINT_TYPES
@@ -18,7 +19,7 @@ from fe_import.link_check import check_damping
 from fe_import.toml_file import choose
 
 if TYPE_CHECKING:
-    from erls.scene import Link, Loop, SceneRecord, Simulation
+    from erls.scene import Event, Link, Loop, SceneRecord, Simulation
 
 GAUGES = ("joint-angle", "minimum-norm")
 BODY_FRAMES = ("tangent", "mean-axis")
@@ -58,7 +59,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         counts = f"{len(scene.links)} links, {len(scene.joints)} joints"
         message = "joint k carries link k, so there must be as many links as joints"
         raise _bad(f"{file}: links", message, counts, "add or remove one")
-    for kind in ("joints", "links", "points", "loops"):
+    for kind in ("joints", "links", "points", "loops", "events"):
         named = [(f"{file}: {kind}[{k}].name", item.name) for k, item in enumerate(getattr(scene, kind))]
         check_names(named)
     for k, joint in enumerate(scene.joints):
@@ -76,6 +77,8 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         choose(payload.point, [p.name for p in scene.points], f"{file}: payloads[{k}].point", SceneError)
     for k, loop in enumerate(scene.loops):
         _check_loop(loop, scene, f"{file}: loops[{k}]")
+    for k, event in enumerate(scene.events):
+        _check_event(event, scene, f"{file}: events[{k}]")
     if scene.simulation.bandwidth is not None:
         _check_bandwidth(scene, f"{file}: simulation.bandwidth")
     if scene.loops:
@@ -87,6 +90,22 @@ def check_scene(scene: SceneRecord, file: str) -> None:
                 if getattr(item.drive, "feed_forward", False):
                     message = "the inverse dynamics of the chain does not know its loops"
                     raise _bad(f"{file}: {kind}[{k}].drive.feed_forward", message, True, "set it to false")
+
+
+def _check_event(event: Event, scene: SceneRecord, place: str) -> None:
+    if bool(event.joint) == bool(event.point):
+        raise _bad(place, "give exactly one of 'joint' and 'point'", event.name, "name what the event watches")
+    if event.joint:
+        choose(event.joint, [joint.name for joint in scene.joints], f"{place}.joint", SceneError)
+    else:
+        choose(event.point, [point.name for point in scene.points], f"{place}.point", SceneError)
+    choose(event.coordinate, OF_JOINTS if event.joint else OF_POINTS, f"{place}.coordinate", SceneError)
+    choose(event.direction, DIRECTIONS, f"{place}.direction", SceneError)
+    if (event.value is None) == (event.value_deg is None):
+        raise _bad(place, "give exactly one of 'value' and 'value_deg'", event.name, "say what is crossed")
+    turns = any(joint.name == event.joint and joint.type == "revolute" for joint in scene.joints)
+    if event.value_deg is not None and not turns:
+        raise _bad(f"{place}.value_deg", "only revolute joints have degrees", event.value_deg, "use value, in metres")
 
 
 def every_number(value: Any, path: str = "") -> Iterable[tuple[str, float]]:

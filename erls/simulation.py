@@ -11,12 +11,14 @@ import numpy as np
 
 from erls.build import Message, build_mechanism
 from erls.errors import SceneError, SimulationError
+from erls.events import Stopper
 from erls.formulations import FORMULATIONS, TREES, compile_kernels, formulate, integrator
 from erls.formulations.base import State
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
 from erls.kernels.jit import announcing
+from erls.mass_watch import indefinite_mass
 from erls.mechanism.chain import Mechanism
 from erls.range_watch import deflection_warnings
 from erls.run import Run, node_positions
@@ -96,7 +98,18 @@ def simulate(
     if settings.effects == "auto":
         from erls.selection.automatic import automatic  # here: most runs need none of it
 
-        return automatic(scene, built.mechanism, run_with, tell, strict)
+        if built.mechanism.bandwidth is None:
+            return automatic(scene, built.mechanism, run_with, tell, strict)
+        from erls.all_modes import with_all_modes
+
+        runs: list[Run] = []
+
+        def run_reduced(scene: Scene, mechanism: Mechanism) -> Run:
+            runs.append(run_with(scene, replace(mechanism, bandwidth=built.mechanism.bandwidth)))
+            return with_all_modes(runs[-1])
+
+        found = automatic(scene, replace(built.mechanism, bandwidth=None), run_reduced, tell, strict)
+        return replace(runs[-1], warnings=found.warnings, certificate=found.certificate)
     return run_with(scene, built.mechanism)
 
 
@@ -148,9 +161,13 @@ def _integrated(
         return Run(scene, formulation, solution, time.perf_counter() - begun, tuple(warn.told))
 
     first = True
+    stops = {event.name for event in scene.record.events if event.stop}
+    stopper = Stopper(make_run, stops)
 
     def observe(t: float, knots: Callable[[], Solution]) -> None:
         nonlocal first, saved
+        if stops:
+            stopper.look(knots())
         if first:
             first = False
             warn(knots().warnings)
@@ -165,17 +182,25 @@ def _integrated(
 
     times = (0.0, settings.duration)
     solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
+    if stopper.happened is not None:
+        solution = stopper.cut(solution)
+        warn.tell(f"event {stopper.happened.name!r} at t = {stopper.happened.time:.6g} s: the run ends")
     if solution.choice:
         warn.tell(f"integrator: {solution.choice}")
     run = make_run(solution)
     seen = run.states(np.linspace(float(run.solution.t[0]), run.end, 101))
     warn((*solution.warnings, *range_warnings(run, seen), *deflection_warnings(run)))
+    if mechanism.bandwidth is not None:
+        from erls.formulations.static_watch import static_warnings  # here: most runs need none of it
+
+        warn(static_warnings(formulation, solution, settings.effects_tolerance))
     if modal and not planned and any(j.drive.reference(0.0) is None for j in mechanism.joints):
         warn(spin_warnings(mechanism, ((s.time, s.coordinates, s.rates) for s in seen)))
     run = replace(run, warnings=tuple(warn.told))
-    if solution.failure is not None:
-        solution.failure.run = run
-        raise solution.failure
+    failure = (modal and indefinite_mass(formulation, solution)) or solution.failure
+    if failure:
+        failure.run = run
+        raise failure
     return run
 
 

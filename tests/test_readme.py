@@ -97,7 +97,7 @@ def test_example_scene_and_link_run(tmp_path: Path) -> None:
     assert run.end == 0.1
     fields = tomllib.loads(scene)
     assert set(fields) == {
-        *("name", "gravity", "simulation", "base", "initial", "joints", "links", "points", "payloads")
+        *("name", "gravity", "simulation", "base", "initial", "joints", "links", "points", "payloads", "events")
     }
 
 

@@ -17,7 +17,8 @@ Rules for adding an integrator:
 6. It counts its work honestly in `Work`; tests assert budgets on it.
 7. It calls ``observer(t, knots)`` after each accepted step (a compiled one after the last of some steps that took
    about 50 ms, once a run has made its first steps), where ``knots()`` returns the `Solution` so far.
-   A `SimulationError` that the observer or the system raises ends the run and becomes its failure.
+   A `SimulationError` that the observer or the system raises ends the run and becomes its failure; a `StopRun` of
+   the observer ends it without failure.
 
 `erls.integrators.driver.integrate_legs` keeps rules 3, 5 and 7 for a method that can advance over one leg.
 """
@@ -40,6 +41,10 @@ _HAIR = 1e-12  # of the largest time, or of 1 s: breakpoints this close are one
 def _hair(times: tuple[float, float]) -> float:
     """Time that no force resolves; above the tolerance within which `erls.mechanism.curves` merges events."""
     return _HAIR * max(abs(times[0]), abs(times[1]), 1.0)
+
+
+class StopRun(Exception):
+    """The observer has seen enough; nothing went wrong."""
 
 
 class MovingSystem(Protocol):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from erls.errors import Cause, SimulationError
-from erls.integrators.base import Array, Leg, Observer, SecondOrderSystem, Solution, Work, legs
+from erls.integrators.base import Array, Leg, Observer, SecondOrderSystem, Solution, StopRun, Work, legs
 
 
 class Recorder:
@@ -182,6 +182,8 @@ def integrate_legs(
                     recorder.accept(leg.end)
                 elif leg.end > leg.start:
                     y, v = advance(leg, y, v, a, recorder)
+        except StopRun:
+            pass
         except KeyboardInterrupt:
             failure = SimulationError(
                 Cause.INTERRUPTED,

@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from erls.errors import Cause, SimulationError
-from erls.integrators.base import Array, Leg, Observer, legs
+from erls.integrators.base import Array, Leg, Observer, StopRun, legs
 from erls.integrators.consistency import consistent_start, refuse_redundant
 from erls.integrators.constrained import (
     Configuration,
@@ -72,6 +72,8 @@ def lie_generalized_alpha(
                     else:
                         _adaptive_steps(steps, leg, step, options.error_tolerance, recorder)
                 q, v = steps.end()
+        except StopRun:
+            pass
         except KeyboardInterrupt:
             failure = SimulationError(
                 Cause.INTERRUPTED, "the run was interrupted", remedy="the motion up to this time was kept"

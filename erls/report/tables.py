@@ -109,6 +109,10 @@ def run_report(run: Run, times: Sequence[float] = ()) -> str:
     ]
     if run.failure is not None:
         lines.append(f"stopped early: {run.failure}")
+    lines += [
+        f"event {happening.name!r} at t = {happening.time:.6g} s, {'rising' if happening.rising else 'falling'}"
+        for happening in run.events
+    ]
     rows = []
     for sample in s["samples"]:
         for name, joint in sample["joints"].items():
