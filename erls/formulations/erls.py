@@ -27,6 +27,7 @@ from erls.formulations.equilibrium import held_equilibrium
 from erls.formulations.joint_frames import FrameMotion, attached, carried
 from erls.formulations.joint_turn import JointTurn, Motion, joint_turn
 from erls.formulations.link_inertia import LinkInertia, moment_about
+from erls.formulations.modal_inertia import modal_inertia
 from erls.formulations.second_order import SecondOrderInertia
 from erls.formulations.second_order_compatibility import second_order_compatibility
 from erls.lie.so3 import Array
@@ -88,7 +89,9 @@ class Erls:
         linear = LinkInertia(link.invariants, self.mechanism.effects)
         if not self.stiffened or link.second_order is None:
             return linear
-        return SecondOrderInertia(linear, link.invariants.rigid_mass_matrix, link.second_order)
+        return SecondOrderInertia(
+            linear, link.invariants.rigid_mass_matrix, link.second_order, modal_inertia(link, self.mechanism.effects)
+        )
 
     @property
     def size(self) -> int:
@@ -97,9 +100,13 @@ class Erls:
 
     @cached_property
     def compiled(self) -> CompiledSystem | None:
-        """The same equations in compiled form; None in the minimum-norm gauge and with geometric stiffening."""
-        if self.gauge != "joint-angle" or self.stiffened:
+        """The same equations in compiled form; None in the minimum-norm gauge and with ``modal_inertia``."""
+        if self.gauge != "joint-angle" or (self.stiffened and "modal_inertia" in self.mechanism.effects):
             return None
+        if self.stiffened:
+            from erls.formulations.erls_stiffened import compile_stiffened
+
+            return compile_stiffened(self)
         from erls.formulations.erls_compiled import compile_chain  # here: it imports the compiler
 
         return compile_chain(self)
@@ -166,13 +173,15 @@ class Erls:
             self._feed_forward_cache = (t, inverse_dynamics(self.mechanism, theta, rates, accelerations))
         return self._feed_forward_cache[1]
 
+    def _wanted(self, k: int, t: float, angle: float, rate: float) -> float:
+        """Force that the drive of joint k asks of its motor."""
+        drive = self.mechanism.joints[k].drive
+        return drive.torque(t, angle, rate) + (float(self.feed_forward(t)[k]) if drive.feed_forward else 0.0)
+
     def _effort(self, k: int, t: float, angle: float, rate: float) -> float:
         """Force of drive, spring, damper and friction on joint k."""
         joint = self.mechanism.joints[k]
-        torque = joint.drive.torque(t, angle, rate)
-        if joint.drive.feed_forward:
-            torque += self.feed_forward(t)[k]
-        return float(joint.drive.limited(torque) + joint.forces.force(angle, rate))
+        return joint.drive.limited(self._wanted(k, t, angle, rate)) + joint.forces.force(angle, rate)
 
     def evaluate(self, t: float, y: Array, v: Array, a: Array) -> Evaluation:
         """Forces over (θ, q_d) that are out of balance, link wrenches from the tip inward, joint efforts."""
@@ -300,7 +309,8 @@ class Erls:
             for k in self.active_joints:
                 joint = self.mechanism.joints[k]
                 turn = self._turn(k, theta, rates, motion)
-                passive, active = joint.forces.gains(turn.rate), joint.drive.gains
+                passive = joint.forces.gains(turn.rate)
+                active = joint.drive.gains_at(self._wanted(k, t, turn.angle, turn.rate))
                 along = np.eye(len(stiffness))[k] if turn.gradient is None else turn.gradient
                 stiffness += (passive[0] + active[0]) * np.outer(along, along)
                 damping += (passive[1] + active[1]) * np.outer(along, along)

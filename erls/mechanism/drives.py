@@ -91,6 +91,10 @@ class Drive:
         """The torque that the motor can give."""
         return max(-self.torque_limit, min(self.torque_limit, torque))
 
+    def gains_at(self, torque: float) -> tuple[float, float]:
+        """`gains`, or none where the motor gives less than the wanted ``torque``."""
+        return self.gains if abs(torque) <= self.torque_limit else (0.0, 0.0)
+
 
 class _Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="type"):
     """Base of all drives."""

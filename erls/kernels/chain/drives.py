@@ -70,19 +70,27 @@ def effort(reals: Array, integers: IntArray, record: int, t: float, link: Array)
     """Force on a free joint; with feed-forward prepared by `feed_forward`."""
     joint = integers[record + at.FORCES]
     angle, rate = link[at.ANGLE], link[at.ANGLE + 1]
+    limit = reals[joint + at.LIMIT]
+    torque = max(-limit, min(limit, wanted(reals, integers, record, t, link)))
+    torque -= reals[joint + at.SPRING] * (angle - reals[joint + at.REST]) + reals[joint + at.DAMPER] * rate
+    if reals[joint + at.FRICTION] != 0.0:
+        torque -= reals[joint + at.FRICTION] * math.tanh(rate / reals[joint + at.TRANSITION])
+    return float(torque)
+
+
+@part
+def wanted(reals: Array, integers: IntArray, record: int, t: float, link: Array) -> float:
+    """Force that the drive of a joint asks of its motor."""
+    joint = integers[record + at.FORCES]
     torque = 0.0
     if integers[record + at.LOAD] >= 0:
         torque, _, _ = curve(integers, reals, integers[record + at.LOAD], t)
     elif integers[record + at.MOTION] >= 0:
-        wanted, wanted_rate, _ = curve(integers, reals, integers[record + at.MOTION], t)
-        torque = reals[joint + at.GAIN] * (wanted - angle) + reals[joint + at.RATE_GAIN] * (wanted_rate - rate)
+        angle, rate, _ = curve(integers, reals, integers[record + at.MOTION], t)
+        torque = reals[joint + at.GAIN] * (angle - link[at.ANGLE])
+        torque += reals[joint + at.RATE_GAIN] * (rate - link[at.ANGLE + 1])
     if integers[record + at.FEED]:
         torque += link[at.EFFECTIVE]
-    limit = reals[joint + at.LIMIT]
-    torque = max(-limit, min(limit, torque))
-    torque -= reals[joint + at.SPRING] * (angle - reals[joint + at.REST]) + reals[joint + at.DAMPER] * rate
-    if reals[joint + at.FRICTION] != 0.0:
-        torque -= reals[joint + at.FRICTION] * math.tanh(rate / reals[joint + at.TRANSITION])
     return float(torque)
 
 

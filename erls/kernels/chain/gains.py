@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from erls.kernels import contract
 from erls.kernels.chain import layout as at
-from erls.kernels.chain.drives import gains
+from erls.kernels.chain.drives import feed_forward, gains, wanted
 from erls.kernels.contract import Array, IntArray
 from erls.kernels.jit import kernel
 
@@ -16,6 +16,8 @@ def stiffness_and_damping(
     """Of modes, joint springs, dampers, friction and controllers; see `erls.kernels.contract`."""
     k[:, :] = 0.0
     c[:, :] = 0.0
+    if integers[at.FEED_FORWARD]:
+        feed_forward(reals, integers, scratch, t)
     for link in range(integers[at.LINKS]):
         record = at.HEADER + link * at.RECORD
         first = integers[record + at.FIRST_MODE]
@@ -25,3 +27,9 @@ def stiffness_and_damping(
         joint = integers[record + at.JOINT]
         if joint >= 0 and integers[record + at.EFFORT]:
             k[joint, joint], c[joint, joint] = gains(reals, integers, record, v[joint])
+            memory, forces = integers[record + at.MEMORY], integers[record + at.FORCES]
+            state = scratch[memory : memory + at.VECTORS]
+            state[at.ANGLE], state[at.ANGLE + 1] = y[joint], v[joint]
+            if abs(wanted(reals, integers, record, t, state)) > reals[forces + at.LIMIT]:  # the motor gives no more
+                k[joint, joint] -= reals[forces + at.GAIN]
+                c[joint, joint] -= reals[forces + at.RATE_GAIN]
