@@ -33,8 +33,9 @@ class Effect:
         Term of the energy that its work comes from; energy is conserved when all forces of a term are there, or none.
     needs : tuple of (str, str)
         Effects without which it is worse than nothing, and why.
-    saves : bool
-        Whether leaving it out saves operations; ``auto`` leaves out nothing else.
+    product : str
+        Constants of a link that it multiplies with the deformation: leaving out saves operations when all effects with
+        the same product go.
     """
 
     name: str
@@ -43,42 +44,50 @@ class Effect:
     of_links: bool = False
     energy: str = ""
     needs: tuple[tuple[str, str], ...] = ()
-    saves: bool = False
+    product: str = ""
 
 
-def _inertia(name: str, summary: str, term: str, *needs: tuple[str, str]) -> Effect:
-    return Effect(name, summary, in_equations=True, of_links=True, energy=term, needs=needs, saves=True)
+def _inertia(product: str, name: str, summary: str, term: str, *needs: tuple[str, str]) -> Effect:
+    return Effect(name, summary, in_equations=True, of_links=True, energy=term, needs=needs, product=product)
 
 
 _LINEAR, _SQUARE = "linear in the deformation", "quadratic in the deformation"
+_BASE = ("geometric_stiffening", "what the same displacements do to the frame's motion is of the same size")
 _LARGER = ("centrifugal_load", "what turns a link loads it first, and then acts on the deformation")
+_DEFINITE = ("inertia_second_order", "the mass matrix may turn indefinite where links deflect far")
 
 EFFECTS: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         Effect("gravity", "weight of links and payloads", False),
-        _inertia("centrifugal_load", "what the turning undeformed link does to its modes: -X_ωᵀ ρν", _LINEAR),
-        _inertia("coriolis", "forces on the modes from their own rates: X_ω q̇ - X_ωᵀ q̇", "", _LARGER),
-        _inertia("inertia_first_order", "mass matrix and frame forces linear in the deformation: X q", _LINEAR),
-        _inertia("inertia_second_order", "frame forces quadratic in the deformation: qᵀ Z q", _SQUARE),
-        _inertia("spin_softening", "centrifugal force on the modes, linear in q: -ωᵀ Z ω q", _SQUARE, _LARGER),
+        _inertia("X", "centrifugal_load", "what the turning undeformed link does to its modes: -X_ωᵀ ρν", _LINEAR),
+        _inertia("X", "coriolis", "forces on the modes from their own rates: X_ω q̇ - X_ωᵀ q̇", "", _LARGER),
+        _inertia("X", "inertia_first_order", "mass matrix and frame forces linear in q: X q", _LINEAR, _DEFINITE),
+        _inertia("Z", "inertia_second_order", "frame forces quadratic in the deformation: qᵀ Z q", _SQUARE),
+        _inertia("Z", "spin_softening", "centrifugal force on the modes, linear in q: -ωᵀ Z ω q", _SQUARE, _LARGER),
         Effect("modal_damping", "damping of the elastic modes", False, of_links=True),
         Effect("joint_stiffness", "springs in joints", False),
         Effect("joint_damping", "viscous damping in joints", False),
         Effect("joint_friction", "Coulomb friction in joints", False),
         Effect("motor_inertia", "rotor inertia reflected to joints", False),
         Effect("payload", "payloads on named points", False),
-        Effect("flexibility", "elastic modes of the links", False, saves=True),
+        Effect("flexibility", "elastic modes of the links", False),
+        Effect("static_correction", "static deflection of modes above simulation.bandwidth", False, of_links=True),
         Effect("geometric_stiffening", "loads on the second-order displacement of links: ½ qᵀΨq", False, of_links=True),
         Effect("foreshortening", "second-order displacement of reported points and nodes", False, of_links=True),
+        Effect("modal_inertia", "mass matrix of the modes, linear in ½ qᵀΨq", False, of_links=True, needs=(_BASE,)),
     )
 }
 
 ALL = frozenset(EFFECTS)
 """Every effect there is."""
 
-DEFAULT = ALL - {"geometric_stiffening", "foreshortening"}
+DEFAULT = ALL - {"geometric_stiffening", "foreshortening", "modal_inertia"}
 """What acts unless a scene says otherwise: links are linear in their own frame."""
+
+SECOND = frozenset(name for name, effect in EFFECTS.items() if effect.product == "Z")
+FIRST = frozenset(name for name, effect in EFFECTS.items() if effect.product == "X")
+"""Effects that share the products Z q, and X q; without the second nothing of the first is left that matters."""
 
 
 def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:

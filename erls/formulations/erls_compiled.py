@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from erls.formulations.packing import Packer, joint_numbers, step_parts
 from erls.kernels.chain import equations, layout
-from erls.kernels.chain.curves import HARMONIC, PIECEWISE
 from erls.kernels.contract import CompiledSystem
 from erls.lie.se3 import inverse, twist_transform
 from erls.lie.so3 import Array
-from erls.mechanism.curves import Curve, Harmonic, Piecewise, Sum
 from erls.mechanism.joints import Joint
+from erls.mechanism.links import Link
 
 if TYPE_CHECKING:
     from erls.formulations.erls import Erls
@@ -27,57 +27,6 @@ _EFFECTS = {
     layout.CENTRIFUGAL: "centrifugal_load",
     layout.SOFTENING: "spin_softening",
 }
-
-
-class _Packer:
-    """Two flat arrays that grow."""
-
-    def __init__(self, links: int) -> None:
-        self.integers = [0] * (layout.HEADER + links * layout.RECORD)
-        self._reals: list[Array] = []
-        self._size = 0
-
-    @property
-    def reals(self) -> Array:
-        """What was put there."""
-        return np.concatenate(self._reals)
-
-    def put(self, values: Array) -> int:
-        """Store numbers; where they start."""
-        flat = np.asarray(values, dtype=float).ravel()
-        self._reals.append(flat)
-        self._size += len(flat)
-        return self._size - len(flat)
-
-    def put_columns(self, *matrices: Array) -> int:
-        """Store matrices, column after column."""
-        return self.put(np.concatenate([np.zeros(0), *(matrix.T.ravel() for matrix in matrices)]))
-
-    def put_curve(self, curve: Curve | None) -> int:
-        """Store a curve as `erls.kernels.chain.curves` reads it; -1 for None."""
-        if curve is None:
-            return -1
-        parts = _parts(curve)
-        start = len(self.integers)
-        self.integers.append(len(parts))
-        for part in parts:
-            if isinstance(part, Piecewise):
-                place = self.put(np.concatenate([part.knots, part.coefficients.ravel()]))
-                self.integers += [PIECEWISE, place, len(part.knots), part.coefficients.shape[1]]
-            else:
-                form = [part.amplitude, part.omega, part.phase, part.offset, part.before, part.after]
-                place = self.put(np.array([*part.breakpoints, *form]))
-                self.integers += [HARMONIC, place, len(part.breakpoints), len(form)]
-        return start
-
-
-def _parts(curve: Curve) -> list[Piecewise | Harmonic]:
-    """The curves of a sum, of sums of sums too."""
-    if isinstance(curve, Sum):
-        return [part for some in curve.parts for part in _parts(some)]
-    if isinstance(curve, Piecewise | Harmonic):
-        return [curve]
-    raise TypeError(f"no compiled form of the curve {type(curve).__name__}")
 
 
 def _rotation_axes(joints: tuple[Joint, ...]) -> list[Array]:
@@ -99,38 +48,14 @@ def _rotation_axes(joints: tuple[Joint, ...]) -> list[Array]:
     return result
 
 
-def _step_parts(joint: Joint) -> Array:
-    """(3, 12) constant, cosine and sine part of a link's pose in the frame before; constant and rising at a slide."""
-
-    def part(middle: Array, shift: Array) -> Array:
-        rotation = joint.before[:3, :3] @ middle
-        place = rotation @ joint.after[:3, 3] + joint.before[:3, :3] @ shift
-        return np.concatenate([(rotation @ joint.after[:3, :3]).ravel(), place])
-
-    axis, none = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    if joint.type.revolute:
-        parts = [part(np.outer(axis, axis), none), part(-turn @ turn, none), part(turn, none)]
-    else:
-        parts = [part(np.eye(3), none), part(np.zeros((3, 3)), axis), np.zeros(12)]
-    parts[0][9:] += joint.before[:3, 3]
-    return np.stack(parts)
-
-
-def _joint_numbers(joint: Joint) -> Array:
-    """Constants of a joint's forces, in the order of `layout`."""
-    forces, drive = joint.forces, joint.drive
-    result = np.zeros(layout.JOINT_REALS)
-    result[layout.SPRING], result[layout.REST] = forces.stiffness, forces.rest
-    result[layout.DAMPER], result[layout.FRICTION] = forces.damping, forces.friction
-    result[layout.TRANSITION], result[layout.ROTOR] = forces.transition_rate, joint.rotor_inertia
-    result[layout.GAIN], result[layout.RATE_GAIN] = drive.gains
-    result[layout.LIMIT], result[layout.HELD] = drive.torque_limit, joint.position
-    return result
-
-
 def _close(found: Array, expected: Array) -> bool:
     return bool(np.abs(found - expected).max(initial=0.0) <= _SAME * max(1.0, float(np.abs(expected).max(initial=0.0))))
+
+
+def combined_modes(link: Link, own: Array) -> Array:
+    """(m, m) the modes [ρ Ψ] of a link over its own, which leave its inboard interface where it is: ``own`` q = 0."""
+    stay = -np.linalg.solve(own[:, :6], own[:, 6:])
+    return np.hstack([link.invariants.rigid, np.vstack([stay, np.eye(link.elastic_modes)])])
 
 
 def compile_chain(chain: Erls) -> CompiledSystem | None:
@@ -147,7 +72,7 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
     """
     mechanism, places = chain.mechanism, chain.compatibility.layout
     links = len(mechanism.links)
-    pack = _Packer(links)
+    pack = Packer(np.zeros(layout.HEADER + links * layout.RECORD, dtype=np.int64))
     pack.put(mechanism.gravity)
     header = pack.integers
     header[layout.LINKS] = links
@@ -161,10 +86,9 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
         zip(mechanism.links, mechanism.joints, chain.compatibility.rows, strict=True)
     ):
         e, rho = link.elastic_modes, link.invariants.rigid
-        stay = -np.linalg.solve(rows.own[:, :6], rows.own[:, 6:])
         if not (_close(rho[6:], np.zeros((e, 6))) and _close(rows.own @ rho, twist_transform(inverse(joint.after)))):
             return None
-        modes = np.hstack([rho, np.vstack([stay, np.eye(e)])])
+        modes = combined_modes(link, rows.own)
         mass = modes.T @ link.invariants.m @ modes
         axes = axes_of[k]
         x = np.einsum("ca,aij->cij", axes, link.invariants.X)
@@ -192,7 +116,7 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
             layout.FEED: int(drive.feed_forward),
             layout.EFFORT: int(k in chain.active_joints),
             layout.MEMORY: memory,
-            layout.STEP: pack.put(_step_parts(joint)),
+            layout.STEP: pack.put(step_parts(joint.before, joint.type.revolute, joint.after)),
             layout.SCREW: pack.put(joint.screw),
             layout.AXIS: pack.put(axes),
             layout.MASS: pack.put_columns(mass),
@@ -207,7 +131,7 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
             layout.RIGID_SHARE: pack.put(towards @ mass[6:, :6]),
             layout.CROSS_SHARE: pack.put(out_towards @ mass[6:, :6]),
             layout.OUT_SHARE: pack.put(out_towards @ out.T),
-            layout.FORCES: pack.put(_joint_numbers(joint)),
+            layout.FORCES: pack.put(joint_numbers(joint.forces, drive, joint.rotor_inertia, joint.position)),
         }
         for place, value in record.items():
             pack.integers[layout.HEADER + k * layout.RECORD + place] = value

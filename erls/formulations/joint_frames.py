@@ -88,22 +88,24 @@ class Conditions:
     ----------
     names : tuple of str
         Direction of each row, in the axes of the inner joint frame.
+    entries : list of (int, Turn or None)
+        Axis and turn of each row.
     """
 
     def __init__(self, rows: Mapping[tuple[str, int], Turn | None]) -> None:
         self.names = tuple(f"{kind} {_AXES[k]}" for kind, k in rows)
-        self._rows = [(k, turns) for (_, k), turns in rows.items()]
+        self.entries = [(k, turns) for (_, k), turns in rows.items()]
 
     def violation(self, pose: Array) -> Array:
         """(m,) Φ."""
         return np.array(
-            [pose[k, 3] if turns is None else sum(c * pose[i, j] for c, i, j in turns) for k, turns in self._rows]
+            [pose[k, 3] if turns is None else sum(c * pose[i, j] for c, i, j in turns) for k, turns in self.entries]
         )
 
     def gradient(self, pose: Array) -> Array:
         """(m, 6) Φ̇ = gradient · d."""
-        result = np.zeros((len(self._rows), 6))
-        for row, (k, turns) in zip(result, self._rows, strict=True):
+        result = np.zeros((len(self.entries), 6))
+        for row, (k, turns) in zip(result, self.entries, strict=True):
             if turns is None:
                 row[:3] = pose[k, :3]
             else:
@@ -115,7 +117,7 @@ class Conditions:
         turning, sliding = skew(twist[3:]), pose[:3, :3] @ cross(twist[3:], twist[:3])
         turned = pose[:3, :3] @ turning @ turning
         return np.array(
-            [sliding[k] if turns is None else sum(c * turned[i, j] for c, i, j in turns) for k, turns in self._rows]
+            [sliding[k] if turns is None else sum(c * turned[i, j] for c, i, j in turns) for k, turns in self.entries]
         )
 
 

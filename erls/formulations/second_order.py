@@ -14,17 +14,22 @@ with the kinetic energy T₁ of the linear modes (`erls.formulations.link_inerti
 that conserve energy. Weight adds -g·S to the potential. Beside rigid-body motion of the frame itself what acts on q is
 
     (S_ab q)·(v̇ + ω × v - g) + α_c P_cᵀ q + ω_c (P_cᵀ - P_c) q̇ - ω_c ω_d W_cd q.
+
+What that velocity has in common with the elastic modes is the effect ``modal_inertia``, see `ModalInertia`.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from erls.formulations.link_inertia import LinkInertia
 from erls.lie.so3 import Array, cross, skew
 from erls.mechanism.second_order import LinkSecondOrder
+
+if TYPE_CHECKING:
+    from erls.formulations.modal_inertia import ModalInertia
 
 _NO_INERTIA = 1e-12  # of the largest: a massless link has no direction to divide by
 
@@ -41,10 +46,12 @@ class _Terms(NamedTuple):
 class SecondOrderInertia:
     """A link's inertia with second-order terms; asked the same questions as `LinkInertia`."""
 
-    def __init__(self, linear: LinkInertia, rigid_mass: Array, data: LinkSecondOrder) -> None:
+    def __init__(
+        self, linear: LinkInertia, rigid_mass: Array, data: LinkSecondOrder, modal: ModalInertia | None = None
+    ) -> None:
         n = linear.size
-        self.linear, self.size = linear, n
-        self._compliance = np.linalg.pinv(rigid_mass, rcond=_NO_INERTIA, hermitian=True)  # M₀⁻¹
+        self.linear, self.size, self.modal = linear, n, modal
+        self._compliance = compliance(rigid_mass)
         turning = data.momentum[3:]
         self._odd = np.ascontiguousarray((turning - turning.transpose(0, 2, 1)) / 2).reshape(3 * n, n)
         # q meets the first index of the momenta
@@ -71,7 +78,7 @@ class SecondOrderInertia:
         result += _transported(twist, momentum + share @ turning)
         modal = modal + share_rate @ coupling - np.multiply.outer(share[3:], twist[3:]).ravel() @ spin
         modal -= 2 * (share[3:] @ (self._odd @ qd).reshape(3, self.size)) + cross(share[:3], twist[3:]) @ coupling[:3]
-        return result, modal
+        return result, modal if self.modal is None else modal + self.modal.forces(q, qd, qdd)
 
     def mass_matrix(self, q: Array) -> Array:
         """(6 + m, 6 + m) mass matrix of (ν, q̇)."""
@@ -79,7 +86,10 @@ class SecondOrderInertia:
         change = np.eye(6 + self.size)
         change[:6, :6] += self._compliance @ turning
         change[:6, 6:] = self._compliance @ coupling
-        return np.asarray(change.T @ self.linear.mass_matrix(q) @ change)
+        result = change.T @ self.linear.mass_matrix(q) @ change
+        if self.modal is not None:
+            result[6:, 6:] += self.modal.mass_matrix(q)
+        return np.asarray(result)
 
     def gravity(self, g: Array, q: Array) -> tuple[Array, Array]:
         """Wrench and modal forces of gravity; see `LinkInertia.gravity`."""
@@ -96,7 +106,13 @@ class SecondOrderInertia:
         """T at a state."""
         coupling, _, turning, _ = self._terms(q)
         momenta = coupling @ qd + turning @ twist
-        return self.linear.kinetic_energy(twist + self._compliance @ momenta, q, qd)
+        result = self.linear.kinetic_energy(twist + self._compliance @ momenta, q, qd)
+        return result if self.modal is None else result + self.modal.kinetic_energy(q, qd)
+
+
+def compliance(rigid_mass: Array) -> Array:
+    """(6, 6) M₀⁻¹; nothing along what has no inertia."""
+    return np.asarray(np.linalg.pinv(rigid_mass, rcond=_NO_INERTIA, hermitian=True))
 
 
 def _turning(moment: Array, square: Array) -> Array:

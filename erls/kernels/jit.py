@@ -20,7 +20,13 @@ import platformdirs
 F = TypeVar("F", bound=Callable[..., Any])
 
 _PART = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-_SUBJECTS = {"chain": "the equations of motion", "nodal": "the equations of motion", "stepping": "the integrators"}
+_SUBJECTS = {
+    "chain": "the equations of motion",
+    "deviation": "the certificate of what auto leaves out",
+    "nodal": "the equations of motion",
+    "stiffened": "the equations of motion",
+    "stepping": "the integrators",
+}
 _listeners: list[Callable[[str], None]] = []
 ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
 

@@ -45,6 +45,8 @@ class Mechanism:
         Joints that close the chain.
     effects : frozenset of str
         Names from `erls.effects` that the equations of motion take into account.
+    bandwidth : float or None
+        Frequency above which modes follow statically [Hz]; None: all of them vibrate.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Mechanism:
     static_start: bool = False
     loops: tuple[Loop, ...] = ()
     effects: frozenset[str] = DEFAULT
+    bandwidth: float | None = None
 
 
 @dataclass(frozen=True)

@@ -59,8 +59,10 @@ def present(mechanism: Mechanism) -> frozenset[str]:
         "joint_friction": any(joint.forces.friction for joint in joints),
         "motor_inertia": any(joint.rotor_inertia for joint in joints),
         "flexibility": flexible,
+        "static_correction": flexible and mechanism.bandwidth is not None,
         "geometric_stiffening": (curved := any(link.elastic_modes and link.second_order for link in links)),
         "foreshortening": curved,
+        "modal_inertia": curved,
         "payload": any(p.mass or p.inertia.any() for link in links for p in link.payloads if not p.motor),
     }
     return frozenset(name for name in mechanism.effects if found.get(name, flexible or not EFFECTS[name].of_links))

@@ -14,7 +14,7 @@ from fe_import.modal.model import ModalModel
 from fe_import.model import IntArray
 from fe_import.second_order.composition import composed, composed_rotation, twice_turned
 from fe_import.second_order.data import SecondOrder, pair_numbers
-from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_masses, of_moments
+from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_masses, of_modes, of_moments
 
 if TYPE_CHECKING:
     from erls.mechanism.links import Link
@@ -30,6 +30,8 @@ class LinkSecondOrder:
     ----------
     momentum, spin : (6, m, m), (3, 3, m, m) arrays
         See `fe_import.second_order.data.SecondOrder`.
+    modal : (n, m, m) array
+        K, likewise, of the n elastic modes.
     model : ModalModel
     field : SecondOrder
     inboard : int
@@ -38,6 +40,7 @@ class LinkSecondOrder:
 
     momentum: Array
     spin: Array
+    modal: Array
     model: ModalModel
     field: SecondOrder
     inboard: int
@@ -96,30 +99,31 @@ def link_second_order(link: Link) -> LinkSecondOrder | None:
     field = model.second_order or (_rigid(model) if model.elastic_modes == 0 else None)
     if field is None:
         return None
-    found = LinkSecondOrder(field.momentum, field.spin, model, field, link.inboard.node)
-    momentum, spin = field.momentum.copy(), field.spin.copy()
+    found = LinkSecondOrder(field.momentum, field.spin, field.modal, model, field, link.inboard.node)
+    momentum, spin, modal = field.momentum.copy(), field.spin.copy(), field.modal.copy()
     if link.inboard.node != model.interface_nodes[field.reference].node:
         # what moves linearly is another interface: all points less its second-order rigid motion
         lift, rigid = found._inboard, model.invariants.rigid_mass_matrix
         slide = lift[:3] + np.einsum("ij,jab->iab", skew(link.inboard.position), lift[3:])
-        momentum -= np.einsum("ij,jab->iab", rigid, np.concatenate([slide, lift[3:]]))
+        motion = np.concatenate([slide, lift[3:]])
+        momentum -= np.einsum("ij,jab->iab", rigid, motion)
+        modal -= np.einsum("cj,jab->cab", (model.invariants.m @ model.invariants.rigid)[6:], motion)
         first = np.array([rigid[5, 1], rigid[3, 2], rigid[4, 0]])
         second = np.trace(rigid[3:, 3:]) / 2 * np.eye(3) - rigid[3:, 3:]  # ∫ρ x ⊗ x
         moment = np.einsum("c,dab->cdab", first, slide) + np.einsum("ce,dfe,fab->cdab", second, LEVI_CIVITA, lift[3:])
         spin -= of_moments(slide, moment)[1]
     for payload in link.payloads:
-        _, phi = _rigid_shape(model, payload.node)
+        u, phi = _rigid_shape(model, payload.node)
         motion = found.node(payload.node)
         centre = motion[:3] - np.einsum("ij,jab->iab", skew(payload.offset), motion[3:])
         centre = centre + twice_turned(phi, payload.offset)
         place = model.nodes[payload.node] + payload.offset
-        for terms in (
-            of_masses(np.array([payload.mass]), place[None], centre[None]),
-            of_inertia(payload.inertia, phi, motion[3:]),
-        ):
-            momentum += terms[0]
-            spin += terms[1]
-    return LinkSecondOrder(momentum, spin, model, field, link.inboard.node)
+        masses = of_masses(np.array([payload.mass]), place[None], centre[None])
+        turning = of_inertia(payload.inertia, phi, motion[3:])
+        momentum, spin = momentum + masses[0] + turning[0], spin + masses[1] + turning[1]
+        own = np.concatenate([u - skew(payload.offset) @ phi, phi])[:, 6:]
+        modal = modal + of_modes(own, np.concatenate([masses[0][:3], turning[0][3:]]))
+    return LinkSecondOrder(momentum, spin, modal, model, field, link.inboard.node)
 
 
 def _rigid_shape(model: ModalModel, node: int) -> tuple[Array, Array]:
@@ -153,5 +157,5 @@ def _rigid(model: ModalModel) -> SecondOrder:
     full = twice_turned(phi, centre - start.position)
     momentum, spin = of_masses(np.array([properties.mass]), centre[None], full[None])
     turning = of_inertia(properties.inertia, phi, np.zeros_like(full))
-    none = np.zeros((0, 3, 0))
-    return SecondOrder(0, momentum + turning[0], spin + turning[1], np.zeros(0, dtype=np.int64), none, none)
+    none, nodes = np.zeros((0, 3, 0)), np.zeros(0, dtype=np.int64)
+    return SecondOrder(0, momentum + turning[0], spin + turning[1], np.zeros((0, 6, 6)), nodes, none, none)

@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 SCHEMA = "erls modal model"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 UNITS = "SI"
 
 

@@ -17,7 +17,7 @@ class SecondOrder:
 
         Ṡ + ω × S,   qᵀ P q̇ + ½ (qᵀ W q) ω,   S = ½ qᵀ S_ab q,
 
-    and weight the potential -g·S.
+    and weight the potential -g·S. Against the velocities of the linear modes φ themselves it adds q̇_c K_cab q_a q̇_b.
 
     Attributes
     ----------
@@ -27,6 +27,8 @@ class SecondOrder:
         S_ab = ∫ρ Ψ (symmetric), then P = ∫ρ x × Ψ with the turning of cross sections, which makes it unsymmetric.
     spin : (3, 3, m, m) array
         W; axis of the angular momentum, axis of ω, symmetric in the modes.
+    modal : (n, m, m) array
+        K_cab = ∫ρ φ_c·Ψ_ab of elastic modes c with the turning of cross sections.
     nodes : (k,) int array
         Rising; those with a stored field.
     translation, rotation : (k, 3, p) arrays
@@ -37,6 +39,7 @@ class SecondOrder:
     reference: int
     momentum: Array
     spin: Array
+    modal: Array
     nodes: IntArray
     translation: Array
     rotation: Array
@@ -52,6 +55,7 @@ class SecondOrder:
             self,
             momentum=np.ascontiguousarray(self.momentum[:, rows, columns]),
             spin=np.ascontiguousarray(self.spin[:, :, rows, columns]),
+            modal=np.ascontiguousarray(self.modal[np.ix_(elastic, modes, modes)]),
             translation=np.ascontiguousarray(self.translation[:, :, pairs]),
             rotation=np.ascontiguousarray(self.rotation[:, :, pairs]),
         )

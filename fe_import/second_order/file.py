@@ -22,6 +22,7 @@ def write_second_order(group: h5py.Group, field: SecondOrder) -> None:
         ("reference", field.reference, "1", "interface whose motion is linear in the modes, from 0"),
         ("momentum", field.momentum, f"SI {pair}", "S, then P; axis, mode, mode"),
         ("spin", field.spin, f"SI {pair}", "W; axis, axis, mode, mode"),
+        ("modal", field.modal, f"SI {pair}", "K; elastic mode, mode, mode"),
         ("nodes", field.nodes, "1", "nodes with a stored field, from 0"),
         ("translation", field.translation, f"m {pair}", "node, axis, pair a <= b of elastic modes, row by row"),
         ("rotation", field.rotation, f"rad {pair}", "rotation vector; node, axis, pair"),
@@ -49,6 +50,7 @@ def read_second_order(file: Reader, interfaces: int, nodes: int, modes: int) -> 
         reference=int(file.integers("reference", (), 0, interfaces)),
         momentum=file.array("momentum", (6, modes, modes)),
         spin=file.array("spin", (3, 3, modes, modes)),
+        modal=file.array("modal", (modes - 6, modes, modes)),
         nodes=stored,
         translation=file.array("translation", shape),
         rotation=file.array("rotation", shape),
@@ -69,6 +71,7 @@ def check_second_order(model: ModalModel, field: SecondOrder, check: Check) -> N
     arrays: list[tuple[str, Any, tuple[int, ...], str]] = [
         ("momentum", field.momentum, (6, m, m), "f"),
         ("spin", field.spin, (3, 3, m, m), "f"),
+        ("modal", field.modal, (m - 6, m, m), "f"),
         ("nodes", field.nodes, (k,), "i"),
         ("translation", field.translation, (k, 3, _pairs(m)), "f"),
         ("rotation", field.rotation, (k, 3, _pairs(m)), "f"),

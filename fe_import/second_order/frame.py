@@ -16,7 +16,7 @@ from fe_import.model import Array, FEModel, IntArray
 from fe_import.second_order.beams import INTEGRALS, POINTS, WEIGHTS, BeamLines, LineFields, line_fields
 from fe_import.second_order.composition import composed, composed_rotation, paired, twice_turned
 from fe_import.second_order.data import SecondOrder
-from fe_import.second_order.moments import of_inertia, of_masses
+from fe_import.second_order.moments import of_inertia, of_masses, of_modes
 
 Pair = tuple[Array, Array]  # Ψ of a displacement and of a rotation vector, (3, n, n) each
 
@@ -45,11 +45,12 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
     first, second = np.triu_indices(count - 6)
     stored = np.zeros((2, len(nodes), 3, len(first)))
     momentum, spin = np.zeros((6, count, count)), np.zeros((3, 3, count, count))
+    modal = np.zeros((count - 6, count, count))
     extra = _point_masses(model, beams.lumped)
 
     def settle(node: int, fields: Pair) -> None:
         """Keep the field of a node, and count its mass."""
-        nonlocal momentum, spin
+        nonlocal momentum, spin, modal
         if node in wanted:
             for k in range(2):
                 stored[k, wanted[node]] = fields[k][:, first, second]
@@ -59,11 +60,11 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
             full = composed(fields[0], moved[:3], phi, place - model.nodes[start])
             turned = composed_rotation(fields[1], moved[3:], phi)
             mass, inertia = extra[node]
-            for terms in (
-                of_masses(np.array([mass]), place[None], full[None]),
-                of_inertia(inertia, phi + moved[3:], turned),
-            ):
-                momentum, spin = momentum + terms[0], spin + terms[1]
+            masses = of_masses(np.array([mass]), place[None], full[None])
+            turning = of_inertia(inertia, phi + moved[3:], turned)
+            momentum, spin = momentum + masses[0] + turning[0], spin + masses[1] + turning[1]
+            own = shapes[model.dof_map[node], 6:]
+            modal = modal + of_modes(own, np.concatenate([masses[0][:3], turning[0][3:]]))
 
     at = {start: (np.zeros((3, count - 6, count - 6)), np.zeros((3, count - 6, count - 6)))}
     settle(start, at[start])
@@ -74,9 +75,10 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
         inside, at[int(far)] = _along(fields, float(beams.lengths[element]), at[int(near)], backward)
         settle(int(far), at[int(far)])
         if not beams.lumped:
-            terms = _line_terms(model, beams, element, fields, inside, phi, start)
-            momentum, spin = momentum + terms[0], spin + terms[1]
-    return SecondOrder(reference, momentum, spin, nodes, stored[0], stored[1])
+            whole = line_fields(beams, element, shapes[model.dof_map[beams.nodes[element]]].reshape(12, count))
+            terms = _line_terms(model, beams, element, fields, inside, whole, start)
+            momentum, spin, modal = momentum + terms[0], spin + terms[1], modal + terms[2]
+    return SecondOrder(reference, momentum, spin, modal, nodes, stored[0], stored[1])
 
 
 def _relative(model: FEModel, shapes: Array, start: int) -> Array:
@@ -131,21 +133,25 @@ def _integrated(rate: Array, length: float, near: Array, backward: bool) -> tupl
 
 
 def _line_terms(
-    model: FEModel, beams: BeamLines, element: int, fields: LineFields, inside: Pair, phi: Array, start: int
-) -> Pair:
-    """Momentum and spin of the mass along an element."""
+    model: FEModel, beams: BeamLines, element: int, fields: LineFields, inside: Pair, whole: LineFields, start: int
+) -> tuple[Array, Array, Array]:
+    """Momentum, spin and modal terms of the mass along an element; ``fields`` are relative to the reference."""
     length, axes = float(beams.lengths[element]), beams.axes[element]
     first = model.nodes[beams.nodes[element, 0]]
     places = first + np.outer(POINTS * length, fields.tangent)
+    phi = (whole.rotation - fields.rotation)[0]
     full = composed(inside[0], fields.displacement, phi, places - model.nodes[start])
-    momentum, spin = of_masses(beams.mass[element] * length * WEIGHTS, places, full)
+    masses = beams.mass[element] * length * WEIGHTS
+    momentum, spin = of_masses(masses, places, full)
+    modal = of_modes(whole.displacement[..., 6:], masses[:, None, None, None] * full)
     if beams.rotary[element].any():
         turned = composed_rotation(inside[1], fields.rotation, phi)
         inertia = axes.T @ (beams.rotary[element][:, None] * axes) * length
-        for weight, theta, field in zip(WEIGHTS, fields.rotation, turned, strict=True):
-            terms = of_inertia(weight * inertia, phi + theta, field)
+        for weight, theta, field in zip(WEIGHTS, whole.rotation, turned, strict=True):
+            terms = of_inertia(weight * inertia, theta, field)
             momentum, spin = momentum + terms[0], spin + terms[1]
-    return momentum, spin
+            modal = modal + of_modes(theta[:, 6:], terms[0][3:])
+    return momentum, spin, modal
 
 
 def _point_masses(model: FEModel, lumped: bool) -> dict[int, tuple[float, Array]]:

@@ -1,4 +1,4 @@
-"""What the second-order motion of masses adds to the kinetic energy, as momenta and spin terms of `SecondOrder`."""
+"""What the second-order motion of masses adds to the kinetic energy: momenta, spin and modal terms of `SecondOrder`."""
 
 from __future__ import annotations
 
@@ -25,6 +25,13 @@ def of_masses(masses: Array, positions: Array, field: Array) -> tuple[Array, Arr
     """Of point masses (k,) at positions (k, 3) with a second-order displacement (k, 3, m, m)."""
     linear = np.einsum("k,kiab->iab", masses, field)
     return of_moments(linear, np.einsum("k,kc,kdab->cdab", masses, positions, field))
+
+
+def of_modes(shapes: Array, momenta: Array) -> Array:
+    """Modal terms (n, m, m) of the momenta (..., 3, m, m) of parts that move or turn by ``shapes`` (..., 3, n)."""
+    rows = int(np.prod(shapes.shape[:-1]))  # -1 cannot be told where there are no modes
+    flat = shapes.reshape(rows, shapes.shape[-1])
+    return np.asarray(np.tensordot(flat.T, momenta.reshape(rows, *momenta.shape[-2:]), 1))
 
 
 def of_inertia(inertia: Array, phi: Array, field: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import expanded
 from fe_import.second_order.composition import composed_rotation, twice_turned
 from fe_import.second_order.data import SecondOrder
-from fe_import.second_order.moments import of_inertia, of_moments
+from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_modes, of_moments
 from fe_import.sparse import factorize
 
 _BLOCK_VALUES = 20_000_000  # entries of second-order fields held at a time
@@ -58,8 +58,9 @@ def solid_second_order(
     n, m = relative.shape[1], shapes.shape[1]
     first, second = np.triu_indices(n)
     stored = np.zeros((2, len(nodes), 3, len(first)))
-    weights = _weights(model)
-    linear, moment = np.zeros((3, m, m)), np.zeros((3, 3, m, m))
+    places = model.dof_map[:, :3].ravel()
+    weights, moving = _weights(model), np.asarray(model.mass @ shapes[:, 6:])[places]
+    linear, moment, modal = np.zeros((3, m, m)), np.zeros((3, 3, m, m)), np.zeros((n, m, m))
     turned = model.dof_map[nodes][:, 3] >= 0
     for some, fields in _solved(model, solid, relative, rows, first, second):
         stored[0][:, :, some] = fields[model.dof_map[nodes, :3]]
@@ -68,8 +69,10 @@ def solid_second_order(
         for a, b in ((first[some], second[some]), (second[some], first[some])):
             linear[:, 6 + a, 6 + b] = found[:3]
             moment[:, :, 6 + a, 6 + b] = found[3:].reshape(3, 3, -1)
+            modal[:, 6 + a, 6 + b] = moving.T @ fields[places]
     phi = shapes[rows[3:]]
     _add_rigid(model, relative, phi, start, weights, linear, moment)
+    modal += _modal_rigid(relative[places], phi, model.nodes - model.nodes[start], moving)
     momentum, spin = of_moments(linear, moment)
     for node, inertia in _turning_masses(model):
         moved = np.zeros((3, m))
@@ -79,7 +82,8 @@ def solid_second_order(
         own[:, first, second] = own[:, second, first] = stored[1, place]
         terms = of_inertia(inertia, phi + moved, composed_rotation(own, moved, phi))
         momentum, spin = momentum + terms[0], spin + terms[1]
-    return SecondOrder(reference, momentum, spin, nodes, stored[0], stored[1])
+        modal += of_modes((phi + moved)[:, 6:], terms[0][3:])
+    return SecondOrder(reference, momentum, spin, modal, nodes, stored[0], stored[1])
 
 
 def _solved(
@@ -169,6 +173,23 @@ def _add_rigid(
         for k in range(len(u)):
             once = np.cross(phi[:, :, None], u[k][:, None, :], axis=0)
             out[k] += once + once.transpose(0, 2, 1) + twice_turned(phi, d[k])
+
+
+def _modal_rigid(relative: Array, phi: Array, arms: Array, moving: Array) -> Array:
+    """(n, m, m) modal terms of what `_add_rigid` adds; ``moving``, the mass times the elastic modes, and ``relative``
+    are of displacements (3 nodes, n).
+    """
+    n, m = relative.shape[1], phi.shape[1]
+    force, moved = (field.reshape(len(arms), 3, n) for field in (moving, relative))
+    result = np.zeros((n, m, m))
+    for i, k, j in np.argwhere(LEVI_CIVITA):
+        once = np.zeros((n, m))
+        once[:, 6:] = LEVI_CIVITA[i, k, j] * (force[:, i].T @ moved[:, j])
+        turned = phi[k][:, None] * once[:, None, :]
+        result += turned + turned.transpose(0, 2, 1)
+    for i in range(3):
+        result += twice_turned(phi, force[:, i].T @ arms)[:, i]
+    return result
 
 
 def _turning_masses(model: FEModel) -> list[tuple[int, Array]]:

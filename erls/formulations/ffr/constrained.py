@@ -218,7 +218,8 @@ class ConstrainedFfr:
         stiffness[at, at], damping[at, at] = self.reduced.stiffness, self.reduced.damping
         if self.reduced.efforts.any:
             rows = [row for _, _, row, _ in self._efforts(t, q, v)]
-            for row, k, c in zip(rows, *self.reduced.efforts.gains(np.array([r @ v for r in rows])), strict=True):
+            gains = self.reduced.efforts.gains(t, q.angles, np.array([r @ v for r in rows]))
+            for row, k, c in zip(rows, *gains, strict=True):
                 stiffness += k * np.outer(row, row)
                 damping += c * np.outer(row, row)
         return stiffness, damping

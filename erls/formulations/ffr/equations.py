@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg as la
@@ -19,15 +19,20 @@ from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State
 from erls.formulations.equilibrium import held_equilibrium
 from erls.formulations.ffr.body_frame import elastic_basis
+from erls.formulations.ffr.interface_motion import InterfaceMotion
 from erls.formulations.ffr.joint_effort import JointEfforts
 from erls.formulations.ffr.recursion import Recursion, Step, bracket, node_motion
 from erls.formulations.ffr.second_order import SecondOrderData
 from erls.formulations.ffr.standard_data import StandardData
 from erls.formulations.joint_frames import FrameMotion, attached, carried
+from erls.formulations.modal_inertia import modal_inertia
 from erls.lie.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link
 from erls.mechanism.loops import LoopEnd
+
+if TYPE_CHECKING:
+    from erls.kernels.contract import CompiledSystem
 
 
 @dataclass(frozen=True)
@@ -79,17 +84,28 @@ class Ffr:
         self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
         self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
         self.damping = np.concatenate([link.damping for link in mechanism.links])
+        self._nodes: dict[tuple[int, int], InterfaceMotion] = {}
 
     def _data(self, link: Link, basis: Array) -> StandardData:
         linear = StandardData(link.invariants, basis, self.mechanism.effects)
         if not self.stiffened or not link.elastic_modes or link.second_order is None:
             return linear
-        return SecondOrderData(linear, link.second_order, basis)
+        modal = modal_inertia(link, self.mechanism.effects, basis)
+        return SecondOrderData(linear, link.second_order, basis, modal)
 
     @property
     def size(self) -> int:
         """Number of independent coordinates."""
         return len(self.free)
+
+    @cached_property
+    def compiled(self) -> CompiledSystem | None:
+        """The same equations in compiled form; None with modal inertia of second order."""
+        if any(isinstance(data, SecondOrderData) and data.modal is not None for data in self.data):
+            return None
+        from erls.formulations.ffr.compiled import compile_frames  # here: it imports the compiler
+
+        return compile_frames(self)
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -249,9 +265,10 @@ class Ffr:
 
     def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
         """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
-        rates = np.zeros(self.joints)
-        rates[self.free_joints] = v[: len(self.free_joints)]
-        gains = self.efforts.gains(rates)
+        f = len(self.free_joints)
+        angles, rates = np.zeros((2, self.joints))  # those of prescribed joints count for nothing
+        angles[self.free_joints], rates[self.free_joints] = y[:f], v[:f]
+        gains = self.efforts.gains(t, angles, rates)
         stiffness = np.concatenate([gains[0], self.stiffness])[self.free]
         damping = np.concatenate([gains[1], self.damping])[self.free]
         return np.diag(stiffness), np.diag(damping)
@@ -302,14 +319,19 @@ class Ffr:
         result: list[FrameMotion] = []
         for k, node, offset in ((int(end.link or 0), end.node, end.frame) for end in ends):
             at = self.modes[k]
-            interface = node_motion(self.mechanism.links[k], node, self.bases[k], self.stiffened)
-            moved = interface.at(motion.eta[at], motion.eta_rates[at])
+            moved = self._node(k, node).at(motion.eta[at], motion.eta_rates[at])
             rows = np.zeros((6, self.joints + self.elastic))
             rows[:, self.joints + at.start : self.joints + at.stop] = moved.jacobian
             local = FrameMotion(moved.pose, rows, moved.jacobian @ motion.eta_rates[at], moved.bias)
             link = FrameMotion(motion.poses[k], jacobians[k], motion.twists[k], biases[k])
             result.append(attached(carried(link, local), offset))
         return result
+
+    def _node(self, k: int, node: int) -> InterfaceMotion:
+        """Motion of a node of link ``k``; those of loops are asked for again and again."""
+        if (k, node) not in self._nodes:
+            self._nodes[k, node] = node_motion(self.mechanism.links[k], node, self.bases[k], self.stiffened)
+        return self._nodes[k, node]
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions at a state: what the links from there outward need."""

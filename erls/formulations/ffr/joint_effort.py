@@ -16,39 +16,43 @@ class JointEfforts:
     ----------
     rotors : (joints,) array
         Reflected inertia on each coordinate.
+    active, leading : lists of int
+        Joints with a drive, spring, damper or friction; those whose drive feeds forward.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
         self.rotors = np.array([j.rotor_inertia for j in mechanism.joints])
-        self._active = [
+        self.active = [
             k for k, j in enumerate(mechanism.joints) if j.forces.active or j.drive.kind not in ("free", "motion")
         ]
-        self._leading = [k for k in self._active if mechanism.joints[k].drive.feed_forward]
+        self.leading = [k for k in self.active if mechanism.joints[k].drive.feed_forward]
         self._known: tuple[float, Array] = (np.nan, np.zeros(0))
 
     @property
     def any(self) -> bool:
         """Whether any force or rotor acts in a joint."""
-        return bool(self._active) or bool(self.rotors.any())
+        return bool(self.active) or bool(self.rotors.any())
 
     def at(self, t: float, angles: Array, rates: Array) -> Array:
         """(joints,) force on each coordinate; zero for what a prescribed motion takes."""
         result = np.zeros(len(self.rotors))
-        for k in self._active:
+        for k in self.active:
             joint, angle, rate = self.mechanism.joints[k], float(angles[k]), float(rates[k])
-            torque = joint.drive.torque(t, angle, rate)
-            if k in self._leading:
-                torque += float(self._feed_forward(t)[k])
-            result[k] = joint.drive.limited(torque) + joint.forces.force(angle, rate)
+            result[k] = joint.drive.limited(self._wanted(k, t, angle, rate)) + joint.forces.force(angle, rate)
         return result
 
-    def gains(self, rates: Array) -> tuple[Array, Array]:
+    def _wanted(self, k: int, t: float, angle: float, rate: float) -> float:
+        """Force that the drive of joint k asks of its motor."""
+        torque = self.mechanism.joints[k].drive.torque(t, angle, rate)
+        return torque + float(self._feed_forward(t)[k]) if k in self.leading else torque
+
+    def gains(self, t: float, angles: Array, rates: Array) -> tuple[Array, Array]:
         """(joints,) twice: minus the derivatives of the forces by angle and by rate."""
         stiffness, damping = np.zeros((2, len(self.rotors)))
-        for k in self._active:
-            joint = self.mechanism.joints[k]
-            passive, active = joint.forces.gains(float(rates[k])), joint.drive.gains
+        for k in self.active:
+            joint, angle, rate = self.mechanism.joints[k], float(angles[k]), float(rates[k])
+            passive, active = joint.forces.gains(rate), joint.drive.gains_at(self._wanted(k, t, angle, rate))
             stiffness[k], damping[k] = passive[0] + active[0], passive[1] + active[1]
         return stiffness, damping
 

@@ -48,6 +48,8 @@ class StandardData:
         C₀; its first rows are the first moment ∫ρ u per elastic coordinate.
     elastic : (n, n) array
         M_e.
+    half, turned, square : (3, 6, n), (3, n, n), (3, 3, n, n) arrays
+        Half of M₁, C₁ and M₂, each with the axes of rotation first.
     """
 
     def __init__(self, invariants: InertiaInvariants, basis: Array, effects: Set[str] = ALL) -> None:
@@ -60,14 +62,14 @@ class StandardData:
         self.rigid = fields.T @ invariants.m @ fields
         self.coupling = fields.T @ invariants.m @ basis
         self.elastic = basis.T @ invariants.m @ basis
-        half = np.stack([fields.T @ x @ basis for x in invariants.X])  # (3, 6, n): half of M₁
-        turned = np.stack([basis.T @ x @ basis for x in invariants.X])  # (3, n, n): C₁
+        self.half = np.stack([fields.T @ x @ basis for x in invariants.X])
+        self.turned = np.stack([basis.T @ x @ basis for x in invariants.X])
         z = invariants.Z
-        square = np.einsum("mi,abmk,kj->abij", basis, (z + z.transpose(0, 1, 3, 2)) / 2, basis, optimize=True)
-        self._half = half.reshape(18, n)
-        self._turned = turned.reshape(3, n * n)
-        self._linear = np.vstack([self._half, turned.reshape(3 * n, n)])
-        self._square = square.reshape(9 * n, n)  # M₂
+        self.square = np.einsum("mi,abmk,kj->abij", basis, (z + z.transpose(0, 1, 3, 2)) / 2, basis, optimize=True)
+        self._half = self.half.reshape(18, n)
+        self._turned = self.turned.reshape(3, n * n)
+        self._linear = np.vstack([self._half, self.turned.reshape(3 * n, n)])
+        self._square = self.square.reshape(9 * n, n)
         self.mass = float(np.trace(self.rigid[:3, :3]) / 3)
         moment = self.rigid[3:, :3]
         self.first_moment = np.array([moment[2, 1], moment[0, 2], moment[1, 0]])

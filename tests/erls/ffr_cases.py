@@ -1,0 +1,60 @@
+"""Chains of floating frames, evaluated by the kernels: ``python ffr_cases.py FOLDER OUTPUT.npz`` saves the results."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import chain_cases
+import numpy as np
+import scenes
+
+from erls.formulations.ffr import Ffr
+from erls.mechanism.chain import Mechanism
+
+ON_MEAN_AXES = ("one link, payload, spring", "parallel axes with a slide", "axes that part", "controllers")
+PARTLY_RIGID = {"rigid in the middle": (1,), "rigid at the ends": (0, 2), "all rigid": (0, 1, 2)}
+STIFFENED = ("one link, payload, spring", "axes that part", "prescribed in the middle", "no effects", *PARTLY_RIGID)
+CASES = [
+    *(f"tangent: {name}" for name in (*chain_cases.CASES, *PARTLY_RIGID)),
+    *(f"mean-axis: {name}" for name in (*ON_MEAN_AXES, *PARTLY_RIGID)),
+    *(f"tangent stiffened: {name}" for name in STIFFENED),
+    *(f"mean-axis stiffened: {name}" for name in STIFFENED),
+]
+
+
+def equations(folder: Path, case: str) -> Ffr:
+    """The FFR equations of a case; files go to ``folder``."""
+    kind, _, name = case.partition(": ")
+    body_frame, *stiffened = kind.split()
+    mechanism = _partly_rigid(folder, name) if name in PARTLY_RIGID else chain_cases.equations(folder, name).mechanism
+    if stiffened:
+        mechanism = replace(mechanism, effects=mechanism.effects | {"geometric_stiffening"})
+    return Ffr(mechanism, body_frame)
+
+
+def _partly_rigid(folder: Path, name: str) -> Mechanism:
+    data = scenes.read_toml(scenes.three_links(folder, "mixed", payloads=[{"point": "end", "mass": 0.2}]))
+    data["joints"][1]["drive"] = {**chain_cases.PD, "feed_forward": True}
+    data["joints"][2].update(chain_cases.SPRING)
+    for k in PARTLY_RIGID[name]:
+        data["links"][k]["flexible"] = False
+    return scenes.mechanism(scenes.write_toml(folder / "case.toml", data))
+
+
+def all_results(folder: Path) -> dict[str, np.ndarray]:
+    """Every function at one state, by 'case/function', in all cases but those of single effects."""
+    result = {}
+    for case in CASES:
+        if ": only" in case or ": without" in case:
+            continue
+        chain = equations(folder, case)
+        assert chain.compiled is not None
+        for what, values in chain_cases.evaluate(chain.compiled, chain_cases.states(chain, case)[1]).items():
+            result[f"{case}/{what}"] = values
+    return result
+
+
+if __name__ == "__main__":
+    np.savez(sys.argv[2], **all_results(Path(sys.argv[1])))

@@ -1,0 +1,164 @@
+"""Compiled chains with geometric stiffening: against the NumPy equations, the same source uncompiled, and in runs."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import chain_cases
+import numpy as np
+import pytest
+import scenes
+import stiffened_cases
+
+import erls
+from erls.errors import SimulationError
+from erls.formulations.erls import Erls
+from erls.integrators.base import Options
+from erls.integrators.generalized_alpha import generalized_alpha
+
+LIKE_NUMPY = 1e-10  # relative: two orders of summation, through some hundred terms
+LIKE_TWIN = 1e-12
+STIFF = 'simulation.effects=["all", "geometric_stiffening", "foreshortening"]'
+
+
+def _distance(found: np.ndarray, expected: np.ndarray) -> float:
+    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
+
+
+@pytest.mark.parametrize("name", stiffened_cases.CASES)
+def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
+    """Residual (joints and modes apart), mass, stiffness, damping, and what accelerations leave out of balance."""
+    chain = stiffened_cases.equations(tmp_path, name)
+    assert chain.stiffened
+    assert chain.compiled is not None
+    f = len(chain.free_joints)
+    for at in stiffened_cases.states(chain, name):
+        found = chain_cases.evaluate(chain.compiled, at)
+        residual = chain.residual(at.t, at.y, at.v, at.a)
+        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
+        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
+        assert _distance(found["mass"], chain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        stiffness, damping = chain.stiffness_and_damping(at.t, at.y, at.v)
+        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert _distance(found["damping"], damping) <= LIKE_NUMPY
+        if np.linalg.eigvalsh(found["mass"])[0] > 0:
+            left = chain.residual(at.t, at.y, at.v, found["acceleration"])
+            taken = np.abs(found["mass"]) @ np.abs(found["acceleration"])
+            assert (np.abs(left) <= LIKE_NUMPY * taken.max()).all()
+        else:  # inertia linear in the deformation alone need not be positive
+            assert name in ("without inertia_second_order", "only inertia_first_order")
+            system, out = chain.compiled, np.empty(chain.size)
+            assert system.acceleration(system.reals, system.integers, system.scratch, at.t, at.y, at.v, out) > 0
+            with pytest.raises(SimulationError):
+                chain.acceleration(at.t, at.y, at.v)
+
+
+def test_second_order_is_felt(tmp_path: Path) -> None:
+    """The cases tell: without second-order terms the same states give forces that differ by more than a hundredth."""
+    chain = stiffened_cases.equations(tmp_path, "arms, mixed")
+    linear = Erls(replace(chain.mechanism, effects=chain.mechanism.effects - {"geometric_stiffening"}))
+    at = stiffened_cases.states(chain, "arms, mixed")[0]
+    forces = [one.residual(at.t, at.y, at.v, at.a) for one in (linear, chain)]
+    assert _distance(*forces) > 1e-2
+
+
+def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
+    """The same source as plain Python (``ERLS_JIT=0``) in a process of its own."""
+    output, folder = tmp_path / "twin.npz", Path(__file__).parent
+    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
+    subprocess.run(
+        [sys.executable, str(folder / "stiffened_cases.py"), str(tmp_path), str(output)], env=environment, check=True
+    )
+    found = stiffened_cases.all_results(tmp_path)
+    with np.load(output) as twin:
+        assert set(twin) == set(found)
+        for key, values in found.items():
+            if key.endswith("acceleration"):  # the condition of the mass matrix is up to 1e9: forces that they take
+                mass = found[key.replace("acceleration", "mass")]
+                apart, size = np.abs(mass @ (values - twin[key])), np.abs(mass) @ np.abs(values)
+                assert apart.max() <= LIKE_TWIN * max(size.max(), 1e-300), key
+            else:
+                assert _distance(values, twin[key]) <= LIKE_TWIN, key
+
+
+def _status(chain: Erls, y: np.ndarray) -> int:
+    system = chain.compiled
+    assert system is not None
+    constants = system.reals, system.integers, system.scratch
+    return int(system.acceleration(*constants, 0.0, y, np.zeros(chain.size), np.empty(chain.size)))
+
+
+def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
+    """The status counts the joint whose motion no inertia opposes; a state that is not finite has one, too."""
+    scenes.arm_link(tmp_path)
+    data = {
+        "simulation": {"duration": 1.0},
+        "joints": [
+            {"name": n, "dh": {"convention": "standard", "a": 0.4, "alpha_deg": a}}
+            for n, a in (("a", 30.0), ("b", 0.0))
+        ],
+        "links": [
+            {"name": "a", "model": "arm.toml", "mesh_pose": {"frame": "joint"}},
+            {"name": "b", "rigid": {"mass": 0.0, "points": {"start": [0, 0, 0], "end": [1, 0, 0]}}},
+        ],
+    }
+    mechanism = scenes.mechanism(scenes.write_toml(tmp_path / "light.toml", data))
+    chain = Erls(replace(mechanism, effects=stiffened_cases.STIFFENED))
+    y, _ = chain.initial_state()
+    assert _status(chain, y) == 1 + 1
+    whole = stiffened_cases.equations(tmp_path, "parallel axes")
+    assert _status(whole, np.zeros(whole.size)) == 0
+    assert _status(whole, np.full(whole.size, np.nan)) > 0
+
+
+class _Plain:
+    """A system without its compiled form."""
+
+    def __init__(self, chain: Erls) -> None:
+        self.chain = chain
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "compiled":
+            raise AttributeError(name)
+        return getattr(self.chain, name)
+
+
+def test_generalized_alpha_takes_the_same_steps(tmp_path: Path) -> None:
+    """Compiled loop and NumPy algorithm: the same knots, steps and motion."""
+    chain = stiffened_cases.equations(tmp_path, "arms, prescribed")
+    y, v = chain.initial_state()
+    options = Options(step=2e-3)
+    fast = generalized_alpha(chain, (0.0, 0.06), y, v, options)
+    slow = generalized_alpha(_Plain(chain), (0.0, 0.06), y, v, options)
+    assert fast.failure is None
+    np.testing.assert_array_equal(fast.t, slow.t)
+    np.testing.assert_allclose(fast.y, slow.y, atol=1e-10 * np.abs(slow.y).max())
+    assert fast.work.steps == slow.work.steps
+
+
+def test_energy_is_conserved_in_a_compiled_run(tmp_path: Path) -> None:
+    """Two soft links with a slide between ground and first, swinging freely, by `lobatto`, which damps nothing."""
+    scenes.arm_link(
+        tmp_path,
+        sections={"s": {"width": 0.012, "height": 0.008}},
+        reduction={"fixed_interface_modes": 2, "elastic_modes": 4},
+    )
+    joints = [
+        {"name": n, "dh": {"convention": "standard", "a": 0.5, "alpha_deg": 90.0}, "initial": {"rate_deg": 200.0}}
+        for n in ("a", "b")
+    ]
+    links = [{"name": n, "model": "arm.toml", "mesh_pose": {"frame": "joint"}} for n in ("upper", "lower")]
+    data = {
+        "simulation": {"duration": 0.5, "integrator": "lobatto", "tolerance": 1e-9},
+        "joints": joints,
+        "links": links,
+    }
+    run = erls.simulate(erls.load_scene(scenes.write_toml(tmp_path / "swing.toml", data), [STIFF]))
+    assert run.conservative
+    energy = run.energy(np.linspace(0.0, 0.5, 51))
+    assert np.ptp(energy.total) < 1e-7 * np.max(energy.kinetic)
