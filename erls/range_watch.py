@@ -32,14 +32,19 @@ def deflection_errors(run: Run) -> dict[str, DeflectionError]:
     Returns
     -------
     dict of DeflectionError
-        By name of link, pieces of a split link together. Empty with geometric stiffening, and in the nodal formulation;
-        links whose modal models know no second order are left out.
+        By name of link, pieces of a split link together. Empty in the nodal formulation; with geometric stiffening only
+        links without it.
     """
     formulation = solved(run.formulation)
     mechanism = formulation.mechanism
-    if run.scene.record.simulation.formulation not in TREES or "geometric_stiffening" in mechanism.effects:
+    if run.scene.record.simulation.formulation not in TREES:
         return {}
-    links = [k for k, link in enumerate(mechanism.links) if link.elastic_modes and link.second_order is not None]
+    stiffened = "geometric_stiffening" in mechanism.effects
+    links = [
+        k
+        for k, link in enumerate(mechanism.links)
+        if link.elastic_modes and not (stiffened and link.second_order is not None)
+    ]
     start, end = float(run.solution.t[0]), run.end
     step = min(_STEP, (end - start) / 4)
     if not links or not step > 0:
@@ -72,12 +77,17 @@ def deflection_warnings(run: Run) -> list[str]:
         if found.error <= _NOTABLE * size:
             continue
         more = "more substructures" if links[name].pieces else "substructures = 4 or more (formulation ffr)"
+        remedy = f"use {more}, the effects geometric_stiffening and foreshortening, or formulation nodal"
+        if found.assumed:
+            remedy = (
+                "this takes it to bend as a beam between its interfaces, since its second-order displacements are "
+                f"{links[name].model.provenance.get('second_order', 'not in its modal file')}"
+            )
         result.append(
             f"link {name!r}: expect errors of about {found.error:.2g} m, since it is linear in its own frame: it "
             f"deflects by up to {found.deflection:.2g} m under up to {100 * found.load:.2g} % of the load that would "
             f"buckle it, which makes vibrations run out of step by up to {found.drift:.2g} rad, and comes nearer by up "
-            f"to {found.shortening:.2g} m; use {more}, the effects geometric_stiffening and foreshortening, or "
-            "formulation nodal"
+            f"to {found.shortening:.2g} m; {remedy}"
         )
     return result
 
@@ -167,5 +177,6 @@ def _of_links(run: Run, mechanism: Mechanism, found: dict[int, DeflectionError])
                 sum(e.shortening for e in some),
                 max(e.load for e in some),
                 max(e.drift for e in some),
+                any(e.assumed for e in some),
             )
     return result

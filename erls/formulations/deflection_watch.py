@@ -12,7 +12,8 @@ the share of δ that vibrates, σ² = max |q̇|² / max |q|², the estimate is
 
     max |u₂| + δ (max |r| + min(2, ½ σ max |∫r dt|)),
 
-times the lever that links beyond make of it. It tells the size: on the L-shaped pendulums, the two-link robot and the
+times the lever that links beyond make of it. A link whose modal model knows no second order is taken to bend as
+`erls.formulations.assumed_bow` says. The estimate tells the size: on the L-shaped pendulums, the two-link robot and the
 fast slider-crank in 1 to 8 pieces it lies within a factor of 2.5 of the distance from exact beams.
 """
 
@@ -22,6 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from erls.formulations.assumed_bow import assumed_second_order
 from erls.lie.so3 import Array, skew
 from erls.mechanism.links import Link, node_shape6
 from erls.mechanism.second_order import LinkSecondOrder
@@ -71,6 +73,8 @@ class DeflectionError:
         Largest load relative to the one that would buckle the link in its shape; 0.1 is 10 %.
     drift : float
         Largest phase by which vibrations run out of step, in rad.
+    assumed : bool
+        Whether second-order displacements are assumed, those of the link being unknown.
     """
 
     error: float
@@ -78,10 +82,11 @@ class DeflectionError:
     shortening: float
     load: float
     drift: float
+    assumed: bool = False
 
 
 def deflection_error(link: Link, motion: LinkMotion, closed: bool, reach: float) -> DeflectionError | None:
-    """Estimate of the error of a link; None for a rigid one, and where its modal model knows no second order.
+    """Estimate of the error of a link; None for a rigid one.
 
     Parameters
     ----------
@@ -92,7 +97,7 @@ def deflection_error(link: Link, motion: LinkMotion, closed: bool, reach: float)
     reach : float
         Largest distance from its inboard interface to what it carries [m].
     """
-    second = link.second_order
+    second = link.second_order or (assumed_second_order(link) if link.elastic_modes else None)
     if not link.elastic_modes or second is None:
         return None
     elastic, model = motion.modal[:, 6:], link.model
@@ -112,7 +117,7 @@ def deflection_error(link: Link, motion: LinkMotion, closed: bool, reach: float)
     sigma = float(np.sqrt((motion.rates[:, 6:] ** 2).sum(axis=1).max()) / amplitude)
     load, drift = float(np.abs(ratio).max()), 0.5 * sigma * float(np.ptp(area))
     error = float(shortening + deflection * (load + min(2.0, drift)))
-    return DeflectionError(error, deflection, shortening, load, drift)
+    return DeflectionError(error, deflection, shortening, load, drift, link.second_order is None)
 
 
 def _tangent(link: Link) -> Array:

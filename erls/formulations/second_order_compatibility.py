@@ -9,6 +9,10 @@ The frames fixed to both links in a joint are displaced by u and turned by exp �
 
 Their sum e is evaluated at the q of the linear compatibility, of which it is a quadratic form; what is left out is of
 third order. Its derivatives are exact, so energy is conserved.
+
+The turn of a link with the tip of the one before it is cut here after second order, too; FFR takes it whole. While
+joints turn, the kinetic energy differs by ω q² q̇: within 0.4 s from an undeformed start the shoulder torque of the
+two-link robot (0.73 N m at its peak) is 3.6e-3 N m off that of exact beams in ERLS, 0.75e-3 N m in FFR.
 """
 
 from __future__ import annotations

@@ -8,6 +8,6 @@ Rules for a kernel:
    and calls any system through a pointer. Helpers need no signature (`erls.kernels.jit.helper`).
 4. What is off costs nothing: a part that a run does not need is skipped by a flag or an empty range, never multiplied
    by zero.
-5. Each subpackage (the equations of one formulation, or the integrators) calls nothing of another one: its code on disk
-   is kept under the digest of its own source.
+5. The code of a subpackage (the equations of one formulation, the integrators) is kept on disk under the digest of its
+   source and of the subpackages whose functions it calls: what changes there compiles all of it again.
 """

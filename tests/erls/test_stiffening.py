@@ -298,6 +298,7 @@ def test_inboard_interface_is_free_to_choose(tmp_path: Path) -> None:
         made.append((found, model))
     (here, model), (there, _) = made
     np.testing.assert_allclose(here.momentum, there.momentum, atol=1e-9 * np.abs(there.momentum).max())
+    np.testing.assert_allclose(here.modal, there.modal, atol=1e-9 * np.abs(there.modal).max())
     spins = [one.spin + one.spin.swapaxes(0, 1) for one in (here, there)]  # what the energy sees
     np.testing.assert_allclose(spins[0], spins[1], atol=1e-9 * np.abs(there.spin).max())
     q = 0.01 * np.random.default_rng(0).normal(size=model.modes)
@@ -322,9 +323,9 @@ def test_what_has_no_second_order_data_is_told(tmp_path: Path) -> None:
 
 
 def test_links_are_linear_unless_asked(tmp_path: Path) -> None:
-    """The default leaves both effects out; critical speeds are those of the axis asked about."""
+    """The default leaves all second-order effects out; critical speeds are those of the axis asked about."""
     mechanism = _spinning("turning", 3.0, tmp_path)
-    assert {"geometric_stiffening", "foreshortening"} == ALL - DEFAULT
+    assert {"geometric_stiffening", "foreshortening", "modal_inertia"} == ALL - DEFAULT
     link = mechanism.links[0]
     assert critical_speed(link, np.array([0.0, 0.0, 1.0])) == pytest.approx(3.5160, rel=1e-3)
     assert critical_speed(link, np.array([1.0, 0.0, 0.0])) == pytest.approx(3.5160, rel=1e-3)
