@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg as la
@@ -27,6 +27,9 @@ from erls.formulations.loop_static import closed_equilibrium
 from erls.integrators.base import metre_scales
 from erls.lie.so3 import Array
 from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.formulations.closed_compiled import CompiledLoops
 
 DECAY = 100.0  # 1/s, of what closing conditions are violated by
 DEPENDENT = 1e-8  # metres per metre, of a row beside those before it: redundant below
@@ -45,7 +48,7 @@ class ClosedChain:
     """
 
     def __init__(self, tree: TreeFormulation) -> None:
-        self.mechanism = tree.mechanism
+        self.bare, self.mechanism = tree, tree.mechanism
         self.rows = LoopRows(tree, tree.mechanism.loops)
         self.efforts = LoopEfforts(tree, self.rows)
         self.tree: TreeFormulation = ActuatedTree(tree, self.efforts) if self.efforts.any else tree
@@ -81,6 +84,20 @@ class ClosedChain:
         _, factor, order = la.qr(matrix.T, mode="economic", pivoting=True)
         sizes = np.abs(np.diag(factor))
         return np.sort(order[: np.count_nonzero(sizes > DEPENDENT)])
+
+    @cached_property
+    def compiled(self) -> CompiledLoops | None:
+        """The same equations in compiled form; None unless the chain is one of ERLS that has a compiled form, without
+        second-order displacements of nodes.
+        """
+        from erls.formulations.erls import Erls  # here: a run imports the formulation it needs
+
+        chain = getattr(self.bare, "compiled", None) if self.size else None
+        if chain is None or not isinstance(self.bare, Erls) or self.bare.stiffened:
+            return None
+        from erls.formulations.closed_compiled import compile_loops  # here: it imports the compiler
+
+        return compile_loops(self, self.bare, chain, DECAY)
 
     @property
     def redundant(self) -> tuple[str, ...]:
@@ -204,6 +221,8 @@ class ClosedChain:
 
     def closed(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
         """The nearest state, in metres, that closes the loops; the same one where there is none nearby."""
+        if self.compiled is not None:
+            return self.compiled.closed(t, y, v)
         found = self.closure(t, y, v)
         y = y.copy()
         try:

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from erls.errors import Cause, SimulationError
-from erls.formulations.closed_chain import ClosedChain
+from erls.formulations.closed_chain import OPEN, ClosedChain
 from erls.integrators import INTEGRATORS
 from erls.integrators.base import Integrator, Observer, Options, SecondOrderSystem, Solution
 from erls.integrators.constrained import ConstrainedOptions
+from erls.integrators.constrained_run import ConstrainedRecorder
+from erls.integrators.lie_formulas import Steps
 from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
 from erls.lie.so3 import Array
+
+if TYPE_CHECKING:
+    from erls.kernels.contract import CompiledSystem
 
 NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
 AT = 1e-3  # of the same: adaptive steps would shrink for ever
@@ -29,6 +35,8 @@ class TiedCoordinates:
         self.constraint_names = tuple(chain.rows.names[k] for k in chain.kept)
         self.length_scales, self.breakpoints = chain.metres, chain.breakpoints
         self._still = np.zeros(chain.size)
+        # of a chain whose nodes have no kernels
+        self._compiled: CompiledSystem | None = None if chain.efforts.any else getattr(chain.bare, "compiled", None)
 
     def compose(self, q: Array, increment: Array) -> Array:
         """q + increment."""
@@ -40,7 +48,11 @@ class TiedCoordinates:
 
     def residual(self, t: float, q: Array, v: Array, a: Array) -> Array:
         """(n,) of the chain."""
-        return self.tree.residual(t, q, v, a)
+        if (compiled := self._compiled) is None:
+            return self.tree.residual(t, q, v, a)
+        out = np.empty(self.size)
+        compiled.residual(compiled.reals, compiled.integers, compiled.scratch, t, q, v, a, out)
+        return out
 
     def mass_matrix(self, t: float, q: Array) -> Array:
         """(n, n) of the chain."""
@@ -79,6 +91,16 @@ class TiedCoordinates:
         self.chain.refuse_open(t, self.chain.closure(t, q, v))
         return q, v, a
 
+    def make_steps(self, options: ConstrainedOptions, recorder: ConstrainedRecorder) -> Steps | None:
+        """Compiled ones for equal steps of a chain in compiled form."""
+        compiled = self.chain.compiled
+        special = options.error_tolerance, options.iteration_matrix, options.start_from
+        if compiled is None or special != (None, "auto", "zero"):
+            return None
+        from erls.formulations.closed_steps import ClosedSteps  # here: it imports the compiler
+
+        return ClosedSteps(self, compiled, options, recorder)
+
 
 def loop_integrator(name: str) -> Integrator:
     """The integrator of that name for a `ClosedChain`; failures near a dead point name the loop."""
@@ -95,12 +117,19 @@ def loop_integrator(name: str) -> Integrator:
         solution: Solution
         if name == "generalized_alpha" and len(system.kept):
             settings = ConstrainedOptions(
-                options.step, options.rtol, options.atol, options.spectral_radius, options.newton_tolerance
+                options.step,
+                options.rtol,
+                options.atol,
+                options.spectral_radius,
+                options.newton_tolerance,
+                output_step=options.output_step,
             )
             solution = lie_generalized_alpha(TiedCoordinates(system), times, y, v, settings, observer)
         else:
-            watch = _watching(system, observer)
+            watch = Watch(system, observer)
             solution = INTEGRATORS[name](system, times, y, v, options, watch)
+            if solution.failure is not None and solution.failure.cause == Cause.LOOP_OPEN:
+                solution = _first(solution, watch.good)
         failure = solution.failure
         if failure is None or failure.cause in _ITS_OWN:
             return solution
@@ -109,20 +138,53 @@ def loop_integrator(name: str) -> Integrator:
     return integrate
 
 
-def _watching(chain: ClosedChain, observer: Observer | None) -> Observer:
-    """An observer that refuses steps at which a loop has come apart or locks; within a step a trial may."""
+class Watch:
+    """An observer that refuses steps at which a loop has come apart or locks; within a step a trial may.
 
-    def observe(t: float, knots: Callable[[], Solution]) -> None:
+    Parameters
+    ----------
+    chain : ClosedChain
+    observer : callable or None
+        Told of what is not refused.
+    """
+
+    def __init__(self, chain: ClosedChain, observer: Observer | None) -> None:
+        self.chain, self.observer = chain, observer
+        self.good = 0
+        """Knots up to the first one that was refused."""
+
+    def __call__(self, t: float, knots: Callable[[], Solution]) -> None:
         found = knots()
-        closure = chain.closure(t, found.y[-1], found.v[-1])
+        for k in self._suspects(found):
+            self.good = k + 1
+            self._refuse(float(found.t[k]), found.y[k], found.v[k])
+        self.good = len(found.t)
+        if self.observer is not None:
+            self.observer(t, knots)
+
+    def _suspects(self, found: Solution) -> list[int]:
+        """Numbers of new knots to look at: the last one; of many compiled steps those that are open or lock."""
+        chain = self.chain
+        if chain.compiled is None:
+            return [len(found.t) - 1]
+        first = max(self.good - 1, 0)  # the last one may have made room for another
+        gaps, stiffest = chain.compiled.watched(found.t[first:], found.y[first:])
+        suspect = (gaps > OPEN * chain.reach) | (stiffest < AT * chain.stiffest_at_start)
+        return [first + int(k) for k in np.flatnonzero(suspect)]
+
+    def _refuse(self, t: float, y: Array, v: Array) -> None:
+        chain = self.chain
+        closure = chain.closure(t, y, v)
         chain.refuse_open(t, closure)
         here = chain.stiffest(closure)
         if here[0] < AT * chain.stiffest_at_start:
             raise chain.locked(t, here)
-        if observer is not None:
-            observer(t, knots)
 
-    return observe
+
+def _first(solution: Solution, knots: int) -> Solution:
+    """Less what many steps at once made after a loop came apart or locked."""
+    arrays = {name: getattr(solution, name)[:knots] for name in ("t", "y", "v", "a")}
+    return replace(solution, **arrays) if knots else solution
 
 
 def _dead_point(chain: ClosedChain, solution: Solution) -> SimulationError | None:

@@ -33,6 +33,8 @@ class Effort:
         [rad, rad/s or m, m/s]
     force : float
         Of drive, spring, damper and friction; a prescribed motion's own left out [N m or N].
+    wanted : float
+        What the drive asks of its motor [N m or N].
     row : (joints + elastic,) array
         The rate over the rates of (θ, elastic).
     bias : float
@@ -43,6 +45,7 @@ class Effort:
     coordinate: float
     rate: float
     force: float
+    wanted: float
     row: Array
     bias: float
 
@@ -75,8 +78,9 @@ class LoopEfforts:
                 continue
             along, motion = free.type.free_row, found.relative[k]
             value, rate = self._coordinate(k, free, motion.pose, t, y), float(motion.twist[along])
-            force = free.drive.limited(free.drive.torque(t, value, rate)) + free.forces.force(value, rate)
-            result.append(Effort(k, value, rate, force, found.moves[k][along], float(motion.bias[along])))
+            wanted = free.drive.torque(t, value, rate)
+            force = free.drive.limited(wanted) + free.forces.force(value, rate)
+            result.append(Effort(k, value, rate, force, wanted, found.moves[k][along], float(motion.bias[along])))
         return result
 
     def _coordinate(self, k: int, free: LoopFreedom, relative: Array, t: float, y: Array) -> float:
@@ -102,7 +106,7 @@ class LoopEfforts:
     def gains(self, effort: Effort) -> tuple[float, float]:
         """Minus the derivatives of the force by coordinate and rate."""
         free = self._freedom(effort.number)
-        passive, active = free.forces.gains(effort.rate), free.drive.gains
+        passive, active = free.forces.gains(effort.rate), free.drive.gains_at(effort.wanted)
         return passive[0] + active[0], passive[1] + active[1]
 
     def along(self, number: int) -> int:

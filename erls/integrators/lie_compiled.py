@@ -30,6 +30,7 @@ from erls.integrators.lie_formulas import (
     TOLERATED,
     Formulas,
     Limit,
+    Steps,
     newton_failure,
     too_slow,
 )
@@ -61,11 +62,19 @@ class Compiled(Protocol):
 
 def compiled_steps(
     system: ConstrainedSystem, options: ConstrainedOptions, recorder: ConstrainedRecorder
-) -> CompiledSteps | None:
-    """Steps by kernels, or None: without the compiler, where a system has none, or where velocities are projected."""
-    offer = getattr(system, "compiled", None)
+) -> Steps | None:
+    """Steps by kernels, or None: without the compiler, where a system has none, or where velocities are projected.
+
+    A system brings steps of its own (``make_steps``) or is ``compiled`` for those of the nodal elements.
+    """
     wanted = ENABLED if options.compiled is None else options.compiled
-    compiled = offer() if wanted and offer is not None and not options.project_velocity else None
+    if not wanted or options.project_velocity:
+        return None
+    if (make_steps := getattr(system, "make_steps", None)) is not None:
+        own: Steps | None = make_steps(options, recorder)
+        return own
+    offer = getattr(system, "compiled", None)
+    compiled = None if offer is None else offer()
     return None if compiled is None else CompiledSteps(system, compiled, options, recorder)
 
 

@@ -13,6 +13,11 @@ BUDGETS = [
     ("l_shape/steel_tall.toml", ["simulation.duration=0.5", "simulation.integrator=lobatto"], (496, 165, 29)),
     ("l_shape/torque.toml", ["simulation.duration=0.2"], (1970, 1970, 11)),
     ("l_shape/steel_flat.toml", ["simulation.duration=0.1", "simulation.formulation=ffr"], (504, 504, 10)),
+    (
+        "l_shape/steel_flat.toml",
+        ["simulation.duration=0.5", "simulation.formulation=ffr", "simulation.integrator=lobatto"],
+        (790, 263, 50),
+    ),
     ("l_shape/aluminium.toml", ["simulation.duration=0.2", "simulation.formulation=nodal"], (1655, 1655, 2)),
     ("robot/two_link.toml", ["simulation.duration=0.5"], (2920, 2920, 135)),
     ("robot/two_link.toml", ["simulation.duration=0.5", "simulation.integrator=lobatto"], (1440, 480, 94)),

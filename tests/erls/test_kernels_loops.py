@@ -1,0 +1,161 @@
+"""Compiled closed chains: against the NumPy equations, against the same source uncompiled, and in runs."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import loop_cases
+import loop_scenes
+import numpy as np
+import pytest
+from chain_cases import evaluate
+
+from erls.errors import Cause, SimulationError
+from erls.formulations.closed_chain import ClosedChain
+from erls.formulations.closed_run import Watch, loop_integrator
+from erls.integrators.base import Options, Solution
+
+LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
+LIKE_TWIN = 1e-12
+
+
+def _distance(found: np.ndarray, expected: np.ndarray) -> float:
+    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
+
+
+def _plain(closed: ClosedChain) -> ClosedChain:
+    """The same equations without their compiled form."""
+    result = ClosedChain(closed.bare)
+    result.compiled = None
+    return result
+
+
+@pytest.mark.parametrize("name", loop_cases.CASES)
+def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
+    """Residual (joints and modes apart), matrices, acceleration, the nearest closed state.
+
+    That comes from the square of the conditions, so it loses twice the digits of their condition number.
+    """
+    closed = loop_cases.chain(tmp_path, name)
+    plain = _plain(closed)
+    assert closed.compiled is not None
+    f = len(closed.bare.free_joints)
+    for at in loop_cases.states(closed, name):
+        found = evaluate(closed.compiled, at)
+        residual = plain.residual(at.t, at.y, at.v, at.a)
+        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
+        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
+        assert _distance(found["mass"], plain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        stiffness, damping = plain.stiffness_and_damping(at.t, at.y, at.v)
+        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert _distance(found["damping"], damping) <= LIKE_NUMPY
+        assert _distance(found["acceleration"], plain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
+        ours, theirs = closed.closed(at.t, at.y, at.v), plain.closed(at.t, at.y, at.v)
+        gaps = [np.abs(plain.openings(plain.closure(at.t, *state))).max() for state in (ours, theirs)]
+        assert gaps[0] <= max(1e-12, 10 * gaps[1])
+        lost = np.linalg.cond(plain.scaled_rows(plain.closure(at.t, *theirs), plain.kept)) ** 2
+        for place, other in zip(ours, theirs, strict=True):
+            np.testing.assert_allclose(place * closed.metres, other * closed.metres, rtol=0, atol=1e-10 + 1e-16 * lost)
+
+
+def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
+    """The same source as plain Python (``ERLS_JIT=0``) in a process of its own, steps included."""
+    output = tmp_path / "twin.npz"
+    folder = Path(__file__).parent
+    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
+    subprocess.run(
+        [sys.executable, str(folder / "loop_cases.py"), str(tmp_path), str(output)], env=environment, check=True
+    )
+    found = loop_cases.all_results(tmp_path)
+    with np.load(output) as twin:
+        assert set(twin) == set(found)
+        for key, values in found.items():
+            assert _distance(values, twin[key]) <= (LIKE_NUMPY if key == "steps" else LIKE_TWIN), key
+
+
+@pytest.mark.parametrize("name", ["torque on a slide", "controlled turn", "two loops"])
+def test_compiled_steps_are_those_of_numpy(name: str, tmp_path: Path) -> None:
+    """Generalized-α: the same knots and the same work over breakpoints of drives; loops closed as well."""
+    closed = loop_cases.chain(tmp_path, name)
+    y, v = closed.initial_state()
+    fast, slow = (loop_cases.steps(closed, y, v, 0.06, 2e-3, compiled) for compiled in (True, False))
+    assert fast.failure is slow.failure is None
+    np.testing.assert_array_equal(fast.t, slow.t)
+    np.testing.assert_allclose(fast.y * closed.metres, slow.y * closed.metres, atol=1e-9)
+    assert fast.work.steps == slow.work.steps
+    # where an estimate meets the tolerance to rounding, one iteration more or less
+    assert fast.work.rhs_calls == pytest.approx(slow.work.rhs_calls, rel=0.02)
+    assert fast.work.factorizations == pytest.approx(slow.work.factorizations, abs=4)
+    gaps = [
+        max(np.abs(closed.openings(closed.closure(*knot))).max() for knot in zip(s.t.tolist(), s.y, s.v, strict=True))
+        for s in (fast, slow)
+    ]
+    assert gaps[0] <= max(1e-12, 2 * gaps[1])
+
+
+def test_compiled_steps_fail_alike(tmp_path: Path) -> None:
+    """Friction that sticks at once in the closing joint: halved steps, and at the end the same cause."""
+    data = loop_scenes.four_bar()
+    data["joints"][0]["initial"]["rate"] = 5.0
+    data["loops"][0]["friction"] = {"force": 3e4, "transition_rate": 1e-7}
+    closed = loop_scenes.chain(tmp_path, data)
+    y, v = closed.initial_state()
+    fast, slow = (loop_cases.steps(closed, y, v, 0.01, 1e-3, compiled) for compiled in (True, False))
+    assert fast.work.rejected_steps == slow.work.rejected_steps > 0
+    assert fast.failure is not None
+    assert slow.failure is not None
+    assert (fast.failure.cause, fast.failure.where) == (slow.failure.cause, slow.failure.where)
+
+
+def test_lobatto_runs_compiled_loops(tmp_path: Path) -> None:
+    """A run in compiled chunks is that of the NumPy equations: knots to a tenth of the tolerance 1e-5 m."""
+    closed = loop_cases.chain(tmp_path, "torque on a slide")
+    y, v = closed.initial_state()
+    fast, slow = (
+        loop_integrator("lobatto")(chain, (0.0, 0.04), y, v, Options()) for chain in (closed, _plain(closed))
+    )
+    assert fast.failure is slow.failure is None
+    assert fast.work.rhs_calls == pytest.approx(slow.work.rhs_calls, rel=0.05)
+    ends = [closed.closed(0.04, s.y[-1], s.v[-1])[0] * closed.metres for s in (fast, slow)]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)
+
+
+def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
+    """A rocker without mass: the status says so, and the run names its joint."""
+    data = loop_scenes.four_bar()
+    data["links"][2]["rigid"] |= {"mass": 0.0, "inertia": [0.0, 0.0, 0.0]}
+    closed = loop_scenes.chain(tmp_path, data)
+    y, v = closed.initial_state()
+    system = closed.compiled
+    assert system is not None
+    assert system.acceleration(system.reals, system.integers, system.scratch, 0.0, y, v, np.empty(closed.size)) > 0
+    failure = loop_integrator("lobatto")(closed, (0.0, 0.01), y, v, Options()).failure
+    assert failure is not None
+    assert failure.cause == Cause.SINGULAR_MASS
+    assert "joint 'j2'" in str(failure)
+
+
+def test_a_lock_ends_compiled_chunks_there(tmp_path: Path) -> None:
+    """Conditions that a chunk of steps met on its way are refused where they were: no knot lies behind."""
+    closed = loop_scenes.chain(tmp_path, loop_scenes.four_bar())
+    assert closed.compiled is not None
+    y, v = closed.initial_state()
+    away = y + np.array([0.0, 0.3, 0.0])
+    gaps, stiffest = closed.compiled.watched(np.zeros(3), np.array([y, away, y]))
+    expected = [closed.closure(0.0, place, v) for place in (y, away)]
+    np.testing.assert_allclose(gaps[:2], [np.abs(closed.openings(found)).max() for found in expected], atol=1e-12)
+    np.testing.assert_allclose(stiffest[:2], [closed.stiffest(found)[0] for found in expected], rtol=1e-6)
+    watch = Watch(closed, None)
+    knots = Solution(np.arange(4.0), *(np.array([y, y, away, y]),) * 3)
+    with pytest.raises(SimulationError, match="comes apart") as caught:
+        watch(3.0, lambda: knots)
+    assert caught.value.cause == Cause.LOOP_OPEN
+    assert watch.good == 3
+
+
+def test_no_compiled_form_over_other_chains(tmp_path: Path) -> None:
+    """The minimum-norm gauge has none, so its loops have none; an empty one has nothing to compile."""
+    assert loop_scenes.chain(tmp_path, loop_scenes.four_bar(), "minimum-norm").compiled is None
