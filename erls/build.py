@@ -110,6 +110,7 @@ def build_mechanism(
         points=tuple(points),
         gravity=np.array(record.gravity),
         static_start=record.initial.deformation == "static",
+        bandwidth=record.simulation.bandwidth,
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
     chain = without(replace(chain, loops=build_loops(scene, chain), effects=effects), ALL - effects)

@@ -18,6 +18,8 @@ from erls.build import build_mechanism
 from erls.effects import Certificate
 from erls.errors import Cause, SceneError, SimulationError
 from erls.formulations import FORMULATIONS, formulate
+from erls.formulations.base import Formulation
+from erls.formulations.quasi_static import QuasiStatic
 from erls.integrators.base import Solution, Work
 from erls.mechanism.tables import read_csv
 from erls.run import Run
@@ -72,12 +74,14 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
     write_strings(group, "scene", scene, "the scene as JSON")
     write_strings(group, "warnings", run.warnings, "what the user was told")
     write_array(group, "knots/time", solution.t, "s", "times of the steps; twice where forces jump")
+    reduced = _reduced(run.formulation)
     for name, values, unit in (
         ("position", solution.y, "rad, m, m sqrt(kg)"),
         ("velocity", solution.v, "per s"),
         ("acceleration", solution.a, "per s^2"),
     ):
-        write_array(group, f"knots/{name}", values, unit, "independent coordinates; knot, coordinate")
+        kept = values if reduced is None else reduced.stored(values)
+        write_array(group, f"knots/{name}", kept, unit, "independent coordinates; knot, coordinate")
     for name, count in msgspec.to_builtins(solution.work).items():
         write_attribute(group["knots"], name, int(count))
     stored: list[ModalModel] = []
@@ -193,7 +197,8 @@ def load_run(path: Path | str) -> Run:
             raise
         knots = file.subgroup("knots")
         t = knots.array("time", (None,))
-        shape = (len(t), formulation.size)
+        reduced = _reduced(formulation)
+        shape = (len(t), formulation.size if reduced is None else reduced.inner.size)
         if not len(t) or (np.diff(t) < 0).any():
             raise file.fail("knots/time", "times must rise", None)
         work = Work(**{name: knots.attribute(name, int) for name in msgspec.to_builtins(Work())})
@@ -202,12 +207,17 @@ def load_run(path: Path | str) -> Run:
         if status != "complete":
             cause = next((c for c in Cause if str(c) == status), Cause.INTERRUPTED)
             failure = SimulationError(cause, file.attribute("message", str) or f"the run is {status}")
-        solution = Solution(
-            t, knots.array("position", shape), knots.array("velocity", shape), knots.array("acceleration", shape),
-            work, failure,
-        )  # fmt: skip
+        y, v, a = (knots.array(name, shape) for name in ("position", "velocity", "acceleration"))
+        if reduced is not None:
+            y, v, a = reduced.restored(y), reduced.restored(v), reduced.restored(a)
+        solution = Solution(t, y, v, a, work, failure)
         warnings = file.names("warnings")
         return Run(scene, formulation, solution, file.attribute("wall_s", float), warnings, _certificate(file, record))
+
+
+def _reduced(formulation: Formulation) -> QuasiStatic | None:
+    """A formulation whose coordinates depend on how modes are scaled: files hold those of all modes."""
+    return formulation if isinstance(formulation, QuasiStatic) else None
 
 
 def _certificate(file: Reader, record: SceneRecord) -> Certificate | None:

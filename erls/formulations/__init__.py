@@ -9,7 +9,7 @@ from importlib import import_module
 from erls.formulations.base import Formulation, TreeFormulation
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.erls import Erls
-from erls.formulations.substructures import Substructured, of_pieces
+from erls.formulations.substructures import Substructured, of_pieces, solved
 from erls.integrators import INTEGRATORS, KERNELS
 from erls.integrators.base import Solution
 from erls.mechanism.chain import Mechanism
@@ -42,12 +42,19 @@ FORMULATIONS: dict[str, Callable[[Mechanism, Simulation], Formulation]] = {
 
 
 def formulate(mechanism: Mechanism, settings: Simulation) -> Formulation:
-    """Equations of motion of a mechanism; of its chain, tied by its loops; of the pieces of links that are split."""
+    """Equations of motion of a mechanism; of its chain, tied by its loops; of the pieces of links that are split; with
+    modes above a bandwidth that follow statically.
+    """
     if settings.formulation in TREES and is_split(mechanism):
         parts = split(mechanism)
         return Substructured(formulate(parts.pieces, settings), parts)
     if mechanism.loops and settings.formulation in TREES:
         return ClosedChain(TREES[settings.formulation](mechanism, settings))
+    if mechanism.bandwidth is not None and settings.formulation in TREES:
+        from erls.formulations.quasi_static import quasi_static
+
+        build = TREES[settings.formulation]
+        return quasi_static(lambda given: build(given, settings), mechanism, settings.duration)
     return FORMULATIONS[settings.formulation](mechanism, settings)
 
 
@@ -77,8 +84,9 @@ def compile_kernels(formulation: Formulation, settings: Simulation) -> None:
     if settings.formulation == "nodal":
         for name in ("system", "matrix", "step"):
             import_module(f"erls.kernels.nodal.{name}")
-    elif getattr(formulation, "compiled", None) is not None and settings.integrator in KERNELS:
-        import_module(KERNELS[settings.integrator])
+    elif getattr(solved(formulation), "compiled", None) is not None and settings.integrator in KERNELS:
+        tied = formulation.mechanism.loops and settings.integrator == "generalized_alpha"
+        import_module("erls.kernels.loops.steps" if tied else KERNELS[settings.integrator])
 
 
 __all__ = ["FORMULATIONS", "TREES", "Formulation", "compile_kernels", "formulate", "integrator"]

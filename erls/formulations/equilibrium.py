@@ -38,12 +38,18 @@ def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray
     zero = np.zeros(size)
     scales = equations.length_scales
 
+    compiled = getattr(equations, "compiled", None)
+
     def out_of_balance(trial: Array) -> Array:
         """Held angles first, then forces on the elastic coordinates."""
-        forces = equations.residual(0.0, trial, zero, zero)
-        return np.concatenate(
-            [equations.state(0.0, trial, zero).angles[held_joints] - held, forces[f:]]
-        )
+        if compiled is None:
+            forces = equations.residual(0.0, trial, zero, zero)
+        else:
+            forces = np.empty(size)
+            compiled.residual(compiled.reals, compiled.integers, compiled.scratch, 0.0, trial, zero, zero, forces)
+        if not f:
+            return forces
+        return np.concatenate([equations.state(0.0, trial, zero).angles[held_joints] - held, forces[f:]])
 
     y = y.copy()
     size_m = max(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in equations.mechanism.links)

@@ -20,13 +20,7 @@ import platformdirs
 F = TypeVar("F", bound=Callable[..., Any])
 
 _PART = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-_SUBJECTS = {
-    "chain": "the equations of motion",
-    "deviation": "the certificate of what auto leaves out",
-    "nodal": "the equations of motion",
-    "stiffened": "the equations of motion",
-    "stepping": "the integrators",
-}
+_SUBJECTS = {"deviation": "the certificate of what auto leaves out", "stepping": "the integrators"}
 _listeners: list[Callable[[str], None]] = []
 ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
 
@@ -110,7 +104,7 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
     subpackage = function.__module__.removeprefix(f"{__package__}.").partition(".")[0]
     if not compiled_before(subpackage):
         for tell in _listeners:
-            tell(f"compiling {_SUBJECTS.get(subpackage, subpackage)} (once on this machine)")
+            tell(f"compiling {_SUBJECTS.get(subpackage, 'the equations of motion')} (once on this machine)")
     numba.config.CACHE_DIR = str(folder(subpackage))
     try:
         return numba.njit(*signature, cache=True, error_model="numpy", nogil=True, **options)(function)

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from effect_scenes import random_chain
 
 import erls
 from erls.build import build_mechanism
 from erls.effects import ALL, DEFAULT, EFFECTS, conserves_energy, in_order, inconsistencies, named_effects
-from erls.errors import Cause, SceneError
+from erls.errors import Cause, SceneError, SimulationError
 from erls.formulations.erls import Erls
 from erls.formulations.ffr import Ffr
 from erls.formulations.ffr.body_frame import elastic_basis
@@ -303,6 +304,7 @@ WARNINGS = [
     (DEFAULT - {"inertia_first_order"}, "erls", "'centrifugal_load' without 'inertia_first_order'"),
     (DEFAULT - {"centrifugal_load", "inertia_first_order"} - SQUARE, "erls", "'coriolis' without 'centrifugal_load'"),
     (DEFAULT - {"coriolis"}, "erls", ""),
+    (DEFAULT - SQUARE, "erls", "'inertia_first_order' without 'inertia_second_order': the mass matrix may turn"),
     (DEFAULT - {"spin_softening"}, "erls", "'inertia_second_order' without 'spin_softening'"),
     (DEFAULT - {"flexibility"}, "erls", "links are rigid without 'flexibility'"),
     (frozenset({"gravity"}), "erls", ""),
@@ -326,3 +328,26 @@ def test_warnings_reach_the_run(scene_file: Path) -> None:
     assert any("without 'inertia_first_order'" in w for w in run.warnings)
     assert run.summary()["effects"] == [name for name in EFFECTS if name in DEFAULT - {"inertia_first_order"}]
     assert "certified_error" not in run.summary()
+
+
+@pytest.mark.parametrize("integrator", ["generalized_alpha", "lobatto", "dop853"])
+def test_an_indefinite_mass_matrix_is_the_cause(tmp_path: Path, integrator: str) -> None:
+    """Whether the integrator failed for it or passed over it; foretold, with the effect that is missing. The first link
+    of this chain turns about an axis along it, so that its inertia is nearly all deformation.
+    """
+    changes = ["simulation.duration=0.05", f"simulation.integrator={integrator}"]
+    scene = load_scene(random_chain(tmp_path, 0), [*changes, "effects=-inertia_second_order,-spin_softening"])
+    told: list[str] = []
+    with pytest.raises(SimulationError) as caught:
+        erls.simulate(scene, tell=told.append)
+    assert caught.value.cause == Cause.SINGULAR_MASS
+    assert "inertia_second_order" in str(caught.value)
+    assert any("the mass matrix may turn indefinite" in text for text in told)
+    run = caught.value.run
+    assert run is not None
+    lowest = [
+        float(np.linalg.eigvalsh(run.formulation.mass_matrix(float(t), y))[0])
+        for t, y in zip(run.solution.t, run.solution.y, strict=True)
+    ]
+    assert min(lowest) < 1e-3 * lowest[0]
+    assert lowest[0] > 0

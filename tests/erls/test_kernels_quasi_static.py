@@ -1,0 +1,51 @@
+"""Compiled chains with static modes: against the NumPy equations, and against the same source uncompiled."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import chain_cases
+import numpy as np
+import pytest
+import quasi_static_cases as cases
+
+LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
+LIKE_TWIN = 1e-12
+
+
+def _distance(found: np.ndarray, expected: np.ndarray) -> float:
+    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
+
+
+@pytest.mark.parametrize("static", [True, False])
+@pytest.mark.parametrize("name", cases.BANDWIDTHS)
+def test_kernels_equal_the_numpy_equations(name: str, static: bool, tmp_path: Path) -> None:
+    """Residual, mass, stiffness, damping, acceleration; with static modes, and with these left out."""
+    system = cases.equations(tmp_path, name, static)
+    assert system.compiled is not None
+    assert (len(system.modes.stiffness) > 0) == static
+    for at in cases.states(system, name):
+        found = chain_cases.evaluate(system.compiled, at)
+        assert _distance(found["residual"], system.residual(at.t, at.y, at.v, at.a)) <= LIKE_NUMPY
+        assert _distance(found["mass"], system.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        stiffness, damping = system.stiffness_and_damping(at.t, at.y, at.v)
+        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert _distance(found["damping"], damping) <= LIKE_NUMPY
+        assert _distance(found["acceleration"], system.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
+
+
+def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
+    """The same source as plain Python (``ERLS_JIT=0``) in a process of its own."""
+    output = tmp_path / "twin.npz"
+    folder = Path(__file__).parent
+    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
+    command = [sys.executable, str(folder / "quasi_static_cases.py"), str(tmp_path), str(output)]
+    subprocess.run(command, env=environment, check=True)
+    found = cases.all_results(tmp_path)
+    with np.load(output) as twin:
+        assert set(twin) == set(found)
+        for key, values in found.items():
+            assert _distance(values, twin[key]) <= LIKE_TWIN, key
