@@ -1,6 +1,6 @@
 """Cost of the compiled equations of motion: a residual and an acceleration, against modes and against links.
 
-    python benchmarks/kernels.py [--quick]
+    python benchmarks/kernels.py [--quick] [--ffr]
 
 Chains of equal links on revolute joints in all directions; between two links of a spatial chain nothing can be told of
 the axis of rotation, so this is the general case. Then the shipped L and the two-link robot. Prints the least CPU time
@@ -25,9 +25,11 @@ sys.path.insert(0, str(ROOT / "tests/erls"))
 import scenes  # noqa: E402
 
 from erls.formulations.erls import Erls  # noqa: E402
+from erls.formulations.ffr import Ffr  # noqa: E402
 from erls.kernels.contract import ACCELERATION, INTEGERS, REALS, RESIDUAL, pointer  # noqa: E402
 
 QUICK = "--quick" in sys.argv[1:]
+FORMULATION = Ffr if "--ffr" in sys.argv[1:] else Erls
 MODES = (6, 12, 25, 50) if QUICK else (6, 12, 25, 50, 100, 200)
 LINKS = (1, 2, 5) if QUICK else (1, 2, 5, 10, 20)
 MODES_PER_LINK = 8
@@ -65,7 +67,7 @@ def least_time(call: Callable[[int], object]) -> float:
     return best
 
 
-def costs(chain: Erls) -> tuple[float, float, float]:
+def costs(chain: Erls | Ffr) -> tuple[float, float, float]:
     """Seconds of a compiled residual and acceleration, and of a NumPy residual."""
     system = chain.compiled
     assert system is not None
@@ -78,7 +80,7 @@ def costs(chain: Erls) -> tuple[float, float, float]:
     return compiled, solved, plain
 
 
-def chain_of(links: int, modes: int) -> Erls:
+def chain_of(links: int, modes: int) -> Erls | Ffr:
     """A spatial chain of equal links."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -95,10 +97,10 @@ def chain_of(links: int, modes: int) -> Erls:
         ]
         arms = [{"name": f"l{k}", "model": "arm.toml", "mesh_pose": {"frame": "joint"}} for k in range(links)]
         data = {"simulation": {"duration": 1.0}, "joints": joints, "links": arms}
-        return scenes.equations(scenes.write_toml(folder / "chain.toml", data))
+        return FORMULATION(scenes.mechanism(scenes.write_toml(folder / "chain.toml", data)))
 
 
-def table(title: str, what: str, cases: dict[int, Erls]) -> None:
+def table(title: str, what: str, cases: dict[int, Erls | Ffr]) -> None:
     """Print costs with growth exponents."""
     print(f"\n{title}\n{what:>6} {'residual':>12} {'exponent':>9} {'acceleration':>13} {'exponent':>9} {'NumPy':>8}")
     before: tuple[int, float, float] | None = None
@@ -125,7 +127,7 @@ def main() -> None:
     )
     print("\nshipped scenes")
     for name in ("l_shape/steel_flat.toml", "robot/two_link.toml"):
-        residual, acceleration, plain = costs(scenes.equations(ROOT / "data" / name))
+        residual, acceleration, plain = costs(FORMULATION(scenes.mechanism(ROOT / "data" / name)))
         print(
             f"{name}: residual {residual * 1e6:.2f} µs, acceleration {acceleration * 1e6:.2f} µs, "
             f"NumPy {plain / residual:.0f}x"

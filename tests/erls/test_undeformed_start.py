@@ -4,7 +4,8 @@ Links then ring without damping, by as much as they sag. Loads on displacements 
 a link by a share of first order in the deflection, and with it the frequencies. Both formulations leave such terms out,
 and not the same ones: ERLS counts the turn of the forearm with the upper arm's tip as a linear displacement, FFR turns
 it. The phase between them grows with ω t δ/L, the torque with it: 1 % of its peak at 0.5 s, 11 % at 1.5 s. With
-second-order kinematics (`geometric_stiffening`, `foreshortening`) both have these terms. From static equilibrium, which
+second-order kinematics (`geometric_stiffening`, `foreshortening`) both have these terms, and what is left is of third
+order (`test_second_order_agreement`). From static equilibrium, which
 rings little, they agree anyway (`test_ffr_reference`).
 """
 
