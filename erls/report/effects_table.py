@@ -6,7 +6,7 @@ from typing import Any
 
 from erls.effects import EFFECTS
 from erls.report.tables import table
-from erls.selection.probe import EffectSize
+from erls.selection.sizes import EffectSize
 from erls.selection.survey import Survey
 
 
@@ -33,6 +33,7 @@ def effects_summary(found: Survey) -> dict[str, Any]:
             for s in found.sizes
         ],
         "left_out": found.left,
+        "decision": found.note,
     }
 
 
@@ -59,12 +60,14 @@ def effects_text(found: Survey) -> str:
     if found.left:
         parts.append(f"not asked for by the scene: {', '.join(found.left)}")
     parts.append(
-        f'auto: on or off with effects = "auto" at a tolerance of {settings.effects_tolerance:.2g} m. '
+        f'auto: what effects = "auto" has to keep at a tolerance of {settings.effects_tolerance:.2g} m. '
         "force: largest generalized force, as one\n"
         "on all mass alike. error: largest distance of named points without the effect, in coarse runs. "
         + ("drives: change\nof drive forces, relative to their peak. time: part" if drives else "time: part\n")
-        + " of an evaluation of the equations that leaving it out saves.\nEffects that save nothing stay on."
+        + " of an evaluation of the equations that leaving it out saves, with effects\n"
+        "that share its products. Effects that save nothing stay on."
     )
+    parts.append(found.note)
     return "\n\n".join(parts)
 
 

@@ -10,6 +10,7 @@ import msgspec
 
 from erls.effects import Certificate, in_order
 from erls.errors import Cause, SimulationError
+from erls.kernels.jit import announcing
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import present
 from erls.run import Run
@@ -49,19 +50,19 @@ def automatic(
     begun = time.perf_counter()
     choice = choose_effects(scene, whole)
     spent = time.perf_counter() - begun
-    for note in choice.notes:
-        tell(note)
+    tell(choice.note)
     while True:
         try:
-            run = integrate(_named(scene, whole, choice), choice.applied(whole))
+            run = integrate(named(scene, whole, choice), choice.applied(whole))
         except SimulationError as problem:
-            if not (choice.off or choice.rigid) or problem.cause == Cause.INTERRUPTED:
+            if not choice.cuts or problem.cause == Cause.INTERRUPTED:
                 raise
-            tell(f"effects: the run failed without {', '.join(in_order(choice.off))} ({problem}); repeated with all")
-            choice = Choice(frozenset())
+            tell(f"effects: the run failed without {_left(choice)} ({problem}); repeated with all")
+            choice = Choice()
             continue
         begun = time.perf_counter()
-        certificate = _certified(run, whole, choice)
+        with announcing(tell):
+            certificate = _certified(run, whole, choice)
         spent += time.perf_counter() - begun
         if certificate.ok or not strict:
             break
@@ -75,7 +76,7 @@ def automatic(
     return replace(run, warnings=warnings, certificate=replace(certificate, wall_s=spent))
 
 
-def _named(scene: Scene, whole: Mechanism, choice: Choice) -> Scene:
+def named(scene: Scene, whole: Mechanism, choice: Choice) -> Scene:
     """The scene with the names of what is on, so that a run file says what was computed."""
     record = scene.record
     settings = msgspec.structs.replace(record.simulation, effects=in_order(whole.effects - choice.off))
@@ -99,18 +100,21 @@ def _certified(run: Run, whole: Mechanism, choice: Choice) -> Certificate:
 
 def _less(choice: Choice, certificate: Certificate) -> Choice:
     """A choice to leave out less: what by its estimate, scaled to what was found, stays far below the tolerance."""
-    estimates = choice.estimates
-    together = sum(estimates.values())
+    together = sum(cut.error for cut in choice.cuts)
     scale = certificate.error / together if together else float("inf")
     bad_effort = (certificate.effort_error or 0.0) > certificate.effort_tolerance
-    if choice.rigid or "flexibility" in choice.off or bad_effort or not scale < float("inf"):
-        return Choice(frozenset())
-    kept = frozenset(n for n in choice.off if estimates.get(n, 0.0) * scale <= _KEPT * certificate.tolerance)
-    return replace(choice, off=kept if len(kept) < len(choice.off) else frozenset())
+    if bad_effort or not scale < float("inf"):
+        return Choice()
+    kept = tuple(cut for cut in choice.cuts if cut.error * scale <= _KEPT * certificate.tolerance)
+    return Choice(kept if len(kept) < len(choice.cuts) else ())
+
+
+def _left(choice: Choice) -> str:
+    return ", ".join([*in_order(choice.off), *(f"flexibility of {link!r}" for link in sorted(choice.rigid))])
 
 
 def _on(choice: Choice) -> str:
-    return f"all but {', '.join(in_order(choice.off))}" if choice.off else "all effects"
+    return f"all but {_left(choice)}" if choice.cuts else "all effects"
 
 
 def _warning(certificate: Certificate) -> str:
@@ -121,5 +125,3 @@ def _warning(certificate: Certificate) -> str:
         f"is {certificate.tolerance:.2g} m and {100 * certificate.effort_tolerance:.2g} % (use --strict, or "
         "effects = 'all')"
     )
-
-

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from erls.effects import Certificate
 from erls.formulations import formulate
 from erls.formulations.substructures import solved
-from erls.integrators.base import Array, hermite
+from erls.integrators.base import Array, hermite, metre_scales
 from erls.mechanism.chain import Mechanism
 from erls.run import Run
-from erls.selection.coordinates import embedded, kept_places
-from erls.selection.error_motion import Knots, error_motion
-from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
+from erls.selection.coordinates import embedded, kept_places, same_start
+from erls.selection.error_motion import Deviation, Knots, error_motion
+from erls.selection.outputs import Outputs, busiest, effort_error, largest_distance, watched_nodes
 from erls.selection.quick import quick
+from erls.selection.resolution import resolution, vibrations
+from fe_import.model import IntArray
 
-STEPS = 1000
-FEWEST = 100  # knots of a run; with fewer of them, states between are taken
-_PLACES, _EFFORTS = 120, 40  # knots at which points and drive forces are compared
+FEWEST = 500  # steps
+PLACES, EFFORTS = 40, 16  # knots at which points and drive forces are compared
+UNRESOLVED = 0.1  # of the tolerance: what vibrations may add that the steps do not follow
+_ACCURACY = 1e-2  # of the tolerance
+_EVEN = 1.01  # ratio of steps that count as equal
 
 
 def certify(run: Run, whole: Mechanism) -> Certificate:
@@ -36,56 +42,72 @@ def certify(run: Run, whole: Mechanism) -> Certificate:
     """
     settings = run.scene.record.simulation
     formulation = formulate(whole, settings)
-    system, reduced = quick(solved(formulation)), quick(solved(run.formulation))
+    system, reduced = solved(formulation), solved(run.formulation)
     kept = kept_places(whole, run.formulation.mechanism, system.size)
-
-    def widened(values: Array) -> Array:
-        return embedded(values, kept, system.size)
-
-    def balance(t: float, y: Array, v: Array, a: Array) -> Array:
-        return widened(reduced.residual(t, y[kept], v[kept], a[kept]))
-
-    legs = [Knots(k.t, widened(k.y), widened(k.v), widened(k.a)) for k in _legs(run)]
-    begin, begun = formulation.initial_state(), run.formulation.initial_state()
-    start = (begin[0] - widened(begun[0]), begin[1] - widened(begun[1]))
-    stride = max(1, round(sum(len(k.t) for k in legs) / STEPS))
-    found = error_motion(system, legs, start, balance, stride, 1e-2 * settings.effects_tolerance)
+    begun = [embedded(x[0], kept, system.size) for x in (run.solution.y, run.solution.v)]
+    begin = begun if same_start(whole, run.formulation.mechanism) else formulation.initial_state()
+    start = (begin[0] - begun[0], begin[1] - begun[1])
+    found = vibrations(quick(system), whole, settings.duration, *begin)
+    wanted = resolution(found, UNRESOLVED * settings.effects_tolerance)
+    step = settings.duration / wanted.count(settings.duration, FEWEST)
+    legs, strides = _legs(run, step)
+    accuracy = _ACCURACY * settings.effects_tolerance
+    deviation = error_motion(system, reduced, kept, legs, start, strides, accuracy)  # type: ignore[arg-type]
     watched = watched_nodes(whole)
     ours = Outputs(run.scene, run.formulation, watched)
     others = Outputs(run.scene, formulation, watched)
-    places = [found[k] for k in np.unique(np.linspace(0, len(found) - 1, _PLACES).astype(int))]
-    here = [ours.positions(run.formulation.state(d.t, d.y[kept], d.v[kept])) for d in places]
-    there = [others.positions(formulation.state(d.t, d.other_y, d.other_v)) for d in places]
+    metres = metre_scales(system)  # type: ignore[arg-type]
+    apart = np.abs(metres * deviation.error).sum(axis=1)
+    here, there = [], []
+    for k in busiest(apart, PLACES):
+        t, other_y, other_v = _other(deviation, k, kept)
+        here.append(ours.positions(run.formulation.state(t, deviation.y[k], deviation.v[k])))
+        there.append(others.positions(formulation.state(t, other_y, other_v)))
     efforts: tuple[list[Array], list[Array]] = ([], [])
     if ours.driven:
-        for d in found[:: max(1, len(found) // _EFFORTS)]:
-            efforts[0].append(others.efforts(d.t, d.other_y, d.other_v))
-            efforts[1].append(ours.efforts(d.t, d.y[kept], d.v[kept]))
+        for k in busiest(apart, EFFORTS):
+            efforts[0].append(others.efforts(*_other(deviation, k, kept)))
+            efforts[1].append(ours.efforts(float(deviation.t[k]), deviation.y[k], deviation.v[k]))
+    error = largest_distance(here, there)
     return Certificate(
-        largest_distance(here, there),
+        error + min(wanted.unresolved, error),
         effort_error(*efforts),
         settings.effects_tolerance,
         settings.effects_effort_tolerance,
     )
 
 
-def _legs(run: Run) -> list[Knots]:
-    """Knots of a run between jumps; where they are few, states between them with accelerations of their own."""
+def _other(deviation: Deviation, k: int, kept: IntArray) -> tuple[float, Array, Array]:
+    """Time and state of the whole system at a knot."""
+    size = deviation.error.shape[1]
+    y = embedded(deviation.y[k], kept, size) + deviation.error[k]
+    v = embedded(deviation.v[k], kept, size) + deviation.rate[k]
+    return float(deviation.t[k]), y, v
+
+
+def _legs(run: Run, step: float) -> tuple[list[Knots], list[int]]:
+    """Knots of a run between jumps, and how many of them make a step.
+
+    Where knots are too far apart for it, or not even, states between them with accelerations of their own.
+    """
     s, system = run.solution, quick(solved(run.formulation))
-    jumps = np.flatnonzero(np.diff(s.t) == 0) + 1
-    result = []
-    for part in np.split(np.arange(len(s.t)), jumps):
+    ends = [0, *(np.flatnonzero(np.diff(s.t) == 0) + 1).tolist(), len(s.t)]
+    legs, strides = [], []
+    for first, end in itertools.pairwise(ends):
+        part = slice(first, end)  # views: a run may be long
         t = s.t[part]
-        if len(part) < 2:
+        if len(t) < 2:
             continue
-        if len(s.t) >= FEWEST:
-            result.append(Knots.inside(t, s.y[part], s.v[part], s.a[part]))
+        gaps = np.diff(t)
+        if gaps.max() <= _EVEN * gaps.min() and gaps.max() <= 2 * step:
+            legs.append(Knots.inside(t, s.y[part], s.v[part], s.a[part]))
+            strides.append(max(1, round(step / gaps[0])))
             continue
-        wanted = int(np.ceil(STEPS * (t[-1] - t[0]) / (s.t[-1] - s.t[0])))
-        times = np.linspace(t[0], t[-1], max(wanted, 2) + 1)
+        times = np.linspace(t[0], t[-1], max(int(np.ceil((t[-1] - t[0]) / step)), 2) + 1)
         y, v = hermite(t, s.y[part], s.v[part], s.a[part], times)
         knots = Knots.inside(times, y, v, np.zeros_like(y))
         states = zip(knots.t.tolist(), y, v, strict=True)
         accelerations = np.array([system.acceleration(*state) for state in states]).reshape(y.shape)
-        result.append(Knots(knots.t, y, v, accelerations))
-    return result
+        legs.append(Knots(knots.t, y, v, accelerations))
+        strides.append(1)
+    return legs, strides

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from erls.effects import FIRST, SECOND
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism
 from fe_import.model import IntArray
@@ -29,6 +30,12 @@ def kept_places(whole: Mechanism, less: Mechanism, size: int) -> IntArray:
             kept.append(np.arange(at, at + count))
         at += count
     return np.concatenate(kept)
+
+
+def same_start(whole: Mechanism, less: Mechanism) -> bool:
+    """Whether both start from the same state: inertia does not act at rest."""
+    modes = [[link.elastic_modes for link in mechanism.links] for mechanism in (whole, less)]
+    return modes[0] == modes[1] and whole.effects - less.effects <= FIRST | SECOND
 
 
 def embedded(values: Array, places: IntArray, size: int) -> Array:

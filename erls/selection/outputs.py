@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from erls.formulations import formulate
 from erls.formulations.base import Formulation, State
 from erls.integrators.base import Solution
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.drives import Drive
 from erls.run import Run, node_positions
 from erls.scene import Scene
+from erls.selection.quick import quick
 
 Watched = tuple[tuple[int, int], ...]
 
@@ -40,6 +44,8 @@ class Outputs:
         self._run = Run(scene, formulation, Solution(np.zeros(1), empty, empty, empty))
         self.formulation, self.watched = formulation, watched
         self.driven = driven_joints(formulation.mechanism)
+        freed = reacting(formulation) if self.driven else None
+        self._reacting = None if freed is None else quick(formulate(freed, scene.record.simulation))
 
     def positions(self, state: State) -> Array:
         """(points, 3) in the world [m]."""
@@ -47,8 +53,37 @@ class Outputs:
 
     def efforts(self, t: float, y: Array, v: Array) -> Array:
         """(driven joints,) [N m or N]."""
-        found = self.formulation.reactions(t, y, v)
-        return np.array([found[k].effort for k in self.driven])
+        if self._reacting is None:
+            found = self.formulation.reactions(t, y, v)
+            return np.array([found[k].effort for k in self.driven])
+        joints = self.formulation.mechanism.joints
+        free = [k for k, joint in enumerate(joints) if not joint.drive.prescribed]
+        state = np.zeros((3, self._reacting.size))
+        a = quick(self.formulation).acceleration(t, y, v) if len(y) else y
+        for row, values in zip(state, (y, v, a), strict=True):
+            row[free], row[len(joints) :] = values[: len(free)], values[len(free) :]
+        for k in self.driven:
+            state[:, k] = joints[k].drive.reference(t)
+        return np.asarray(self._reacting.residual(t, *state))[self.driven]
+
+
+def reacting(formulation: Formulation) -> Mechanism | None:
+    """The same chain with nothing that prescribes its motion: forces out of balance on its joints are those of their
+    drives. None where there is no compiled form, or a drive that knows its own force.
+    """
+    mechanism = formulation.mechanism
+    if getattr(formulation, "compiled", None) is None or mechanism.loops:
+        return None
+    if not all(mechanism.joints[k].drive.prescribed for k in driven_joints(mechanism)):
+        return None
+    joints = tuple(replace(j, drive=Drive()) if j.drive.prescribed else j for j in mechanism.joints)
+    return replace(mechanism, joints=joints)
+
+
+def busiest(size: Array, count: int) -> list[int]:
+    """At most ``count`` places, the largest in each of as many stretches of ``size`` (k,), the last one among them."""
+    stretches = np.array_split(np.arange(len(size)), min(count, len(size)))
+    return sorted({*(int(part[np.argmax(size[part])]) for part in stretches), len(size) - 1})
 
 
 def largest_distance(first: Sequence[Array], second: Sequence[Array]) -> float:

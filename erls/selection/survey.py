@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from erls.build import build_mechanism
 from erls.effects import EFFECTS, in_order
 from erls.scene import Scene, load_scene
-from erls.selection.choice import affordable, candidates
-from erls.selection.probe import EffectSize, effect_sizes
+from erls.selection.choice import Choice, affordable, choose_effects
+from erls.selection.cuts import Cut, possible_cuts
+from erls.selection.sizes import EffectSize, effect_sizes
 
 
 @dataclass(frozen=True)
@@ -23,13 +24,16 @@ class Survey:
     sizes : tuple of EffectSize
         Of the effects that the scene asks for.
     off, rigid : frozenset of str
-        What ``auto`` would leave out of these, and the links that it would make rigid.
+        What the tolerance allows ``auto`` to leave out of these, and the links that it allows to be rigid.
+    note : str
+        What ``auto`` decides, which also asks what deciding costs.
     """
 
     scene: Scene
     sizes: tuple[EffectSize, ...]
     off: frozenset[str]
     rigid: frozenset[str]
+    note: str
 
     def keeps(self, size: EffectSize) -> bool:
         """Whether ``auto`` would keep an effect."""
@@ -52,11 +56,23 @@ def survey(path: Path | str, overrides: Iterable[str] = (), tell: Callable[[str]
         The coarse run with all effects failed.
     """
     scene = load_scene(path, overrides)
-    mechanism = build_mechanism(scene, tell).mechanism
-    sizes = effect_sizes(scene, mechanism, in_order(mechanism.effects), measure=True)
+    reduced = build_mechanism(scene, tell).mechanism
+    mechanism = replace(reduced, bandwidth=None)  # other effects are judged with all modes
+    sizes = effect_sizes(scene, mechanism, in_order(mechanism.effects))
+    if reduced.bandwidth is not None:
+        own = effect_sizes(scene, reduced, {"static_correction"} & reduced.effects)
+        sizes = tuple(next((o for o in own if o.name == s.name), s) for s in sizes)
     settings = scene.record.simulation
-    possible = set(candidates(mechanism, settings.formulation))
-    off, rigid = affordable(
-        [s for s in sizes if s.name in possible], settings.effects_tolerance, settings.effects_effort_tolerance
-    )
-    return Survey(scene, sizes, off, rigid)
+    cuts = [_sized(cut, sizes) for cut in possible_cuts(mechanism, settings.formulation)]
+    choice = Choice(affordable(cuts, settings.effects_tolerance, settings.effects_effort_tolerance))
+    return Survey(scene, sizes, choice.off, choice.rigid, choose_effects(scene, mechanism).note)
+
+
+def _sized(cut: Cut, sizes: tuple[EffectSize, ...]) -> Cut:
+    """With the errors of its effects added up; flexibility stands for all that acts on the deformation."""
+    if cut.link:
+        found = [s for s in sizes if s.link == cut.link]
+    else:
+        names = {"flexibility"} if "flexibility" in cut.off else cut.off
+        found = [s for s in sizes if s.name in names and not s.link]
+    return replace(cut, error=sum(s.error for s in found), effort_error=sum(s.effort_error or 0.0 for s in found))

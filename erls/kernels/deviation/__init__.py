@@ -1,0 +1,1 @@
+"""The error that leaving out effects makes, followed along a computed motion."""

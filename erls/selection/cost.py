@@ -1,0 +1,130 @@
+"""What runs, and looks at them, cost: by counting, so that no decision depends on a clock.
+
+Times are those of one machine of 2024 for the operations of `erls.kernels.chain`, and of NumPy where a formulation has
+no compiled form; only their ratios matter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from erls.effects import FIRST, SECOND
+from erls.formulations import Formulation, formulate, integrator
+from erls.formulations.substructures import solved
+from erls.integrators.base import Options
+from erls.mechanism.chain import Mechanism, poses
+from erls.scene import Scene
+from erls.selection.outputs import driven_joints, reacting
+from erls.selection.probe import fixed_steps
+
+ITERATIONS, CALM = 2.3, 1.1  # of generalized-alpha, per step; without vibrations and free joints
+_COARSE = 6.0  # the same in large steps
+_PILOT = 1 / 40  # of a run with adaptive steps: what is run to count them
+_LINK, _MASS, _X, _Z = 1.5e-7, 4e-10, 6e-10, 8e-10  # s: per link; per entry of each matrix in use
+_SOLVE, _FACTOR, _REFRESH = 1.2e-9, 4e-10, 0.05  # s per entry, s per entry and column; share of steps with new factors
+_STIFFENED = 2.2
+_PYTHON, _PYTHON_LINK, _PYTHON_X, _PYTHON_Z = 4e-5, 5e-5, 3e-5, 1e-5
+PREPARE, STATE = 5e-4, 1e-4  # s per link: of equations, of the points of a state
+_EFFORTS, _REACTING = 7e-4, 2e-5  # s per link: of drive forces in a state, in Python and compiled
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a step of equations of motion consists of [s].
+
+    Attributes
+    ----------
+    links : int
+    evaluation, solution, factors : float
+        Of the equations; with the iteration matrix; of that matrix.
+    """
+
+    links: int
+    evaluation: float
+    solution: float
+    factors: float
+
+    @property
+    def iteration(self) -> float:
+        """Of Newton's method."""
+        return self.evaluation + self.solution
+
+    def step(self, iterations: float) -> float:
+        """Of generalized-alpha."""
+        return iterations * self.iteration + (_REFRESH if iterations > CALM else 0.0) * self.factors
+
+    @property
+    def coarse_step(self) -> float:
+        """The same with large steps."""
+        return _COARSE * self.iteration + self.factors
+
+
+def cost_of(formulation: Formulation) -> Cost:
+    """Cost of a formulation's equations."""
+    system = solved(formulation)
+    mechanism = system.mechanism
+    first = not FIRST.isdisjoint(mechanism.effects)
+    second = not SECOND.isdisjoint(mechanism.effects)
+    axes = _axes(mechanism)
+    size = system.size
+    if not size:  # nothing to integrate
+        return Cost(len(axes), 0.0, 0.0, 0.0)
+    if getattr(system, "compiled", None) is None:
+        evaluation = _PYTHON + len(axes) * (_PYTHON_LINK + first * _PYTHON_X + second * _PYTHON_Z)
+        return Cost(len(axes), evaluation, _PYTHON / 2, 2 * evaluation)
+    evaluation = 0.0
+    for link, count in zip(mechanism.links, axes, strict=True):
+        entries = (6 + link.elastic_modes) ** 2
+        pairs = count * (count + 1) // 2
+        evaluation += _LINK + entries * (_MASS + first * count * _X + second * pairs * _Z)
+    if "geometric_stiffening" in mechanism.effects and any(k.second_order is not None for k in mechanism.links):
+        evaluation *= _STIFFENED
+    factors = evaluation + _FACTOR * size**3 + _SOLVE * size**2
+    return Cost(len(axes), evaluation, _SOLVE * size**2, factors)
+
+
+def effort_cost(formulation: Formulation) -> float:
+    """Of the drive forces in a state, per link [s]."""
+    if not driven_joints(formulation.mechanism):
+        return 0.0
+    return _EFFORTS if reacting(formulation) is None else _REACTING
+
+
+def count_steps(scene: Scene, mechanism: Mechanism) -> float:
+    """Steps of a run, as steps of generalized-alpha: from the scene, or from a short run with an adaptive method.
+
+    Raises
+    ------
+    SimulationError
+        That run failed.
+    """
+    settings = scene.record.simulation
+    steps = fixed_steps(settings)
+    if steps is not None:
+        return steps
+    formulation = formulate(mechanism, settings)
+    y, v = formulation.initial_state()
+    options = Options(None, settings.rtol, settings.atol, settings.spectral_radius, tolerance=settings.tolerance)
+    end = _PILOT * settings.duration
+    solution = integrator(mechanism, settings)(formulation, (0.0, end), y, v, options, None)
+    if solution.failure is not None:
+        raise solution.failure
+    late = np.count_nonzero(solution.t > end / 2) / max(len(solution.t), 1)  # without its first, small steps
+    return 2 * late * solution.work.rhs_calls / ITERATIONS / _PILOT
+
+
+def _axes(mechanism: Mechanism) -> list[int]:
+    """Axes about which each link can turn: 0, 1, or 3 as soon as two joints before it are not parallel."""
+    frames = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
+    result: list[int] = []
+    seen: list[np.ndarray] = []
+    for k, joint in enumerate(mechanism.joints):
+        if joint.type.revolute:
+            before = frames[k - 1] if k else np.eye(4)
+            seen.append((before @ joint.before)[:3, 2])
+        parallel = all(math.isclose(abs(float(axis @ seen[0])), 1.0, abs_tol=1e-9) for axis in seen)
+        result.append((1 if parallel else 3) if seen else 0)
+    return result
