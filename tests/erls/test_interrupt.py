@@ -48,7 +48,7 @@ sys.exit(main())
 def folder(tmp_path: Path) -> Path:
     """A scene that would take minutes: a hundred million steps."""
     scenes.l_link(tmp_path)
-    scenes.l_scene(tmp_path, simulation={"duration": 100.0, "step": 1e-6})
+    scenes.l_scene(tmp_path, simulation={"duration": 100.0, "step": 1e-6, "output_step": 1e-4})
     return tmp_path
 
 
