@@ -4,7 +4,8 @@
 
 Chains of equal links on revolute joints in all directions; between two links of a spatial chain nothing can be told of
 the axis of rotation, so this is the general case. Then the shipped L and the two-link robot. Prints the least CPU time
-of several repetitions, the growth exponent from row to row, and how many times longer the NumPy equations take.
+of several repetitions, of a residual, an acceleration and a step of generalized-α, the growth exponent from row to row,
+and how many times longer the NumPy equations take for a residual.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ import scenes  # noqa: E402
 
 from erls.formulations.erls import Erls  # noqa: E402
 from erls.formulations.ffr import Ffr  # noqa: E402
+from erls.integrators.base import Options  # noqa: E402
+from erls.integrators.generalized_alpha import generalized_alpha  # noqa: E402
 from erls.kernels.contract import ACCELERATION, INTEGERS, REALS, RESIDUAL, pointer  # noqa: E402
 
 QUICK = "--quick" in sys.argv[1:]
@@ -35,6 +38,7 @@ LINKS = (1, 2, 5) if QUICK else (1, 2, 5, 10, 20)
 MODES_PER_LINK = 8
 REPEATS = 3 if QUICK else 7
 SLICE = 0.02  # s of one repetition
+STEPS = 100
 
 
 _SYSTEM = (REALS, INTEGERS, REALS)
@@ -100,23 +104,32 @@ def chain_of(links: int, modes: int) -> Erls | Ffr:
         return FORMULATION(scenes.mechanism(scenes.write_toml(folder / "chain.toml", data)))
 
 
+def step_cost(chain: Erls | Ffr) -> float:
+    """Seconds of CPU of a step of generalized-α of 1 ms, factorizations included, at best."""
+    y, v = chain.initial_state()
+    best = math.inf
+    for _ in range(REPEATS):
+        start = time.process_time()
+        found = generalized_alpha(chain, (0.0, STEPS * 1e-3), y, v, Options(1e-3))
+        best = min(best, (time.process_time() - start) / found.work.steps)
+    return best
+
+
 def table(title: str, what: str, cases: dict[int, Erls | Ffr]) -> None:
     """Print costs with growth exponents."""
-    print(f"\n{title}\n{what:>6} {'residual':>12} {'exponent':>9} {'acceleration':>13} {'exponent':>9} {'NumPy':>8}")
-    before: tuple[int, float, float] | None = None
+    heads = "".join(f"{name:>12} {'exponent':>9}" for name in ("residual", "acceleration", "step"))
+    print(f"\n{title}\n{what:>6} {heads} {'NumPy':>8}")
+    before: tuple[int, tuple[float, ...]] | None = None
     for number, chain in cases.items():
         residual, acceleration, plain = costs(chain)
-        growth = ["", ""]
+        now = residual, acceleration, step_cost(chain)
+        growth = [""] * len(now)
         if before is not None:
             span = math.log(number / before[0])
-            growth = [
-                f"{math.log(now / then) / span:.2f}" for now, then in ((residual, before[1]), (acceleration, before[2]))
-            ]
-        print(
-            f"{number:6d} {residual * 1e6:9.2f} µs {growth[0]:>9} {acceleration * 1e6:10.2f} µs {growth[1]:>9} "
-            f"{plain / residual:7.0f}x"
-        )
-        before = number, residual, acceleration
+            growth = [f"{math.log(a / b) / span:.2f}" for a, b in zip(now, before[1], strict=True)]
+        cells = "".join(f"{cost * 1e6:9.2f} µs {exponent:>9}" for cost, exponent in zip(now, growth, strict=True))
+        print(f"{number:6d} {cells} {plain / residual:7.0f}x")
+        before = number, now
 
 
 def main() -> None:

@@ -141,6 +141,8 @@ def _integrated(
     planned = planned_spin_warnings(mechanism, settings.duration) if modal else []
     warn((*missing_stiffening(mechanism), *planned) if modal else ())
     formulation = formulate(mechanism, settings)
+    with announcing(warn.tell):
+        compile_kernels(formulation, settings)
     y, v = formulation.initial_state()
     if isinstance(chain := solved(formulation), ClosedChain):
         warn(chain.warnings)
@@ -153,8 +155,6 @@ def _integrated(
         tolerance=settings.tolerance,
         output_step=settings.output_step,
     )
-    with announcing(warn.tell):
-        compile_kernels(formulation, settings)
     begun = saved = time.perf_counter()
 
     def make_run(solution: Solution) -> Run:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from importlib import import_module
 
@@ -84,9 +85,15 @@ def compile_kernels(formulation: Formulation, settings: Simulation) -> None:
     if settings.formulation == "nodal":
         for name in ("system", "matrix", "step"):
             import_module(f"erls.kernels.nodal.{name}")
-    elif getattr(solved(formulation), "compiled", None) is not None and settings.integrator in KERNELS:
+    elif settings.integrator in KERNELS:
+        from erls.kernels.jit import compiling_beside
+
         tied = formulation.mechanism.loops and settings.integrator == "generalized_alpha"
-        import_module("erls.kernels.loops.steps" if tied else KERNELS[settings.integrator])
+        one = tied or settings.gauge != "joint-angle"  # module, or none at all
+        with nullcontext() if one else compiling_beside(KERNELS[settings.integrator]):
+            compiled = getattr(solved(formulation), "compiled", None)
+        if compiled is not None:
+            import_module("erls.kernels.loops.steps" if tied else KERNELS[settings.integrator])
 
 
 __all__ = ["FORMULATIONS", "TREES", "Formulation", "compile_kernels", "formulate", "integrator"]

@@ -8,6 +8,8 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -69,6 +71,34 @@ def compiled_before(subpackage: str) -> bool:
     return not ENABLED or folder(subpackage).is_dir()
 
 
+@contextmanager
+def compiling_beside(module: str) -> Iterator[None]:
+    """While kernels are compiled here, have those of another module compiled too, by a process of their own."""
+    subpackage = module.removeprefix(f"{__package__}.").partition(".")[0]
+    if compiled_before(subpackage) or (os.cpu_count() or 1) < 2:
+        yield
+        return
+    _tell_of(subpackage)
+    process = subprocess.Popen(
+        [sys.executable, "-c", f"import {module}"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        yield
+    except BaseException:
+        process.terminate()
+        raise
+    finally:
+        process.wait()  # whatever became of it: what it has not compiled is compiled here
+
+
+def _tell_of(subpackage: str) -> None:
+    for tell in _listeners:
+        tell(f"compiling {_SUBJECTS.get(subpackage, 'the equations of motion')} (once on this machine)")
+
+
 def helper(function: F) -> F:
     """A function that kernels call; compiled within them."""
     return _njit(function) if ENABLED else function
@@ -103,8 +133,7 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
     before = numba.config.CACHE_DIR
     subpackage = function.__module__.removeprefix(f"{__package__}.").partition(".")[0]
     if not compiled_before(subpackage):
-        for tell in _listeners:
-            tell(f"compiling {_SUBJECTS.get(subpackage, 'the equations of motion')} (once on this machine)")
+        _tell_of(subpackage)
     numba.config.CACHE_DIR = str(folder(subpackage))
     try:
         return numba.njit(*signature, cache=True, error_model="numpy", nogil=True, **options)(function)
