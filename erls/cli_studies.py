@@ -211,7 +211,8 @@ def cost(
     integrators
         Ours and dop853 unless given.
     effects
-        Values of simulation.effects, separated by commas; all,auto unless given.
+        Values of simulation.effects, separated by commas; all,auto unless given, and, for links made of beams, all with
+        geometric stiffening and foreshortening.
     points
         Named points that the error is taken over; all unless given.
     norm

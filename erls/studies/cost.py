@@ -30,6 +30,7 @@ _SCIPY = ("rk45", "dop853", "radau", "bdf", "lsoda")
 _RELATIVE = tuple(10.0**-k for k in range(3, 11))
 _STEP_SHARES = tuple(2.0**-k for k in range(-3, 6))  # of the scene's own step
 _TOLERANCE_SHARES = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)  # of the tolerance asked for
+STIFFENED = "all,geometric_stiffening,foreshortening"
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,8 @@ def study_cost(
     begun = time.monotonic()
     kind = reference or default_reference(loaded)
     choose(kind, ("nodal", "tight"), "reference", SceneError)
-    rungs = _ladders(loaded, grid or Grid(), tolerance, min(modes.values(), default=0))
+    beams = default_reference(loaded) == "nodal"
+    rungs = ladders(loaded, grid or Grid(), tolerance, min(modes.values(), default=0), beams)
     total = len(REFERENCES[kind][1]) + len(rungs)
     truth = make_reference(path, loaded, tuple(overrides), kind, chosen, workers, lambda done, _: progress(done, total))
     fields = tuple(count_field(loaded, name) for name in modes)
@@ -177,8 +179,8 @@ def _check(value: float, name: str) -> None:
         raise SceneError(Cause.BAD_FIELD, message, where=name, value=value, remedy=remedy)
 
 
-def _ladders(scene: Scene, grid: Grid, tolerance: float, most: int) -> list[tuple[Setting, ...]]:
-    """All combinations of the grid, each from coarse to fine."""
+def ladders(scene: Scene, grid: Grid, tolerance: float, most: int, beams: bool) -> list[tuple[Setting, ...]]:
+    """All combinations of the grid, each from coarse to fine; for beams second-order displacements with all modes."""
     for integrator in grid.integrators:
         choose(integrator, INTEGRATORS, "integrators", SceneError)
     for formulation in grid.formulations:
@@ -190,11 +192,13 @@ def _ladders(scene: Scene, grid: Grid, tolerance: float, most: int) -> list[tupl
     counts: tuple[int | None, ...] = grid.modes or tuple(dict.fromkeys((None, most // 2, most // 4)))
     if not most:
         counts = (None,)
+    models = [(effects, count) for effects in grid.effects or ("all", "auto") for count in counts]
+    if beams and most and not grid.effects:
+        models.append((STIFFENED, counts[0]))
     return [
         tuple(Setting(formulation, integrator, effects, count, *rung) for rung in _rungs(scene, integrator, tolerance))
         for formulation in grid.formulations or ("erls", "ffr")
-        for effects in grid.effects or ("all", "auto")
-        for count in counts
+        for effects, count in models
         for integrator in grid.integrators or _default_integrators(scene)
     ]
 

@@ -42,10 +42,10 @@ def default_reference(scene: Scene) -> str:
 
 REFERENCES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "nodal": (
-        "nodal formulation, 16 and 8 elements per member with steps in the same ratio, extrapolated",
+        "nodal formulation, 32 and 16 elements per member with steps in the same ratio, extrapolated",
         (
+            ("simulation.formulation=nodal", "simulation.elements_per_member=32", "simulation.step=2.5e-4"),
             ("simulation.formulation=nodal", "simulation.elements_per_member=16", "simulation.step=5e-4"),
-            ("simulation.formulation=nodal", "simulation.elements_per_member=8", "simulation.step=1e-3"),
         ),
     ),
     "tight": (

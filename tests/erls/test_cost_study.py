@@ -18,9 +18,11 @@ from erls.cli import main
 from erls.errors import Cause, SceneError, SimulationError
 from erls.report.cost_page import cost_csv, cost_page, cost_text
 from erls.studies.cost import (
+    STIFFENED,
     CostStudy,
     Grid,
     cost_summary,
+    ladders,
     pareto_front,
     recommendation,
     study_cost,
@@ -102,6 +104,15 @@ def test_reports_agree_with_the_json(study: CostStudy) -> None:
     for found in (f"{study.front[0].error:.2e}", recommendation(study)):
         assert found in page
         assert found in text
+
+
+def test_what_is_tried_unless_given() -> None:
+    """Both formulations, all and half and a quarter of the modes, all and auto; for beams second order too."""
+    scene = erls.load_scene(scenes.ROOT / "data/l_shape/steel_flat.toml")
+    found = {(rungs[0].effects, rungs[0].modes) for rungs in ladders(scene, Grid(), 1e-4, 18, True)}
+    assert found == {(e, n) for e in ("all", "auto") for n in (None, 9, 4)} | {(STIFFENED, None)}
+    for grid, beams in ((Grid(), False), (Grid(effects=("all",)), True)):
+        assert all(rungs[0].effects != STIFFENED for rungs in ladders(scene, grid, 1e-4, 18, beams))
 
 
 def test_failures_stay_visible(tmp_path: Path) -> None:
