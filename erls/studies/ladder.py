@@ -151,7 +151,8 @@ def _measured(task: Ladder, setting: Setting, longest: float) -> CostPoint:
             run = simulate(scene, progress=watch)
             walls.append(run.wall_s)
     except _TooSlow:
-        return failed(setting, _over_budget(f"stopped after {longest:.0f} s: too slow for this study"))
+        why = "too slow for this study" if longest >= task.slowest else "the budget of the study was used up"
+        return failed(setting, _over_budget(f"stopped after {longest:.1f} s: {why}"))
     except ReportedError as problem:
         if problem.cause == Cause.INTERRUPTED:
             raise
