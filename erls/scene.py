@@ -5,7 +5,6 @@ Every record below is one table of the file; unknown keys are errors with a sugg
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +16,9 @@ from erls.errors import Cause, SceneError
 from erls.integrators import FIXED_STEP
 from erls.mechanism.drives import DriveRecord, FreeDrive
 from erls.scene_check import check_scene
+from erls.scene_overrides import apply_override
 from fe_import.link import Damping, Inertia, Vector
 from fe_import.toml_file import convert, read_toml
-
-_SHORT = {"effects": "simulation.effects"}
 
 
 class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -359,53 +357,3 @@ def _with_integrator(record: SceneRecord) -> SceneRecord:
 def is_body_scene(data: dict[str, Any]) -> bool:
     """Whether the tables of a scene file are those of `erls.body_scenes`."""
     return not {"bodies", "beams"}.isdisjoint(data) and {"joints", "links"}.isdisjoint(data)
-
-
-def apply_override(data: dict[str, Any], text: str) -> None:
-    """Set one KEY=VALUE in parsed TOML, as `load_scene` does.
-
-    Raises
-    ------
-    SceneError
-        No such place, or not of this form.
-    """
-    key, equals, value = text.partition("=")
-    where = f"--set {text}"
-    steps = _SHORT.get(key.strip(), key.strip()).split(".")
-    if not equals or not all(steps):
-        raise SceneError(
-            Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4"
-        )
-    try:
-        found = tomllib.loads(f"value = {value}")
-    except (ValueError, RecursionError):
-        found = {}
-    parsed = found["value"] if len(found) == 1 else value.strip()  # a bare word is a string
-    at: Any = data
-    for step, following in zip(steps, [*steps[1:], None], strict=True):
-        if isinstance(at, list):
-            names = [str(k) for k in range(len(at))]
-            names += [str(item["name"]) for item in at if isinstance(item, dict) and "name" in item]
-            named = [k for k, item in enumerate(at) if isinstance(item, dict) and item.get("name") == step]
-            place: Any = named[0] if named else int(step) if step in names[: len(at)] else None
-            if place is None:
-                known = ", ".join(names) or "none"
-                raise SceneError(
-                    Cause.BAD_REFERENCE,
-                    f"no member {step!r}",
-                    where=where,
-                    value=step,
-                    remedy=f"known: {known}",
-                )
-        elif isinstance(at, dict):
-            place = step
-            if following is not None:
-                at.setdefault(step, {})
-        else:
-            raise SceneError(
-                Cause.BAD_FIELD, f"{step!r} is not inside a table", where=where, remedy="check the key"
-            )
-        if following is None:
-            at[place] = parsed
-        else:
-            at = at[place]

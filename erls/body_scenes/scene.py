@@ -10,7 +10,8 @@ from typing import Any
 from erls.body_scenes.check import check_body_scene
 from erls.body_scenes.schema import BodySceneRecord
 from erls.errors import SceneError
-from erls.scene import apply_override, is_body_scene
+from erls.scene import is_body_scene
+from erls.scene_overrides import apply_override
 from fe_import.toml_file import convert, read_toml
 
 

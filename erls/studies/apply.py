@@ -9,7 +9,8 @@ import tomlkit
 
 from erls.errors import Cause, SceneError
 from erls.output_file import check_writable, replacing
-from erls.scene import apply_override, load_scene
+from erls.scene import load_scene
+from erls.scene_overrides import apply_override
 
 
 def check_copy(path: Path, scene: Path) -> None:
