@@ -117,7 +117,7 @@ def step_cost(chain: Erls | Ffr) -> float:
 
 def table(title: str, what: str, cases: dict[int, Erls | Ffr]) -> None:
     """Print costs with growth exponents."""
-    heads = "".join(f"{name:>12} {'exponent':>9}" for name in ("residual", "acceleration", "step"))
+    heads = "".join(f"{name:>13} {'exponent':>9}" for name in ("residual", "acceleration", "step"))
     print(f"\n{title}\n{what:>6} {heads} {'NumPy':>8}")
     before: tuple[int, tuple[float, ...]] | None = None
     for number, chain in cases.items():
@@ -127,7 +127,7 @@ def table(title: str, what: str, cases: dict[int, Erls | Ffr]) -> None:
         if before is not None:
             span = math.log(number / before[0])
             growth = [f"{math.log(a / b) / span:.2f}" for a, b in zip(now, before[1], strict=True)]
-        cells = "".join(f"{cost * 1e6:9.2f} µs {exponent:>9}" for cost, exponent in zip(now, growth, strict=True))
+        cells = "".join(f"{cost * 1e6:10.2f} µs {exponent:>9}" for cost, exponent in zip(now, growth, strict=True))
         print(f"{number:6d} {cells} {plain / residual:7.0f}x")
         before = number, now
 
