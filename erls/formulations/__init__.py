@@ -94,6 +94,8 @@ def compile_kernels(formulation: Formulation, settings: Simulation) -> None:
             compiled = getattr(solved(formulation), "compiled", None)
         if compiled is not None:
             import_module("erls.kernels.loops.steps" if tied else KERNELS[settings.integrator])
+    elif (compiled := getattr(solved(formulation), "compiled", None)) is not None:
+        compiled.load_acceleration()
 
 
 __all__ = ["FORMULATIONS", "TREES", "Formulation", "compile_kernels", "formulate", "integrator"]

@@ -109,7 +109,7 @@ def compile_loops(closed: ClosedChain, tree: Erls, chain: CompiledSystem, decay:
         residual=system.residual,
         mass_matrix=system.mass_matrix,
         stiffness_and_damping=system.stiffness_and_damping,
-        acceleration=system.acceleration,
+        load_acceleration=lambda: system.acceleration,
         conditions=m,
         kept=r,
     )

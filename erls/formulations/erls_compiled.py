@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.linalg as la
 
 from erls.formulations.packing import Packer, joint_numbers, step_parts
 from erls.kernels.chain import equations, layout
-from erls.kernels.contract import CompiledSystem
+from erls.kernels.contract import CompiledSystem, Factoring, acceleration_in
 from erls.lie.se3 import inverse, twist_transform
 from erls.lie.so3 import Array
 from erls.mechanism.joints import Joint
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
 _SAME = 1e-9  # relative: rigid-body modes are what they should be
 _PARALLEL = 1e-13  # sine of the angle between axes that count as one
+
+_MIXING = 0.1  # rate at which iterations converge that leave out how damping couples the coordinates of a link
+DENSE = 40  # coordinates up to which dense factors cost less than elimination link by link
 
 _EFFECTS = {
     layout.FIRST_ORDER: "inertia_first_order",
@@ -52,18 +57,57 @@ def _close(found: Array, expected: Array) -> bool:
     return bool(np.abs(found - expected).max(initial=0.0) <= _SAME * max(1.0, float(np.abs(expected).max(initial=0.0))))
 
 
+@dataclass(frozen=True)
+class ElasticBasis:
+    """Coordinates z of a link, q_d = V z, in which its elastic mass is 1 and its stiffness diagonal.
+
+    Attributes
+    ----------
+    vectors : (e, e) array
+        V.
+    stiffness, damping : (e,) arrays
+        Diagonals of Vᵀ K V, Vᵀ C V.
+    mixing : float
+        Bound on the spectral radius of D⁻¹ α (Vᵀ C V - its diagonal) for D = 1 + α diag(Vᵀ C V) + α² Vᵀ K V: of an
+        implicit integrator, whose α² has no negative real part, |D_i| is at least √2 |α| ω_i.
+    """
+
+    vectors: Array
+    stiffness: Array
+    damping: Array
+    mixing: float
+
+
+def elastic_basis(mass: Array, stiffness: Array, damping: Array) -> ElasticBasis:
+    """Of an elastic block (e, e) of the mass matrix, with diagonals (e,) of stiffness and damping."""
+    if not len(mass):
+        return ElasticBasis(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
+    squares, vectors = la.eigh(np.diag(stiffness), mass)
+    turned = vectors.T @ (damping[:, None] * vectors)
+    coupled = np.abs(turned - np.diag(np.diag(turned)))
+    if not coupled.any():
+        return ElasticBasis(vectors, squares, np.diag(turned), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        coupled /= np.sqrt(2 * np.sqrt(np.abs(np.outer(squares, squares))))
+    mixing = float(np.linalg.norm(coupled, 2)) if np.isfinite(coupled).all() else np.inf
+    return ElasticBasis(vectors, squares, np.diag(turned), mixing)
+
+
 def combined_modes(link: Link, own: Array) -> Array:
     """(m, m) the modes [ρ Ψ] of a link over its own, which leave its inboard interface where it is: ``own`` q = 0."""
     stay = -np.linalg.solve(own[:, :6], own[:, 6:])
     return np.hstack([link.invariants.rigid, np.vstack([stay, np.eye(link.elastic_modes)])])
 
 
-def compile_chain(chain: Erls) -> CompiledSystem | None:
+def compile_chain(chain: Erls, dense: int = DENSE) -> CompiledSystem | None:
     """The compiled form of a chain in the joint-angle gauge.
 
     Parameters
     ----------
     chain : Erls
+    dense : int
+        Coordinates up to which iteration matrices get dense factors. Beyond, they are solved link by link, with the
+        damping that couples elastic coordinates of a link left out of them where that hardly slows iterations down.
 
     Returns
     -------
@@ -81,7 +125,8 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
     header[layout.WEIGHT] = int(bool(np.any(mechanism.gravity)))
     axes_of = _rotation_axes(mechanism.joints)
     free = {int(k): i for i, k in enumerate(chain.free_joints)}
-    memory = 0
+    memory, mixing = 0, 0.0
+    shifted = sum(layout.memory_size(link.elastic_modes) for link in mechanism.links)
     for k, (link, joint, rows) in enumerate(
         zip(mechanism.links, mechanism.joints, chain.compatibility.rows, strict=True)
     ):
@@ -101,9 +146,11 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
             following = chain.compatibility.rows[k + 1].previous
             assert following is not None  # only the first joint sits on the ground
             out = twist_transform(inverse(mechanism.joints[k + 1].before)) @ following @ modes[:, 6:]
-        elastic_inverse = np.linalg.inv(mass[6:, 6:])
-        elastic_inverse = (elastic_inverse + elastic_inverse.T) / 2
-        towards, out_towards = mass[:6, 6:] @ elastic_inverse, out @ elastic_inverse
+        basis = elastic_basis(mass[6:, 6:], link.stiffness, link.damping)
+        mixing = max(mixing, basis.mixing)
+        rigid_basis, out_basis = mass[:6, 6:] @ basis.vectors, out @ basis.vectors
+        shares = rigid_basis @ rigid_basis.T, out_basis @ rigid_basis.T, out_basis @ out_basis.T
+        block = np.concatenate([part.ravel() for part in (np.ones(e), rigid_basis, out_basis, *shares)])
         drive = joint.drive
         record = {
             layout.MODES: e,
@@ -125,18 +172,26 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
             layout.OUT: pack.put_columns(out),
             layout.STIFFNESS: pack.put(link.stiffness),
             layout.DAMPING: pack.put(link.damping),
-            layout.INVERSE: pack.put(elastic_inverse),
-            layout.TOWARDS: pack.put(towards),
-            layout.OUT_TOWARDS: pack.put(out_towards),
-            layout.RIGID_SHARE: pack.put(towards @ mass[6:, :6]),
-            layout.CROSS_SHARE: pack.put(out_towards @ mass[6:, :6]),
-            layout.OUT_SHARE: pack.put(out_towards @ out.T),
+            layout.BASIS: pack.put(basis.vectors),
+            layout.OUT_BASIS: pack.put_columns(out_basis),
+            layout.RIGID_BASIS: pack.put_columns(rigid_basis),
+            layout.BASIS_STIFFNESS: pack.put(basis.stiffness),
+            layout.BASIS_DAMPING: pack.put(basis.damping),
+            layout.BLOCK: pack.put(block),
             layout.FORCES: pack.put(joint_numbers(joint.forces, drive, joint.rotor_inertia, joint.position)),
+            layout.SHIFTED: shifted,
         }
         for place, value in record.items():
             pack.integers[layout.HEADER + k * layout.RECORD + place] = value
         memory += layout.memory_size(e)
+        shifted += layout.block_size(e)
     header[layout.FEED_FORWARD] = int(chain.needs_feed_forward)
+    from_blocks = None
+    if chain.size > dense and mixing < _MIXING:
+        from erls.kernels.shifted import equations as linked  # here: it is compiled on its own
+
+        size = shifted + 3
+        from_blocks = Factoring(size, linked.factor, linked.solve, linked.factor_complex, linked.solve_complex)
     return CompiledSystem(
         size=chain.size,
         reals=pack.reals,
@@ -145,5 +200,6 @@ def compile_chain(chain: Erls) -> CompiledSystem | None:
         residual=equations.residual,
         mass_matrix=equations.mass_matrix,
         stiffness_and_damping=equations.stiffness_and_damping,
-        acceleration=equations.acceleration,
+        load_acceleration=acceleration_in("erls.kernels.chain.elimination"),
+        factoring=from_blocks,
     )

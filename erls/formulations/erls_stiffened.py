@@ -12,7 +12,7 @@ from erls.formulations.packing import Packer
 from erls.formulations.second_order import compliance
 from erls.formulations.second_order_compatibility import frame_second_order
 from erls.kernels.chain import layout as at
-from erls.kernels.contract import CompiledSystem
+from erls.kernels.contract import CompiledSystem, acceleration_in
 from erls.kernels.stiffened import equations
 from erls.kernels.stiffened import layout as more
 from erls.lie.se3 import inverse, twist_transform
@@ -138,5 +138,5 @@ def compile_stiffened(chain: Erls) -> CompiledSystem | None:
         residual=equations.residual,
         mass_matrix=equations.mass_matrix,
         stiffness_and_damping=equations.stiffness_and_damping,
-        acceleration=equations.acceleration,
+        load_acceleration=acceleration_in("erls.kernels.stiffened.elimination"),
     )

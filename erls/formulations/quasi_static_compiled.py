@@ -57,5 +57,5 @@ def compile_quasi_static(inner: CompiledSystem, outer: QuasiStatic) -> CompiledS
         residual=chain.residual,
         mass_matrix=chain.mass_matrix,
         stiffness_and_damping=chain.stiffness_and_damping,
-        acceleration=chain.acceleration,
+        load_acceleration=lambda: chain.acceleration,
     )

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 MAX_HALVINGS = 12
 MAX_ITERATIONS = 10
 REFRESH_COST = 4  # of a fresh iteration matrix, in residuals
+_OWN_REFRESH_COST = 1  # the same where the system has its own way of solving
 _ROUNDING = 16 * np.finfo(float).eps
 _SLOWEST_KNOWN, _FASTEST_TRUSTED = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
 _SINGULAR = "the iteration matrix is singular"
@@ -261,7 +262,7 @@ class _Compiled:
         counts = {
             loop.MAX_HALVINGS: MAX_HALVINGS,
             loop.MAX_ITERATIONS: MAX_ITERATIONS,
-            loop.REFRESH_COST: REFRESH_COST,
+            loop.REFRESH_COST: REFRESH_COST if system.factoring is None else _OWN_REFRESH_COST,
             loop.USUAL: MAX_ITERATIONS,
         }
         self.chunks = Chunks(system, known, counts, stepper.metres)

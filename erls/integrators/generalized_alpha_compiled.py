@@ -11,6 +11,7 @@ from erls.integrators.base import Array, Leg
 from erls.integrators.driver import Recorder
 from erls.kernels.contract import CompiledSystem
 from erls.kernels.stepping import generalized_alpha as loop
+from erls.kernels.stepping.absent import FACTORING
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts
 _SINGLE = 32  # first steps of an observed run, each looked at: a short run is seen step by step
@@ -34,7 +35,10 @@ class Chunks:
         self.system = system
         self.known, self.counts = np.zeros(loop.KNOWN), np.zeros(loop.COUNTS, dtype=np.int64)
         self.known[list(known)], self.counts[list(counts)] = list(known.values()), list(counts.values())
-        self.state, self.matrices = np.zeros((loop.STATE, n)), np.zeros((4, n, n))
+        self.factoring = system.factoring or FACTORING
+        self.own = np.zeros(self.factoring.size)
+        dense = 0 if self.factoring.size else n
+        self.state, self.matrices = np.zeros((loop.STATE, n)), np.zeros((4, dense, dense))
         self.state[loop.METRES], self.state[loop.PER_METRE] = metres, 1 / metres
         self.pivots = np.zeros(n, dtype=np.int64)
         self.steps = _FIRST
@@ -50,15 +54,18 @@ class Chunks:
             state[row] = start
         state[[loop.CHANGE, loop.GUESS]] = 0.0
         functions = self.system.residual, self.system.mass_matrix, self.system.stiffness_and_damping
+        own = self.factoring.factor, self.factoring.solve
         while counts[loop.AT] < counts[loop.TOTAL]:
             size = 1 if recorder.observed and recorder.steps < _SINGLE else self.steps
             times, knots = np.empty(size), np.empty((size, 3, self.system.size))
             begun = time.perf_counter()
             made = loop.advance(
                 *functions,
+                *own,
                 self.system.reals,
                 self.system.integers,
                 self.system.scratch,
+                self.own,
                 known,
                 counts,
                 state,

@@ -84,15 +84,20 @@ class _Run:
         from erls.integrators.uncompiled import uncompiled  # here: they import the compiler
         from erls.kernels.stepping import lobatto as loop
         from erls.kernels.stepping import stages as at
+        from erls.kernels.stepping.absent import FACTORING
 
         self.at, self.recorder, n = at, recorder, system.size
         compiled: CompiledSystem | None = getattr(system, "compiled", None)
         self.system = compiled or uncompiled(system)
         self.step = loop.advance if compiled else getattr(loop.advance, "py_func", loop.advance)
         self.chunk, self.largest_chunk = (8, 4096) if compiled else (1, 1)  # steps
+        self.factoring = own = self.system.factoring or FACTORING
+        self.solving = own.factor, own.solve, own.factor_complex, own.solve_complex
+        self.mixed = np.zeros(n, dtype=complex)
         self.coefficients = _coefficients()
         self.stages, self.last = np.zeros((4, 3, n)), np.zeros((4, 3, n))
-        self.matrices = np.zeros((at.SOLVERS + 4, n, n))
+        self.own = np.zeros((3, self.factoring.size)), np.zeros((2, self.factoring.size), dtype=complex)
+        self.matrices = np.zeros((at.SOLVERS + (0 if self.factoring.size else 4), n, n))
         self.vectors = np.zeros((at.RESIDUALS + 6, n))
         self.vectors[at.METRES] = metre_scales(system)
         self.known, self.counts = np.zeros(at.KNOWN), np.zeros(at.COUNTS, dtype=np.int64)
@@ -133,9 +138,12 @@ class _Run:
                 system.residual,
                 system.mass_matrix,
                 system.stiffness_and_damping,
+                *self.solving,
                 system.reals,
                 system.integers,
                 system.scratch,
+                *self.own,
+                self.mixed,
                 self.known,
                 counts,
                 self.coefficients,

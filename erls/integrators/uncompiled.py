@@ -33,7 +33,7 @@ def uncompiled(system: SecondOrderSystem) -> CompiledSystem:
 
     empty = np.zeros(0)
     return CompiledSystem(
-        system.size, empty, none, empty, residual, mass_matrix, stiffness_and_damping, acceleration
+        system.size, empty, none, empty, residual, mass_matrix, stiffness_and_damping, lambda: acceleration
     )
 
 

@@ -24,6 +24,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _PART = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
 _SUBJECTS = {"deviation": "the certificate of what auto leaves out", "stepping": "the integrators"}
 _listeners: list[Callable[[str], None]] = []
+_told: set[str] = set()  # subpackages
 ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
 
 
@@ -95,8 +96,16 @@ def compiling_beside(module: str) -> Iterator[None]:
 
 
 def _tell_of(subpackage: str) -> None:
+    if subpackage in _told:
+        return
+    _told.add(subpackage)
     for tell in _listeners:
         tell(f"compiling {_SUBJECTS.get(subpackage, 'the equations of motion')} (once on this machine)")
+
+
+def _on_disk(subpackage: str, function: Any) -> bool:
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-{function.__code__.co_firstlineno}"
+    return any(folder(subpackage).glob(f"*/{name}.*"))
 
 
 def helper(function: F) -> F:
@@ -132,7 +141,7 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
 
     before = numba.config.CACHE_DIR
     subpackage = function.__module__.removeprefix(f"{__package__}.").partition(".")[0]
-    if not compiled_before(subpackage):
+    if signature and not _on_disk(subpackage, function):
         _tell_of(subpackage)
     numba.config.CACHE_DIR = str(folder(subpackage))
     try:

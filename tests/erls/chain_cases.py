@@ -12,6 +12,7 @@ import scenes
 
 from erls.effects import EFFECTS
 from erls.formulations.erls import Erls
+from erls.formulations.erls_compiled import compile_chain
 from erls.kernels.contract import CompiledSystem
 
 INERTIAL = [name for name, effect in EFFECTS.items() if effect.in_equations]
@@ -134,6 +135,30 @@ def evaluate(system: CompiledSystem, at: State) -> dict[str, np.ndarray]:
     return found
 
 
+SHIFTS = {"real": (3e-3, 8e-6), "complex": (3e-3 * (0.14 + 0.13j), (3e-3 * (0.14 + 0.13j)) ** 2)}
+
+
+def solved(chain: Erls, at: State) -> dict[str, np.ndarray]:
+    """(M + α C + β K)⁻¹ a, link by link, twice with other factors in between."""
+    system = compile_chain(chain, dense=0)
+    assert system is not None
+    assert system.factoring is not None
+    ways = {
+        "real": (float, system.factoring.factor, system.factoring.solve),
+        "complex": (complex, system.factoring.factor_complex, system.factoring.solve_complex),
+    }
+    result = {}
+    for kind, (dtype, factor, solve) in ways.items():
+        factors = np.zeros(system.factoring.size, dtype=dtype)
+        for alpha, beta, y in ((0.0, 0.0, 0 * at.y), (*SHIFTS[kind], 0 * at.y), (*SHIFTS[kind], at.y)):
+            state = at.t, y, at.v, dtype(alpha), dtype(beta)
+            status = factor(system.reals, system.integers, system.scratch, *state, factors)
+        assert status == 0
+        result[kind] = at.a.astype(dtype)
+        solve(system.reals, system.integers, factors, result[kind])
+    return result
+
+
 def all_results(folder: Path) -> dict[str, np.ndarray]:
     """Every function in every case and state, by 'case/state/function'."""
     result = {}
@@ -143,6 +168,8 @@ def all_results(folder: Path) -> dict[str, np.ndarray]:
         for k, at in enumerate(states(chain, name)):
             for what, values in evaluate(chain.compiled, at).items():
                 result[f"{name}/{k}/{what}"] = values
+            if k:
+                result.update({f"{name}/solved {kind}": x for kind, x in solved(chain, at).items()})
     return result
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from erls.formulations.ffr.interface_motion import InterfaceMotion
 from erls.formulations.ffr.second_order import SecondOrderData
 from erls.formulations.packing import Packer, joint_numbers, step_parts
-from erls.kernels.contract import CompiledSystem
+from erls.kernels.contract import CompiledSystem, acceleration_in
 from erls.kernels.ffr import equations, layout
 from erls.lie.so3 import Array
 
@@ -132,5 +132,5 @@ def compile_frames(chain: Ffr) -> CompiledSystem:
         residual=equations.residual,
         mass_matrix=equations.mass_matrix,
         stiffness_and_damping=equations.stiffness_and_damping,
-        acceleration=equations.acceleration,
+        load_acceleration=acceleration_in("erls.kernels.ffr.solve"),
     )

@@ -6,7 +6,22 @@ from erls.kernels import contract
 from erls.kernels.chain import layout as at
 from erls.kernels.chain.drives import feed_forward, gains, wanted
 from erls.kernels.contract import Array, IntArray
-from erls.kernels.jit import kernel
+from erls.kernels.jit import kernel, part
+
+
+@part
+def joint_gains(
+    reals: Array, integers: IntArray, scratch: Array, record: int, t: float, angle: float, rate: float
+) -> tuple[float, float]:
+    """Stiffness and damping along a joint on which forces act, after `feed_forward`."""
+    stiffness, damping = gains(reals, integers, record, rate)
+    memory, forces = integers[record + at.MEMORY], integers[record + at.FORCES]
+    state = scratch[memory : memory + at.VECTORS]
+    state[at.ANGLE], state[at.ANGLE + 1] = angle, rate
+    if abs(wanted(reals, integers, record, t, state)) > reals[forces + at.LIMIT]:  # the motor gives no more
+        stiffness -= reals[forces + at.GAIN]
+        damping -= reals[forces + at.RATE_GAIN]
+    return stiffness, damping
 
 
 @kernel(contract.STIFFNESS_AND_DAMPING, counted=False)
@@ -26,10 +41,5 @@ def stiffness_and_damping(
             c[first + i, first + i] = reals[integers[record + at.DAMPING] + i]
         joint = integers[record + at.JOINT]
         if joint >= 0 and integers[record + at.EFFORT]:
-            k[joint, joint], c[joint, joint] = gains(reals, integers, record, v[joint])
-            memory, forces = integers[record + at.MEMORY], integers[record + at.FORCES]
-            state = scratch[memory : memory + at.VECTORS]
-            state[at.ANGLE], state[at.ANGLE + 1] = y[joint], v[joint]
-            if abs(wanted(reals, integers, record, t, state)) > reals[forces + at.LIMIT]:  # the motor gives no more
-                k[joint, joint] -= reals[forces + at.GAIN]
-                c[joint, joint] -= reals[forces + at.RATE_GAIN]
+            stiffness, damping = joint_gains(reals, integers, scratch, record, t, y[joint], v[joint])
+            k[joint, joint], c[joint, joint] = stiffness, damping

@@ -7,6 +7,8 @@ column after column, in the order X q needs them.
 
 from __future__ import annotations
 
+from erls.kernels.jit import part
+
 # header of integers
 LINKS = 0
 FIRST_ORDER = 1  # effects, 0 or 1
@@ -39,14 +41,16 @@ Z = 15  # for each pair of axes (n, n), symmetric part: 1, or (00, 11, 22, 01, 0
 OUT = 16  # (e, 6) C, column after column
 STIFFNESS = 17  # (e,)
 DAMPING = 18  # (e,)
-INVERSE = 19  # (e, e) inverse of the elastic block of the mass matrix M_ee
-TOWARDS = 20  # (6, e) M_re M_ee⁻¹
-OUT_TOWARDS = 21  # (6, e) C M_ee⁻¹
-RIGID_SHARE = 22  # (6, 6) M_re M_ee⁻¹ M_er
-CROSS_SHARE = 23  # (6, 6) C M_ee⁻¹ M_er
-OUT_SHARE = 24  # (6, 6) C M_ee⁻¹ Cᵀ
+BASIS = 19  # (e, e) V, row after row: Vᵀ M_ee V = 1 and Vᵀ K V is diagonal
+OUT_BASIS = 20  # (e, 6) C V, column after column
+RIGID_BASIS = 21  # (e, 6) M_re V, column after column
+BASIS_STIFFNESS = 22  # (e,) of Vᵀ K V
+BASIS_DAMPING = 23  # (e,) of Vᵀ C V
+BLOCK = 24  # what belongs to the elastic block of the mass matrix, see below
 FORCES = 25  # of the joint, see below
-RECORD = 26
+# ... and in the memory of `erls.kernels.shifted`
+SHIFTED = 26  # the same for the mass matrix with stiffness and damping
+RECORD = 27
 
 # joint forces in reals
 SPRING, REST, DAMPER, FRICTION, TRANSITION, ROTOR, GAIN, RATE_GAIN, LIMIT, HELD = range(10)
@@ -76,9 +80,12 @@ MOVE = 282  # (9,) acceleration of (w, ω)
 EFFECTIVE = 291  # inertia along the joint
 OUTPUT = 292  # (6, 9) and (6,): C q̈ = OUTPUT (ẇ, ω̇) + OUTPUT_FREE
 OUTPUT_FREE = 346
-SQUARE = 352  # (6, 16) of the equations for those
-PRODUCT = 448  # (9, 9)
-VECTORS = 529  # from here, vectors of n: see motion and forces
+SQUARE = 352  # (6, 12) of the equations for those, and the inverse
+BOUND = 424  # (6, 9) C V D⁻¹ B
+PRODUCT = 478  # (9, 9)
+GIVEN = 559  # (6,) right side for OUTPUT_FREE
+RESISTANCE = 565  # what stiffness and damping add to the inertia along the joint; 0 in scratch
+VECTORS = 566  # from here, vectors of n: see motion and forces
 # each of n
 Q, Q_RATE, Q_ACCELERATION, MODAL, X_Q, X_RATE, Z_Q, RELAXED, COLUMN = 0, 1, 2, 3, 4, 7, 10, 16, 19
 VECTOR_COUNT = 28
@@ -87,3 +94,39 @@ VECTOR_COUNT = 28
 def memory_size(modes: int) -> int:
     """Working memory of a link with so many elastic modes."""
     return VECTORS + VECTOR_COUNT * (6 + modes)
+
+
+# what belongs to a diagonal D of the elastic block, from the place that BLOCK or SHIFTED names: (e,) D⁻¹, and then
+@part
+def towards(modes: int) -> int:
+    """(6, e) M_re V D⁻¹."""
+    return modes
+
+
+@part
+def out_towards(modes: int) -> int:
+    """(6, e) C V D⁻¹."""
+    return 7 * modes
+
+
+@part
+def rigid_share(modes: int) -> int:
+    """(6, 6) M_re V D⁻¹ (M_re V)ᵀ."""
+    return 13 * modes
+
+
+@part
+def cross_share(modes: int) -> int:
+    """(6, 6) C V D⁻¹ (M_re V)ᵀ."""
+    return 13 * modes + 36
+
+
+@part
+def out_share(modes: int) -> int:
+    """(6, 6) C V D⁻¹ (C V)ᵀ."""
+    return 13 * modes + 72
+
+
+def block_size(modes: int) -> int:
+    """Numbers of all of these."""
+    return 13 * modes + 108

@@ -17,6 +17,17 @@ def add_columns(matrix: Array, at: int, size: int, x: Array, count: int, factor:
 
 
 @reordered
+def rows_times(matrix: Array, at: int, size: int, x: Array, out: Array) -> None:
+    """out (size,) is a square matrix, row after row from ``at``, times x."""
+    for i in range(size):
+        row = matrix[at + i * size : at + (i + 1) * size]
+        total = 0.0
+        for j in range(size):
+            total += row[j] * x[j]
+        out[i] = total
+
+
+@reordered
 def add_symmetric(matrix: Array, at: int, size: int, x: Array, start: int, out: Array) -> None:
     """Add to out (size,) a symmetric matrix times x (size,) whose entries before ``start`` are zero.
 

@@ -1,7 +1,9 @@
 """The steps of generalized-α over a compiled system: the algorithm of `erls.integrators.generalized_alpha`.
 
 ``advance`` makes as many steps as there is room for knots, or until the leg ends or fails, and leaves everything that
-the next call needs in its arguments: numbers in ``known``, counts in ``counts``, vectors in the rows of ``state``.
+the next call needs in its arguments: numbers in ``known``, counts in ``counts``, vectors in the rows of ``state``. A
+system's own way of solving serves where it has one, with its factors in ``own``; otherwise that is empty, and dense
+factors are made in ``matrices``.
 """
 
 from __future__ import annotations
@@ -40,8 +42,11 @@ if ENABLED:
         contract.pointer(contract.RESIDUAL),
         contract.pointer(contract.MASS_MATRIX),
         contract.pointer(contract.STIFFNESS_AND_DAMPING),
+        contract.pointer(contract.FACTOR),
+        contract.pointer(contract.SOLVE),
         contract.REALS,
         contract.INTEGERS,
+        contract.REALS,
         contract.REALS,
         contract.REALS,
         contract.INTEGERS,
@@ -147,9 +152,11 @@ def predict(known: Array, state: Array) -> None:
 def refresh(
     mass_matrix: Callable[..., None],
     stiffness_and_damping: Callable[..., None],
+    own_factor: Callable[..., int],
     reals: Array,
     integers: IntArray,
     scratch: Array,
+    own: Array,
     t: float,
     known: Array,
     counts: IntArray,
@@ -157,17 +164,21 @@ def refresh(
     matrices: Array,
     pivots: IntArray,
 ) -> bool:
-    """Factor S, scaled to newtons per metre, at Y1, V1; False when it is singular or not finite."""
+    """Factor S at Y1, V1, scaled to newtons per metre, or S / β' in the system's own way; False when it is singular."""
     n = state.shape[1]
-    matrix, stiffness, damping, factors = matrices[0], matrices[1], matrices[2], matrices[3]
-    stiffness_and_damping(reals, integers, scratch, t, state[Y1], state[V1], stiffness, damping)
-    mass_matrix(reals, integers, scratch, t, state[Y1], matrix)
-    per = state[PER_METRE]
-    for i in range(n):
-        for j in range(n):
-            entry = known[TO_A] * matrix[i, j] + known[TO_V] * damping[i, j] + stiffness[i, j]
-            factors[j, i] = per[i] * entry * per[j]
-    info = factor(factors, pivots)
+    if len(own) > 0:
+        alpha, beta = known[TO_V] / known[TO_A], 1 / known[TO_A]
+        info = own_factor(reals, integers, scratch, t, state[Y1], state[V1], alpha, beta, own)
+    else:
+        matrix, stiffness, damping, factors = matrices[0], matrices[1], matrices[2], matrices[3]
+        stiffness_and_damping(reals, integers, scratch, t, state[Y1], state[V1], stiffness, damping)
+        mass_matrix(reals, integers, scratch, t, state[Y1], matrix)
+        per = state[PER_METRE]
+        for i in range(n):
+            for j in range(n):
+                entry = known[TO_A] * matrix[i, j] + known[TO_V] * damping[i, j] + stiffness[i, j]
+                factors[j, i] = per[i] * entry * per[j]
+        info = factor(factors, pivots)
     counts[FACTORIZATIONS] += 1
     counts[FACTORED] = 1 if info == 0 else 0
     known[RATE], counts[USUAL], counts[EXCESS] = known[SLOWEST], counts[MAX_ITERATIONS], 0
@@ -181,14 +192,16 @@ def refresh(
 @part
 def iterate(
     residual: Callable[..., None],
+    own_solve: Callable[..., None],
     reals: Array,
     integers: IntArray,
     scratch: Array,
+    own: Array,
     t: float,
     known: Array,
     counts: IntArray,
     state: Array,
-    factors: Array,
+    matrices: Array,
     pivots: IntArray,
 ) -> bool:
     """Chord iteration on Y1, V1, ACC1; True when the remaining error is estimated within tolerance."""
@@ -207,9 +220,16 @@ def iterate(
         counts[RHS_CALLS] += 1
         counts[ITERATIONS] += 1
         residual(reals, integers, scratch, t, y, v, acc, out)
-        for i in range(n):
-            correction[i] = out[i] * per_metre[i]
-        back_solve(factors, pivots, correction)
+        if len(own) > 0:
+            for i in range(n):
+                correction[i] = out[i] / known[TO_A]
+            own_solve(reals, integers, own, correction)
+            for i in range(n):
+                correction[i] *= metres[i]
+        else:
+            for i in range(n):
+                correction[i] = out[i] * per_metre[i]
+            back_solve(matrices[3], pivots, correction)
         size, total = 0.0, 0.0
         for i in range(n):
             size = max(size, abs(correction[i]))
@@ -251,9 +271,12 @@ def solve(
     residual: Callable[..., None],
     mass_matrix: Callable[..., None],
     stiffness_and_damping: Callable[..., None],
+    own_factor: Callable[..., int],
+    own_solve: Callable[..., None],
     reals: Array,
     integers: IntArray,
     scratch: Array,
+    own: Array,
     t: float,
     known: Array,
     counts: IntArray,
@@ -266,10 +289,22 @@ def solve(
     while True:
         predict(known, state)
         if fresh and not refresh(
-            mass_matrix, stiffness_and_damping, reals, integers, scratch, t, known, counts, state, matrices, pivots
+            mass_matrix,
+            stiffness_and_damping,
+            own_factor,
+            reals,
+            integers,
+            scratch,
+            own,
+            t,
+            known,
+            counts,
+            state,
+            matrices,
+            pivots,
         ):
             return False
-        if iterate(residual, reals, integers, scratch, t, known, counts, state, matrices[3], pivots):
+        if iterate(residual, own_solve, reals, integers, scratch, own, t, known, counts, state, matrices, pivots):
             return True
         if fresh:
             return False
@@ -296,9 +331,12 @@ def advance(
     residual: Callable[..., None],
     mass_matrix: Callable[..., None],
     stiffness_and_damping: Callable[..., None],
+    own_factor: Callable[..., int],
+    own_solve: Callable[..., None],
     reals: Array,
     integers: IntArray,
     scratch: Array,
+    own: Array,
     known: Array,
     counts: IntArray,
     state: Array,
@@ -324,9 +362,12 @@ def advance(
             residual,
             mass_matrix,
             stiffness_and_damping,
+            own_factor,
+            own_solve,
             reals,
             integers,
             scratch,
+            own,
             min(t, known[LAST]),
             known,
             counts,

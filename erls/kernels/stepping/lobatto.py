@@ -31,6 +31,8 @@ from erls.kernels.stepping.stages import (
     INACCURATE,
     ITERATIONS,
     KEPT,
+    LAMBDA_IM,
+    LAMBDA_RE,
     LARGEST,
     LAST,
     MASS,
@@ -68,6 +70,7 @@ from erls.kernels.stepping.stages import (
     halfway,
     is_diagonal,
     judge,
+    pairs,
     transpose,
 )
 
@@ -80,9 +83,16 @@ if ENABLED:
         contract.pointer(contract.RESIDUAL),
         contract.pointer(contract.MASS_MATRIX),
         contract.pointer(contract.STIFFNESS_AND_DAMPING),
+        contract.pointer(contract.FACTOR),
+        contract.pointer(contract.SOLVE),
+        contract.pointer(contract.FACTOR_COMPLEX),
+        contract.pointer(contract.SOLVE_COMPLEX),
         contract.REALS,
         contract.INTEGERS,
         contract.REALS,
+        contract.MATRIX,
+        _t.complex128[:, ::1],
+        contract.COMPLEX,
         contract.REALS,
         contract.INTEGERS,
         _CUBE,
@@ -196,9 +206,16 @@ def advance(
     residual: Callable[..., None],
     mass_matrix: Callable[..., None],
     stiffness_and_damping: Callable[..., None],
+    own_factor: Callable[..., int],
+    own_solve: Callable[..., None],
+    own_factor_complex: Callable[..., int],
+    own_solve_complex: Callable[..., None],
     reals: Array,
     integers: IntArray,
     scratch: Array,
+    own: Array,
+    own_complex: Any,
+    mixed: Any,
     known: Array,
     counts: IntArray,
     coefficients: Array,
@@ -217,6 +234,7 @@ def advance(
         Number of knots made; -1 - that number when no step is small enough to go on.
     """
     made, m, nodes = 0, stages.shape[0] - 1, coefficients[ROWS, NODES]
+    way = reals, integers, own, own_complex, mixed
     factored = known[BEFORE] if counts[FACTORED] else 0.0  # the step of the present factors
     while made + m <= len(times) and known[T] < known[END]:
         choose_step(known)
@@ -236,14 +254,27 @@ def advance(
                 transpose(matrices[DAMPING])
                 diagonal = is_diagonal(matrices[STIFFNESS]) and is_diagonal(matrices[DAMPING])
                 counts[DIAGONAL] = 1 if diagonal else 0
-                status = factor(h, coefficients, matrices)
+                if own.shape[1] > 0:
+                    y, v = stages[1, 0], stages[0, 1]
+                    status = own_factor(reals, integers, scratch, at, y, v, h, h * h, own[0])
+                    for k in range(pairs(m)):
+                        p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
+                        if status == 0 and q == 0.0:
+                            status = own_factor(reals, integers, scratch, at, y, v, p, p * p, own[k + 1])
+                        elif status == 0:
+                            shift = p + 1j * q
+                            status = own_factor_complex(
+                                reals, integers, scratch, at, y, v, shift, shift * shift, own_complex[k]
+                            )
+                else:
+                    status = factor(h, coefficients, matrices)
                 counts[FACTORIZATIONS] += 1
                 known[RATE], counts[USUAL], counts[EXCESS] = SLOWEST, counts[MAX_ITERATIONS], 0
                 factored = h
                 if status != 0:
                     counts[SUSPECT] = status - 1
                     break
-            foretell(known, counts, coefficients, stages, last, matrices, vectors)
+            foretell(known, counts, coefficients, stages, last, matrices, vectors, own_solve, own_solve_complex, way)
             rounding = known[ROUNDING] * farthest(stages, vectors[METRES])
             goal, before, earlier, verdict = known[GOAL] + rounding, 0.0, 0.0, 0
             for k in range(1, counts[MAX_ITERATIONS] + 1):
@@ -253,7 +284,7 @@ def advance(
                     residual(reals, integers, scratch, at, y, v, a, vectors[RESIDUALS + i - 1])
                     counts[RHS_CALLS] += 1
                 counts[ITERATIONS] += 1
-                size = correct(h, coefficients, stages, matrices, vectors)
+                size = correct(h, coefficients, stages, matrices, vectors, own_solve, own_solve_complex, way)
                 if not math.isfinite(size):
                     verdict = -2
                     break
@@ -275,7 +306,9 @@ def advance(
             counts[SUSPECT] = largest_entry(vectors[RESIDUALS + m], vectors[METRES])
             going = retry(known, counts, SLOW, 0.5)
         else:
-            error = judge(h, coefficients, stages, matrices, vectors) / known[TOLERANCE]
+            error = (
+                judge(h, coefficients, stages, matrices, vectors, own_solve, own_solve_complex, way) / known[TOLERANCE]
+            )
             scale = min(GROWTH, max(SHRINK, SAFETY * max(error, 1e-12) ** (-1.0 / (m + 2))))
             if error > 1.0:
                 counts[SUSPECT] = largest_entry(vectors[PART_IM], vectors[METRES])

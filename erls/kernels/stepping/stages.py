@@ -1,12 +1,17 @@
 """The stages of a step of Lobatto IIIA: their start, iteration, factors and error (`erls.kernels.stepping.lobatto`).
 
 Arrays: numbers in ``known``, counts in ``counts``; ``stages`` and ``last`` (stages + 1, 3, n) hold y, v, a at the nodes
-of the present and of the last step; ``coefficients``, ``matrices`` and ``vectors`` are named below.
+of the present and of the last step; ``coefficients``, ``matrices`` and ``vectors`` are named below. ``own_solve`` and
+``own_solve_complex`` are the system's way of solving (`erls.kernels.contract.Factoring`), ``way`` what they need: its
+constants, factors in real and in complex numbers, room for n complex numbers. Without such factors, ``matrices`` holds
+dense ones.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from erls.kernels.contract import Array, IntArray
 from erls.kernels.jit import helper, part
@@ -39,7 +44,16 @@ KEPT, WORTH = 0.95, 1.2  # bounds on a change of the step that is not worth new 
 
 @helper
 def foretell(
-    known: Array, counts: IntArray, coefficients: Array, stages: Array, last: Array, matrices: Array, vectors: Array
+    known: Array,
+    counts: IntArray,
+    coefficients: Array,
+    stages: Array,
+    last: Array,
+    matrices: Array,
+    vectors: Array,
+    own_solve: Callable[..., None],
+    own_solve_complex: Callable[..., None],
+    way: Any,
 ) -> None:
     """Stages from the polynomial through the last ones, made to fulfil the linear part of the equations.
 
@@ -78,7 +92,7 @@ def foretell(
                     out[q] += matrix[q, q] * difference[q]
             else:
                 add_product(matrices[kind], difference, out)
-    correct(h, coefficients, stages, matrices, vectors)
+    correct(h, coefficients, stages, matrices, vectors, own_solve, own_solve_complex, way)
 
 
 @part
@@ -99,8 +113,51 @@ def combine(h: float, coefficients: Array, stages: Array) -> None:
                 v_out[q] += to_v * a[q]
 
 
+@part
+def pairs(stages: int) -> int:
+    """Eigenvalues, of which conjugate ones count once."""
+    return (stages + 1) // 2
+
+
 @helper
-def correct(h: float, coefficients: Array, stages: Array, matrices: Array, vectors: Array) -> float:
+def solve(
+    k: int,
+    real: bool,
+    matrices: Array,
+    re: Array,
+    im: Array,
+    own_solve: Callable[..., None],
+    own_solve_complex: Callable[..., None],
+    way: Any,
+) -> None:
+    """Replace re + i im by the solution with the matrix of eigenvalue k, or with the filter where k is -1."""
+    reals, integers, own, own_complex, mixed = way
+    if own.shape[1] > 0:
+        if real:
+            own_solve(reals, integers, own[k + 1], re)
+        else:
+            for i in range(len(re)):
+                mixed[i] = re[i] + 1j * im[i]
+            own_solve_complex(reals, integers, own_complex[k], mixed)
+            for i in range(len(re)):
+                re[i], im[i] = mixed[i].real, mixed[i].imag
+    elif real:
+        solve_real(matrices[FILTER if k < 0 else SOLVERS + 2 * k], re)
+    else:
+        solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
+
+
+@helper
+def correct(
+    h: float,
+    coefficients: Array,
+    stages: Array,
+    matrices: Array,
+    vectors: Array,
+    own_solve: Callable[..., None],
+    own_solve_complex: Callable[..., None],
+    way: Any,
+) -> float:
     """One iteration from the residuals of the stages; the largest change of a position, and of h v [metres]."""
     m, n = stages.shape[0] - 1, stages.shape[2]
     re, im = vectors[PART_RE], vectors[PART_IM]
@@ -110,7 +167,7 @@ def correct(h: float, coefficients: Array, stages: Array, matrices: Array, vecto
     for j in range(m):
         for i in range(n):
             changes[j, i] = 0.0
-    for k in range((matrices.shape[0] - SOLVERS) // 2):
+    for k in range(pairs(m)):
         re[:] = 0.0
         im[:] = 0.0
         for j in range(m):
@@ -118,10 +175,7 @@ def correct(h: float, coefficients: Array, stages: Array, matrices: Array, vecto
             for i in range(n):
                 re[i] += p * out[i]
                 im[i] += q * out[i]
-        if coefficients[ROWS, LAMBDA_IM, k] == 0.0:
-            solve_real(matrices[SOLVERS + 2 * k], re)
-        else:
-            solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
+        solve(k, coefficients[ROWS, LAMBDA_IM, k] == 0.0, matrices, re, im, own_solve, own_solve_complex, way)
         for j in range(m):
             p, q, change = back_re[j, k], back_im[j, k], changes[j]
             for i in range(n):
@@ -151,14 +205,14 @@ def correct(h: float, coefficients: Array, stages: Array, matrices: Array, vecto
 
 @helper
 def factor(h: float, coefficients: Array, matrices: Array) -> int:
-    """Factors for steps of ``h``; 0, or 1 + the coordinate at which elimination broke down."""
+    """Dense factors for steps of ``h``; 0, or 1 + the coordinate at which elimination broke down."""
     n = matrices.shape[1]
     mass, damping, stiffness, real = matrices[MASS], matrices[DAMPING], matrices[STIFFNESS], matrices[FILTER]
     for i in range(n):
         for j in range(n):
             real[i, j] = mass[i, j] + h * damping[i, j] + h * h * stiffness[i, j]
     status = factor_real(real)
-    for k in range((matrices.shape[0] - SOLVERS) // 2):
+    for k in range(pairs(coefficients[RATES].shape[0] - 1)):
         p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
         pp, qq = p * p - q * q, 2 * p * q
         re, im = matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1]
@@ -196,7 +250,16 @@ def transpose(matrix: Array) -> None:
 
 
 @helper
-def judge(h: float, coefficients: Array, stages: Array, matrices: Array, vectors: Array) -> float:
+def judge(
+    h: float,
+    coefficients: Array,
+    stages: Array,
+    matrices: Array,
+    vectors: Array,
+    own_solve: Callable[..., None],
+    own_solve_complex: Callable[..., None],
+    way: Any,
+) -> float:
     """Estimated error of a step [metres]: (M + h C + h² K)⁻¹ M h² times the highest difference of the accelerations."""
     m, n = stages.shape[0] - 1, stages.shape[2]
     weights, metres = coefficients[ROWS, DIFFERENCE], vectors[METRES]
@@ -208,7 +271,7 @@ def judge(h: float, coefficients: Array, stages: Array, matrices: Array, vectors
         difference[q] = h * h * total
         error[q] = 0.0
     add_product(matrices[MASS], difference, error)
-    solve_real(matrices[FILTER], error)
+    solve(-1, True, matrices, error, difference, own_solve, own_solve_complex, way)
     largest = 0.0
     for q in range(n):
         largest = max(largest, metres[q] * abs(error[q]))
