@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.linalg as la
 
+from erls.formulations.elastic_basis import MIXING, elastic_basis
 from erls.formulations.packing import Packer, joint_numbers, step_parts
 from erls.kernels.chain import equations, layout
 from erls.kernels.contract import CompiledSystem, Factoring, acceleration_in
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 _SAME = 1e-9  # relative: rigid-body modes are what they should be
 _PARALLEL = 1e-13  # sine of the angle between axes that count as one
 
-_MIXING = 0.1  # rate at which iterations converge that leave out how damping couples the coordinates of a link
 DENSE = 40  # coordinates up to which dense factors cost less than elimination link by link
 
 _EFFECTS = {
@@ -55,42 +53,6 @@ def _rotation_axes(joints: tuple[Joint, ...]) -> list[Array]:
 
 def _close(found: Array, expected: Array) -> bool:
     return bool(np.abs(found - expected).max(initial=0.0) <= _SAME * max(1.0, float(np.abs(expected).max(initial=0.0))))
-
-
-@dataclass(frozen=True)
-class ElasticBasis:
-    """Coordinates z of a link, q_d = V z, in which its elastic mass is 1 and its stiffness diagonal.
-
-    Attributes
-    ----------
-    vectors : (e, e) array
-        V.
-    stiffness, damping : (e,) arrays
-        Diagonals of Vᵀ K V, Vᵀ C V.
-    mixing : float
-        Bound on the spectral radius of D⁻¹ α (Vᵀ C V - its diagonal) for D = 1 + α diag(Vᵀ C V) + α² Vᵀ K V: of an
-        implicit integrator, whose α² has no negative real part, |D_i| is at least √2 |α| ω_i.
-    """
-
-    vectors: Array
-    stiffness: Array
-    damping: Array
-    mixing: float
-
-
-def elastic_basis(mass: Array, stiffness: Array, damping: Array) -> ElasticBasis:
-    """Of an elastic block (e, e) of the mass matrix, with diagonals (e,) of stiffness and damping."""
-    if not len(mass):
-        return ElasticBasis(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
-    squares, vectors = la.eigh(np.diag(stiffness), mass)
-    turned = vectors.T @ (damping[:, None] * vectors)
-    coupled = np.abs(turned - np.diag(np.diag(turned)))
-    if not coupled.any():
-        return ElasticBasis(vectors, squares, np.diag(turned), 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        coupled /= np.sqrt(2 * np.sqrt(np.abs(np.outer(squares, squares))))
-    mixing = float(np.linalg.norm(coupled, 2)) if np.isfinite(coupled).all() else np.inf
-    return ElasticBasis(vectors, squares, np.diag(turned), mixing)
 
 
 def combined_modes(link: Link, own: Array) -> Array:
@@ -187,7 +149,7 @@ def compile_chain(chain: Erls, dense: int = DENSE) -> CompiledSystem | None:
         shifted += layout.block_size(e)
     header[layout.FEED_FORWARD] = int(chain.needs_feed_forward)
     from_blocks = None
-    if chain.size > dense and mixing < _MIXING:
+    if chain.size > dense and mixing < MIXING:
         from erls.kernels.shifted import equations as linked  # here: it is compiled on its own
 
         size = shifted + 3

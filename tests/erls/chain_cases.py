@@ -138,9 +138,8 @@ def evaluate(system: CompiledSystem, at: State) -> dict[str, np.ndarray]:
 SHIFTS = {"real": (3e-3, 8e-6), "complex": (3e-3 * (0.14 + 0.13j), (3e-3 * (0.14 + 0.13j)) ** 2)}
 
 
-def solved(chain: Erls, at: State) -> dict[str, np.ndarray]:
-    """(M + α C + β K)⁻¹ a, link by link, twice with other factors in between."""
-    system = compile_chain(chain, dense=0)
+def solved(system: CompiledSystem | None, at: State) -> dict[str, np.ndarray]:
+    """(M + α C + β K)⁻¹ a, link by link, after factors of other shifts and states in the same memory."""
     assert system is not None
     assert system.factoring is not None
     ways = {
@@ -159,6 +158,16 @@ def solved(chain: Erls, at: State) -> dict[str, np.ndarray]:
     return result
 
 
+def solved_densely(
+    matrices: dict[str, np.ndarray], damping: np.ndarray, at: State, kind: str
+) -> tuple[np.ndarray, float]:
+    """The same from the matrices of `evaluate` with this damping; and the rounding to expect, of its largest entry."""
+    alpha, beta = SHIFTS[kind]
+    matrix = matrices["mass"] + alpha * damping + beta * matrices["stiffness"]
+    result = np.linalg.solve(matrix, at.a)
+    return result, 100 * np.finfo(float).eps * float(np.linalg.cond(matrix) * np.abs(result).max())
+
+
 def all_results(folder: Path) -> dict[str, np.ndarray]:
     """Every function in every case and state, by 'case/state/function'."""
     result = {}
@@ -168,8 +177,8 @@ def all_results(folder: Path) -> dict[str, np.ndarray]:
         for k, at in enumerate(states(chain, name)):
             for what, values in evaluate(chain.compiled, at).items():
                 result[f"{name}/{k}/{what}"] = values
-            if k:
-                result.update({f"{name}/solved {kind}": x for kind, x in solved(chain, at).items()})
+        for kind, x in solved(compile_chain(chain, dense=0), states(chain, name)[1]).items():
+            result[f"{name}/solved {kind}"] = x
     return result
 
 

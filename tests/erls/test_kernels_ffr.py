@@ -28,6 +28,7 @@ from erls.scene import load_scene
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-12
+LIKE_SOLVED = 1e-9
 
 
 def _distance(found: np.ndarray, expected: np.ndarray) -> float:
@@ -72,8 +73,8 @@ def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     with np.load(output) as twin:
         assert set(twin) == set(found)
         for key, values in found.items():
-            # rounding of the forces counts with the condition of the mass matrix, up to 1e8
-            limit = LIKE_NUMPY if key.endswith("acceleration") else LIKE_TWIN
+            # rounding counts with the condition of what is solved: up to 1e8, and 1e9 of complex matrices on mean axes
+            limit = LIKE_SOLVED if "acceleration" in key or "solved" in key else LIKE_TWIN
             assert _distance(values, twin[key]) <= limit, key
 
 

@@ -7,18 +7,20 @@ from pathlib import Path
 from typing import Any
 
 import chain_cases
+import ffr_cases
 import numpy as np
 import pytest
 import scenes
 
 from erls.formulations import erls_compiled
+from erls.formulations.elastic_basis import elastic_basis
 from erls.formulations.erls import Erls
-from erls.formulations.erls_compiled import compile_chain, elastic_basis
+from erls.formulations.erls_compiled import compile_chain
+from erls.formulations.ffr import Ffr
+from erls.formulations.ffr.compiled import compile_frames
 from erls.integrators.base import Options
 from erls.integrators.generalized_alpha import generalized_alpha
 from erls.integrators.lobatto import lobatto
-
-EXACT = 1e-10  # relative: rounding times the condition of these matrices, up to 1e6
 
 
 def _damping(chain: Erls, whole: np.ndarray) -> np.ndarray:
@@ -44,24 +46,37 @@ def test_link_by_link_solves_what_dense_factors_solve(name: str, tmp_path: Path)
     assert chain.compiled is not None
     matrices = chain_cases.evaluate(chain.compiled, at)
     damping = _damping(chain, matrices["damping"])
-    for kind, found in chain_cases.solved(chain, at).items():
-        alpha, beta = chain_cases.SHIFTS[kind]
-        expected = np.linalg.solve(matrices["mass"] + alpha * damping + beta * matrices["stiffness"], at.a)
-        np.testing.assert_allclose(found, expected, rtol=0, atol=EXACT * np.abs(expected).max())
+    for kind, found in chain_cases.solved(compile_chain(chain, dense=0), at).items():
+        expected, rounding = chain_cases.solved_densely(matrices, damping, at, kind)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=rounding)
+
+
+@pytest.mark.parametrize("case", ffr_cases.CASES)
+def test_floating_frames_solve_what_dense_factors_solve(case: str, tmp_path: Path) -> None:
+    """The same for FFR: both body frames, with second-order displacements and without, rigid links among others."""
+    chain = ffr_cases.equations(tmp_path, case)
+    at = chain_cases.states(chain, case)[1]
+    assert chain.compiled is not None
+    matrices = chain_cases.evaluate(chain.compiled, at)
+    for kind, found in chain_cases.solved(compile_frames(chain, dense=0), at).items():
+        expected, rounding = chain_cases.solved_densely(matrices, matrices["damping"], at, kind)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=rounding)
 
 
 @pytest.mark.parametrize("integrate", [generalized_alpha, lobatto])
 @pytest.mark.parametrize("name", ["five links", "axes that part", "prescribed in the middle"])
+@pytest.mark.parametrize("frames", [False, True], ids=["ERLS", "FFR"])
 def test_integrators_go_the_same_way(
-    name: str, integrate: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, frames: bool, integrate: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With dense factors and link by link: the same motion within the iterations' error, at about the same work."""
-    chain = chain_cases.equations(tmp_path, name)
+    chain: Any = ffr_cases.equations(tmp_path, f"tangent: {name}") if frames else chain_cases.equations(tmp_path, name)
+    compiled: Any = compile_frames if frames else compile_chain
     y, v = chain.initial_state()
     options = Options(2e-3 if integrate is generalized_alpha else None, tolerance=1e-5)
     runs = []
     for dense in (10**6, 0):
-        system = compile_chain(chain, dense)
+        system = compiled(chain, dense)
         assert system is not None
         assert (system.factoring is None) == (dense > 0)
         monkeypatch.setitem(chain.__dict__, "compiled", system)  # in place of the cached property
@@ -86,6 +101,19 @@ def test_chains_choose_by_their_size(tmp_path: Path) -> None:
     small = chain_cases.equations(tmp_path, "one link").compiled
     assert small is not None
     assert small.factoring is None
+
+
+def test_accelerations_of_a_long_chain_of_frames(tmp_path: Path) -> None:
+    """Nine links are solved link by link there too: against the NumPy equations, by the rounding of their condition."""
+    chain = Ffr(long_chain(tmp_path, 9).mechanism)
+    assert chain.compiled is not None
+    assert chain.compiled.factoring is not None
+    at = chain_cases.states(chain, "nine links")[0]
+    found = chain_cases.evaluate(chain.compiled, at)
+    expected = chain.acceleration(at.t, at.y, at.v)
+    rounding = 100 * np.finfo(float).eps * np.linalg.cond(found["mass"])
+    assert rounding < 1e-2
+    np.testing.assert_allclose(found["acceleration"], expected, rtol=0, atol=rounding * np.abs(expected).max())
 
 
 def test_mixing_bounds_the_rate_of_iterations() -> None:

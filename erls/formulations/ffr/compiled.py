@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from erls.formulations.elastic_basis import MIXING, ElasticBasis, elastic_basis
 from erls.formulations.ffr.interface_motion import InterfaceMotion
 from erls.formulations.ffr.second_order import SecondOrderData
 from erls.formulations.packing import Packer, joint_numbers, step_parts
-from erls.kernels.contract import CompiledSystem, acceleration_in
+from erls.kernels.contract import CompiledSystem, Factoring, acceleration_in
 from erls.kernels.ffr import equations, layout
 from erls.lie.so3 import Array
 
 if TYPE_CHECKING:
     from erls.formulations.ffr.equations import Ffr
+
+DENSE = 60  # coordinates up to which dense factors cost less than elimination link by link
 
 _EFFECTS = {
     layout.FIRST_ORDER: "inertia_first_order",
@@ -52,6 +55,22 @@ def _put_second_order(pack: Packer, chain: Ffr, k: int, outboard: InterfaceMotio
     }
 
 
+def _elastic_basis(chain: Ffr, k: int) -> ElasticBasis:
+    link = chain.mechanism.links[k]
+    return elastic_basis(chain.data[k].elastic, link.stiffness, link.damping)
+
+
+def _put_basis(pack: Packer, basis: ElasticBasis | None) -> dict[int, int]:
+    """Coordinates for `erls.kernels.ffr.link_by_link`."""
+    if basis is None:
+        return {}
+    return {
+        layout.BASIS: pack.put(basis.vectors),
+        layout.BASIS_STIFFNESS: pack.put(basis.stiffness),
+        layout.BASIS_DAMPING: pack.put(basis.damping),
+    }
+
+
 def _rotation_axes(chain: Ffr, k: int) -> Array:
     """(axes, 3) about which the frame of a link turns: on the ground that of its joint alone; behind a link, on mean
     axes, or with a corrected twist all three.
@@ -62,18 +81,22 @@ def _rotation_axes(chain: Ffr, k: int) -> Array:
     return turning if chain.mechanism.joints[k].type.revolute else np.zeros((0, 3))
 
 
-def compile_frames(chain: Ffr) -> CompiledSystem:
+def compile_frames(chain: Ffr, dense: int = DENSE) -> CompiledSystem:
     """The compiled form of a chain.
 
     Parameters
     ----------
     chain : Ffr
+    dense : int
+        Coordinates up to which iteration matrices get dense factors. Beyond, they are solved link by link, with the
+        damping that couples elastic coordinates of a link left out of them where that hardly slows iterations down.
     """
     mechanism, recursion = chain.mechanism, chain.recursion
     links = len(mechanism.links)
     pack = Packer(np.zeros(layout.HEADER + links * layout.RECORD, dtype=np.int64), mechanism.gravity)
     free = {int(k): i for i, k in enumerate(chain.free_joints)}
-    memory = 0
+    memory = shifted = 0
+    bases = [_elastic_basis(chain, k) if chain.size > dense else None for k in range(links)]
     for k, (joint, data) in enumerate(zip(mechanism.joints, chain.data, strict=True)):
         e, drive, axes = data.size, joint.drive, _rotation_axes(chain, k)
         outboard = recursion.outboard[k + 1] if k + 1 < links else None
@@ -111,10 +134,13 @@ def compile_frames(chain: Ffr) -> CompiledSystem:
             layout.DAMPING: pack.put(mechanism.links[k].damping),
             layout.FORCES: pack.put(joint_numbers(joint.forces, drive, joint.rotor_inertia, joint.position)),
             **_put_second_order(pack, chain, k, outboard),
+            **_put_basis(pack, bases[k]),
+            layout.SHIFTED: shifted,
         }
         for place, value in record.items():
             pack.integers[layout.HEADER + k * layout.RECORD + place] = value
         memory += layout.memory_size(e, isinstance(data, SecondOrderData))
+        shifted += layout.factor_size(e)
     header = {
         layout.LINKS: links,
         layout.WEIGHT: int(bool(np.any(mechanism.gravity))),
@@ -124,13 +150,20 @@ def compile_frames(chain: Ffr) -> CompiledSystem:
     }
     for place, value in header.items():
         pack.integers[place] = value
+    factoring, accelerate, room = None, "erls.kernels.ffr.solve", chain.size**2 + chain.size
+    if all(basis is not None and basis.mixing < MIXING for basis in bases):
+        from erls.kernels.ffr import factoring as linked  # here: it is compiled on its own
+
+        accelerate, room = "erls.kernels.ffr.factoring", shifted
+        factoring = Factoring(shifted, linked.factor, linked.solve, linked.factor_complex, linked.solve_complex)
     return CompiledSystem(
         size=chain.size,
         reals=pack.reals,
         integers=np.array(pack.integers, dtype=np.int64),
-        scratch=np.zeros(memory + chain.size**2 + chain.size),
+        scratch=np.zeros(memory + room),
         residual=equations.residual,
         mass_matrix=equations.mass_matrix,
         stiffness_and_damping=equations.stiffness_and_damping,
-        load_acceleration=acceleration_in("erls.kernels.ffr.solve"),
+        load_acceleration=acceleration_in(accelerate),
+        factoring=factoring,
     )

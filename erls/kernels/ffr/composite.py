@@ -24,7 +24,7 @@ def _node_rates(scratch: Array, start: int, e: int, mode: int, node: Array, x: A
 
 
 @part
-def _move_coordinates(integers: IntArray, scratch: Array, record: int) -> None:
+def move_coordinates(integers: IntArray, scratch: Array, record: int) -> None:
     """MOVES and CARRIED of a link: how its outboard node and its frame move per η̇, each in its axes."""
     e, memory = integers[record + at.MODES], integers[record + at.MEMORY]
     link = scratch[memory : memory + at.VECTORS]
@@ -50,7 +50,7 @@ def _move_coordinates(integers: IntArray, scratch: Array, record: int) -> None:
 
 
 @part
-def _own_inertia(reals: Array, integers: IntArray, scratch: Array, record: int, q: Array) -> None:
+def own_inertia(reals: Array, integers: IntArray, scratch: Array, record: int, q: Array) -> None:
     """OWN of a link, M(η), and COUPLED, C(η)."""
     e, memory, axes = len(q), integers[record + at.MEMORY], integers[record + at.AXES]
     link, axis = scratch[memory : memory + at.VECTORS], integers[record + at.AXIS]
@@ -87,7 +87,7 @@ def _own_inertia(reals: Array, integers: IntArray, scratch: Array, record: int, 
 
 
 @part
-def _shift_inertia(pose: Array, inertia: Array, x: Array) -> None:
+def shift_inertia(pose: Array, inertia: Array, x: Array) -> None:
     """Tᵀ I T: replace an inertia (6, 6) by that on the frame before."""
     for i in range(6):
         carry_back(pose, inertia, 6 * i, inertia, 6 * i)
@@ -183,25 +183,25 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
     place_frames(reals, integers, scratch, t, y, y, y[0:0])
     links = integers[at.LINKS]
     for k in range(links):
-        _move_coordinates(integers, scratch, at.HEADER + k * at.RECORD)
+        move_coordinates(integers, scratch, at.HEADER + k * at.RECORD)
     for k in range(links - 1, -1, -1):
         record = at.HEADER + k * at.RECORD
         memory, first = integers[record + at.MEMORY], integers[record + at.FIRST_MODE]
         link = scratch[memory : memory + at.VECTORS]
         inertia, spare = link[at.INERTIA : at.INERTIA + 36], link[at.POINT : at.POINT + 6]
         pull = link[at.WRENCH : at.WRENCH + 6]
-        _own_inertia(reals, integers, scratch, record, y[first : first + integers[record + at.MODES]])
+        own_inertia(reals, integers, scratch, record, y[first : first + integers[record + at.MODES]])
         if integers[record + at.BEND] >= 0:
             bent_inertia(reals, integers, scratch, record)
         _fill_modes(reals, integers, scratch, k, out)
         for i in range(36):
             inertia[i] = link[at.BORNE + i] if k + 1 < links else 0.0
         if k + 1 < links and integers[record + at.OUTBOARD] >= 0:
-            _shift_inertia(link[at.OUTER : at.OUTER + at.NODE], inertia, spare)
+            shift_inertia(link[at.OUTER : at.OUTER + at.NODE], inertia, spare)
         for i in range(36):
             inertia[i] += link[at.OWN + i]
         if integers[record + at.INBOARD] >= 0:
-            _shift_inertia(link[at.INNER + at.BACK : at.INNER + at.BACK + 12], inertia, spare)
+            shift_inertia(link[at.INNER + at.BACK : at.INNER + at.BACK + 12], inertia, spare)
         joint, screw = integers[record + at.JOINT], integers[record + at.SCREW]
         if joint >= 0:
             for i in range(6):
@@ -211,7 +211,7 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
             _fill(reals, integers, scratch, k, joint, pull, out)
             out[joint, joint] += reals[integers[record + at.FORCES] + ROTOR]
         if k > 0:
-            _shift_inertia(link, inertia, spare)
+            shift_inertia(link, inertia, spare)
             start = integers[record - at.RECORD + at.MEMORY]
             for i in range(36):
                 scratch[start + at.BORNE + i] = inertia[i]

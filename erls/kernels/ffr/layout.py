@@ -17,7 +17,7 @@ CENTRIFUGAL = 5
 SOFTENING = 6
 WEIGHT = 7  # gravity acts
 FEED_FORWARD = 8
-MATRIX = 9  # (n, n) in scratch
+MATRIX = 9  # room in scratch for (n, n) and (n,), or for the factors of `link_by_link`
 HEADER = 10
 
 # record of a link in integers: numbers
@@ -55,7 +55,11 @@ SPIN = 29  # per coordinate (9, e): W
 SKEW = 30  # per coordinate (3, e): second-order angular momentum less its transpose
 PER_MASS = 31  # (6, 6) M₀⁻¹
 BENT = 32  # rows of BEND
-RECORD = 33
+# ... and of coordinates z with η̇ = V z in which M_e is 1 and the stiffness is diagonal, for `link_by_link`
+BASIS = 33  # (e, e) V, row after row
+BASIS_STIFFNESS, BASIS_DAMPING = 34, 35  # (e,) diagonals of Vᵀ K V, Vᵀ C V
+SHIFTED = 36  # memory of the link in its factors
+RECORD = 37
 
 GRAVITY = 0  # (3,) in reals: world axes
 
@@ -105,3 +109,24 @@ BENT_COUNT = 100
 def memory_size(modes: int, bent: bool) -> int:
     """Working memory of a link with so many elastic coordinates, with second-order displacements or without."""
     return VECTORS + (BENT_COUNT if bent else VECTOR_COUNT) * modes
+
+
+# memory of a link in the factors of `link_by_link`
+POSE_STEP, POSE_OUTER, POSE_INNER = 0, 12, 24  # of the step, the outboard node, and from the inboard one back
+PUSH = 36  # (6,) inertia times the joint's screw
+ALONG, RESISTANCE = 42, 43  # inertia along the joint, and what stiffness and damping add to it
+LOADED, HANDED = 44, 50  # (6,) forces on the frame, and on the outboard node from the links after it
+GONE, ARRIVED = 56, 62  # (6,) accelerations of the outboard node and of the frame
+RESTING, HANGING, WHOLE = 68, 104, 140  # (6, 6) inertia of the link alone, of the links after it, of both
+REST = 176  # (6,) for passing on
+MOST_PORTS = 30
+FREE, PRESSED, GIVEN_PORTS = 182, 212, 242  # (ports,)
+OUTPUT = 272  # (ports, 6)
+FLEXIBILITY, BOUND = 452, 1352  # (ports, ports)
+SOLVER = 2252  # (ports, 2 ports)
+DIAGONAL = 4052  # (e,) D⁻¹, then (e,) forces on z, then (ports, e) rows
+
+
+def factor_size(modes: int) -> int:
+    """Memory of a link in the factors."""
+    return DIAGONAL + (2 + MOST_PORTS) * modes
