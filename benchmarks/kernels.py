@@ -4,8 +4,8 @@
 
 Chains of equal links on revolute joints in all directions; between two links of a spatial chain nothing can be told of
 the axis of rotation, so this is the general case. Then the shipped L and the two-link robot. Prints the least CPU time
-of several repetitions, of a residual, an acceleration and a step of generalized-α, the growth exponent from row to row,
-and how many times longer the NumPy equations take for a residual.
+of several repetitions, of a residual, an acceleration, a step of generalized-α and one of lobatto, factors included, the
+growth exponent from row to row, and how many times longer the NumPy equations take for a residual.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ import scenes  # noqa: E402
 
 from erls.formulations.erls import Erls  # noqa: E402
 from erls.formulations.ffr import Ffr  # noqa: E402
-from erls.integrators.base import Options  # noqa: E402
+from erls.integrators.base import Integrator, Options  # noqa: E402
 from erls.integrators.generalized_alpha import generalized_alpha  # noqa: E402
+from erls.integrators.lobatto import lobatto  # noqa: E402
 from erls.kernels.contract import ACCELERATION, INTEGERS, REALS, RESIDUAL, pointer  # noqa: E402
 
 QUICK = "--quick" in sys.argv[1:]
@@ -38,7 +39,8 @@ LINKS = (1, 2, 5) if QUICK else (1, 2, 5, 10, 20)
 MODES_PER_LINK = 8
 REPEATS = 3 if QUICK else 7
 SLICE = 0.02  # s of one repetition
-STEPS = 100
+STEPS = 200
+TOLERANCE = 1e-4  # m, of lobatto
 
 
 _SYSTEM = (REALS, INTEGERS, REALS)
@@ -104,25 +106,26 @@ def chain_of(links: int, modes: int) -> Erls | Ffr:
         return FORMULATION(scenes.mechanism(scenes.write_toml(folder / "chain.toml", data)))
 
 
-def step_cost(chain: Erls | Ffr) -> float:
-    """Seconds of CPU of a step of generalized-α of 1 ms, factorizations included, at best."""
+def step_cost(chain: Erls | Ffr, integrate: Integrator, options: Options) -> float:
+    """Seconds of CPU of a step, at best."""
     y, v = chain.initial_state()
     best = math.inf
     for _ in range(REPEATS):
         start = time.process_time()
-        found = generalized_alpha(chain, (0.0, STEPS * 1e-3), y, v, Options(1e-3))
+        found = integrate(chain, (0.0, STEPS * 1e-3), y, v, options, None)
         best = min(best, (time.process_time() - start) / found.work.steps)
     return best
 
 
 def table(title: str, what: str, cases: dict[int, Erls | Ffr]) -> None:
     """Print costs with growth exponents."""
-    heads = "".join(f"{name:>13} {'exponent':>9}" for name in ("residual", "acceleration", "step"))
+    heads = "".join(f"{name:>13} {'exponent':>9}" for name in ("residual", "acceleration", "step", "lobatto"))
     print(f"\n{title}\n{what:>6} {heads} {'NumPy':>8}")
     before: tuple[int, tuple[float, ...]] | None = None
     for number, chain in cases.items():
         residual, acceleration, plain = costs(chain)
-        now = residual, acceleration, step_cost(chain)
+        fixed = step_cost(chain, generalized_alpha, Options(1e-3))
+        now = residual, acceleration, fixed, step_cost(chain, lobatto, Options(tolerance=TOLERANCE))
         growth = [""] * len(now)
         if before is not None:
             span = math.log(number / before[0])

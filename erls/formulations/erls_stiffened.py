@@ -101,7 +101,7 @@ def compile_stiffened(chain: Erls) -> CompiledSystem | None:
     CompiledSystem or None
         None when a link's modes hold no exact rigid-body motions.
     """
-    base = compile_chain(chain)
+    base = compile_chain(chain, dense=chain.size)  # link by link it solves with other inertias
     if base is None:
         return None
     pack = Packer(base.integers, base.reals)

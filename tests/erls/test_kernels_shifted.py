@@ -90,7 +90,7 @@ def test_integrators_go_the_same_way(
 
 
 def test_chains_choose_by_their_size(tmp_path: Path) -> None:
-    """Six links are solved link by link; with strong damping, which couples their modes, they are not."""
+    """Six links are solved link by link; with strong damping, which couples their modes, or second-order displacements they are not."""
     chain = long_chain(tmp_path, 6)
     assert chain.compiled is not None
     assert chain.compiled.factoring is not None
@@ -98,6 +98,10 @@ def test_chains_choose_by_their_size(tmp_path: Path) -> None:
     other = Erls(replace(chain.mechanism, links=tuple(damped)))
     assert other.compiled is not None
     assert other.compiled.factoring is None
+    stiffened = Erls(replace(chain.mechanism, effects=chain.mechanism.effects | {"geometric_stiffening"}))
+    assert stiffened.stiffened
+    assert stiffened.compiled is not None
+    assert stiffened.compiled.factoring is None
     small = chain_cases.equations(tmp_path, "one link").compiled
     assert small is not None
     assert small.factoring is None
