@@ -4,8 +4,8 @@
 
 Chains of equal links on revolute joints in all directions; between two links of a spatial chain nothing can be told of
 the axis of rotation, so this is the general case. Then the shipped L and the two-link robot. Prints the least CPU time
-of several repetitions, of a residual, an acceleration, a step of generalized-α and one of lobatto, factors included, the
-growth exponent from row to row, and how many times longer the NumPy equations take for a residual.
+of several repetitions, of a residual, an acceleration, a step of generalized-α and one of lobatto, with its share of
+factors, the growth exponent from row to row, and how many times longer the NumPy equations take for a residual.
 """
 
 from __future__ import annotations

@@ -90,7 +90,7 @@ def test_integrators_go_the_same_way(
 
 
 def test_chains_choose_by_their_size(tmp_path: Path) -> None:
-    """Six links are solved link by link; with strong damping, which couples their modes, or second-order displacements they are not."""
+    """Six links are solved link by link; not so with strong damping, which couples modes, nor with stiffening."""
     chain = long_chain(tmp_path, 6)
     assert chain.compiled is not None
     assert chain.compiled.factoring is not None
