@@ -101,8 +101,8 @@ class _Stepper:
         if abs(h - self.h) > 1e-6 * h:
             self.factored = False
         self.h = h
-        # an error e in y is one of e β' in ÿ: let it fall with h³, like the truncation error of a step
-        self.tolerance = self.asked_tolerance * min(1.0, h / 1e-3) ** 3
+        # an error e in y is one of e β' in ÿ: let it fall with h³, like the truncation error of a step, down to 0.01 ms
+        self.tolerance = self.asked_tolerance * min(1.0, max(h / 1e-3, 0.01)) ** 3
         share = (1 - self.alpha_f) / (1 - self.alpha_m)  # of ÿ₁ in a₁
         self.to_v, self.to_a = self.gamma / (h * self.beta), 1 / (h * h * self.beta * share)
         keep, pull = -self.alpha_m / (1 - self.alpha_m), self.alpha_f / (1 - self.alpha_m)
@@ -236,7 +236,7 @@ class _Stepper:
             value=f"step {self.h:.3g} s",
             limit=f"{MAX_HALVINGS} halvings of the step",
             remedy="check forces and stiffness that act on this coordinate, for jumps without breakpoint "
-            "first; then try a smaller step or a larger Newton tolerance",
+            "first; then try a smaller step, or integrator lobatto",
         )
 
 

@@ -52,7 +52,7 @@ class Formulas:
         alpha_m, alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
         gamma = 0.5 + alpha_f - alpha_m
         beta = 0.25 * (gamma + 0.5) ** 2
-        return Formulas(h, alpha_m, alpha_f, gamma, beta, options.newton_tolerance * min(1.0, h / 1e-3) ** 3)
+        return Formulas(h, alpha_m, alpha_f, gamma, beta, options.newton_tolerance * min(1.0, max(h / 1e-3, 0.01)) ** 3)
 
     @property
     def share(self) -> float:
@@ -136,8 +136,7 @@ def newton_failure(
         limit="one iteration matrix" if frozen else f"{MAX_HALVINGS} halvings of the step",
         remedy="let iteration_matrix be auto"
         if frozen
-        else "check forces and stiffness that act there, for jumps without breakpoint first; then try a smaller "
-        "step or a larger Newton tolerance",
+        else "check forces and stiffness that act there, for jumps without breakpoint first; then try a smaller step",
     )
 
 

@@ -65,7 +65,7 @@ def set_step(known: Array, counts: IntArray, h: float) -> None:
         counts[FACTORED] = 0
     gamma, beta = known[GAMMA], known[BETA]
     known[H] = h
-    known[TOLERANCE] = known[ASKED] * min(1.0, h / 1e-3) ** 3
+    known[TOLERANCE] = known[ASKED] * min(1.0, max(h / 1e-3, 0.01)) ** 3
     share = (1 - known[ALPHA_F]) / (1 - known[ALPHA_M])
     known[TO_V], known[TO_A] = gamma / (h * beta), 1 / (h * h * beta * share)
     known[SHARE], known[PULL] = share, known[ALPHA_F] / (1 - known[ALPHA_M])
