@@ -31,6 +31,7 @@ class Cause(enum.StrEnum):
     STEP_TOO_SMALL = "step size became too small"
     NO_PICTURE = "picture could not be made"
     OUT_OF_MEMORY = "out of memory"
+    RUNAWAY = "deflection beyond any meaning"
     INTERRUPTED = "interrupted"
     BUDGET = "time budget used up"
 
@@ -43,6 +44,7 @@ _NUMERICAL = {
     Cause.NEWTON_FAILED,
     Cause.NOT_FINITE,
     Cause.STEP_TOO_SMALL,
+    Cause.RUNAWAY,
     Cause.OUT_OF_MEMORY,
     Cause.NO_PICTURE,
 }
@@ -56,6 +58,7 @@ class SimulationError(ReportedError):
     """A failed simulation: says when, why and what to try; ``run`` holds what was computed, if anything."""
 
     run: Any = None  # a Run; its module stands above this one
+    whole: tuple[float, ...] = ()  # times whose steps are kept where others are dropped
 
     @property
     def exit_code(self) -> int:

@@ -76,34 +76,37 @@ def happenings(run: Run, since: float | None = None) -> tuple[Happening, ...]:
 
 
 class Stopper:
-    """Ends a run at the first event that says so; to be called by its observer."""
+    """Finds events as knots pass, and ends a run at the first one that says so; to be called by its observer."""
 
     def __init__(self, run: Callable[[Solution], Run], names: set[str]) -> None:
         self._run, self._names = run, names
         self._since = 0.0
         self.happened: Happening | None = None
 
-    def look(self, solution: Solution) -> None:
-        """Raise `StopRun` where an event stops the run.
+    def look(self, solution: Solution) -> list[float]:
+        """Times of events since the last look; their steps are to be kept, so that the run shows them.
 
         Raises
         ------
         StopRun
+            With these times, where an event stops the run.
         """
+        times = []
         for happening in happenings(self._run(solution), self._since):
+            times.append(happening.time)
             if happening.name in self._names:
                 self.happened = happening
-                raise StopRun
+                raise StopRun(*times)
         self._since = float(solution.t[-1])
+        return times
 
-    def cut(self, solution: Solution) -> Solution:
-        """The solution up to the first knot at or after the event."""
-        if self.happened is None:
-            return solution
-        knots = int(np.searchsorted(solution.t, self.happened.time)) + 1
-        parts = {f.name: getattr(solution, f.name) for f in fields(solution)}
-        own: dict[str, Any] = {name: part[:knots] for name, part in parts.items() if isinstance(part, np.ndarray)}
-        return replace(solution, **own)
+
+def cut(solution: Solution, time: float) -> Solution:
+    """A solution up to its first knot at or after a time."""
+    knots = int(np.searchsorted(solution.t, time)) + 1
+    parts = {f.name: getattr(solution, f.name) for f in fields(solution)}
+    own: dict[str, Any] = {name: part[:knots] for name, part in parts.items() if isinstance(part, np.ndarray)}
+    return replace(solution, **own)
 
 
 def _height(run: Run, event: Event) -> Callable[..., float]:

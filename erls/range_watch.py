@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from erls.errors import SimulationError
 from erls.formulations import TREES
-from erls.formulations.base import State
+from erls.formulations.base import Formulation, Reaction, State
 from erls.formulations.closed_chain import ClosedChain
 from erls.formulations.deflection_watch import DeflectionError, LinkMotion, deflection_error
+from erls.formulations.state_series import StateSeries
 from erls.formulations.substructures import Substructured, solved
 from erls.integrators.base import hermite
 from erls.lie.so3 import Array, cross
 from erls.mechanism.chain import Mechanism, poses
 from erls.run import Run
 
+if TYPE_CHECKING:
+    from erls.kernels.contract import CompiledSystem
+
 _SAMPLES, _SAMPLES_OF_LOOPS = 61, 31  # loads of loops take an acceleration of their own
 _STEP = 1e-5  # s, of central differences, as in `erls.link_loads`
-_NOTABLE = 2e-3  # of the size of a link
+NOTABLE = 2e-3  # of the size of a link: errors above this make a run warn
 
 
 def deflection_errors(run: Run) -> dict[str, DeflectionError]:
@@ -50,7 +55,7 @@ def deflection_errors(run: Run) -> dict[str, DeflectionError]:
     if not links or not step > 0:
         return {}
     count = _SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES
-    times = np.linspace(start + step, end - step, count)
+    times = run.looks(count, step)
     inner = replace(run, formulation=formulation)
     places = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
     ends = [end for loop in mechanism.loops for end in (loop.inner, loop.outer)]
@@ -74,7 +79,7 @@ def deflection_warnings(run: Run) -> list[str]:
     links = {link.name: link for link in run.formulation.mechanism.links}
     for name, found in deflection_errors(run).items():
         size = float(np.linalg.norm(np.ptp(links[name].model.nodes, axis=0)))
-        if found.error <= _NOTABLE * size:
+        if found.error <= NOTABLE * size:
             continue
         more = "more substructures" if links[name].pieces else "substructures = 4 or more (formulation ffr)"
         remedy = f"use {more}, the effects geometric_stiffening and foreshortening, or formulation nodal"
@@ -94,13 +99,12 @@ def deflection_warnings(run: Run) -> list[str]:
 
 def _motions(run: Run, links: list[int], times: Array, step: float) -> dict[int, LinkMotion]:
     """Motion of some links, with the loads on their interfaces."""
-    before, at, after = (run.states(times + shift) for shift in (-step, 0.0, step))
-    loads = _loads(run, times, at)
+    seen = run.series(np.concatenate([times - step, times, times + step]))
+    loads = _loads(run, times, seen)
     gravity = run.formulation.mechanism.gravity
     result = {}
     for k in links:
-        frames = [np.array([s.poses[k] for s in states]) for states in (before, at, after)]
-        q = [np.array([s.modal[k] for s in states]) for states in (before, at, after)]
+        frames, q = np.split(seen.poses[k], 3), np.split(seen.modal[k], 3)
         turn = frames[1][:, :3, :3]
         speed = np.einsum("kji,kjl->kil", turn, (frames[2] - frames[0])[:, :3]) / (2 * step)
         change = np.einsum("kji,kjl->kil", turn, (frames[2] - 2 * frames[1] + frames[0])[:, :3]) / step**2
@@ -116,12 +120,17 @@ def _axial(matrices: Array) -> Array:
     return np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1) / 2
 
 
-def _loads(run: Run, times: Array, states: list[State]) -> list[Array]:
-    """(k, 6 i) of every link: what the next joint and closing joints do to its interfaces, in its axes."""
+def _loads(run: Run, times: Array, seen: StateSeries) -> list[Array]:
+    """(k, 6 i) of every link: what the next joint and closing joints do to its interfaces, in its axes; the middle
+    third of the states is at these times.
+    """
     formulation, mechanism = run.formulation, run.formulation.mechanism
     nodes = [[i.node for i in link.model.interface_nodes] for link in mechanism.links]
     result = [np.zeros((len(times), len(own), 6)) for own in nodes]
     carriers = any(link.outboard is not None for link in mechanism.links[:-1])
+    if not (carriers or isinstance(formulation, ClosedChain)):
+        return [loads.reshape(len(times), -1) for loads in result]
+    states = seen.states()[len(times) : 2 * len(times)]
 
     def add(sample: int, link: int, node: int, force: Array, moment: Array, place: Array) -> None:
         if node in nodes[link]:
@@ -133,7 +142,7 @@ def _loads(run: Run, times: Array, states: list[State]) -> list[Array]:
     y_all, v_all = hermite(s.t, s.y, s.v, s.a, times)
     for sample, (t, y, v) in enumerate(zip(times.tolist(), y_all, v_all, strict=True)):
         if carriers:
-            for k, reaction in enumerate(formulation.reactions(t, y, v)):
+            for k, reaction in enumerate(_reactions(formulation, t, y, v)):
                 outboard = mechanism.links[k - 1].outboard if k else None
                 if outboard is not None:
                     place = _place(states[sample], mechanism, k, mechanism.links[k].inboard.node)
@@ -144,6 +153,19 @@ def _loads(run: Run, times: Array, states: list[State]) -> list[Array]:
                     if end.link is not None:
                         add(sample, end.link, end.node, sign * given.force, sign * given.moment, given.place)
     return [loads.reshape(len(times), -1) for loads in result]
+
+
+def _reactions(formulation: Formulation, t: float, y: Array, v: Array) -> list[Reaction]:
+    """In the joints, with the acceleration from the equations that the run has compiled, if it has."""
+    compiled: CompiledSystem | None = vars(formulation).get("compiled")
+    if compiled is None or not hasattr(formulation, "reactions_at"):
+        return formulation.reactions(t, y, v)
+    mass, force = np.empty((len(y), len(y))), np.empty(len(y))
+    constants = compiled.reals, compiled.integers, compiled.scratch
+    compiled.residual(*constants, t, y, v, np.zeros(len(y)), force)
+    compiled.mass_matrix(*constants, t, y, mass)
+    found: list[Reaction] = formulation.reactions_at(t, y, v, np.linalg.solve(mass, -force))
+    return found
 
 
 def _place(state: State, mechanism: Mechanism, link: int, node: int) -> Array:

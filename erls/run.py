@@ -15,6 +15,7 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.events import Happening, happenings
 from erls.formulations.base import Energy, Formulation, State
 from erls.formulations.closed_chain import ClosedChain
+from erls.formulations.state_series import StateSeries, state_series
 from erls.formulations.substructures import solved
 from erls.integrators.base import Solution, hermite
 from erls.lie.so3 import Array
@@ -79,13 +80,26 @@ class Run:
 
     @cached_property
     def times(self) -> Array:
-        """(k,) times of the integrator's steps, each once."""
+        """(k,) times of the integrator's steps, or of the states that ``output_step`` keeps, each once."""
         return np.unique(self.solution.t)
 
     @cached_property
     def events(self) -> tuple[Happening, ...]:
         """Events of the scene that happened, in the order of time."""
         return happenings(self)
+
+    def looks(self, count: int, margin: float = 0.0) -> Array:
+        """(k,) times, up to ``count``, to look along the run at, ``margin`` [s] away from its ends: even ones; or,
+        where ``output_step`` left out steps, those of the stored states nearest to them.
+        """
+        t = self.solution.t
+        times = np.linspace(float(t[0]) + margin, self.end - margin, count)
+        if self.scene.record.simulation.output_step is None:
+            return times
+        stored = np.unique(t[(t >= times[0]) & (t <= times[-1])])
+        if not len(stored):
+            return times
+        return np.asarray(np.unique(stored[np.searchsorted((stored[1:] + stored[:-1]) / 2, times)]))
 
     @property
     def point_names(self) -> tuple[str, ...]:
@@ -123,8 +137,12 @@ class Run:
 
     def states(self, t: ArrayLike) -> list[State]:
         """The mechanism at each time."""
+        return self.series(t).states()
+
+    def series(self, t: ArrayLike) -> StateSeries:
+        """The same as arrays, of all times together."""
         _, flat, y, v = self._interpolated(t)
-        return [self.formulation.state(*at) for at in zip(flat.tolist(), y, v, strict=True)]
+        return state_series(self.formulation, flat, y, v)
 
     def position(self, point: str, t: ArrayLike) -> Array:
         """(..., 3) world position of a named point [m]."""
@@ -259,7 +277,7 @@ class Run:
 
     def summary(self, times: Sequence[float] = ()) -> dict[str, Any]:
         """The JSON of ``erls simulate``; ``max_drift`` is None where energy is not conserved."""
-        totals = self.energy(np.linspace(float(self.solution.t[0]), self.end, 201)).total
+        totals = self.energy(self.looks(201)).total
         work = self.solution.work
         return {
             "scene": self.scene.name,

@@ -11,18 +11,20 @@ import numpy as np
 
 from erls.build import Message, build_mechanism
 from erls.errors import SceneError, SimulationError
-from erls.events import Stopper
+from erls.events import Stopper, cut
 from erls.formulations import FORMULATIONS, TREES, compile_kernels, formulate, integrator
-from erls.formulations.base import State
 from erls.formulations.closed_chain import ClosedChain
+from erls.formulations.state_series import StateSeries
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
 from erls.kernels.jit import announcing
 from erls.mass_watch import indefinite_mass
 from erls.mechanism.chain import Mechanism
+from erls.output_watch import output_step, output_warnings
 from erls.range_watch import deflection_warnings
-from erls.run import Run, node_positions
+from erls.run import Run
 from erls.run_file import self_contained, write_run
+from erls.runaway import Runaway
 from erls.scene import Scene, load_scene
 from erls.spin_stability import missing_stiffening, planned_spin_warnings, spin_warnings
 from fe_import.link import LinkDescription
@@ -35,6 +37,7 @@ _LARGE_DEFLECTION = (
     0.1  # of the link's size; the second-order error of a small-displacement model is then about 1 %
 )
 _LARGE_ROTATION = 0.2  # rad
+_AT_ONCE = 1_000_000  # displacements in memory while states are looked at
 CHECKPOINT_S = 20.0  # a killed run loses at most this much work
 
 
@@ -61,7 +64,8 @@ def simulate(
     strict : bool
         With ``effects = "auto"``: whether to repeat the run where what was left out passes the tolerance.
     like : Run, optional
-        A run of a scene with the same links, whose modal models serve again instead of being read.
+        A run of a scene with the same links, whose modal models serve again instead of being read. Where links are
+        split, it is of the nodal formulation if the scene is.
 
     Returns
     -------
@@ -87,7 +91,7 @@ def simulate(
         scene = load_scene(scene)
     settings = scene.record.simulation
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
-    built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *_models(like))
+    built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
     warn = _Warnings(tell)
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
@@ -113,9 +117,11 @@ def simulate(
     return run_with(scene, built.mechanism)
 
 
-def _models(run: Run) -> tuple[list[ModalModel], list[LinkDescription | None]]:
+def models_of(run: Run) -> tuple[list[ModalModel], list[LinkDescription | None], list[list[ModalModel]]]:
+    """Modal models of the links of a run, descriptions, and modal models of their pieces, for `build_mechanism`."""
     links = run.formulation.mechanism.links
-    return [link.model for link in links], [link.description for link in links]
+    pieces = [[piece.model for piece in link.pieces] for link in links]
+    return [link.model for link in links], [link.description for link in links], pieces
 
 
 class _Warnings:
@@ -153,7 +159,7 @@ def _integrated(
         settings.atol,
         settings.spectral_radius,
         tolerance=settings.tolerance,
-        output_step=settings.output_step,
+        output_step=output_step(settings),
     )
     begun = saved = time.perf_counter()
 
@@ -162,12 +168,15 @@ def _integrated(
 
     first = True
     stops = {event.name for event in scene.record.events if event.stop}
+    looked_for = stops or (scene.record.events and settings.output_step is not None)
     stopper = Stopper(make_run, stops)
+    runaway = Runaway(formulation) if modal else None
 
-    def observe(t: float, knots: Callable[[], Solution]) -> None:
+    def observe(t: float, knots: Callable[[], Solution]) -> Sequence[float]:
         nonlocal first, saved
-        if stops:
-            stopper.look(knots())
+        found = stopper.look(knots()) if looked_for else ()
+        if runaway is not None:
+            runaway.look(knots())
         if first:
             first = False
             warn(knots().warnings)
@@ -179,23 +188,33 @@ def _integrated(
             except SceneError as problem:  # a full disk may have room again at the end
                 warn.tell(f"warning: no checkpoint: {problem}")
             saved = time.perf_counter()
+        return found
 
     times = (0.0, settings.duration)
     solution = integrator(mechanism, settings)(formulation, times, y, v, options, observe)
     if stopper.happened is not None:
-        solution = stopper.cut(solution)
+        solution = cut(solution, stopper.happened.time)
         warn.tell(f"event {stopper.happened.name!r} at t = {stopper.happened.time:.6g} s: the run ends")
     if solution.choice:
         warn.tell(f"integrator: {solution.choice}")
+    gone = None if runaway is None else runaway.ended
+    if gone is not None:
+        solution = cut(solution, gone)
     run = make_run(solution)
-    seen = run.states(np.linspace(float(run.solution.t[0]), run.end, 101))
-    warn((*solution.warnings, *range_warnings(run, seen), *deflection_warnings(run)))
-    if mechanism.bandwidth is not None:
+    seen = run.series(run.looks(101))
+    warn(solution.warnings)
+    if gone is None:
+        warn((*range_warnings(run, seen), *deflection_warnings(run), *output_warnings(run)))
+    if mechanism.bandwidth is not None and gone is None:
         from erls.formulations.static_watch import static_warnings  # here: most runs need none of it
 
         warn(static_warnings(formulation, solution, settings.effects_tolerance))
+    if step is None and any(joint.drive.torque_limit < np.inf for joint in mechanism.joints):
+        from erls.limit_watch import limit_warnings
+
+        warn(limit_warnings(formulation, solution, settings.tolerance))
     if modal and not planned and any(j.drive.reference(0.0) is None for j in mechanism.joints):
-        warn(spin_warnings(mechanism, ((s.time, s.coordinates, s.rates) for s in seen)))
+        warn(spin_warnings(mechanism, zip(seen.times.tolist(), seen.coordinates, seen.rates, strict=True)))
     run = replace(run, warnings=tuple(warn.told))
     failure = (modal and indefinite_mass(formulation, solution)) or solution.failure
     if failure:
@@ -226,23 +245,26 @@ def impulse_warnings(mechanism: Mechanism, duration: float) -> list[str]:
     return result
 
 
-def range_warnings(run: Run, states: Sequence[State]) -> list[str]:
+def range_warnings(run: Run, seen: StateSeries) -> list[str]:
     """Links whose displacement left the range of small displacements, in which a modal model holds."""
+    if seen.nodes is not None:
+        return []  # the links may deflect as they like
     mechanism: Mechanism = run.formulation.mechanism
     largest = np.zeros(len(mechanism.links))
     turned = np.zeros(len(mechanism.links))
-    for state in states:
-        if state.nodes is not None:
-            return []  # the links may deflect as they like
-        for k, link in enumerate(mechanism.links):
-            frame = state.poses[k]
-            undeformed = link.model.nodes @ frame[:3, :3].T + frame[:3, 3]
-            moved = node_positions(run, state, k) - undeformed
-            moved -= moved[link.inboard.node]
-            largest[k] = max(largest[k], np.linalg.norm(moved, axis=1).max())
-            rotations = link.model.rotation_shapes @ state.modal[k]
-            if len(rotations):
-                turned[k] = max(turned[k], np.linalg.norm(rotations, axis=1).max())
+    for k, link in enumerate(mechanism.links):
+        model, q = link.model, seen.modal[k]
+        second_order = link.second_order if "foreshortening" in mechanism.effects else None
+        per_pass = max(1, _AT_ONCE // model.translation_shapes[..., 0].size)
+        for some in np.split(q, range(per_pass, len(q), per_pass)):
+            moved = np.tensordot(some, model.translation_shapes, ([1], [2]))
+            if second_order is not None:
+                moved += second_order.displacements(np.arange(len(model.nodes)), some)
+            moved -= moved[:, link.inboard.node, None]
+            largest[k] = np.fmax(largest[k], np.linalg.norm(moved, axis=2).max())
+            if len(model.rotation_shapes):
+                rotations = np.tensordot(some, model.rotation_shapes, ([1], [2]))
+                turned[k] = np.fmax(turned[k], np.linalg.norm(rotations, axis=2).max())
     result = []
     for k, link in enumerate(mechanism.links):
         size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))

@@ -18,6 +18,7 @@ from erls.mechanism.substructures import is_split, split
 
 _NOTABLE = 0.2  # share of the stiffness that is lost; the deflection is then wrong by more than a tenth
 _SAMPLES = 401
+UNSTABLE = "the linear model loses stability"  # in warnings of links whose motion is then meaningless
 
 
 def missing_stiffening(mechanism: Mechanism) -> list[str]:
@@ -78,7 +79,9 @@ def spin_warnings(mechanism: Mechanism, motion: Iterable[tuple[float, Array, Arr
     turning = np.array([joint.type.revolute for joint in mechanism.joints])
     largest = max(bounds.values(), default=0.0)
     for t, theta, rates in motion if softened else ():
-        if np.abs(rates[turning]).sum() ** 2 * largest <= _NOTABLE:
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that failed may hold anything
+            bound = np.abs(rates[turning]).sum() ** 2 * largest
+        if not _NOTABLE < bound < np.inf:
             continue
         twists = kinematics(mechanism, screws, theta, rates).twists
         for k, parts in softened.items():
@@ -122,7 +125,7 @@ def _warning(link: Link, share: float, speed: float, lost: tuple[float, float] |
             f"{100 * share:.0f} % of its stiffness, since its tension is left out; {remedy}"
         )
     return (
-        f"link {link.name!r}: the linear model loses stability at {lost[1]:.4g} rad/s (reached at t = {lost[0]:.4g} s, "
+        f"link {link.name!r}: {UNSTABLE} at {lost[1]:.4g} rad/s (reached at t = {lost[0]:.4g} s, "
         f"top speed {speed:.4g} rad/s): the centrifugal force on its deformation outgrows its stiffness, since its "
         f"tension is left out; what is computed from there on is meaningless; {remedy}"
     )

@@ -22,10 +22,11 @@ os.environ.setdefault("ERLS_KERNELS", os.environ["ERLS_CACHE"])
 
 KERNELS = (
     "import erls.kernels.nodal.matrix, erls.kernels.nodal.step, erls.kernels.nodal.system, erls.kernels.ffr.equations, "
-    "erls.kernels.quasi_static.chain",
-    "import erls.kernels.chain.equations, erls.kernels.stepping.generalized_alpha, erls.kernels.stepping.lobatto, "
+    "erls.kernels.ffr.solve, erls.kernels.ffr.factoring, erls.kernels.quasi_static.chain",
+    "import erls.kernels.chain.equations, erls.kernels.chain.elimination, erls.kernels.shifted.equations, "
+    "erls.kernels.stepping.generalized_alpha, erls.kernels.stepping.lobatto, erls.kernels.stepping.absent, "
     "erls.kernels.loops.steps, erls.kernels.loops.system, erls.kernels.loops.nearest, "
-    "erls.kernels.stiffened.equations, erls.kernels.deviation.follow",
+    "erls.kernels.stiffened.equations, erls.kernels.stiffened.elimination, erls.kernels.deviation.follow",
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
 AT = 1e-3  # of the same: adaptive steps would shrink for ever
-_ITS_OWN = (Cause.INTERRUPTED, Cause.SINGULAR_MASS)
+_ITS_OWN = (Cause.INTERRUPTED, Cause.SINGULAR_MASS, Cause.RUNAWAY)
 
 
 class TiedCoordinates:
@@ -150,24 +150,28 @@ class Watch:
 
     def __init__(self, chain: ClosedChain, observer: Observer | None) -> None:
         self.chain, self.observer = chain, observer
-        self.good = 0
-        """Knots up to the first one that was refused."""
+        self.good = -np.inf
+        """Time of the first knot that was refused, or of the last one that was looked at."""
 
-    def __call__(self, t: float, knots: Callable[[], Solution]) -> None:
+    def __call__(self, t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:
         found = knots()
-        for k in self._suspects(found):
-            self.good = k + 1
-            self._refuse(float(found.t[k]), found.y[k], found.v[k])
-        self.good = len(found.t)
-        if self.observer is not None:
-            self.observer(t, knots)
+        suspects, last = self._suspects(found), float(found.t[-1])
+        for k in suspects:
+            self.good = float(found.t[k])
+            try:
+                self._refuse(self.good, found.y[k], found.v[k])
+            except SimulationError as problem:
+                problem.whole = (self.good,)
+                raise
+        self.good = last
+        return None if self.observer is None else self.observer(t, knots)
 
     def _suspects(self, found: Solution) -> list[int]:
         """Numbers of new knots to look at: the last one; of many compiled steps those that are open or lock."""
         chain = self.chain
         if chain.compiled is None:
             return [len(found.t) - 1]
-        first = max(self.good - 1, 0)  # the last one may have made room for another
+        first = int(np.searchsorted(found.t, self.good))
         gaps, stiffest = chain.compiled.watched(found.t[first:], found.y[first:])
         suspect = (gaps > OPEN * chain.reach) | (stiffest < AT * chain.stiffest_at_start)
         return [first + int(k) for k in np.flatnonzero(suspect)]
@@ -181,8 +185,9 @@ class Watch:
             raise chain.locked(t, here)
 
 
-def _first(solution: Solution, knots: int) -> Solution:
+def _first(solution: Solution, time: float) -> Solution:
     """Less what many steps at once made after a loop came apart or locked."""
+    knots = int(np.searchsorted(solution.t, time, side="right"))
     arrays = {name: getattr(solution, name)[:knots] for name in ("t", "y", "v", "a")}
     return replace(solution, **arrays) if knots else solution
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.formulations.assumed_bow import assumed_second_order
-from erls.lie.so3 import Array, skew
+from erls.lie.so3 import Array
 from erls.mechanism.links import Link, node_shape6
 from erls.mechanism.second_order import LinkSecondOrder
 
@@ -109,7 +109,7 @@ def deflection_error(link: Link, motion: LinkMotion, closed: bool, reach: float)
     shortening = lever * float(np.linalg.norm(second.displacements(nodes, clamped), axis=-1).max(initial=0.0))
     strain = elastic**2 @ link.stiffness
     frames = motion.modal[:, :6] - held[:, :6]
-    work = np.einsum("ka,kab,kb->k", held, _load_stiffness(link, second, motion, frames), held)
+    work = _load_work(link, second, motion, frames, held)
     ratio = work / np.maximum(strain, _SMALL * strain.max(initial=0.0) + 1e-300)
     steps = np.diff(motion.times)
     area = np.concatenate([[0.0], np.cumsum((ratio[1:] + ratio[:-1]) / 2 * steps)])
@@ -126,21 +126,25 @@ def _tangent(link: Link) -> Array:
     return np.vstack([-np.linalg.solve(rows[:, :6], rows[:, 6:]), np.eye(link.elastic_modes)])
 
 
-def _load_stiffness(link: Link, second: LinkSecondOrder, motion: LinkMotion, frames: Array) -> Array:
-    """(k, m, m) G, in axes that are turned against the link's frame by rigid-body coordinates (k, 6)."""
+def _load_work(link: Link, second: LinkSecondOrder, motion: LinkMotion, frames: Array, held: Array) -> Array:
+    """(k,) qᵀGq at q = ``held`` (k, m), in axes turned against the link's frame by rigid-body coordinates (k, 6)."""
     rotation = node_shape6(link.model, link.inboard.node)[1][:, :6]
-    turn = np.eye(3) + np.stack([skew(rotation @ q) for q in frames])
+    turn = np.eye(3) + np.cross(np.eye(3), (frames @ rotation.T)[:, None])
+    pairs = (held[:, :, None] * held[:, None]).reshape(len(held), -1)
 
     def turned(vectors: Array) -> Array:
         return np.asarray(np.einsum("kji,kj->ki", turn, vectors))
 
-    slide, spin = second.momentum[:3], second.momentum[3:]
+    def work(forces: Array, stiffness: Array) -> Array:
+        """Of forces (k, n) with the stiffness that a unit of each makes (n, m, m)."""
+        return np.asarray((forces * (pairs @ stiffness.reshape(len(stiffness), -1).T)).sum(axis=1))
+
     omega = turned(motion.omega)
-    result = np.einsum("kc,cab->kab", turned(motion.pull), slide) + np.einsum("kc,cab->kab", turned(motion.alpha), spin)
-    result -= np.einsum("kc,kd,cdab->kab", omega, omega, second.spin)
+    squares = (omega[:, :, None] * omega[:, None]).reshape(-1, 9)
+    result = work(np.hstack([turned(motion.pull), turned(motion.alpha)]), second.momentum)
+    result -= work(squares, second.spin.reshape(9, *second.spin.shape[2:]))
     for number, interface in enumerate(link.model.interface_nodes):
         load = motion.loads[:, 6 * number : 6 * number + 6]
         if interface.node != link.inboard.node and load.any():
-            wrench = np.hstack([turned(load[:, :3]), turned(load[:, 3:])])
-            result -= np.einsum("kc,cab->kab", wrench, second.node(interface.node))
-    return np.asarray(result)
+            result -= work(np.hstack([turned(load[:, :3]), turned(load[:, 3:])]), second.node(interface.node))
+    return result

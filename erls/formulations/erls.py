@@ -24,12 +24,14 @@ from erls.formulations.base import Energy, Reaction, State
 from erls.formulations.compatibility import Compatibility
 from erls.formulations.displaced_frame import displaced_frame
 from erls.formulations.equilibrium import held_equilibrium
+from erls.formulations.erls_series import chain_series
 from erls.formulations.joint_frames import FrameMotion, attached, carried
 from erls.formulations.joint_turn import JointTurn, Motion, joint_turn
 from erls.formulations.link_inertia import LinkInertia, moment_about
 from erls.formulations.modal_inertia import modal_inertia
 from erls.formulations.second_order import SecondOrderInertia
 from erls.formulations.second_order_compatibility import second_order_compatibility
+from erls.formulations.state_series import StateSeries
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism, jacobians, kinematics, poses
 from erls.mechanism.links import Link, node_shape6
@@ -341,6 +343,10 @@ class Erls:
             angles=np.array([turn.angle for turn in turns]),
             rates=np.array([turn.rate for turn in turns]),
         )
+
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries | None:
+        """States at (k,) times; None where they are found one by one."""
+        return chain_series(self, t, y, v)
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""

@@ -33,6 +33,7 @@ import numpy as np
 
 from erls.errors import Cause, SimulationError
 from erls.formulations.base import Energy, Reaction, State, TreeFormulation
+from erls.formulations.state_series import StateSeries, state_series
 from erls.formulations.static_modes import StaticModes, static_modes
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -43,10 +44,11 @@ if TYPE_CHECKING:
 
 MOST = 6  # evaluations of r
 NEAR = 0.05  # of the first correction: what the last one may be
-PER_PERIOD = 100  # steps of differences in time, of a period at the bandwidth
+PER_PERIOD = 100  # steps of differences in time, of the period below
 _EXACT, _MOST_EXACT = 1e-12, 30  # NEAR and MOST for states
 _FOUND = 1e-6  # of η: what a state may lack
 _CORRECTIONS = 3  # of an acceleration
+_HAIR = 2e-12  # of a run, before its end
 _LEFT_OUT = {"coriolis", "inertia_first_order", "inertia_second_order", "spin_softening", "geometric_stiffening"}
 
 
@@ -78,7 +80,7 @@ def quasi_static(
     modes = static_modes(equations, mechanism.bandwidth, duration, static)
     if modes.slow.shape[1] == equations.size:
         return equations
-    return QuasiStatic(mechanism, equations, formulated(without(vibrating, _LEFT_OUT)), modes)
+    return QuasiStatic(mechanism, equations, formulated(without(vibrating, _LEFT_OUT)), modes, duration)
 
 
 class QuasiStatic:
@@ -93,10 +95,17 @@ class QuasiStatic:
     light : TreeFormulation
         The same in the same coordinates without what deformation adds to inertia, to estimate η.
     modes : StaticModes
+    end : float, optional
+        Of the run [s]: loads that change there do not deflect links any more.
     """
 
     def __init__(
-        self, mechanism: Mechanism, inner: TreeFormulation, light: TreeFormulation, modes: StaticModes
+        self,
+        mechanism: Mechanism,
+        inner: TreeFormulation,
+        light: TreeFormulation,
+        modes: StaticModes,
+        end: float = np.inf,
     ) -> None:
         self.mechanism, self.inner, self.light, self.modes = mechanism, inner, light, modes
         self.bandwidth = mechanism.bandwidth or np.inf
@@ -106,6 +115,10 @@ class QuasiStatic:
         stiffness[inner.size - len(elastic) :] = elastic
         self.squares = np.einsum("ns,n,ns->s", modes.slow, stiffness, modes.slow)  # of the modes' frequencies [1/s²]
         self.squares[: len(inner.free_joints)] = 0.0
+        self.last = end - _HAIR * max(1.0, end) if np.isfinite(end) else end
+        slowest = float(modes.static_frequencies_hz.min(initial=np.inf))
+        self.period = min(1 / slowest if slowest else np.inf, end)
+        """Of the slowest static mode, but no longer than the run [s]; the same for any bandwidth below that mode."""
         self.ends = (0.0, *(b for b in inner.breakpoints if b > 0.0))
 
     @property
@@ -120,9 +133,9 @@ class QuasiStatic:
 
     @cached_property
     def compiled(self) -> CompiledSystem | None:
-        """The same equations in compiled form; None where those of all modes have none of a chain."""
+        """The same equations in compiled form; None where those of all modes have none of a chain, or all follow."""
         inner: CompiledSystem | None = getattr(self.inner, "compiled", None)
-        if inner is None:
+        if inner is None or not self.size:
             return None
         from erls.formulations.quasi_static_compiled import compile_quasi_static  # here: it imports the compiler
 
@@ -135,7 +148,7 @@ class QuasiStatic:
     @property
     def lapse(self) -> float:
         """Step of differences in time [s]."""
-        return 1 / (PER_PERIOD * self.bandwidth)
+        return self.period / PER_PERIOD
 
     def around(self, t: float) -> tuple[float, float]:
         """Steps back and forth from a time, which do not reach over a breakpoint."""
@@ -206,6 +219,8 @@ class QuasiStatic:
             SINGULAR_MASS.
         """
         a = np.zeros(self.size)
+        if not self.size:
+            return a
         mass = self.mass_matrix(t, y)
         try:
             for _ in range(_CORRECTIONS):
@@ -222,7 +237,7 @@ class QuasiStatic:
 
     def _accelerated(self, t: float, z: Array, v: Array) -> Array:
         """`acceleration`, from the compiled form where there is one."""
-        if self.compiled is not None and self.size:
+        if self.compiled is not None:
             c, out = self.compiled, np.empty(self.size)
             if c.acceleration(c.reals, c.integers, c.scratch, t, z.copy(), v.copy(), out) == 0:
                 return out
@@ -252,6 +267,7 @@ class QuasiStatic:
 
     def _exact(self, t: float, z: Array, v: Array, a: Array) -> tuple[Array, Array]:
         """η in balance, and η̇."""
+        t = min(t, self.last)
         eta, rate, force = self._balance(t, z, v, a, _MOST_EXACT, _EXACT)
         left, size = self._correction(force)[1], float(np.sqrt(self.modes.stiffness @ eta**2))
         if left > _FOUND * size and left > _FOUND * self._correction(self._forces(self.light, t, z, v, a))[1]:
@@ -275,6 +291,13 @@ class QuasiStatic:
     def state(self, t: float, y: Array, v: Array) -> State:
         """Poses, modal coordinates and joint angles, with the static deflection."""
         return self.inner.state(t, *self.all_modes(t, y, v, self._accelerated(t, y, v))[:2])
+
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries:
+        """The same at times (k,), with coordinates and rates (k, s)."""
+        found = np.zeros((2, len(t), self.inner.size))
+        for k, at in enumerate(t.tolist()):
+            found[:, k] = self.all_modes(at, y[k], v[k], self._accelerated(at, y[k], v[k]))[:2]
+        return state_series(self.inner, t, found[0], found[1])
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies, with those of the static deflection."""

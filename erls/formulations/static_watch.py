@@ -21,7 +21,7 @@ from erls.lie.so3 import Array
 
 _SAMPLES, _SAMPLES_UNCOMPILED = 30, 10
 _MOST_LEGS = 30
-_PER_PERIOD = 40  # differences in time, of a period at the bandwidth
+_PER_PERIOD = 40  # differences in time, of the period of the slowest static mode
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def static_error(formulation: QuasiStatic, solution: Solution) -> StaticError | 
 
     walk = legs(formulation, times)
     walk = [walk[k] for k in np.unique(np.linspace(0, len(walk) - 1, _MOST_LEGS).astype(int))]
-    middle, step = _samples(formulation, walk, times)
+    middle, step = _samples(formulation, walk, s.t)
     try:
         with np.errstate(all="ignore"):  # a run that failed may hold anything
             before, at, after = eta(middle - step), eta(middle), eta(middle + step)
@@ -123,17 +123,20 @@ def static_warnings(formulation: Formulation, solution: Solution, tolerance: flo
     ]
 
 
-def _samples(formulation: QuasiStatic, walk: list[Leg], times: tuple[float, float]) -> tuple[Array, Array]:
-    """Times away from jumps, and the steps of differences around them."""
+def _samples(formulation: QuasiStatic, walk: list[Leg], knots: Array) -> tuple[Array, Array]:
+    """Times away from jumps, those of the knots next to even ones, and the steps of differences around them."""
     count = _SAMPLES_UNCOMPILED if getattr(formulation.inner, "compiled", None) is None else _SAMPLES
-    finest = 1 / (_PER_PERIOD * formulation.bandwidth)
+    finest = formulation.period / _PER_PERIOD
     middle, step = [], []
     for leg in walk:
         length = leg.last - leg.first
-        some = max(1, round(count * length / (times[1] - times[0])))
+        some = max(1, round(count * length / float(knots[-1] - knots[0])))
         margin = min(finest, length / 8)
-        middle.append(np.linspace(leg.first + margin, leg.last - margin, some + 2)[1:-1])
-        step.append(np.full(some, margin))
+        even = np.linspace(leg.first + margin, leg.last - margin, some + 2)[1:-1]
+        own = knots[(knots >= leg.first + margin) & (knots <= leg.last - margin)]
+        at = np.unique(own[np.searchsorted((own[1:] + own[:-1]) / 2, even)]) if len(own) else even
+        middle.append(at)
+        step.append(np.full(len(at), margin))
     return np.concatenate(middle), np.concatenate(step)
 
 

@@ -16,7 +16,9 @@ Rules for adding an integrator:
    in a failure with cause INTERRUPTED.
 6. It counts its work honestly in `Work`; tests assert budgets on it.
 7. It calls ``observer(t, knots)`` after each accepted step (a compiled one after the last of some steps that took
-   about 50 ms, once a run has made its first steps), where ``knots()`` returns the `Solution` so far.
+   about 50 ms, once a run has made its first steps), where ``knots()`` returns the `Solution` so far, with every step
+   since the last call. What is kept of these follows ``options.output_step``, and times that the observer returns,
+   whose knots on either side are kept.
    A `SimulationError` that the observer or the system raises ends the run and becomes its failure; a `StopRun` of
    the observer ends it without failure.
 
@@ -25,7 +27,7 @@ Rules for adding an integrator:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -44,7 +46,7 @@ def _hair(times: tuple[float, float]) -> float:
 
 
 class StopRun(Exception):
-    """The observer has seen enough; nothing went wrong."""
+    """The observer has seen enough; nothing went wrong. Its arguments are times as an `Observer` may return them."""
 
 
 class MovingSystem(Protocol):
@@ -126,7 +128,8 @@ class Options:
     tolerance : float
         Error over the whole run [m] that ``lobatto`` and ``auto`` aim at.
     output_step : float or None
-        Of the knots only the first one in each stretch of this length [s] is kept; None keeps all.
+        Of the knots only the states at these distances in time [s] are kept (`erls.integrators.thinning`) beside the
+        ends of legs; None keeps all.
 
     Raises
     ------
@@ -179,7 +182,7 @@ class Solution:
     choice: str = ""
 
 
-Observer = Callable[[float, Callable[[], Solution]], None]
+Observer = Callable[[float, Callable[[], Solution]], Sequence[float] | None]
 Integrator = Callable[
     [SecondOrderSystem, tuple[float, float], Array, Array, Options, Observer | None], Solution
 ]
@@ -257,8 +260,14 @@ def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, A
     y, v : (m, n) arrays
         Interpolated positions and velocities (the derivative of the interpolant).
     """
+    position, velocity, _ = hermite_knots(t, y, v, a, at)
+    return position, velocity
+
+
+def hermite_knots(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, Array, Array]:
+    """The same with (m, n) accelerations, the second derivative of the interpolant."""
     if len(t) == 1:  # a run that failed at once
-        return np.repeat(y, len(at), axis=0), np.repeat(v, len(at), axis=0)
+        return np.repeat(y, len(at), axis=0), np.repeat(v, len(at), axis=0), np.repeat(a, len(at), axis=0)
     right = np.clip(np.searchsorted(t, at, side="right"), 1, len(t) - 1)
     # a zero-length interval (a jump) is never asked for: step back over it at the end of the knots
     right = np.where(t[right] == t[right - 1], right - 1, right).clip(1)
@@ -276,4 +285,5 @@ def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, A
     c5 = 6 * dy - 3 * dv + da / 2
     position = y0 + s * (v0 + s * (a0 / 2 + s * (c3 + s * (c4 + s * c5))))
     velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
-    return position, velocity
+    acceleration = (a0 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2
+    return position, velocity, acceleration

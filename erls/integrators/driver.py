@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from erls.errors import Cause, SimulationError
 from erls.integrators.base import Array, Leg, Observer, SecondOrderSystem, Solution, StopRun, Work, legs
+from erls.integrators.thinning import thinned
 
 
 class Recorder:
@@ -23,8 +24,8 @@ class Recorder:
     capacity : int
         Knots to reserve.
     apart : float or None
-        Of the accepted knots keep the first one in each stretch of this length [s] beside the ends of all legs, so that
-        memory stays flat however many steps there are; None keeps all.
+        Of the knots that the observer was told of keep the states at these distances in time [s] beside the ends of all
+        legs (`erls.integrators.thinning`), so that memory stays flat however many steps there are; None keeps all.
     beside : int
         Numbers to keep beside y, v, a of each knot.
     """
@@ -36,18 +37,19 @@ class Recorder:
         self.warnings: list[str] = []
         self._size, self._observer, self._apart = size, observer, apart
         self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
-        self._begun, self._stretch = 0.0, 0  # of ``apart``
-        # how many knots are kept, accepted steps, and the last knot where it may yet be dropped: one object, so that
-        # an interrupt finds all or nothing
-        self._kept: tuple[int, int, tuple[float, Array] | None] = 0, 0, None
+        self._begun = 0.0
+        # how many knots are kept, accepted steps, and, where knots are dropped, the last one that was looked at and
+        # those after it: one object, so that an interrupt finds all or nothing
+        self._kept: tuple[int, int, tuple[Array, Array]] = 0, 0, (self._t[:0], self._rows[:0])
 
     def begin(self, t: float, *parts: Array) -> None:
         """Add a copy of the knot y, v, a (and what is kept beside it) at which a leg begins; the last leg ends."""
-        row = np.concatenate(parts)
-        self._settle()
+        row = np.concatenate(parts)[None]
         if not self._kept[0]:
             self._begun = t
-        self._store(np.array([t]), row[None], 0)
+        times, rows = self._waiting()
+        rest = (np.array([t]), row) if self._apart is not None else self._kept[2]
+        self._store(np.append(times[-1:], t), np.concatenate([rows[-1:], row]), 0, rest)
 
     def append(self, t: float, *parts: Array) -> None:
         """Add a copy of a knot."""
@@ -65,41 +67,58 @@ class Recorder:
 
     def accept(self, t: float) -> None:
         """Count an accepted step, whose knots were added, and tell the observer."""
-        knots, steps, last = self._kept
-        self._kept = knots, steps + 1, last
+        knots, steps, rest = self._kept
+        self._kept = knots, steps + 1, rest
         self._tell(t)
 
     def _add(self, t: Array, rows: Array, steps: int) -> None:
+        knots, before, (times, states) = self._kept
         if self._apart is None:
-            self._store(t, rows, steps)
+            self._store(t, rows, steps, (times, states))
+        else:
+            self._kept = knots, before + steps, (np.concatenate([times, t]), np.concatenate([states, rows]))
+
+    def _tell(self, t: float) -> None:
+        whole: Sequence[float] | None = ()
+        try:
+            if self._observer is not None:
+                whole = self._observer(t, self.solution)
+        except StopRun as stop:
+            whole = stop.args
+            raise
+        except SimulationError as problem:
+            whole = problem.whole
+            raise
+        finally:
+            self._thin(whole or ())
+
+    def _thin(self, whole: Sequence[float]) -> None:
+        """Drop what need not be kept, once the observer has seen it."""
+        times, rows = self._kept[2]
+        if self._apart is None or len(times) < 2:
             return
-        stretches = np.floor((t - self._begun) / self._apart * (1 + 1e-12)).astype(np.int64)
-        first = np.diff(stretches, prepend=self._stretch) > 0
-        if first.any():
-            self._stretch = int(stretches[-1])
-            self._store(t[first], rows[first], 0)
-        knots, before, _ = self._kept
-        spare = None if not len(t) or first[-1] else (float(t[-1]), rows[-1].copy())
-        self._kept = knots, before + steps, spare
+        t, kept = thinned(times, rows, self._size, self._begun, self._apart, whole)
+        first = int(self._stored(t))
+        self._store(t[first:], kept[first:], 0, (times[-1:].copy(), rows[-1:].copy()))
 
-    def _settle(self) -> None:
-        """Keep the last knot for good."""
-        last = self._kept[2]
-        if last is not None:
-            self._store(np.array([last[0]]), last[1][None], 0)
+    def _stored(self, t: Array) -> bool:
+        """Whether the first of some knots is the last one that is kept for good."""
+        return bool(self._kept[0] and len(t) and self._t[self._kept[0] - 1] == t[0])
 
-    def _store(self, t: Array, rows: Array, steps: int) -> None:
+    def _waiting(self) -> tuple[Array, Array]:
+        """Times and rows of knots that are not kept for good."""
+        times, rows = self._kept[2]
+        first = int(self._stored(times))
+        return times[first:], rows[first:]
+
+    def _store(self, t: Array, rows: Array, steps: int, rest: tuple[Array, Array]) -> None:
         start, before, _ = self._kept
         end = start + len(t)
         while end > len(self._t):
             self._t = np.concatenate([self._t, np.empty(len(self._t))])
             self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
         self._t[start:end], self._rows[start:end] = t, rows
-        self._kept = end, before + steps, None
-
-    def _tell(self, t: float) -> None:
-        if self._observer is not None:
-            self._observer(t, self.solution)
+        self._kept = end, before + steps, rest
 
     @property
     def steps(self) -> int:
@@ -114,24 +133,25 @@ class Recorder:
     @property
     def time(self) -> float | None:
         """Time of the last knot."""
-        knots, _, last = self._kept
-        if last is not None:
-            return last[0]
+        knots, _, (times, _) = self._kept
+        if len(times):
+            return float(times[-1])
         return float(self._t[knots - 1]) if knots else None
 
     def solution(self, failure: SimulationError | None = None) -> Solution:
         """The run so far; later knots leave its arrays unchanged."""
-        t, rows, steps = self._so_far()
+        t, rows = self._so_far()
         y, v, a = (rows[:, i * self._size : (i + 1) * self._size] for i in range(3))
-        return Solution(t, y, v, a, replace(self.work, steps=steps), failure, tuple(self.warnings))
+        return Solution(t, y, v, a, replace(self.work, steps=self.steps), failure, tuple(self.warnings))
 
-    def _so_far(self) -> tuple[Array, Array, int]:
-        """Times, rows and steps."""
-        knots, steps, last = self._kept
+    def _so_far(self) -> tuple[Array, Array]:
+        """Times and rows."""
+        knots = self._kept[0]
         t, rows = self._t[:knots], self._rows[:knots]
-        if last is not None:
-            t, rows = np.append(t, last[0]), np.vstack([rows, last[1]])
-        return t, rows, steps
+        more = self._waiting()
+        if len(more[0]):
+            t, rows = np.concatenate([t, more[0]]), np.concatenate([rows, more[1]])
+        return t, rows
 
 
 Advance = Callable[[Leg, Array, Array, Array, Recorder], tuple[Array, Array]]

@@ -55,3 +55,15 @@ def joint_pose(revolute: bool, coordinate: float) -> Array:
     if revolute:
         return pose(rotation_z(coordinate))
     return pose(position=np.array([0.0, 0.0, coordinate]))
+
+
+def joint_poses(revolute: bool, coordinates: Array) -> Array:
+    """(k, 4, 4) `joint_pose` of (k,) coordinates."""
+    result = np.tile(np.eye(4), (len(coordinates), 1, 1))
+    if revolute:
+        c, s = np.cos(coordinates), np.sin(coordinates)
+        result[:, 0, 0] = result[:, 1, 1] = c
+        result[:, 0, 1], result[:, 1, 0] = -s, s
+    else:
+        result[:, 2, 3] = coordinates
+    return result

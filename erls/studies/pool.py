@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass
-from multiprocessing import get_context
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from erls.errors import Cause, SceneError, SimulationError
+from erls.crew import Crew, reported
+from erls.errors import Cause, SceneError
+from erls.workers import possible
 from fe_import.errors import ReportedError
 
 A = TypeVar("A")
 R = TypeVar("R")
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_LOOK_S = 0.2  # between looks at whether workers are left
 
 
 @dataclass(frozen=True)
@@ -39,12 +38,12 @@ def run_all(
     Parameters
     ----------
     work : callable
-        Importable by name; its argument and result can be pickled.
+        Importable by name from a module other than the script; its argument and result can be pickled.
     tasks : sequence
     progress : callable
         Called with (finished, all).
     workers : int, optional
-        Processes; as many as cores unless given. One runs in this process.
+        Processes (`erls.crew`); as many as cores unless given. One runs in this process.
     longest_last : bool
         Whether the last tasks take longest, so that several processes start with them.
 
@@ -65,7 +64,7 @@ def run_all(
     count = min(workers or os.cpu_count() or 1, len(tasks))
     finished: list[Finished] = []
     try:
-        for one in _here(work, tasks) if count <= 1 else _spread(work, tasks, count, longest_last):
+        for one in _spread(work, tasks, count, longest_last) if count > 1 and possible() else _here(work, tasks):
             finished.append(one)
             progress(len(finished), len(tasks))
     except KeyboardInterrupt:
@@ -84,47 +83,14 @@ def _here(work: Callable[[A], R], tasks: Sequence[A]) -> Iterator[Finished]:
 
 
 def _spread(work: Callable[[A], R], tasks: Sequence[A], count: int, longest_last: bool) -> Iterator[Finished]:
-    numbers: dict[Future[tuple[R | None, ReportedError | None]], int] = {}
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))  # read by the workers when they load their libraries
-    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_deaf)
+    order = range(len(tasks))
+    crew = Crew(work, tasks, reversed(order) if longest_last else order)
+    crew.start(count)
     try:
-        numbered = list(enumerate(tasks))
-        for number, task in reversed(numbered) if longest_last else numbered:
-            numbers[pool.submit(_caught, work, task)] = number
-        waiting = set(numbers)
-        while waiting:
-            done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in done:
-                result, error = _result(future)
-                yield Finished(numbers[future], result, error)
+        while crew.members or crew.given:
+            for answer in crew.answers(_LOOK_S):
+                yield Finished(answer.number, answer.result, reported(answer))
+        while (number := crew.take()) is not None:  # no worker could be started
+            yield from (replace(done, number=number) for done in _here(work, [tasks[number]]))
     finally:
-        if any(not future.done() for future in numbers):  # interrupted: a run in progress is of no use any more
-            for process in list((pool._processes or {}).values()):
-                process.terminate()
-        pool.shutdown(wait=True, cancel_futures=True)
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-def _result(future: Future[tuple[R | None, ReportedError | None]]) -> tuple[R | None, ReportedError | None]:
-    try:
-        return future.result()
-    except (BrokenExecutor, MemoryError):
-        remedy = "free memory, or run fewer at a time"
-        return None, SimulationError(Cause.OUT_OF_MEMORY, "the process of this run died", remedy=remedy)
-
-
-def _caught(work: Callable[[A], R], task: A) -> tuple[R | None, ReportedError | None]:
-    try:
-        return work(task), None
-    except ReportedError as problem:
-        return None, problem  # pickled without the run that it may carry
-
-
-def _deaf() -> None:
-    """Workers leave Ctrl-C to the process that started them."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        crew.dismiss()  # interrupted: a run in progress is of no use any more

@@ -6,7 +6,7 @@ and answers every question as the other does.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -45,9 +45,8 @@ def absolute_generalized_alpha(
         y, v, a = (x[:, kept] for x in (found.y, found.v, found.a))
         return Solution(found.t, y, v, a, found.work, found.failure, found.warnings)
 
-    def watch(t: float, knots: Callable[[], Solution]) -> None:
-        if observer is not None:
-            observer(t, lambda: independent(knots()))
+    def watch(t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:
+        return None if observer is None else observer(t, lambda: independent(knots()))
 
     start = absolute.configuration(times[0], y, v)
     return independent(lie_generalized_alpha(absolute, times, *start, settings, watch))

@@ -6,7 +6,7 @@ accelerations and multipliers of the knots, interpolated through differences of 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -49,9 +49,8 @@ def nodal_generalized_alpha(
         full = [np.concatenate(pair, axis=1) for pair in zip((found.y, found.v, found.a), more, strict=True)]
         return Solution(found.t, full[0], full[1], full[2], found.work, found.failure, found.warnings)
 
-    def watch(t: float, knots: Callable[[], ConstrainedSolution]) -> None:
-        if observer is not None:
-            observer(t, lambda: complete(knots()))
+    def watch(t: float, knots: Callable[[], ConstrainedSolution]) -> Sequence[float] | None:
+        return None if observer is None else observer(t, lambda: complete(knots()))
 
     start = system.configuration(y, v)
     return complete(lie_generalized_alpha(system.system, times, *start, settings, watch))  # type: ignore[arg-type]

@@ -1,0 +1,49 @@
+"""Warnings of motors that reach their limit and leave it again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import scenes
+
+import erls
+
+SWING = {"shape": "sine", "amplitude_deg": 90.0, "frequency_hz": 5.0}
+
+
+def _told(folder: Path, drive: dict[str, Any], *changes: str) -> list[str]:
+    scenes.l_link(folder)
+    joint = {**scenes.L_SCENE["joints"][0], "drive": {"type": "pd", "motion": SWING, **drive}}
+    path = scenes.l_scene(folder, joints=[joint])
+    told: list[str] = []
+    erls.simulate(erls.load_scene(path, ["simulation.duration=0.15", *changes]), tell=told.append)
+    return [text for text in told if "reaches its limit" in text]
+
+
+@pytest.mark.parametrize("lead", [False, True])
+@pytest.mark.parametrize("formulation", ["erls", "ffr"])
+def test_a_motor_that_switches_between_its_limits_is_told_of(formulation: str, lead: bool, tmp_path: Path) -> None:
+    """With its joint, its limit and what to do."""
+    drive = {"proportional_gain": 200.0, "derivative_gain": 4.0, "torque_limit": 3.0, "feed_forward": lead}
+    lobatto = ("simulation.integrator=lobatto", "simulation.tolerance=1e-3")
+    (text,) = _told(tmp_path, drive, f"simulation.formulation={formulation}", *lobatto)
+    assert "its limit of 3" in text
+    assert "tolerance of 0.001 m" in text
+
+
+@pytest.mark.parametrize(
+    ("drive", "changes"),
+    [
+        ({"proportional_gain": 200.0, "derivative_gain": 4.0}, ("simulation.integrator=lobatto",)),
+        ({"proportional_gain": 1.0, "derivative_gain": 0.1, "torque_limit": 1e4}, ("simulation.integrator=lobatto",)),
+        (
+            {"proportional_gain": 200.0, "derivative_gain": 4.0, "torque_limit": 3.0},
+            ("simulation.integrator=generalized_alpha", "simulation.step=1e-3"),  # its error is that of its step
+        ),
+    ],
+)
+def test_others_are_not(drive: dict[str, Any], changes: tuple[str, ...], tmp_path: Path) -> None:
+    """No limit, a distant one, and fixed steps."""
+    assert _told(tmp_path, drive, *changes) == []
