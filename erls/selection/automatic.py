@@ -79,7 +79,8 @@ def automatic(
 def named(scene: Scene, whole: Mechanism, choice: Choice) -> Scene:
     """The scene with the names of what is on, so that a run file says what was computed."""
     record = scene.record
-    settings = msgspec.structs.replace(record.simulation, effects=in_order(whole.effects - choice.off))
+    effects, bandwidth = in_order(whole.effects - choice.off), choice.bandwidth or record.simulation.bandwidth
+    settings = msgspec.structs.replace(record.simulation, effects=effects, bandwidth=bandwidth)
     links = [msgspec.structs.replace(k, flexible=k.flexible and k.name not in choice.rigid) for k in record.links]
     return replace(scene, record=msgspec.structs.replace(record, simulation=settings, links=links))
 
@@ -88,7 +89,7 @@ def _certified(run: Run, whole: Mechanism, choice: Choice) -> Certificate:
     """The certificate; infinite where the error cannot be followed."""
     settings = run.scene.record.simulation
     tolerances = settings.effects_tolerance, settings.effects_effort_tolerance
-    if not choice.rigid and choice.off.isdisjoint(present(whole)):
+    if not choice.rigid and not choice.bandwidth and choice.off.isdisjoint(present(whole)):
         return Certificate(0.0, None, *tolerances)
     try:
         return certify(run, whole)
@@ -110,7 +111,7 @@ def _less(choice: Choice, certificate: Certificate) -> Choice:
 
 
 def _left(choice: Choice) -> str:
-    return ", ".join([*in_order(choice.off), *(f"flexibility of {link!r}" for link in sorted(choice.rigid))])
+    return ", ".join(cut.name for cut in choice.cuts)
 
 
 def _on(choice: Choice) -> str:

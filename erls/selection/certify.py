@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from erls.selection.error_motion import Deviation, Knots, error_motion
 from erls.selection.outputs import Outputs, busiest, effort_error, largest_distance, watched_nodes
 from erls.selection.quick import quick
 from erls.selection.resolution import resolution, vibrations
+from erls.selection.static import vibrating_efforts
 from fe_import.model import IntArray
 
 FEWEST = 500  # steps
@@ -57,7 +59,9 @@ def certify(run: Run, whole: Mechanism) -> Certificate:
     ours = Outputs(run.scene, run.formulation, watched)
     others = Outputs(run.scene, formulation, watched)
     metres = metre_scales(system)  # type: ignore[arg-type]
-    apart = np.abs(metres * deviation.error).sum(axis=1)
+    static = run.formulation.mechanism.bandwidth is not None
+    moved = _swing(system, deviation) if static else deviation.error
+    apart = np.abs(metres * moved).sum(axis=1)
     here, there = [], []
     for k in busiest(apart, PLACES):
         t, other_y, other_v = _other(deviation, k, kept)
@@ -68,10 +72,12 @@ def certify(run: Run, whole: Mechanism) -> Certificate:
         for k in busiest(apart, EFFORTS):
             efforts[0].append(others.efforts(*_other(deviation, k, kept)))
             efforts[1].append(ours.efforts(float(deviation.t[k]), deviation.y[k], deviation.v[k]))
-    error = largest_distance(here, there)
+    error, effort = largest_distance(here, there), effort_error(*efforts)
+    if static and found.forced is not None and effort is not None:  # coarse steps do not follow fast vibrations
+        effort = max(effort, vibrating_efforts(run.scene, formulation, found.forced) or 0.0)
     return Certificate(
-        error + min(wanted.unresolved, error),
-        effort_error(*efforts),
+        error + (wanted.unresolved if static else min(wanted.unresolved, error)),
+        effort,
         settings.effects_tolerance,
         settings.effects_effort_tolerance,
     )
@@ -83,6 +89,16 @@ def _other(deviation: Deviation, k: int, kept: IntArray) -> tuple[float, Array, 
     y = embedded(deviation.y[k], kept, size) + deviation.error[k]
     v = embedded(deviation.v[k], kept, size) + deviation.rate[k]
     return float(deviation.t[k]), y, v
+
+
+def _swing(system: Any, deviation: Deviation) -> Array:
+    """(k, n) K⁻¹ M ë: about how far links are from where they would rest under their loads."""
+    t, rest = deviation.t, np.zeros(system.size)
+    spans = np.diff(t)
+    a = np.diff(deviation.rate, axis=0) / np.maximum(spans, np.median(spans) / 2)[:, None]  # 0 between legs
+    stiffness = system.stiffness_and_damping(float(t[0]), rest, rest)[0]
+    weight = np.linalg.solve(stiffness, system.mass_matrix(float(t[0]), rest))
+    return np.vstack([a[:1], a]) @ weight.T
 
 
 def _legs(run: Run, step: float) -> tuple[list[Knots], list[int]]:

@@ -1,7 +1,8 @@
 """``effects = "auto"``: which effects may be left out within a tolerance, decided before the run.
 
 Deciding costs coarse looks at the scene before the run, and a certificate after it. Both, and the run itself, are
-estimated by counting (`erls.selection.cost`); where the run saves less than that, all effects stay.
+estimated by counting (`erls.selection.cost`); where the run saves less than that, all effects stay. Vibrations that
+prescribed motions set off need no look (`erls.selection.forced`): where they do not matter, links follow statically.
 """
 
 from __future__ import annotations
@@ -10,20 +11,21 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from erls.errors import Cause, SimulationError
-from erls.formulations import formulate
+from erls.formulations import Formulation, formulate
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import with_rigid, without
 from erls.run import Run
 from erls.scene import Scene
-from erls.selection import certify, probe
+from erls.selection.certify import FEWEST
 from erls.selection.coordinates import same_start
-from erls.selection.cost import CALM, ITERATIONS, PREPARE, STATE, Cost, cost_of, count_steps, effort_cost
+from erls.selection.cost import cost_of
 from erls.selection.cuts import Cut, possible_cuts
-from erls.selection.probe import coarse_run, deformation, difference, look_steps, needed, too_coarse
+from erls.selection.probe import coarse_run, deformation, difference, look_steps, needed, resolved, too_coarse
+from erls.selection.purse import Purse
+from erls.selection.resolution import Vibrations
+from erls.selection.static import may_follow, static_cut
 
 BUDGET = 0.3  # of the tolerance: what a coarse run may overlook is in the rest
-_IN_VAIN = 0.08  # of the run: what looks may cost that find nothing to leave out
-_FOLLOWED = 4  # iterations of a step of the certificate
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,15 @@ class Choice:
         """Links to make rigid."""
         return frozenset(cut.link for cut in self.cuts if cut.link)
 
+    @property
+    def bandwidth(self) -> float:
+        """Below all vibrations [Hz], where links follow statically; 0 where they vibrate."""
+        return max((cut.bandwidth for cut in self.cuts), default=0.0)
+
     def applied(self, whole: Mechanism) -> Mechanism:
         """The mechanism with what was decided."""
-        return with_rigid(without(whole, self.off), self.rigid)
+        less = with_rigid(without(whole, self.off), self.rigid)
+        return replace(less, bandwidth=self.bandwidth) if self.bandwidth else less
 
 
 def choose_effects(scene: Scene, mechanism: Mechanism, thrifty: bool = True) -> Choice:
@@ -78,10 +86,11 @@ def choose_effects(scene: Scene, mechanism: Mechanism, thrifty: bool = True) -> 
     if not cuts:
         return Choice(note="effects: auto leaves nothing out: nothing that the scene holds would save anything")
     try:
-        purse = _Purse(scene, mechanism) if thrifty else None
+        formulation = formulate(mechanism, settings)
+        purse = Purse(scene, formulation) if thrifty else None
         if purse is not None and not purse.may_pay:
             return Choice(note=_TOO_SHORT)
-        return _chosen(scene, mechanism, cuts, purse)
+        return _chosen(scene, formulation, cuts, purse)
     except SimulationError as problem:
         if problem.cause == Cause.INTERRUPTED:
             raise
@@ -91,65 +100,21 @@ def choose_effects(scene: Scene, mechanism: Mechanism, thrifty: bool = True) -> 
 _TOO_SHORT = "effects: all kept: the whole run costs less than deciding"
 
 
-class _Purse:
-    """Estimated times [s]: of the run, of what was spent on looks, and what they won."""
-
-    def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
-        self.scene, self.mechanism = scene, mechanism
-        formulation = formulate(mechanism, scene.record.simulation)
-        self.cost = cost_of(formulation)
-        self.steps = count_steps(scene, mechanism)
-        self.effort = effort_cost(formulation)
-        self.spent = self.won = 0.0
-        self.followed, self.iterations = certify.FEWEST, ITERATIONS
-
-    @property
-    def may_pay(self) -> bool:
-        """Whether the shortest decision costs less than the run."""
-        shortest = self.look(self.cost, probe.FEWEST) + self.comparison
-        return self.affords(shortest) and self.certificate + shortest < self.run
-
-    @property
-    def run(self) -> float:
-        """With all effects."""
-        return self.steps * self.cost.step(self.iterations)
-
-    @property
-    def certificate(self) -> float:
-        """Of what was left out."""
-        places = 2 * (certify.PLACES * STATE + certify.EFFORTS * self.effort + PREPARE)
-        step = _FOLLOWED * self.cost.iteration + self.cost.evaluation
-        return self.followed * step + places * self.cost.links
-
-    def look(self, cost: Cost, count: int) -> float:
-        """One coarse run."""
-        return count * cost.coarse_step + PREPARE * cost.links
-
-    @property
-    def comparison(self) -> float:
-        """Of two coarse runs."""
-        return 2 * (probe.PLACES * STATE + probe.EFFORTS * self.effort) * self.cost.links
-
-    def affords(self, price: float) -> bool:
-        """Whether looks may cost so much more, when this one finds nothing to leave out."""
-        return self.spent + price <= _IN_VAIN * self.run + self.won / 2
-
-    def saved(self, choice: Choice) -> float:
-        """By leaving out what was chosen."""
-        cost = cost_of(formulate(choice.applied(self.mechanism), self.scene.record.simulation))
-        return self.run - self.steps * cost.step(self.iterations)
-
-
-def _chosen(scene: Scene, mechanism: Mechanism, cuts: list[Cut], purse: _Purse | None) -> Choice:
-    settings = scene.record.simulation
-    resolution, start = needed(scene, mechanism)
+def _chosen(scene: Scene, formulation: Formulation, cuts: list[Cut], purse: Purse | None) -> Choice:
+    settings, mechanism = scene.record.simulation, formulation.mechanism
+    found, start = needed(settings, formulation)
+    resolution = resolved(settings, found)
     count = look_steps(settings, resolution)
     if purse is not None:
-        purse.followed = resolution.count(settings.duration, certify.FEWEST)
-        if resolution.calm and settings.integrator == "generalized_alpha":
-            purse.iterations = CALM
+        purse.spent += purse.amplitudes
+        purse.followed = resolution.count(settings.duration, FEWEST)
+        purse.set_calm(resolution.calm)
+    following = _following(scene, formulation, found, purse)
+    if following is not None:
+        return following
+    if purse is not None:
         price = purse.look(purse.cost, count)
-        best = max(purse.saved(Choice((cut,))) for cut in cuts)
+        best = max(purse.saved(cut.applied(mechanism)) for cut in cuts)
         if not purse.affords(price + purse.comparison) or best < purse.certificate + price + purse.comparison:
             return Choice(note=_TOO_SHORT)
         purse.spent += price
@@ -163,11 +128,24 @@ def _chosen(scene: Scene, mechanism: Mechanism, cuts: list[Cut], purse: _Purse |
     for cut in cuts:
         looks.consider(cut)
     choice = Choice(tuple(looks.taken))
-    if purse is not None and choice.cuts and purse.saved(choice) < purse.certificate:
+    if purse is not None and choice.cuts and purse.saved(choice.applied(mechanism)) < purse.certificate:
         return Choice(note="effects: all kept: what could be left out saves less than its certificate costs")
     if not choice.cuts and looks.passed:
         return Choice(note=_TOO_SHORT)
     return replace(choice, note=_told(choice.cuts, settings.effects_tolerance))
+
+
+def _following(scene: Scene, formulation: Formulation, found: Vibrations, purse: Purse | None) -> Choice | None:
+    """All links following statically, where that is within the tolerances and pays."""
+    settings, mechanism = scene.record.simulation, formulation.mechanism
+    if found.forced is None or not may_follow(mechanism, settings):
+        return None
+    cut = static_cut(scene, formulation, found.forced)
+    if cut is None or not _Room(settings.effects_tolerance, settings.effects_effort_tolerance).take(cut):
+        return None
+    if purse is not None and purse.saved(cut.applied(mechanism)) <= purse.certificate:
+        return None
+    return Choice((cut,), _told((cut,), settings.effects_tolerance))
 
 
 @dataclass
@@ -178,7 +156,7 @@ class _Looks:
     whole: Run
     count: int
     room: _Room
-    purse: _Purse | None
+    purse: Purse | None
     taken: list[Cut] = field(default_factory=list)
     passed: bool = False  # whether a look would have cost too much
 
@@ -194,7 +172,7 @@ class _Looks:
         if self.purse is not None:
             cost = cost_of(formulate(less, self.scene.record.simulation))
             price = self.purse.look(cost, self.count) + self.purse.comparison
-            after = self.purse.saved(Choice((*self.taken, cut)))
+            after = self.purse.saved(Choice((*self.taken, cut)).applied(mechanism))
             gain = after - self.purse.won - (0.0 if self.taken else self.purse.certificate)
             if not self.purse.affords(price) or gain < price:
                 self.passed = True

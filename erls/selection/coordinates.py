@@ -16,14 +16,16 @@ def kept_places(whole: Mechanism, less: Mechanism, size: int) -> IntArray:
     Parameters
     ----------
     whole, less : Mechanism
-        ``less`` with some links rigid.
+        ``less`` with some links rigid, or with all following statically.
     size : int
         Number of coordinates of ``whole``.
     """
     counts = [link.elastic_modes for link in whole.links]
+    at = size - sum(counts)
+    if less.bandwidth != whole.bandwidth:
+        return np.arange(at)
     if counts == [link.elastic_modes for link in less.links]:
         return np.arange(size)
-    at = size - sum(counts)
     kept = [np.arange(at)]
     for count, link in zip(counts, less.links, strict=True):
         if link.elastic_modes:
@@ -35,7 +37,8 @@ def kept_places(whole: Mechanism, less: Mechanism, size: int) -> IntArray:
 def same_start(whole: Mechanism, less: Mechanism) -> bool:
     """Whether both start from the same state: inertia does not act at rest."""
     modes = [[link.elastic_modes for link in mechanism.links] for mechanism in (whole, less)]
-    return modes[0] == modes[1] and whole.effects - less.effects <= FIRST | SECOND
+    same = modes[0] == modes[1] and whole.bandwidth == less.bandwidth
+    return same and whole.effects - less.effects <= FIRST | SECOND
 
 
 def embedded(values: Array, places: IntArray, size: int) -> Array:

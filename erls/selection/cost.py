@@ -17,6 +17,7 @@ from erls.formulations.substructures import solved
 from erls.integrators.base import Options
 from erls.mechanism.chain import Mechanism, poses
 from erls.scene import Scene
+from erls.selection.forced import KNOTS
 from erls.selection.outputs import driven_joints, reacting
 from erls.selection.probe import fixed_steps
 
@@ -28,6 +29,10 @@ _SOLVE, _FACTOR, _REFRESH = 1.2e-9, 4e-10, 0.05  # s per entry, s per entry and 
 _STIFFENED = 2.2
 _PYTHON, _PYTHON_LINK, _PYTHON_X, _PYTHON_Z = 4e-5, 5e-5, 3e-5, 1e-5
 PREPARE, STATE = 5e-4, 1e-4  # s per link: of equations, of the points of a state
+FIXED = 0.05  # s: of files, and of what a run looks at afterwards
+FOLLOWING = 0.03  # s per link: of states of links that follow statically, in what a run looks at afterwards
+_CALL, _SPECTRUM = 8e-6, 1.5e-7  # s: of an evaluation from Python; of modes, per cube of their number
+_LOOK = 2e-3  # s per link: of equations with and without prescribed motions
 _EFFORTS, _REACTING = 7e-4, 2e-5  # s per link: of drive forces in a state, in Python and compiled
 
 
@@ -37,12 +42,14 @@ class Cost:
 
     Attributes
     ----------
-    links : int
+    links, size : int
+        The latter of coordinates.
     evaluation, solution, factors : float
         Of the equations; with the iteration matrix; of that matrix.
     """
 
     links: int
+    size: int
     evaluation: float
     solution: float
     factors: float
@@ -71,10 +78,10 @@ def cost_of(formulation: Formulation) -> Cost:
     axes = _axes(mechanism)
     size = system.size
     if not size:  # nothing to integrate
-        return Cost(len(axes), 0.0, 0.0, 0.0)
+        return Cost(len(axes), 0, 0.0, 0.0, 0.0)
     if getattr(system, "compiled", None) is None:
         evaluation = _PYTHON + len(axes) * (_PYTHON_LINK + first * _PYTHON_X + second * _PYTHON_Z)
-        return Cost(len(axes), evaluation, _PYTHON / 2, 2 * evaluation)
+        return Cost(len(axes), size, evaluation, _PYTHON / 2, 2 * evaluation)
     evaluation = 0.0
     for link, count in zip(mechanism.links, axes, strict=True):
         entries = (6 + link.elastic_modes) ** 2
@@ -83,7 +90,12 @@ def cost_of(formulation: Formulation) -> Cost:
     if "geometric_stiffening" in mechanism.effects and any(k.second_order is not None for k in mechanism.links):
         evaluation *= _STIFFENED
     factors = evaluation + _FACTOR * size**3 + _SOLVE * size**2
-    return Cost(len(axes), evaluation, _SOLVE * size**2, factors)
+    return Cost(len(axes), size, evaluation, _SOLVE * size**2, factors)
+
+
+def forced_cost(cost: Cost) -> float:
+    """Of the vibrations that prescribed motions set off [s]."""
+    return KNOTS * (cost.evaluation + _CALL) + _SPECTRUM * cost.size**3 + _LOOK * cost.links
 
 
 def effort_cost(formulation: Formulation) -> float:

@@ -1,8 +1,8 @@
-"""What ``auto`` may leave out of a scene: sets of effects, and links to make rigid, that save operations."""
+"""What ``auto`` may leave out of a scene, to save operations: sets of effects, flexibility of links, vibrations."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from erls.effects import EFFECTS, FIRST, SECOND, in_order
 from erls.mechanism.chain import Mechanism
@@ -17,9 +17,11 @@ class Cut:
     Attributes
     ----------
     off : frozenset of str
-        Effects; empty where a link becomes rigid.
+        Effects; empty where a link becomes rigid, or all follow statically.
     link : str
         Link to make rigid; empty for all of them, or none.
+    bandwidth : float
+        Below all vibrations [Hz], which lets links follow statically; 0 where they vibrate.
     error : float
         Estimated error of leaving it out [m].
     effort_error : float
@@ -28,16 +30,25 @@ class Cut:
 
     off: frozenset[str] = frozenset()
     link: str = ""
+    bandwidth: float = 0.0
     error: float = 0.0
     effort_error: float = 0.0
 
     def applied(self, mechanism: Mechanism) -> Mechanism:
         """The mechanism without it."""
+        if self.bandwidth:
+            return replace(mechanism, bandwidth=self.bandwidth)
         return with_rigid(mechanism, {self.link}) if self.link else without(mechanism, self.off)
 
     def __str__(self) -> str:
-        names = f"flexibility of {self.link!r}" if self.link else ", ".join(in_order(_named(self.off)))
-        return f"{names} ({self.error:.2g} m)"
+        return f"{self.name} ({self.error:.2g} m)"
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        if self.bandwidth:
+            return "vibrations of links"
+        return f"flexibility of {self.link!r}" if self.link else ", ".join(in_order(_named(self.off)))
 
 
 RIGID = frozenset(name for name in EFFECTS if name == "flexibility" or EFFECTS[name].of_links)

@@ -9,6 +9,7 @@ import numpy as np
 
 from erls.formulations import formulate
 from erls.formulations.base import Formulation, State
+from erls.formulations.quasi_static import QuasiStatic
 from erls.integrators.base import Solution
 from erls.lie.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -44,7 +45,8 @@ class Outputs:
         self._run = Run(scene, formulation, Solution(np.zeros(1), empty, empty, empty))
         self.formulation, self.watched = formulation, watched
         self.driven = driven_joints(formulation.mechanism)
-        freed = reacting(formulation) if self.driven else None
+        self._static = formulation if isinstance(formulation, QuasiStatic) else None
+        freed = reacting(formulation if self._static is None else self._static.inner) if self.driven else None
         self._reacting = None if freed is None else quick(formulate(freed, scene.record.simulation))
 
     def positions(self, state: State) -> Array:
@@ -56,10 +58,13 @@ class Outputs:
         if self._reacting is None:
             found = self.formulation.reactions(t, y, v)
             return np.array([found[k].effort for k in self.driven])
+        if self._static is not None:
+            y, v, a = self._static.all_modes(t, y, v, self._static.acceleration(t, y, v))
+        else:
+            a = quick(self.formulation).acceleration(t, y, v) if len(y) else y
         joints = self.formulation.mechanism.joints
         free = [k for k, joint in enumerate(joints) if not joint.drive.prescribed]
         state = np.zeros((3, self._reacting.size))
-        a = quick(self.formulation).acceleration(t, y, v) if len(y) else y
         for row, values in zip(state, (y, v, a), strict=True):
             row[free], row[len(joints) :] = values[: len(free)], values[len(free) :]
         for k in self.driven:

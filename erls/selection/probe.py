@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from erls.errors import Cause
-from erls.formulations import formulate, integrator
+from erls.formulations import Formulation, formulate, integrator
 from erls.formulations.substructures import solved
 from erls.integrators.base import Array, Options, hermite, metre_scales
 from erls.mechanism.chain import Mechanism
@@ -22,7 +22,7 @@ from erls.scene import Scene, Simulation
 from erls.selection.coordinates import embedded, kept_places
 from erls.selection.outputs import Outputs, busiest, effort_error, largest_distance, watched_nodes
 from erls.selection.quick import quick
-from erls.selection.resolution import Resolution, resolution, vibrations
+from erls.selection.resolution import Resolution, Vibrations, resolution, vibrations
 
 FEWEST, MOST = 120, 20_000  # steps
 PLACES, EFFORTS = 16, 6  # times at which points and drive forces are compared
@@ -64,19 +64,21 @@ def look_steps(settings: Simulation, found: Resolution) -> int:
     return min(found.count(settings.duration, FEWEST), MOST, fixed_steps(settings) or MOST)
 
 
-def needed(scene: Scene, mechanism: Mechanism) -> tuple[Resolution, State]:
-    """Resolution of coarse looks at a scene, and the state in which it starts.
+def needed(settings: Simulation, formulation: Formulation) -> tuple[Vibrations, State]:
+    """What coarse looks at a scene have to follow, and the state in which it starts.
 
     Raises
     ------
     SimulationError
         SINGULAR_MASS.
     """
-    settings = scene.record.simulation
-    formulation = formulate(mechanism, settings)
     start = formulation.initial_state()
-    found = vibrations(quick(solved(formulation)), mechanism, settings.duration, *start)
-    return resolution(found, UNRESOLVED * settings.effects_tolerance), start
+    return vibrations(quick(solved(formulation)), formulation.mechanism, settings.duration, *start), start
+
+
+def resolved(settings: Simulation, found: Vibrations) -> Resolution:
+    """How finely coarse looks follow that."""
+    return resolution(found, UNRESOLVED * settings.effects_tolerance)
 
 
 def coarse_run(scene: Scene, mechanism: Mechanism, count: int, start: State | None = None) -> Run:

@@ -3,7 +3,8 @@
 A force that jumps by Δf at the start of a run, or at a breakpoint of a drive, sets off a vibration in each mode φ_j of
 K φ = ω² M φ, with the amplitude φ_jᵀ Δf / ω_j² = φ_jᵀ M Δa / ω_j². Fast ones of small amplitude need no resolution:
 their amplitudes bound what they can do. The others have to be followed for as long as they last without losing more
-than a radian of phase, since errors add up along a motion that keeps its own.
+than a radian of phase, since errors add up along a motion that keeps its own. Where all joints follow prescribed
+motions, amplitudes come from the loads along the whole run (`erls.selection.forced`).
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 
-from erls.integrators.base import Array, SecondOrderSystem, legs, metre_scales
+from erls.integrators.base import Array, legs, metre_scales
 from erls.mechanism.chain import Mechanism
+from erls.selection.forced import Forced, all_prescribed, forced_vibrations
 
 _RIGID = 1e-9  # of the largest ω²
 _JUMPS = 40  # at most so many are looked at
@@ -43,6 +46,8 @@ class Vibrations:
     prescribed : float
         The same of prescribed motions.
     duration : float
+    forced : Forced or None
+        Where all joints follow prescribed motions: what amplitudes come from.
     """
 
     omega: Array
@@ -51,6 +56,7 @@ class Vibrations:
     pace: float
     prescribed: float
     duration: float
+    forced: Forced | None = None
 
 
 @dataclass(frozen=True)
@@ -76,10 +82,8 @@ class Resolution:
         return max(fewest, math.ceil(duration / self.step)) if self.step > 0 else fewest
 
 
-def vibrations(
-    system: SecondOrderSystem, mechanism: Mechanism, duration: float, y: Array, v: Array
-) -> Vibrations:
-    """Vibrations that the start (y, v) of a run and the jumps of its drives set off.
+def vibrations(system: Any, mechanism: Mechanism, duration: float, y: Array, v: Array) -> Vibrations:
+    """Vibrations of a `SecondOrderSystem` that the start (y, v) of a run and its drives set off.
 
     Raises
     ------
@@ -107,11 +111,15 @@ def vibrations(
     omega, metres = np.sqrt(values), metre_scales(system)
     amplitude = np.linalg.norm(np.array(jumps) @ mass @ modes, axis=0) / values
     amplitude = amplitude * np.abs(metres[:, None] * modes).max(axis=0, initial=0.0)
+    forced = forced_vibrations(system, duration, y, v) if all_prescribed(mechanism) and elastic.all() else None
+    if forced is not None:
+        amplitude = forced.metres(metres)
     decay = np.einsum("ij,ik,kj->j", modes, damping, modes) / 2
     lasting = np.minimum(duration, _DECAYED / np.maximum(decay, _DECAYED / duration))
     free = np.diag(stiffness) == 0
     pace = max(np.sqrt(np.abs(jumps)).max(axis=0)[free].max(initial=0.0), np.abs(v[free]).max(initial=0.0))
-    return Vibrations(omega, np.nan_to_num(amplitude, nan=np.inf), lasting, float(pace), prescribed, duration)
+    amplitude = np.where(np.isnan(amplitude), np.inf, amplitude)
+    return Vibrations(omega, amplitude, lasting, float(pace), prescribed, duration, forced)
 
 
 def resolution(found: Vibrations, room: float) -> Resolution:

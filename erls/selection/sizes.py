@@ -18,7 +18,7 @@ from erls.run import Run
 from erls.scene import Scene
 from erls.selection.coordinates import kept_places
 from erls.selection.cuts import flexible_links, partners
-from erls.selection.probe import coarse_run, difference, look_steps, needed
+from erls.selection.probe import coarse_run, difference, look_steps, needed, resolved
 from erls.selection.quick import quick
 
 _FORCES = 20  # knots at which forces are compared
@@ -72,8 +72,9 @@ def effect_sizes(scene: Scene, mechanism: Mechanism, names: Iterable[str]) -> tu
         The coarse run with all effects failed.
     """
     there = present(mechanism)
-    resolution, start = needed(scene, mechanism)
-    count = look_steps(scene.record.simulation, resolution)
+    settings = scene.record.simulation
+    found, start = needed(settings, formulate(mechanism, settings))
+    count = look_steps(settings, resolved(settings, found))
     whole = coarse_run(scene, mechanism, count, start)
     if whole.solution.failure is not None:
         raise whole.solution.failure
@@ -87,10 +88,10 @@ def effect_sizes(scene: Scene, mechanism: Mechanism, names: Iterable[str]) -> tu
             cuts += [(link, with_rigid(mechanism, {link})) for link in flexible_links(mechanism)]
         for link, less in cuts:
             run = coarse_run(scene, less, count)
-            found = difference(whole, run)
+            apart = difference(whole, run)
             faster = less if link else without(mechanism, partners(name))
-            share = _share(whole, formulate(faster, scene.record.simulation))
-            result.append(EffectSize(name, True, _force(whole, run), found.error, found.effort_error, share, link))
+            share = _share(whole, formulate(faster, settings))
+            result.append(EffectSize(name, True, _force(whole, run), apart.error, apart.effort_error, share, link))
     return tuple(result)
 
 

@@ -1,20 +1,28 @@
-"""Random chains of one to three flexible links, for what leaving out effects does to them."""
+"""Random chains of one to three flexible links, for what leaving out effects or vibrations does to them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scenes
 
+_Drives = Callable[[np.random.Generator, float], dict[str, Any]]
 
-def random_chain(folder: Path, seed: int) -> Path:
+
+def random_led_chain(folder: Path, seed: int) -> Path:
+    """A scene whose joints all follow prescribed motions, for longer."""
+    return random_chain(folder, seed, _led, 3.0)
+
+
+def random_chain(folder: Path, seed: int, drives: _Drives | None = None, longer: float = 1.0) -> Path:
     """A scene: stiff or soft, slow or fast, with drives of every kind, from a seed."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, 4))
     joints, links = [], []
-    duration = float(rng.uniform(0.3, 0.8))
+    duration = longer * float(rng.uniform(0.3, 0.8))
     for k in range(count):
         length, stiff = float(rng.uniform(0.3, 0.7)), float(10 ** rng.uniform(-1.9, -1.3))
         steel = bool(rng.integers(2))
@@ -30,7 +38,7 @@ def random_chain(folder: Path, seed: int) -> Path:
         )
         (folder / "arm.toml").rename(folder / f"arm{k}.toml")
         dh = {"convention": "standard", "a": length, "alpha_deg": float(rng.uniform(-90, 90))}
-        joints.append({"name": f"j{k}", "dh": dh, **_drive(rng, duration)})
+        joints.append({"name": f"j{k}", "dh": dh, **(drives or _drive)(rng, duration)})
         links.append({"name": f"l{k}", "model": f"arm{k}.toml", "mesh_pose": {"frame": "joint"}})
         if rng.random() < 0.4:
             links[-1]["damping"] = {"ratio": float(rng.uniform(0.002, 0.05))}
@@ -45,7 +53,29 @@ def random_chain(folder: Path, seed: int) -> Path:
         data["payloads"] = [{"point": f"p{count - 1}", "mass": float(rng.uniform(0.05, 0.5))}]
     if rng.random() < 0.3:
         data["initial"] = {"deformation": "static"}
-    return scenes.write_toml(folder / f"chain{seed}.toml", data)
+    return scenes.write_toml(folder / f"{'led' if drives else 'chain'}{seed}.toml", data)
+
+
+def _led(rng: np.random.Generator, duration: float) -> dict[str, Any]:
+    end, start = float(rng.uniform(-120, 120)), float(rng.choice([0.0, 0.1 * duration]))
+    lasting, degree = duration * float(rng.uniform(0.2, 0.9)), int(rng.choice([3, 5, 7]))
+    motions: list[dict[str, Any]] = [
+        {"shape": "polynomial", "from_deg": 0.0, "to_deg": end, "start": start, "duration": lasting, "degree": degree},
+        {"shape": "spin_up", "rate_deg": end, "start": start, "duration": lasting, "degree": degree},
+        {
+            "shape": "waypoints",
+            "times": [start, start + lasting / 2, start + lasting],
+            "values_deg": [0.0, end, end / 3],
+            "degree": degree,
+        },
+        {
+            "shape": "table",
+            "times": np.linspace(0.0, duration, 6).tolist(),
+            "values": rng.uniform(-0.5, 0.5, 6).tolist(),
+        },
+        {"shape": "sine", "amplitude_deg": end / 20, "frequency_hz": float(10 ** rng.uniform(-0.5, 1.0))},
+    ]
+    return {"drive": {"type": "motion", "motion": motions[int(rng.integers(len(motions)))]}}
 
 
 def _drive(rng: np.random.Generator, duration: float) -> dict[str, Any]:
