@@ -11,10 +11,11 @@ from typing import Any
 from erls.kernels import contract
 from erls.kernels.chain import layout as at
 from erls.kernels.chain.drives import feed_forward
-from erls.kernels.chain.elimination import eliminate, substitute
+from erls.kernels.chain.elimination import eliminate
 from erls.kernels.chain.forces import deform_first_order, deform_second_order
 from erls.kernels.chain.gains import joint_gains
 from erls.kernels.chain.motion import place_frames
+from erls.kernels.chain.substitution import substitute
 from erls.kernels.contract import Array, IntArray
 from erls.kernels.jit import kernel, part
 from erls.kernels.shifted.blocks import shift
