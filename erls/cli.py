@@ -128,7 +128,8 @@ def simulate(
     at
         Times in seconds, separated by commas, at which to report joints and points.
     strict
-        With effects = "auto": repeat the run where what was left out passes the tolerance.
+        With effects = "auto": repeat the run where what was left out passes the tolerance; exit code 4 where no effect
+        brings its own estimate within it.
     json
         Print one JSON object.
     """

@@ -182,7 +182,7 @@ def cost(
     formulations: str = "",
     modes: str = "",
     integrators: str = "",
-    effects: str = "",
+    effects: Annotated[list[str] | None, Parameter(name="--effects", negative="")] = None,
     points: str = "",
     norm: str = "max",
     reference: str = "",
@@ -211,18 +211,22 @@ def cost(
     integrators
         Ours and dop853 unless given.
     effects
-        Values of simulation.effects, separated by commas; all,auto unless given, and, for links made of beams, all with
-        geometric stiffening and foreshortening.
+        Sets of effects, separated by commas, or the option repeated; names of a set joined by +, what it leaves out by
+        -: all,all+geometric_stiffening,all-coriolis. That of the scene is always tried; all,auto unless given, and,
+        where links have second-order displacements, all+geometric_stiffening+foreshortening.
     points
         Named points that the error is taken over; all unless given.
     norm
         max or rms over time; the worst point counts.
     reference
-        nodal, or tight: all modes and effects at a tight tolerance. Nodal where links are beams unless given.
+        nodal, or tight: all modes and effects at a tight tolerance, with second-order displacements where links have
+        them. Nodal where links are beams and nothing closes the chain unless given.
     budget
-        Time after which no further run starts [s]; a single run may take a tenth of it.
+        Time after which no further run starts [s], without compiling on first use; the reference may take 0.4 of it, or
+        0.7 where it would be too coarse, a single run a tenth.
     apply
-        Write a copy of the scene with the recommended setting, beside the scene.
+        Write a copy of the scene with the recommended setting, beside the scene; what --set changes is for the study
+        alone.
     set_
         Change a field of the scene, KEY=VALUE; may be repeated.
     workers
@@ -232,12 +236,13 @@ def cost(
     """
     from erls.report.cost_page import cost_csv, cost_page, cost_text
     from erls.studies.apply import check_copy, write_copy
-    from erls.studies.cost import Grid, cost_summary, study_cost
+    from erls.studies.cost import cost_summary, study_cost
+    from erls.studies.grid import Grid
 
     _check_output(output, scene, (".html", ".csv", ".json"))
     if apply is not None:
         check_copy(apply, scene)
-    grid = Grid(_names(formulations), _names(integrators), _names(effects), tuple(_counts(modes, "--modes") or ()))
+    grid = Grid(_names(formulations), _names(integrators), tuple(effects or ()), tuple(_counts(modes, "--modes") or ()))
     with Progress("cost study") as advance:
         result = study_cost(
             scene,
@@ -256,14 +261,21 @@ def cost(
         makers = {".html": cost_page, ".csv": cost_csv}
         _write(output, makers[output.suffix](result) if output.suffix in makers else _dumped(summary))
     if apply is not None and result.chosen is not None:
-        write_copy(apply, scene, (*(set_ or ()), *result.chosen_overrides), summary["recommendation"])
+        write_copy(apply, scene, result.chosen_overrides, "\n".join([summary["recommendation"], *_kept(set_)]))
     if json:
         print_json({**summary, "output": None if output is None else str(output)})
     else:
         print(cost_text(result))
         _tell_written(output)
         _tell_written(apply if result.chosen is not None else None)
+        for line in _kept(set_) if apply is not None and result.chosen is not None else ():
+            tell(line)
     return _exit_code(result.complete, []) or (0 if result.chosen is not None else 4)
+
+
+def _kept(changes: list[str] | None) -> list[str]:
+    """What a copy of the scene does not take over from a study."""
+    return [f"the study ran with {', '.join(changes)}, which this copy does not take over"] if changes else []
 
 
 def _names(text: str) -> tuple[str, ...]:

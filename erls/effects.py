@@ -104,7 +104,8 @@ def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:
     Raises
     ------
     SceneError
-        BAD_REFERENCE: unknown name, with a suggestion; BAD_FIELD: names with and without a minus.
+        BAD_REFERENCE: unknown name, with a suggestion; BAD_FIELD: names with and without a minus, the same one with
+        both, or a minus in front of ``all`` or ``auto``.
     """
     if value == "auto":
         return DEFAULT
@@ -114,6 +115,12 @@ def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:
         choose(name.removeprefix("-"), known, where, SceneError)
     off = {name[1:] for name in given if name.startswith("-")}
     on = {name for name in given if not name.startswith("-")}
+    for name in sorted(off & {"all", "auto"}):
+        message = f"a minus leaves out one effect, not {name!r}"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="[] is no effect at all")
+    if off & on:
+        message = f"{_list(sorted(off & on))} both on and off"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one of the two")
     if off and on and "all" not in on:
         message = "either names of what is on, or, with a minus, of what is off"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one kind, or add 'all'")

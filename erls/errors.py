@@ -32,6 +32,7 @@ class Cause(enum.StrEnum):
     NO_PICTURE = "picture could not be made"
     OUT_OF_MEMORY = "out of memory"
     RUNAWAY = "deflection beyond any meaning"
+    BEYOND_TOLERANCE = "estimated error beyond the tolerance"
     INTERRUPTED = "interrupted"
     BUDGET = "time budget used up"
 
@@ -62,7 +63,9 @@ class SimulationError(ReportedError):
 
     @property
     def exit_code(self) -> int:
-        """3 for a numerical failure, 130 after an interrupt, otherwise 2."""
+        """3 for a numerical failure, 4 for a tolerance not met, 130 after an interrupt, otherwise 2."""
         if self.cause == Cause.INTERRUPTED:
             return 130
+        if self.cause == Cause.BEYOND_TOLERANCE:
+            return 4
         return 3 if self.cause in _NUMERICAL else 2

@@ -17,6 +17,7 @@ from erls.integrators.base import Solution
 _LOOKS = 60
 _ROUNDING = 1e-12
 _VANISHED = 1e-6  # of what it was at the start: what explicit steps, ever smaller ones, do not pass
+_VANISHING = 1e-3  # of the same: what a run ends at whose next step has met an indefinite matrix
 
 
 def indefinite_mass(formulation: Formulation, solution: Solution) -> SimulationError | None:
@@ -39,6 +40,8 @@ def indefinite_mass(formulation: Formulation, solution: Solution) -> SimulationE
         return None
     if solution.failure is not None and solution.failure.cause == Cause.INTERRUPTED:
         return None
+    met = solution.failure is not None and solution.failure.cause == Cause.SINGULAR_MASS
+    share = _VANISHING if met else _VANISHED if solution.failure is not None else 0.0
     first = 0.0
     for k in np.unique(np.linspace(0, len(solution.t) - 1, _LOOKS).astype(int)):
         mass = system.mass_matrix(float(solution.t[k]), solution.y[k])  # type: ignore[attr-defined]
@@ -47,8 +50,7 @@ def indefinite_mass(formulation: Formulation, solution: Solution) -> SimulationE
         scale = 1 / np.sqrt(np.abs(np.diag(mass)))
         lowest = float(np.linalg.eigvalsh(scale[:, None] * mass * scale)[0])
         first = first or lowest
-        failed = solution.failure is not None and k == len(solution.t) - 1
-        if lowest < (_VANISHED * first if failed else -_ROUNDING):
+        if lowest < (share * first if share and k == len(solution.t) - 1 else -_ROUNDING):
             return SimulationError(
                 Cause.SINGULAR_MASS,
                 "the mass matrix is indefinite: with 'inertia_first_order' but not 'inertia_second_order' the kinetic "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -27,12 +28,14 @@ _STEP = 1e-5  # s, of central differences, as in `erls.link_loads`
 NOTABLE = 2e-3  # of the size of a link: errors above this make a run warn
 
 
-def deflection_errors(run: Run) -> dict[str, DeflectionError]:
+def deflection_errors(run: Run, samples: int | None = None) -> dict[str, DeflectionError]:
     """Estimated error of every flexible link that is linear in its frame: see `erls.formulations.deflection_watch`.
 
     Parameters
     ----------
     run : Run
+    samples : int, optional
+        Times to look at, instead of the usual number.
 
     Returns
     -------
@@ -54,8 +57,8 @@ def deflection_errors(run: Run) -> dict[str, DeflectionError]:
     step = min(_STEP, (end - start) / 4)
     if not links or not step > 0:
         return {}
-    count = _SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES
-    times = run.looks(count, step)
+    usual = _SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES
+    times = run.looks(samples or usual, step)
     inner = replace(run, formulation=formulation)
     places = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
     ends = [end for loop in mechanism.loops for end in (loop.inner, loop.outer)]
@@ -73,11 +76,11 @@ def deflection_errors(run: Run) -> dict[str, DeflectionError]:
     return _of_links(run, mechanism, found)
 
 
-def deflection_warnings(run: Run) -> list[str]:
+def deflection_warnings(run: Run, errors: Mapping[str, DeflectionError] | None = None) -> list[str]:
     """Links whose estimated error is more than 0.2 % of their size, with the reason and what to do."""
     result = []
     links = {link.name: link for link in run.formulation.mechanism.links}
-    for name, found in deflection_errors(run).items():
+    for name, found in (deflection_errors(run) if errors is None else errors).items():
         size = float(np.linalg.norm(np.ptp(links[name].model.nodes, axis=0)))
         if found.error <= NOTABLE * size:
             continue

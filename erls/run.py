@@ -42,6 +42,8 @@ class Run:
         What the user should know before trusting the run.
     certificate : Certificate or None
         Of a run with ``effects = "auto"``.
+    second_order_error : float or None
+        Estimate of `erls.range_watch`, of all links [m]; None where it was not made.
 
     Examples
     --------
@@ -67,6 +69,7 @@ class Run:
     wall_s: float = 0.0
     warnings: tuple[str, ...] = field(default=())
     certificate: Certificate | None = None
+    second_order_error: float | None = None
 
     @property
     def failure(self) -> SimulationError | None:

@@ -110,10 +110,10 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
 
 
 def _fill_output(group: h5py.Group, run: Run) -> None:
-    """Curves at even times."""
-    times = np.linspace(float(run.solution.t[0]), run.end, _OUTPUT_TIMES)
+    """Curves at even times, or at those of stored states."""
+    times = run.looks(_OUTPUT_TIMES)
     states = run.states(times)
-    write_array(group, "output/time", times, "s", "even times")
+    write_array(group, "output/time", times, "s", "even times, or those of stored states")
     for k, name in enumerate(run.point_names):
         positions = np.array([run.point_position(s, k) for s in states])
         write_array(group, f"output/points/{name}", positions, "m", "world position; time, axis")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from erls.errors import Cause, SimulationError
@@ -24,9 +27,12 @@ class Runaway:
     ----------
     formulation : Formulation
         One whose links are linear in their own frame.
+    every : int
+        Of the calls of the observer, one in so many looks, at all knots since the last one.
     """
 
-    def __init__(self, formulation: Formulation) -> None:
+    def __init__(self, formulation: Formulation, every: int = 1) -> None:
+        self._every, self._calls = every, 0
         self._system = solved(formulation)
         self._links = self._system.mechanism.links
         self._sizes = np.array([np.linalg.norm(np.ptp(link.model.nodes, axis=0)) for link in self._links])
@@ -37,6 +43,20 @@ class Runaway:
         self._since = -np.inf
         self.ended: float | None = None
         """Time of the first knot beyond the limit."""
+
+    def pass_by(self, knots: Callable[[], Solution]) -> None:
+        """Look, now and then; see `look`."""
+        self._calls += 1
+        if self._calls % self._every == 0:
+            self.look(knots())
+
+    def judged(self, solution: Solution) -> Solution:
+        """A run that ended by itself, or failed, with what its last knots have to say as its failure."""
+        try:
+            self.look(solution)
+        except SimulationError as problem:
+            return replace(solution, failure=problem)
+        return solution
 
     def look(self, solution: Solution) -> None:
         """Raise where a node of a link is displaced by more than 10 times the link's size.

@@ -54,8 +54,9 @@ class Simulation(_Record, frozen=True):
     rtol, atol : float
         Tolerances of SciPy's integrators, ``atol`` in metres.
     output_step : float, optional
-        Of the steps only the first one in each stretch of this length [s] is kept, so that the memory and the file of a
-        long run stay small; between those, motion is interpolated. All are kept unless given.
+        Of the steps only the states at multiples of this time [s] are kept, or of a part of it that makes them 201 or
+        more, and the steps around events, so that the memory and the file of a long run stay small; between those,
+        motion is interpolated. All steps are kept unless given.
     tolerance : float
         Error of any point over the whole run [m] that ``lobatto`` and ``auto`` aim at.
     spectral_radius : float

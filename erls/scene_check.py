@@ -29,6 +29,7 @@ DEFORMATIONS = ("zero", "static")
 _ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "damping", "friction", "motor")  # on one coordinate
 MOST_STEPS = 100_000_000  # fill any memory; more are a slip
 SMALLEST_RTOL = 3e-14  # rounding
+SHORTEST = 1e-9  # s, a thousand times what separates two breakpoints
 
 
 def check_scene(scene: SceneRecord, file: str) -> None:
@@ -141,6 +142,8 @@ def _check_simulation(s: Simulation, place: str) -> None:
         value = getattr(s, name)
         if value is not None and not value > 0:
             raise _bad(f"{place}.{name}", f"{name} must be positive", value, "give a number above 0")
+    if s.duration < SHORTEST:
+        raise _bad(f"{place}.duration", "shorter than any run", s.duration, f"give at least {SHORTEST:g} s")
     if s.duration > LATEST:
         raise _bad(f"{place}.duration", "longer than any run", s.duration, f"give at most {LATEST:g} s")
     if s.duration / MOST_STEPS > (s.step or 1e-3):

@@ -21,7 +21,7 @@ from erls.kernels.jit import announcing
 from erls.mass_watch import indefinite_mass
 from erls.mechanism.chain import Mechanism
 from erls.output_watch import output_step, output_warnings
-from erls.range_watch import deflection_warnings
+from erls.range_watch import deflection_errors, deflection_warnings
 from erls.run import Run
 from erls.run_file import self_contained, write_run
 from erls.runaway import Runaway
@@ -62,7 +62,8 @@ def simulate(
     checkpoint : Path, optional
         Run file to which a long run saves what it has, every 20 s of work.
     strict : bool
-        With ``effects = "auto"``: whether to repeat the run where what was left out passes the tolerance.
+        With ``effects = "auto"``: whether to repeat the run where what was left out passes the tolerance, and to fail
+        where its own estimate still does.
     like : Run, optional
         A run of a scene with the same links, whose modal models serve again instead of being read. Where links are
         split, it is of the nodal formulation if the scene is.
@@ -97,7 +98,7 @@ def simulate(
     warn((*built.warnings, *impulse_warnings(built.mechanism, settings.duration)))
 
     def run_with(scene: Scene, mechanism: Mechanism) -> Run:
-        return _integrated(scene, mechanism, warn, progress, checkpoint)
+        return _integrated(scene, mechanism, warn.beside(), progress, checkpoint)
 
     if settings.effects == "auto":
         from erls.selection.automatic import automatic  # here: most runs need none of it
@@ -137,6 +138,12 @@ class _Warnings:
                 self.told.append(text)
                 self.tell(f"warning: {text}")
 
+    def beside(self) -> _Warnings:
+        """For one of several runs of a scene: with what is known before it."""
+        result = _Warnings(self.tell)
+        result.told += self.told
+        return result
+
 
 def _integrated(
     scene: Scene, mechanism: Mechanism, warn: _Warnings, progress: Progress | None, checkpoint: Path | None
@@ -170,13 +177,13 @@ def _integrated(
     stops = {event.name for event in scene.record.events if event.stop}
     looked_for = stops or (scene.record.events and settings.output_step is not None)
     stopper = Stopper(make_run, stops)
-    runaway = Runaway(formulation) if modal else None
+    runaway = Runaway(formulation, every=1 if settings.output_step is not None else 16) if modal else None
 
     def observe(t: float, knots: Callable[[], Solution]) -> Sequence[float]:
         nonlocal first, saved
         found = stopper.look(knots()) if looked_for else ()
         if runaway is not None:
-            runaway.look(knots())
+            runaway.pass_by(knots)
         if first:
             first = False
             warn(knots().warnings)
@@ -197,6 +204,8 @@ def _integrated(
         warn.tell(f"event {stopper.happened.name!r} at t = {stopper.happened.time:.6g} s: the run ends")
     if solution.choice:
         warn.tell(f"integrator: {solution.choice}")
+    if runaway is not None and runaway.ended is None:
+        solution = runaway.judged(solution)
     gone = None if runaway is None else runaway.ended
     if gone is not None:
         solution = cut(solution, gone)
@@ -204,7 +213,9 @@ def _integrated(
     seen = run.series(run.looks(101))
     warn(solution.warnings)
     if gone is None:
-        warn((*range_warnings(run, seen), *deflection_warnings(run), *output_warnings(run)))
+        errors = deflection_errors(run)
+        run = replace(run, second_order_error=sum(e.error for e in errors.values()))
+        warn((*range_warnings(run, seen), *deflection_warnings(run, errors), *output_warnings(run)))
     if mechanism.bandwidth is not None and gone is None:
         from erls.formulations.static_watch import static_warnings  # here: most runs need none of it
 

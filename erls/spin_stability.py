@@ -37,12 +37,12 @@ def _reason(link: Link) -> str:
     return found or "its modal file was made without them; reduce it again"
 
 
-def planned_spin_warnings(mechanism: Mechanism, duration: float) -> list[str]:
+def planned_spin_warnings(mechanism: Mechanism, duration: float, samples: int = _SAMPLES) -> list[str]:
     """Of the motions that drives prescribe or follow, before anything is computed; other joints are taken at rest."""
     if all(joint.drive.reference(0.0) is None for joint in mechanism.joints):
         return []
     breaks = [b for joint in mechanism.joints for b in joint.drive.breakpoints if 0 < b < duration]
-    times = np.unique(np.concatenate([np.linspace(0.0, duration, _SAMPLES), breaks]))
+    times = np.unique(np.concatenate([np.linspace(0.0, duration, samples), breaks]))
 
     def planned(t: float) -> tuple[float, Array, Array]:
         found = [j.drive.reference(t) or (j.position, 0.0, 0.0) for j in mechanism.joints]

@@ -22,7 +22,8 @@ from fe_import.link import Interface, LinkDescription, LinkFile, Member, Recover
 from fe_import.link_reduction import Reduction
 from fe_import.model import Array, IntArray
 
-MOST_PIECES = 1000  # more are a slip
+MOST_PIECES = 1000  # of any link
+_ALWAYS = 16  # pieces that a coarse mesh may have too: elements are cut where need be
 _SAME = 1e-9  # of the length of the path
 
 
@@ -53,7 +54,7 @@ def split_link(link: LinkFile, count: int, inboard: str, outboard: str, where: s
     link : LinkFile
         A link made of beams.
     count : int
-        Number of pieces, 2 or more.
+        Number of pieces, 2 or more, at most as many as elements on the load path, or 16.
     inboard : str
         Interface where the load path begins.
     outboard : str
@@ -72,7 +73,8 @@ def split_link(link: LinkFile, count: int, inboard: str, outboard: str, where: s
     Raises
     ------
     FEImportError
-        Not made of beams; a ring that one cut leaves in one; options that name interfaces or modes of the whole.
+        Not made of beams; more than 16 pieces and than elements on the load path; a ring that one cut leaves in one;
+        options that name interfaces or modes of the whole.
     """
     description, frame = link.description, link.description.frame
     if frame is None:
@@ -80,13 +82,16 @@ def split_link(link: LinkFile, count: int, inboard: str, outboard: str, where: s
         message = "only links made of beams can be split into substructures"
         remedy = "give the link as a [frame], or remove substructures and use geometric_stiffening if it is available"
         raise FEImportError(Cause.BAD_FIELD, message, where=where, value=kind, remedy=remedy)
-    if count > MOST_PIECES:
-        message, remedy = "too many substructures", "2 to 16 are usual"
-        raise FEImportError(Cause.BAD_FIELD, message, where=where, value=count, limit=MOST_PIECES, remedy=remedy)
     _check_options(description, where)
     mesh = frame_mesh(description, frame, str(link.path))
     nodes_of = {i.name: mesh.names[i.node] for i in description.interfaces if i.node in mesh.names}
     path = _load_path(mesh, nodes_of[inboard], nodes_of.get(outboard))
+    elements = len(path.elements)
+    most = min(max(elements, _ALWAYS), MOST_PIECES)
+    if count > most:
+        message = f"too many substructures for a load path of {elements} elements"
+        remedy = "2 to 16 are usual; beyond these give its members as many elements as it is to have pieces"
+        raise FEImportError(Cause.BAD_FIELD, message, where=where, value=count, limit=most, remedy=remedy)
     bars, placed, cuts = _cut(mesh, path, count, where)
     return tuple(_piece(link, mesh, bars, placed, cuts, k, (inboard, outboard)) for k in range(count))
 

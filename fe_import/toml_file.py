@@ -109,7 +109,7 @@ def _explained(text: str, data: Any, kind: Any, where: str, error: type[Reported
     if unknown:
         name = shortened(unknown.group(1))
         place = _place(where, [*steps, name])
-        remedy = _suggest(name, [f.encode_name for c in records for f in c.fields])
+        remedy = _suggest(name, [f.encode_name for c in records for f in c.fields], _further_in(name, records))
         return error(Cause.UNKNOWN_FIELD, f"unknown field {name!r}", where=place, remedy=remedy)
     if missing:
         name = missing.group(1)
@@ -224,8 +224,20 @@ def _tags(types: list[Any], field: str | int) -> list[str]:
     return [str(t.tag) for t in types if getattr(t, "tag", None) is not None and t.tag_field == field]
 
 
-def _suggest(name: str, fields: list[str]) -> str:
+def _further_in(name: str, records: list[Any]) -> list[str]:
+    """Tables in these records that have a field of this name, as ``table.name``."""
+    found = []
+    for table in (f for record in records for f in record.fields):
+        kinds = [t for t in _alternatives(table.type, None) if isinstance(t, msgspec.inspect.StructType)]
+        if any(f.encode_name == name for t in kinds for f in t.fields):
+            found.append(f"{table.encode_name}.{name}")
+    return list(dict.fromkeys(found))
+
+
+def _suggest(name: str, fields: list[str], further_in: list[str]) -> str:
     """The field that was probably meant, or all there are."""
+    if further_in:
+        return "did you mean " + " or ".join(repr(field) for field in further_in) + "?"
     close = difflib.get_close_matches(name[:200], fields, n=1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]!r}?"

@@ -19,6 +19,7 @@ from erls.formulations.quasi_static import QuasiStatic
 from erls.integrators.base import Leg, Solution, hermite, legs
 from erls.lie.so3 import Array
 
+ABOVE = "modes above the bandwidth"  # in warnings of an error beyond the tolerance
 _SAMPLES, _SAMPLES_UNCOMPILED = 30, 10
 _MOST_LEGS = 30
 _PER_PERIOD = 40  # differences in time, of the period of the slowest static mode
@@ -117,7 +118,7 @@ def static_warnings(formulation: Formulation, solution: Solution, tolerance: flo
     else:
         why = f"at {found.rate_hz:.3g} Hz, at which their loads change, inertia would add {found.inertia:.2g} m"
     return [
-        f"modes above the bandwidth, {formulation.bandwidth:g} Hz, follow statically and deflect by up to "
+        f"{ABOVE}, {formulation.bandwidth:g} Hz, follow statically and deflect by up to "
         f"{found.deflection:.2g} m: {why}; expect errors of about {found.error:.2g} m, or raise simulation.bandwidth "
         f"(tolerance {tolerance:.2g} m)"
     ]

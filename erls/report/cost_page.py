@@ -14,7 +14,9 @@ from erls.report.tables import table
 from erls.studies.cost import CostStudy, recommendation
 from erls.studies.ladder import CostPoint
 
-_HEADER = ("setting", "accuracy", "time [s]", "error [m]", "steps", "right-hand sides", "factorizations")
+_HEADER = (
+    *("setting", "accuracy", "time [s]", "error [m]", "warns of [m]", "steps", "right-hand sides", "factorizations"),
+)
 
 
 def cost_text(study: CostStudy) -> str:
@@ -39,7 +41,7 @@ def cost_csv(study: CostStudy) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(
         ("formulation", "elastic_modes", "integrator", "effects", "knob", "value", "wall_s", "error_m", "steps",
-         "rhs_calls", "factorizations", "on_front", "failure")
+         "rhs_calls", "factorizations", "on_front", "failure", "warned_error_m")
     )  # fmt: skip
     for r in study.runs:
         s = r.setting
@@ -48,7 +50,7 @@ def cost_csv(study: CostStudy) -> str:
         work = (r.steps, r.rhs_calls, r.factorizations)
         cause = "" if r.failure is None else str(r.failure.cause)
         writer.writerow((s.formulation, modes, s.integrator, s.effects, s.knob, f"{s.value:.6g}", *figures, *work,
-                         int(id(r) in front), cause))  # fmt: skip
+                         int(id(r) in front), cause, "" if r.failure else f"{r.foretold:.6g}"))  # fmt: skip
     return out.getvalue()
 
 
@@ -69,16 +71,20 @@ def cost_page(study: CostStudy) -> str:
 
 
 def _about_reference(study: CostStudy) -> str:
+    linear = "; links are linear in it, and what that leaves out is not counted" if study.reference.linear else ""
+    warned = "".join(f" The reference itself warns: {text}." for text in study.reference.warnings)
     return (
-        f"Reference: {study.reference.made_by}; its own error is about {study.reference.error:.1e} m. Error: "
-        f"{'largest' if study.norm == 'max' else 'root mean square'} distance over time at the worst of "
-        f"{', '.join(study.points)}. Time: the integration alone, median of its runs."
+        f"Reference: {study.reference.made_by}; its own error is about {study.reference.error:.1e} m{linear}.{warned} "
+        f"Error: {'largest' if study.norm == 'max' else 'root mean square'} distance over time at the worst of "
+        f"{', '.join(study.points)}. Time: the integration, with choosing effects and certifying where they are auto, "
+        f"median of its runs. Settings whose run warns of an error above {study.tolerance:.3g} m are not recommended."
     )
 
 
 def _row(r: CostPoint) -> tuple[str, ...]:
     counts = (str(r.steps), str(r.rhs_calls), str(r.factorizations))
-    return (r.setting.name, _accuracy(r), f"{r.wall_s:.3g}", f"{r.error:.2e}", *counts)
+    warned = f"{r.foretold:.2e}" if r.foretold else ""
+    return (r.setting.name, _accuracy(r), f"{r.wall_s:.3g}", f"{r.error:.2e}", warned, *counts)
 
 
 def _accuracy(r: CostPoint) -> str:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
-from erls.effects import EFFECTS
+from erls.effects import EFFECTS, in_order
 from erls.report.tables import table
-from erls.selection.sizes import EffectSize
+from erls.selection.sizes import FAILS, UNSTABLE, EffectSize
 from erls.selection.survey import Survey
+
+_LARGEST = 1e12  # N: beyond, a motion means nothing
+_MOST = 10.0  # times the peak
 
 
 def effects_summary(found: Survey) -> dict[str, Any]:
@@ -25,15 +29,19 @@ def effects_summary(found: Survey) -> dict[str, Any]:
                 "present": s.present,
                 "link": s.link or None,
                 "auto": found.keeps(s),
-                "force": s.force,
-                "error": s.error,
+                "why": found.why(s) or None,
+                "force": s.force if s.force < _LARGEST else None,
+                "error": None if s.outcome else s.error,
+                "outcome": s.outcome or None,
                 "effort_error": s.effort_error,
                 "share": s.share,
             }
             for s in found.sizes
         ],
         "left_out": found.left,
-        "decision": found.note,
+        "missing": list(found.missing),
+        "added": in_order(found.choice.addition.names),
+        "decision": _decision(found),
     }
 
 
@@ -41,14 +49,16 @@ def effects_text(found: Survey) -> str:
     """The table with a short explanation."""
     settings = found.scene.record.simulation
     drives = any(s.effort_error is not None for s in found.sizes)
-    header = ("effect", "auto", "force [N]", "error [m]", *(("drives",) if drives else ()), "time")
+    header = ("effect", "auto", "force [N]", "error [m]", *(("drives",) if drives else ()), "time", "kept")
     rows = [
         (
             s.name if not s.link else f"  of {s.link}",
             _state(s, found),
-            *((f"{s.force:.2g}", f"{s.error:.2g}") if s.present else ("-", "-")),
-            *((_percent(s.effort_error),) if drives else ()),
+            f"{s.force:.2g}" if s.present and s.force < _LARGEST else "-",
+            (s.outcome or f"{s.error:.2g}") if s.present else "-",
+            *((_percent(None if s.outcome else s.effort_error),) if drives else ()),
             _percent(s.share),
+            found.why(s),
         )
         for s in found.sizes
     ]
@@ -58,17 +68,31 @@ def effects_text(found: Survey) -> str:
     shown = "\n".join(f"{a.ljust(width)}  {b}".rstrip() for a, b in zip(lines, summaries, strict=True))
     parts = [f"{found.scene.name} ({settings.formulation}): physical effects", shown]
     if found.left:
-        parts.append(f"not asked for by the scene: {', '.join(found.left)}")
+        parts.append(_filled(f"not asked for by the scene: {', '.join(found.left)}"))
+    parts += [_filled(text) for text in found.missing]
+    outcomes = {s.outcome for s in found.sizes}
     parts.append(
-        f'auto: what effects = "auto" has to keep at a tolerance of {settings.effects_tolerance:.2g} m. '
-        "force: largest generalized force, as one\n"
-        "on all mass alike. error: largest distance of named points without the effect, in coarse runs. "
-        + ("drives: change\nof drive forces, relative to their peak. time: part" if drives else "time: part\n")
-        + " of an evaluation of the equations that leaving it out saves, with effects\n"
-        "that share its products. Effects that save nothing stay on."
+        _filled(
+            f'auto: what effects = "auto" does at a tolerance of {settings.effects_tolerance:.2g} m. force: largest '
+            "generalized force, as one on all mass alike. error: largest distance of named points without the effect, "
+            "in coarse runs"
+            + ("; fails: there is no motion without it" if FAILS in outcomes else "")
+            + ("; unstable: points leave their links" if UNSTABLE in outcomes else "")
+            + (". drives: change of drive forces, relative to their peak" if drives else "")
+            + ". time: part of an evaluation of the equations that leaving it out saves, with effects that share its "
+            "products. kept: why; effects that save nothing, or only with others that are needed, stay on."
+        )
     )
-    parts.append(found.note)
+    parts.append("\n".join(_filled(line) for line in _decision(found).split("\n")))
     return "\n\n".join(parts)
+
+
+def _decision(found: Survey) -> str:
+    return "\n".join(text for text in (found.choice.addition.note, found.choice.note) if text)
+
+
+def _filled(text: str) -> str:
+    return textwrap.fill(text, 116, break_on_hyphens=False)
 
 
 def _state(size: EffectSize, found: Survey) -> str:
@@ -78,4 +102,8 @@ def _state(size: EffectSize, found: Survey) -> str:
 
 
 def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.2g} %"
+    if value is None:
+        return "-"
+    if not value < _MOST:
+        return f"> {100 * _MOST:.0f} %"
+    return f"{100 * value:.2g} %" if value < 0.995 else f"{100 * value:.0f} %"

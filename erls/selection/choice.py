@@ -3,6 +3,7 @@
 Deciding costs coarse looks at the scene before the run, and a certificate after it. Both, and the run itself, are
 estimated by counting (`erls.selection.cost`); where the run saves less than that, all effects stay. Vibrations that
 prescribed motions set off need no look (`erls.selection.forced`): where they do not matter, links follow statically.
+Links that lose their stability to planned speeds are stiffened first (`erls.selection.stiffening`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from erls.selection.probe import coarse_run, deformation, difference, look_steps
 from erls.selection.purse import Purse
 from erls.selection.resolution import Vibrations
 from erls.selection.static import may_follow, static_cut
+from erls.selection.stiffening import Addition, stiffening
 
 BUDGET = 0.3  # of the tolerance: what a coarse run may overlook is in the rest
 
@@ -38,10 +40,13 @@ class Choice:
         What to leave out.
     note : str
         What the user should know.
+    addition : Addition
+        What to add before; the cuts are those of the mechanism with it.
     """
 
     cuts: tuple[Cut, ...] = ()
     note: str = ""
+    addition: Addition = field(default_factory=Addition)
 
     @property
     def off(self) -> frozenset[str]:
@@ -65,7 +70,7 @@ class Choice:
 
 
 def choose_effects(scene: Scene, mechanism: Mechanism, thrifty: bool = True) -> Choice:
-    """Decide what to leave out.
+    """Decide what to add, and what to leave out.
 
     Parameters
     ----------
@@ -81,6 +86,11 @@ def choose_effects(scene: Scene, mechanism: Mechanism, thrifty: bool = True) -> 
     SimulationError
         INTERRUPTED.
     """
+    added = stiffening(scene, mechanism)
+    return replace(_cut(scene, added.applied(mechanism), thrifty), addition=added)
+
+
+def _cut(scene: Scene, mechanism: Mechanism, thrifty: bool) -> Choice:
     settings = scene.record.simulation
     cuts = possible_cuts(mechanism, settings.formulation)
     if not cuts:

@@ -13,6 +13,7 @@ import numpy as np
 
 from erls.effects import FIRST, SECOND
 from erls.formulations import Formulation, formulate, integrator
+from erls.formulations.erls import Erls
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options
 from erls.mechanism.chain import Mechanism, poses
@@ -26,8 +27,11 @@ _COARSE = 6.0  # the same in large steps
 _PILOT = 1 / 40  # of a run with adaptive steps: what is run to count them
 _LINK, _MASS, _X, _Z = 1.5e-7, 4e-10, 6e-10, 8e-10  # s: per link; per entry of each matrix in use
 _SOLVE, _FACTOR, _REFRESH = 1.2e-9, 4e-10, 0.05  # s per entry, s per entry and column; share of steps with new factors
+_LINKED_FACTOR, _LINKED_SOLVE = 0.6, 0.15  # of an evaluation
+_LINKED = 2.5e-9  # s per square of the modes of a link
 _STIFFENED = 2.2
 _PYTHON, _PYTHON_LINK, _PYTHON_X, _PYTHON_Z = 4e-5, 5e-5, 3e-5, 1e-5
+_PYTHON_CURVED, _PYTHON_CURVED_FRAME = 6e-4, 8e-5  # s per link with geometric stiffening: ERLS, floating frames
 PREPARE, STATE = 5e-4, 1e-4  # s per link: of equations, of the points of a state
 FIXED = 0.05  # s: of files, and of what a run looks at afterwards
 FOLLOWING = 0.03  # s per link: of states of links that follow statically, in what a run looks at afterwards
@@ -71,6 +75,19 @@ class Cost:
 
 def cost_of(formulation: Formulation) -> Cost:
     """Cost of a formulation's equations."""
+    return _cost(formulation, _is_stiffened(solved(formulation).mechanism))
+
+
+def stiffened_cost(formulation: Formulation) -> Cost:
+    """The same with geometric stiffening, without having to formulate that."""
+    return _cost(formulation, True)
+
+
+def _is_stiffened(mechanism: Mechanism) -> bool:
+    return "geometric_stiffening" in mechanism.effects and any(k.second_order is not None for k in mechanism.links)
+
+
+def _cost(formulation: Formulation, stiffened: bool) -> Cost:
     system = solved(formulation)
     mechanism = system.mechanism
     first = not FIRST.isdisjoint(mechanism.effects)
@@ -79,18 +96,25 @@ def cost_of(formulation: Formulation) -> Cost:
     size = system.size
     if not size:  # nothing to integrate
         return Cost(len(axes), 0, 0.0, 0.0, 0.0)
-    if getattr(system, "compiled", None) is None:
-        evaluation = _PYTHON + len(axes) * (_PYTHON_LINK + first * _PYTHON_X + second * _PYTHON_Z)
+    compiled = getattr(system, "compiled", None)
+    if compiled is None or (stiffened and mechanism.loops):
+        per_link = _PYTHON_LINK + first * _PYTHON_X + second * _PYTHON_Z
+        if stiffened:
+            per_link += _PYTHON_CURVED if isinstance(getattr(system, "bare", system), Erls) else _PYTHON_CURVED_FRAME
+        evaluation = _PYTHON + len(axes) * per_link
         return Cost(len(axes), size, evaluation, _PYTHON / 2, 2 * evaluation)
     evaluation = 0.0
     for link, count in zip(mechanism.links, axes, strict=True):
         entries = (6 + link.elastic_modes) ** 2
         pairs = count * (count + 1) // 2
         evaluation += _LINK + entries * (_MASS + first * count * _X + second * pairs * _Z)
-    if "geometric_stiffening" in mechanism.effects and any(k.second_order is not None for k in mechanism.links):
+    if stiffened:
         evaluation *= _STIFFENED
-    factors = evaluation + _FACTOR * size**3 + _SOLVE * size**2
-    return Cost(len(axes), size, evaluation, _SOLVE * size**2, factors)
+    if getattr(compiled, "factoring", None) is not None:  # link by link
+        solving = _LINKED_SOLVE * evaluation + _LINKED * sum(link.elastic_modes**2 for link in mechanism.links)
+        return Cost(len(axes), size, evaluation, solving, _LINKED_FACTOR * evaluation)
+    solving = _SOLVE * size**2
+    return Cost(len(axes), size, evaluation, solving, evaluation + _FACTOR * size**3 + solving)
 
 
 def forced_cost(cost: Cost) -> float:

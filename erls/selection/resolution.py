@@ -90,7 +90,7 @@ def vibrations(system: Any, mechanism: Mechanism, duration: float, y: Array, v: 
     SimulationError
         SINGULAR_MASS.
     """
-    prescribed = _reference_pace(mechanism, duration)
+    prescribed = reference_pace(mechanism, duration)
     if not system.size:
         none = np.zeros(0)
         return Vibrations(none, none, none, 0.0, prescribed, duration)
@@ -149,7 +149,7 @@ def _followed(omega: float, lasting: float) -> float:
     return min(_PER_RADIAN / omega, math.sqrt(_PHASE / (omega**3 * lasting))) if omega > 0 else math.inf
 
 
-def _reference_pace(mechanism: Mechanism, duration: float) -> float:
+def reference_pace(mechanism: Mechanism, duration: float) -> float:
     """Largest pace of the motions that drives prescribe or want."""
     largest = 0.0
     drives = [j.drive for j in mechanism.joints] + [k.freedom.drive for k in mechanism.loops if k.freedom is not None]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from erls.effects import in_order
+from erls.errors import Cause, SimulationError
 from erls.formulations import Formulation, formulate
 from erls.formulations.substructures import solved
 from erls.mechanism.chain import Mechanism
@@ -18,9 +20,11 @@ from erls.run import Run
 from erls.scene import Scene
 from erls.selection.coordinates import kept_places
 from erls.selection.cuts import flexible_links, partners
-from erls.selection.probe import coarse_run, difference, look_steps, needed, resolved
+from erls.selection.probe import Difference, coarse_run, difference, look_steps, needed, resolved
 from erls.selection.quick import quick
 
+T = TypeVar("T")
+FAILS, UNSTABLE = "fails", "unstable"
 _FORCES = 20  # knots at which forces are compared
 _REPEATS, _CALLS = 9, 20
 
@@ -45,6 +49,8 @@ class EffectSize:
         share its products.
     link : str
         Of ``flexibility``: the one link that it is about; empty for all of them.
+    outcome : str
+        ``FAILS`` or ``UNSTABLE`` where there is no error to tell; else empty.
     """
 
     name: str
@@ -54,6 +60,7 @@ class EffectSize:
     effort_error: float | None = None
     share: float | None = None
     link: str = ""
+    outcome: str = ""
 
 
 def effect_sizes(scene: Scene, mechanism: Mechanism, names: Iterable[str]) -> tuple[EffectSize, ...]:
@@ -78,7 +85,7 @@ def effect_sizes(scene: Scene, mechanism: Mechanism, names: Iterable[str]) -> tu
     whole = coarse_run(scene, mechanism, count, start)
     if whole.solution.failure is not None:
         raise whole.solution.failure
-    result = []
+    result, limit = [], 2 * _reach(mechanism)
     for name in in_order(names):
         if name not in there:
             result.append(EffectSize(name, False))
@@ -87,26 +94,50 @@ def effect_sizes(scene: Scene, mechanism: Mechanism, names: Iterable[str]) -> tu
         if name == "flexibility":
             cuts += [(link, with_rigid(mechanism, {link})) for link in flexible_links(mechanism)]
         for link, less in cuts:
-            run = coarse_run(scene, less, count)
-            apart = difference(whole, run)
-            faster = less if link else without(mechanism, partners(name))
-            share = _share(whole, formulate(faster, settings))
-            result.append(EffectSize(name, True, _force(whole, run), apart.error, apart.effort_error, share, link))
+            apart, force, share = _size(scene, whole, less, less if link else without(mechanism, partners(name)), count)
+            outcome = FAILS if np.isinf(apart.error) else UNSTABLE if not apart.error <= limit else ""
+            result.append(EffectSize(name, True, force, apart.error, apart.effort_error, share, link, outcome))
     return tuple(result)
 
 
-def _force(whole: Run, less: Run) -> float:
+def _size(
+    scene: Scene, whole: Run, less: Mechanism, faster: Mechanism, count: int
+) -> tuple[Difference, float, float | None]:
+    """Difference, largest force, and share of the time of an evaluation."""
+    settings = scene.record.simulation
+    apart = _or_fails(lambda: difference(whole, coarse_run(scene, less, count)), Difference(np.inf, None))
+    force = _or_fails(lambda: _force(whole, formulate(less, settings)), np.inf)
+    share = _or_fails(lambda: _share(whole, formulate(faster, settings)), None)
+    return apart, force, share
+
+
+def _or_fails(value: Callable[[], T], otherwise: T) -> T:
+    """A value, or what stands for one where equations without an effect cannot be solved."""
+    try:
+        return value()
+    except SimulationError as problem:
+        if problem.cause == Cause.INTERRUPTED:
+            raise
+        return otherwise
+
+
+def _reach(mechanism: Mechanism) -> float:
+    """Size of all links together [m]: points that are farther apart than twice that left them."""
+    return sum(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in mechanism.links)
+
+
+def _force(whole: Run, less: Formulation) -> float:
     """Largest difference of generalized forces along the coarse run; without flexibility, what holds the modes.
 
     Forces F count as sqrt(μ Fᵀ M⁻¹ F) with the mass μ of all links: one that acts on all mass alike counts as it is,
     whatever the coordinates.
     """
-    system, other = quick(solved(whole.formulation)), quick(solved(less.formulation))
+    system, other = quick(solved(whole.formulation)), quick(solved(less))
     if not hasattr(system, "residual") or not system.size:
         return 0.0
     mass = sum(link_mass_properties(link).mass for link in whole.formulation.mechanism.links)
     s = whole.solution
-    kept = kept_places(whole.formulation.mechanism, less.formulation.mechanism, system.size)
+    kept = kept_places(whole.formulation.mechanism, less.mechanism, system.size)
     rigid = np.setdiff1d(np.arange(system.size), kept)
     largest = 0.0
     for k in np.unique(np.linspace(1, len(s.t) - 1, _FORCES).astype(int)):

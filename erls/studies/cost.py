@@ -1,9 +1,9 @@
 """What accuracy costs in time: one scene in many settings, error against time, and the cheapest that is good enough.
 
 A *ladder* is a formulation with a number of modes, a set of effects and an integrator, run with finer and finer steps
-or tolerances until it is as good as the reference, or too slow. The reference is the nodal formulation on two meshes
-with two steps, or, where links are no beams, a tight run of all modes and effects beside a looser one; the distance of
-the two says how far the reference itself can be trusted.
+or tolerances until it is as good as the reference, or too slow. What the reference is, `erls.studies.reference` says.
+A setting is recommended when its error, with that of the reference, is within the tolerance, and its run does not warn
+of a larger one itself.
 """
 
 from __future__ import annotations
@@ -17,20 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from erls.errors import Cause, SceneError
-from erls.integrators import INTEGRATORS
+from erls.errors import Cause, SceneError, SimulationError
 from erls.scene import Scene, load_scene
-from erls.studies.ladder import CostPoint, Ladder, Norm, Setting, climb, failed, overrides_of
+from erls.studies.grid import Grid, checked, ladders
+from erls.studies.ladder import CostPoint, Ladder, Norm, climb, failed, overrides_of
 from erls.studies.mode_overrides import available_modes, count_field
 from erls.studies.pool import Finished, run_all
-from erls.studies.reference import REFERENCES, Reference, default_reference, make_reference
+from erls.studies.reference import Reference, default_reference, knows_second_order, make_reference
+from fe_import.errors import ReportedError
 from fe_import.toml_file import choose
 
-_SCIPY = ("rk45", "dop853", "radau", "bdf", "lsoda")
-_RELATIVE = tuple(10.0**-k for k in range(3, 11))
-_STEP_SHARES = tuple(2.0**-k for k in range(-3, 6))  # of the scene's own step
-_TOLERANCE_SHARES = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)  # of the tolerance asked for
-STIFFENED = "all,geometric_stiffening,foreshortening"
+_AS_CHEAP = 1.2  # times the shortest: what noise makes of equal times
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ class CostStudy:
     front : tuple of CostPoint
         Runs that no other one beats in both error and time, from cheap to accurate.
     chosen : CostPoint or None
-        The cheapest that meets the tolerance.
+        The cheapest that meets the tolerance; of those within a fifth of its time the plainest.
     chosen_overrides : tuple of str
         Its ``KEY=VALUE``.
     complete : bool
@@ -68,23 +65,6 @@ class CostStudy:
     chosen: CostPoint | None
     chosen_overrides: tuple[str, ...]
     complete: bool
-
-
-@dataclass(frozen=True)
-class Grid:
-    """What the study varies; empty means a choice that suits the scene.
-
-    Attributes
-    ----------
-    formulations, integrators, effects : tuple of str
-    modes : tuple of int
-        Elastic modes of every link; all there are, half and a quarter of them unless given.
-    """
-
-    formulations: tuple[str, ...] = ()
-    integrators: tuple[str, ...] = ()
-    effects: tuple[str, ...] = ()
-    modes: tuple[int, ...] = ()
 
 
 def study_cost(
@@ -113,13 +93,14 @@ def study_cost(
     norm : str
         ``max`` or ``rms`` over time; the worst point counts.
     reference : str
-        ``nodal`` or ``tight``; nodal where every link is made of beams and nothing closes the chain unless given.
+        ``nodal`` or ``tight``; nodal wherever it can run unless given.
     overrides : sequence of str
         ``KEY=VALUE`` applied to the scene, for all runs.
     budget : float
-        Wall time after which no further run starts [s]; what did not run is reported as such.
+        Wall time after which no further run starts [s], without what the reference compiles; what did not run is
+        reported as such.
     progress : callable
-        Called with (finished reference runs and ladders, all).
+        Called with (reference and finished ladders, all).
     workers : int, optional
         Processes; as many as cores unless given.
 
@@ -127,6 +108,8 @@ def study_cost(
     ------
     SceneError, FEImportError
         Bad input.
+    SceneError
+        BUDGET: it would not last for a reference.
     SimulationError
         The reference failed.
     """
@@ -142,80 +125,48 @@ def study_cost(
     for point in points:
         choose(point, named, "points", SceneError)
     chosen = tuple(points) or tuple(named)
-    modes = available_modes(loaded)
+    choose(reference or "nodal", ("nodal", "tight"), "reference", SceneError)
+    grid = checked(grid or Grid())
     begun = time.monotonic()
-    kind = reference or default_reference(loaded)
-    choose(kind, ("nodal", "tight"), "reference", SceneError)
-    beams = default_reference(loaded) == "nodal"
-    rungs = ladders(loaded, grid or Grid(), tolerance, min(modes.values(), default=0), beams)
-    total = len(REFERENCES[kind][1]) + len(rungs)
-    truth = make_reference(path, loaded, tuple(overrides), kind, chosen, workers, lambda done, _: progress(done, total))
+    modes = available_modes(loaded)
+    rungs = ladders(loaded, grid, tolerance, min(modes.values(), default=0), knows_second_order(loaded) is True)
+    total = 1 + len(rungs)
+    progress(0, total)
+    truth = _reference(loaded, reference, chosen, tolerance, budget)
+    progress(1, total)
     fields = tuple(count_field(loaded, name) for name in modes)
+    until = begun + budget + truth.prepared_s
     tasks = [
-        Ladder(
-            str(path), tuple(overrides), fields, ladder, chosen, norm, truth, tolerance, budget / 10, begun + budget
-        )
+        Ladder(str(path), tuple(overrides), fields, ladder, chosen, norm, truth, tolerance, budget / 10, until)
         for ladder in rungs
     ]
-    before = total - len(rungs)
-    advance = partial(_advanced, progress, before, total)
-    # what is compiled comes first: the budget may not last for the others
+    advance = partial(_advanced, progress, total)
     finished, complete = run_all(climb, tasks, advance, workers, longest_last=False)
     runs = tuple(run for one in finished for run in _runs(one, tasks[one.number]))
-    front = pareto_front(runs)
-    met = [run for run in runs if run.failure is None and run.error + truth.error <= tolerance]
-    best = min(met, key=lambda run: run.wall_s, default=None)
+    best = cheapest(runs, tolerance - truth.error, tolerance)
     how = () if best is None else overrides_of(best.setting, fields)
-    return CostStudy(loaded.name, chosen, norm, tolerance, truth, runs, front, best, how, complete)
+    return CostStudy(loaded.name, chosen, norm, tolerance, truth, runs, pareto_front(runs), best, how, complete)
 
 
-def _advanced(progress: Callable[[float, float], None], before: int, total: int, done: float, _: float) -> None:
-    progress(before + done, total)
+def _reference(scene: Scene, kind: str, points: tuple[str, ...], tolerance: float, budget: float) -> Reference:
+    """The one asked for, or a tight one where beams turn out to be nothing for the nodal formulation."""
+    first = kind or default_reference(scene)
+    try:
+        return make_reference(scene, "nodal" if first == "nodal" else "tight", points, tolerance, budget)
+    except ReportedError as problem:
+        if kind or first == "tight" or isinstance(problem, SimulationError) or problem.cause == Cause.BUDGET:
+            raise
+        return make_reference(scene, "tight", points, tolerance, budget)
+
+
+def _advanced(progress: Callable[[float, float], None], total: int, done: float, _: float) -> None:
+    progress(1 + done, total)
 
 
 def _check(value: float, name: str) -> None:
     if not 0 < value < np.inf:
         message, remedy = f"the {name} must be a positive number", "give metres" if name == "tolerance" else "seconds"
         raise SceneError(Cause.BAD_FIELD, message, where=name, value=value, remedy=remedy)
-
-
-def ladders(scene: Scene, grid: Grid, tolerance: float, most: int, beams: bool) -> list[tuple[Setting, ...]]:
-    """All combinations of the grid, each from coarse to fine; for beams second-order displacements with all modes."""
-    for integrator in grid.integrators:
-        choose(integrator, INTEGRATORS, "integrators", SceneError)
-    for formulation in grid.formulations:
-        choose(formulation, ("erls", "ffr"), "formulations", SceneError)
-    for count in grid.modes:
-        if not 0 <= count <= most:
-            message, remedy = "the modal models do not have this number of elastic modes", "give counts up to the limit"
-            raise SceneError(Cause.BAD_FIELD, message, where="modes", value=count, limit=most, remedy=remedy)
-    counts: tuple[int | None, ...] = grid.modes or tuple(dict.fromkeys((None, most // 2, most // 4)))
-    if not most:
-        counts = (None,)
-    models = [(effects, count) for effects in grid.effects or ("all", "auto") for count in counts]
-    if beams and most and not grid.effects:
-        models.append((STIFFENED, counts[0]))
-    return [
-        tuple(Setting(formulation, integrator, effects, count, *rung) for rung in _rungs(scene, integrator, tolerance))
-        for formulation in grid.formulations or ("erls", "ffr")
-        for effects, count in models
-        for integrator in grid.integrators or _default_integrators(scene)
-    ]
-
-
-def _default_integrators(scene: Scene) -> tuple[str, ...]:
-    own = [name for name in INTEGRATORS if name not in (*_SCIPY, "auto")]
-    return (*own, "dop853")
-
-
-def _rungs(scene: Scene, integrator: str, tolerance: float) -> list[tuple[str, float]]:
-    settings = scene.record.simulation
-    if integrator in _SCIPY:
-        return [("rtol", value) for value in _RELATIVE]
-    if integrator == "generalized_alpha":
-        step = settings.step or min(settings.duration / 1000, 1e-3)
-        return [("step", share * step) for share in _STEP_SHARES]
-    return [("tolerance", share * tolerance) for share in _TOLERANCE_SHARES]
 
 
 def _runs(one: Finished, task: Ladder) -> list[CostPoint]:
@@ -231,15 +182,34 @@ def pareto_front(runs: Sequence[CostPoint]) -> tuple[CostPoint, ...]:
     return tuple(front)
 
 
+def cheapest(runs: Sequence[CostPoint], largest: float, tolerance: float) -> CostPoint | None:
+    """The run to recommend: of those off by ``largest`` at most that do not warn of more than the tolerance the
+    cheapest, or, of those as cheap within the noise, the plainest: effects that are named, and few of them.
+    """
+    met = [run for run in runs if run.failure is None and run.error <= largest and run.foretold <= tolerance]
+    shortest = min((run.wall_s for run in met), default=0.0)
+    equal = [run for run in met if run.wall_s <= _AS_CHEAP * shortest]
+    return min(equal, key=_plainness, default=None)
+
+
+def _plainness(run: CostPoint) -> tuple[bool, int, float]:
+    effects = run.setting.effects
+    return effects == "auto", effects.count("+") + effects.count("-"), run.wall_s
+
+
 def recommendation(study: CostStudy) -> str:
     """One sentence: the cheapest setting that meets the tolerance, or that none does."""
     where = f"{study.tolerance:.3g} m ({study.norm} over time, at {', '.join(study.points)})"
     if study.chosen is None:
         best = min((r for r in study.runs if r.failure is None), key=lambda r: r.error, default=None)
+        if study.reference.error >= study.tolerance:
+            unsure = f"the reference itself is known to {study.reference.error:.2g} m only"
+            return f"no setting can be judged within {where}: {unsure}; raise the budget (--budget)"
         if best is None:
             return f"no setting ran; none can be recommended for {where}"
         found = f"the best was {best.setting.name}, {best.setting.knob} = {best.setting.value:.3g}"
-        return f"no setting meets {where}: {found}, off by {best.error:.2g} m"
+        warned = f", and its run warns of {best.foretold:.2g} m" if best.foretold > study.tolerance else ""
+        return f"no setting meets {where}: {found}, off by {best.error:.2g} m{warned}"
     s = study.chosen.setting
     return (
         f"the cheapest setting within {where} is {s.name}, {s.knob} = {s.value:.3g}: "
@@ -256,7 +226,12 @@ def cost_summary(study: CostStudy) -> dict[str, Any]:
         "points": list(study.points),
         "norm": study.norm,
         "tolerance": study.tolerance,
-        "reference": {"made_by": study.reference.made_by, "error": study.reference.error},
+        "reference": {
+            "made_by": study.reference.made_by,
+            "error": study.reference.error,
+            "linear_links": study.reference.linear,
+            "warnings": list(study.reference.warnings),
+        },
         "complete": study.complete,
         "recommendation": recommendation(study),
         "chosen": None if study.chosen is None else _point_summary(study.chosen, True),
@@ -278,6 +253,7 @@ def _point_summary(run: CostPoint, on_front: bool) -> dict[str, Any]:
         "rhs_calls": run.rhs_calls,
         "factorizations": run.factorizations,
         "runs": run.runs,
+        "warned_error": run.foretold,
         "on_front": on_front,
         "failure": None if run.failure is None else run.failure.as_dict(),
     }

@@ -10,9 +10,10 @@ from typing import Literal
 import numpy as np
 
 from erls.errors import Cause, SimulationError
-from erls.run import Run
 from erls.scene import load_scene
 from erls.simulation import simulate
+from erls.studies.doubts import foretold_error
+from erls.studies.effect_sets import as_field
 from erls.studies.reference import Reference, sampled
 from fe_import.errors import ReportedError
 
@@ -25,7 +26,9 @@ class Setting:
 
     Attributes
     ----------
-    formulation, integrator, effects : str
+    formulation, integrator : str
+    effects : str
+        As `erls.studies.effect_sets` writes them.
     modes : int or None
         Elastic modes of every link; all of the model when None.
     knob : str
@@ -55,13 +58,15 @@ class CostPoint:
     ----------
     setting : Setting
     wall_s : float
-        Median over ``runs`` of the integration alone; nan when it failed.
+        Median over ``runs`` of the integration, with what choosing effects and certifying takes; nan when it failed.
     error : float
         In the norm of the study [m]; nan when it failed.
     steps, rhs_calls, factorizations : int
     runs : int
     failure : ReportedError or None
         Failed runs stay in the report with their cause.
+    foretold : float
+        Error that the run warns of itself [m]: see `erls.studies.doubts`.
     """
 
     setting: Setting
@@ -72,6 +77,7 @@ class CostPoint:
     factorizations: int
     runs: int
     failure: ReportedError | None = None
+    foretold: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,7 @@ def overrides_of(setting: Setting, fields: Sequence[str]) -> tuple[str, ...]:
     result = [
         f"simulation.formulation={setting.formulation}",
         f"simulation.integrator={setting.integrator}",
-        f"simulation.effects={setting.effects}",
+        f"simulation.effects={as_field(setting.effects)}",
         f"simulation.{setting.knob}={setting.value:.6g}",
     ]
     if setting.knob == "rtol":
@@ -117,11 +123,11 @@ def climb(task: Ladder) -> list[CostPoint]:
         if left <= 0:
             found.append(failed(setting, _over_budget("not run: the budget of the study was used up")))
             break
-        point = _measured(task, setting, min(task.slowest, left))
+        point = _measured(task, setting, min(task.slowest, left), not found)
         found.append(point)
         good = point.failure is None and point.error <= max(task.reference.error, 0.03 * task.tolerance)
-        slow = point.failure is not None and point.failure.cause == Cause.BUDGET
-        if good or slow or _stalled(found):
+        refused = point.failure is not None and point.failure.exit_code == 2  # too slow, or not possible at all
+        if good or refused or _stalled(found) or _ran_away(found):
             break
     return found
 
@@ -132,8 +138,17 @@ def _stalled(found: list[CostPoint]) -> bool:
     return len(errors) == 3 and max(errors) - min(errors) < 0.1 * errors[-1]
 
 
-def _measured(task: Ladder, setting: Setting, longest: float) -> CostPoint:
-    """Runs of one setting: one, and two more where they are short."""
+def _ran_away(found: list[CostPoint]) -> bool:
+    """Whether two in a row deflected beyond any meaning: the model is the cause then, not the step."""
+    failures = [point.failure for point in found[-2:]]
+    return len(failures) == 2 and all(one is not None and one.cause == Cause.RUNAWAY for one in failures)
+
+
+def _measured(task: Ladder, setting: Setting, longest: float, first: bool) -> CostPoint:
+    """Runs of one setting: one, and two more where they are short; one before that does not count where it may load or
+    compile something on its way, the first of a ladder or one that chooses its effects, unless it takes long.
+    """
+    warms = first or setting.effects == "auto"
     begun: float | None = None
 
     def watch(t: float, duration: float) -> None:
@@ -143,13 +158,14 @@ def _measured(task: Ladder, setting: Setting, longest: float) -> CostPoint:
             raise _TooSlow
 
     walls: list[float] = []
-    run: Run | None = None
     try:
         scene = load_scene(task.path, (*task.overrides, *overrides_of(setting, task.fields)))
-        while not walls or (len(walls) < 3 and walls[0] < 1.0):
+        wanted = 1
+        while len(walls) < wanted and (not walls or time.monotonic() < task.until):
             begun = None
             run = simulate(scene, progress=watch)
-            walls.append(run.wall_s)
+            walls.append(run.wall_s + (0.0 if run.certificate is None else run.certificate.wall_s))
+            wanted = warms + 3 if run.wall_s < 1.0 else warms + 1 if run.wall_s < longest / 4 else 1
     except _TooSlow:
         why = "too slow for this study" if longest >= task.slowest else "the budget of the study was used up"
         return failed(setting, _over_budget(f"stopped after {longest:.1f} s: {why}"))
@@ -157,14 +173,15 @@ def _measured(task: Ladder, setting: Setting, longest: float) -> CostPoint:
         if problem.cause == Cause.INTERRUPTED:
             raise
         return failed(setting, problem)
-    assert run is not None
     distance = np.linalg.norm(
         sampled(run, task.points, task.reference.times) - task.reference.positions, axis=2
     )
     error = float(distance.max() if task.norm == "max" else np.sqrt((distance**2).mean(axis=0)).max())
     work = run.solution.work
-    wall = float(np.median(walls))
-    return CostPoint(setting, wall, error, work.steps, work.rhs_calls, work.factorizations, len(walls))
+    counted = walls[1:] if warms and len(walls) > 1 else walls
+    foretold = foretold_error(run, task.reference.linear)
+    counts = (work.steps, work.rhs_calls, work.factorizations, len(counted))
+    return CostPoint(setting, float(np.median(counted)), error, *counts, foretold=foretold)
 
 
 def _over_budget(message: str) -> SimulationError:

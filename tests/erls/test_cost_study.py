@@ -18,19 +18,19 @@ from erls.cli import main
 from erls.errors import Cause, SceneError, SimulationError
 from erls.report.cost_page import cost_csv, cost_page, cost_text
 from erls.studies.cost import (
-    STIFFENED,
     CostStudy,
-    Grid,
     cost_summary,
-    ladders,
     pareto_front,
     recommendation,
     study_cost,
 )
-from erls.studies.ladder import CostPoint, Setting, overrides_of
+from erls.studies.effect_sets import STIFFENED
+from erls.studies.grid import Grid, ladders
+from erls.studies.ladder import CostPoint, Setting, failed, overrides_of
 
 TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"
-SHORT = ("simulation.duration=0.04", "simulation.step=1e-3")
+SHORT = ("simulation.duration=0.04", "simulation.step=5e-4")
+NO_TIME = SimulationError(Cause.BUDGET, "the budget of the study was used up")
 GRID = Grid(formulations=("erls",), integrators=("generalized_alpha",), effects=("all",), modes=(6, 18))
 
 
@@ -45,10 +45,10 @@ def study() -> CostStudy:
 
 
 def test_front_holds_what_nobody_beats() -> None:
-    failed = point(math.nan, math.nan, SimulationError(Cause.NOT_FINITE, "no"))
-    runs = [point(3.0, 1e-6), point(1.0, 1e-3), failed, point(2.0, 2e-3), point(2.5, 1e-4), point(4.0, 1e-6)]
+    nothing = point(math.nan, math.nan, SimulationError(Cause.NOT_FINITE, "no"))
+    runs = [point(3.0, 1e-6), point(1.0, 1e-3), nothing, point(2.0, 2e-3), point(2.5, 1e-4), point(4.0, 1e-6)]
     assert [(p.wall_s, p.error) for p in pareto_front(runs)] == [(1.0, 1e-3), (2.5, 1e-4), (3.0, 1e-6)]
-    assert pareto_front([failed]) == ()
+    assert pareto_front([nothing]) == ()
 
 
 def test_error_is_that_of_the_run(study: CostStudy) -> None:
@@ -73,12 +73,12 @@ def test_more_modes_and_smaller_steps_come_nearer(study: CostStudy) -> None:
 
 
 def test_recommended_setting_meets_the_tolerance_in_a_copy(study: CostStudy, tmp_path: Path) -> None:
-    """Cheapest of all that meet it, and the sentence names it."""
+    """None of those that meet it is cheaper beyond the noise, and the sentence names it."""
     from erls.studies.apply import write_copy
 
     chosen = study.chosen
     assert chosen is not None
-    cheaper = [r for r in study.runs if r.wall_s < chosen.wall_s]
+    cheaper = [r for r in study.runs if 1.2 * r.wall_s < chosen.wall_s]
     assert all(r.error + study.reference.error > study.tolerance for r in cheaper)
     assert f"{chosen.setting.modes} modes" in recommendation(study)
     text = TALL.read_text(encoding="utf-8").replace("links/", f"{TALL.parent}/links/")
@@ -111,14 +111,27 @@ def test_what_is_tried_unless_given() -> None:
     scene = erls.load_scene(scenes.ROOT / "data/l_shape/steel_flat.toml")
     found = {(rungs[0].effects, rungs[0].modes) for rungs in ladders(scene, Grid(), 1e-4, 18, True)}
     assert found == {(e, n) for e in ("all", "auto") for n in (None, 9, 4)} | {(STIFFENED, None)}
-    for grid, beams in ((Grid(), False), (Grid(effects=("all",)), True)):
-        assert all(rungs[0].effects != STIFFENED for rungs in ladders(scene, grid, 1e-4, 18, beams))
+    for grid, known in ((Grid(), False), (Grid(effects=("all",)), True)):
+        assert all(rungs[0].effects != STIFFENED for rungs in ladders(scene, grid, 1e-4, 18, known))
 
 
-def test_failures_stay_visible(tmp_path: Path) -> None:
-    """An explicit method that a stiff link makes too slow, and a budget that is used up, are reported as such."""
+def test_set_of_the_scene_is_always_tried() -> None:
+    """First of all, in its own formulation; in other words it is the same set."""
+    scene = erls.load_scene(scenes.ROOT / "data/slider_crank/fast.toml")
+    for asked in ((), ("all",), ("auto", "all+foreshortening+geometric_stiffening")):
+        found = [rungs[0] for rungs in ladders(scene, Grid(effects=asked), 1e-4, 12, True)]
+        assert (found[0].formulation, found[0].effects, found[0].modes) == ("ffr", STIFFENED, None)
+        sets = {setting.effects for setting in found}
+        assert sets == {STIFFENED, *(asked or ("all", "auto"))} - {"all+foreshortening+geometric_stiffening"}
+    split = erls.load_scene(scene.path, ["links.rod.substructures=4"])
+    assert {rungs[0].formulation for rungs in ladders(split, Grid(), 1e-4, 12, True)} == {"ffr"}
+
+
+def test_failures_stay_visible(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An explicit method that a stiff link makes too slow is reported as such, and not tried more tightly."""
     grid = Grid(("erls",), ("rk45",), ("all",), (18,))
-    result = study_cost(TALL, 1e-4, grid=grid, reference="nodal", overrides=SHORT, budget=0.01, workers=1)
+    monkeypatch.setattr("erls.studies.ladder._measured", lambda task, setting, *rest: failed(setting, NO_TIME))
+    result = study_cost(TALL, 1e-4, grid=grid, reference="tight", overrides=SHORT, workers=1)
     assert result.chosen is None
     assert [r.failure.cause for r in result.runs if r.failure is not None] == [Cause.BUDGET]
     assert "no setting ran" in recommendation(result)
@@ -142,7 +155,7 @@ def test_tight_reference_of_a_rigid_pendulum(tmp_path: Path) -> None:
     grid = Grid(("erls",), ("generalized_alpha",), ("all",))
     result = study_cost(path, 1e-3, grid=grid, reference="tight", norm="rms", workers=1)
     errors = [r.error for r in result.runs]
-    assert result.reference.error < 1e-7
+    assert result.reference.error < 1e-6  # a thousandth of the tolerance is enough
     assert errors[-3] / errors[-1] == pytest.approx(16, rel=0.2)
     assert result.chosen is not None
     del data["points"]
@@ -160,6 +173,10 @@ def test_tight_reference_of_a_rigid_pendulum(tmp_path: Path) -> None:
         (("--integrators", "euler"), "euler"),
         (("--formulations", "nodal"), "nodal"),
         (("--modes", "99"), "modes"),
+        (("--effects", "foo"), "foo"),
+        (("--effects", "all,coriolis_"), "coriolis"),
+        (("--effects", "all", "--effects", "all+auto"), "auto"),
+        (("--effects", "all,geometric_stiffening"), "all+geometric_stiffening"),
         (("--modes", "a"), "--modes"),
         (("--reference", "adams"), "adams"),
         (("--apply", "scene.toml"), "the scene itself"),

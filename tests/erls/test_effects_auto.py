@@ -343,9 +343,9 @@ def test_table(pendulum: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = {row["name"]: row for row in found["effects"]}
     assert list(rows) == [n for n in EFFECTS if n in DEFAULT - {"modal_damping"}]
     assert not rows["payload"]["present"]
-    assert not rows["spin_softening"]["auto"]
-    assert rows["centrifugal_load"]["auto"]
-    assert rows["coriolis"]["auto"]  # small, but without it alone nothing is saved
+    assert rows["spin_softening"]["why"] == "deciding costs more"
+    assert rows["centrifugal_load"]["why"] == "needed"
+    assert rows["coriolis"]["why"] == "goes with inertia_first_order"  # small, but without it alone nothing is saved
     assert "all kept" in found["decision"]
     weight = 9.81 * 7800 * 0.01 * 0.03 * 1.0  # of a metre of steel, in N
     assert 0.9 * weight < rows["gravity"]["force"] <= weight  # six coordinates feel less than all the mass

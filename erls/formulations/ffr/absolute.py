@@ -42,7 +42,7 @@ def absolute_generalized_alpha(
     kept = np.concatenate([angles, frames + np.arange(system.elastic)])
 
     def independent(found: Solution) -> Solution:
-        y, v, a = (x[:, kept] for x in (found.y, found.v, found.a))
+        y, v, a = (np.ascontiguousarray(x[:, kept]) for x in (found.y, found.v, found.a))
         return Solution(found.t, y, v, a, found.work, found.failure, found.warnings)
 
     def watch(t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:

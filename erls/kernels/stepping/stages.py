@@ -51,8 +51,8 @@ def foretell(
     last: Array,
     matrices: Array,
     vectors: Array,
-    own_solve: Callable[..., None],
-    own_solve_complex: Callable[..., None],
+    own_solve: Callable[..., None] | None,
+    own_solve_complex: Any,
     way: Any,
 ) -> None:
     """Stages from the polynomial through the last ones, made to fulfil the linear part of the equations.
@@ -126,22 +126,25 @@ def solve(
     matrices: Array,
     re: Array,
     im: Array,
-    own_solve: Callable[..., None],
-    own_solve_complex: Callable[..., None],
+    own_solve: Callable[..., None] | None,
+    own_solve_complex: Any,
     way: Any,
 ) -> None:
     """Replace re + i im by the solution with the matrix of eigenvalue k, or with the filter where k is -1."""
     reals, integers, own, own_complex, mixed = way
-    if own.shape[1] > 0:
-        if real:
-            own_solve(reals, integers, own[k + 1], re)
-        else:
+    # a system that is not compiled has no way of its own: what follows is then left out of the compiled code
+    if own_solve is not None:  # noqa: SIM102
+        if own.shape[1] > 0:
+            if real:
+                own_solve(reals, integers, own[k + 1], re)
+                return
             for i in range(len(re)):
                 mixed[i] = re[i] + 1j * im[i]
             own_solve_complex(reals, integers, own_complex[k], mixed)
             for i in range(len(re)):
                 re[i], im[i] = mixed[i].real, mixed[i].imag
-    elif real:
+            return
+    if real:
         solve_real(matrices[FILTER if k < 0 else SOLVERS + 2 * k], re)
     else:
         solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
@@ -154,8 +157,8 @@ def correct(
     stages: Array,
     matrices: Array,
     vectors: Array,
-    own_solve: Callable[..., None],
-    own_solve_complex: Callable[..., None],
+    own_solve: Callable[..., None] | None,
+    own_solve_complex: Any,
     way: Any,
 ) -> float:
     """One iteration from the residuals of the stages; the largest change of a position, and of h v [metres]."""
@@ -256,8 +259,8 @@ def judge(
     stages: Array,
     matrices: Array,
     vectors: Array,
-    own_solve: Callable[..., None],
-    own_solve_complex: Callable[..., None],
+    own_solve: Callable[..., None] | None,
+    own_solve_complex: Any,
     way: Any,
 ) -> float:
     """Estimated error of a step [metres]: (M + h C + h² K)⁻¹ M h² times the highest difference of the accelerations."""
