@@ -94,9 +94,9 @@ class _Run:
         self.step = loop.advance if compiled else getattr(loop.advance, "py_func", loop.advance)
         self.chunk, self.largest_chunk = (8, 4096) if compiled else (1, 1)  # steps
         self.factoring = own = self.system.factoring or FACTORING
-        self.solving: tuple[Any, ...] = own.factor, own.solve, own.factor_complex, own.solve_complex
+        self.solving: tuple[Any, Any, Any, Any] = own.factor, own.solve, own.factor_complex, own.solve_complex
         if compiled is None:
-            self.solving = (None,) * 4  # so that what the loop calls is compiled once, not in every process
+            self.solving = None, None, None, None  # so that what the loop calls is compiled once, not in every process
         self.mixed = np.zeros(n, dtype=complex)
         self.coefficients = _coefficients()
         self.stages, self.last = np.zeros((4, 3, n)), np.zeros((4, 3, n))
