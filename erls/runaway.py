@@ -39,7 +39,7 @@ class Runaway:
         self._metres = metre_scales(self._system)  # type: ignore[arg-type]
         joints = sum(not joint.drive.prescribed for joint in self._system.mechanism.joints)
         self._elastic = slice(min(joints, len(self._metres)), None)
-        self._least = LARGEST * float(self._sizes.min(initial=np.inf))
+        self._least = LARGEST * float(self._sizes[self._sizes > 0].min(initial=np.inf))  # a crank may be a point
         self._since = -np.inf
         self.ended: float | None = None
         """Time of the first knot beyond the limit."""
@@ -83,8 +83,9 @@ class Runaway:
         """Number of the link that is displaced most for its size, and by how much [m]; None within the limit."""
         state = self._system.state(float(solution.t[knot]), solution.y[knot], solution.v[knot])
         moved = np.array([_moved(link, q) for link, q in zip(self._links, state.modal, strict=True)])
-        worst = int(np.argmax(moved / self._sizes))
-        return (worst, float(moved[worst])) if moved[worst] > LARGEST * self._sizes[worst] else None
+        shares = np.divide(moved, self._sizes, out=np.zeros_like(moved), where=self._sizes > 0)
+        worst = int(np.argmax(shares))
+        return (worst, float(moved[worst])) if shares[worst] > LARGEST else None
 
     def _failure(self, solution: Solution, knot: int, number: int, moved: float) -> SimulationError:
         link, size = self._links[number], float(self._sizes[number])
