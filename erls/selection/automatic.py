@@ -18,7 +18,7 @@ from erls.run import Run
 from erls.scene import Scene
 from erls.selection.certify import certify
 from erls.selection.choice import Choice, choose_effects
-from erls.selection.stiffening import Addition, addition, beyond_range, can_stiffen, off_by, unstable
+from erls.selection.stiffening import Addition, addition, can_stiffen, off_by, unstable
 from erls.spin_stability import UNSTABLE
 
 _KEPT = 0.1  # of the tolerance: what an estimate, scaled by what the certificate found, may take when a run is repeated
@@ -118,13 +118,12 @@ class _Physics:
         return True
 
     def stiffens(self, run: Run, strict: bool) -> bool:
-        """Whether a run without stiffening needs it, by its own estimate."""
+        """Whether a run without stiffening needs it: for lost stability and, strictly, by its own estimate."""
         if not self._may_add:
             return False
-        tolerance = self.settings.effects_tolerance
-        error, limit = run.second_order_error or 0.0, tolerance if strict else beyond_range(self.whole)
+        error, tolerance = run.second_order_error or 0.0, self.settings.effects_tolerance
         lost = unstable(run.warnings)
-        if not lost and error <= max(limit, tolerance):
+        if not lost and not (strict and error > tolerance):
             return False
         self._add(addition(self.scene, self.whole, lost or off_by(error, tolerance)))
         return True

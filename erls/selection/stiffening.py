@@ -2,15 +2,14 @@
 
 Links that are linear in their own frame are off by what second order makes of their motion; `erls.range_watch`
 estimates that from the motion of the run, within a factor of about 2.5. Spins that take away the stiffness of a link
-need no run where drives prescribe them. ``auto`` is there to leave out what a scene does not need: beyond its tolerance
-it warns, and adds these effects where a run would have no meaning without them, or where the user is strict.
+need no run where drives prescribe them. ``auto`` is there to leave out what a scene does not need, and never to be
+slower than all effects: beyond its tolerance it warns, and adds these where links lose their stability without them, or
+where the user is strict.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from erls.effects import in_order
 from erls.formulations import TREES, formulate
@@ -20,7 +19,6 @@ from erls.selection.cost import cost_of, stiffened_cost
 from erls.spin_stability import UNSTABLE, planned_spin_warnings
 
 STIFFENING = frozenset({"geometric_stiffening", "foreshortening"})
-BEYOND_RANGE = 0.01  # of the largest link: an error of second order that leaves a run without meaning
 _SPEEDS = 61
 
 
@@ -76,12 +74,6 @@ def stiffening(scene: Scene, mechanism: Mechanism) -> Addition:
         return Addition()
     lost = unstable(planned_spin_warnings(mechanism, settings.duration, _SPEEDS))
     return addition(scene, mechanism, lost) if lost else Addition()
-
-
-def beyond_range(mechanism: Mechanism) -> float:
-    """Error of second order from which on a run has no meaning [m]."""
-    sizes = [float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in mechanism.links]
-    return BEYOND_RANGE * max(sizes, default=0.0)
 
 
 def off_by(error: float, tolerance: float) -> str:
