@@ -10,13 +10,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from erls.crew import Crew, reported
 from erls.errors import Cause, SceneError, SimulationError
 from erls.packed_run import PackedRun, packed
+from erls.parallel.crew import Crew, reported
+from erls.parallel.worker_process import stopped
+from erls.parallel.workers import IDLE, possible
 from erls.run import Run
 from erls.variants import Variants
-from erls.worker_process import stopped
-from erls.workers import IDLE, possible
 from fe_import.errors import ReportedError
 
 _START_S, _READY_S = 1.0, 0.2  # of work left, from which on workers pay that must be started, or that are there
@@ -171,12 +171,9 @@ class _Batch:
 
     def _received(self, problem: ReportedError | None, run: PackedRun | None) -> Run | ReportedError:
         made = None if run is None else self.here.unpacked(run)
-        if problem is None:
-            assert made is not None
-            return made
-        if made is not None and isinstance(problem, SimulationError):
+        if isinstance(problem, SimulationError) and made is not None:
             problem.run = made
-        return problem
+        return problem or made or _interrupted()
 
 
 def _interrupted() -> SimulationError:

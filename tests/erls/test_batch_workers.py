@@ -18,13 +18,13 @@ from pool_work import square
 
 import erls
 from erls.batch import _run, _Task
-from erls.crew import Crew, reported
 from erls.errors import Cause, SceneError, SimulationError
 from erls.packed_run import LaterRun, PackedRun, packed
+from erls.parallel.crew import Crew, reported
+from erls.parallel.workers import IDLE
 from erls.run import Run
 from erls.studies.pool import run_all
 from erls.variants import Variants
-from erls.workers import IDLE
 from fe_import.errors import ReportedError
 
 DATA = scenes.ROOT / "data"
@@ -206,7 +206,7 @@ SCRIPT = """
 import sys, time
 open("starts", "a").write("once ")
 import erls, erls.batch
-from erls.crew import Crew
+from erls.parallel.crew import Crew
 from erls.packed_run import LaterRun
 from erls.studies.pool import run_all
 

@@ -18,8 +18,8 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.integrators import INTEGRATORS
 from erls.integrators.base import Options, Solution, hermite_knots
 from erls.integrators.driver import Recorder
-from erls.output_watch import FEWEST, output_error, output_step
 from erls.scene import Simulation
+from erls.watches.stored_output import FEWEST, output_error, output_step
 
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"
 FLAT = scenes.ROOT / "data/l_shape/steel_flat.toml"

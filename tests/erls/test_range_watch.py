@@ -12,7 +12,7 @@ import scenes
 import erls
 from erls.formulations.assumed_bow import assumed_second_order
 from erls.formulations.deflection_watch import LinkMotion, deflection_error
-from erls.range_watch import deflection_errors, deflection_warnings
+from erls.watches.deflection_range import deflection_errors, deflection_warnings
 
 DATA = scenes.ROOT / "data"
 

@@ -12,8 +12,8 @@ import erls
 from erls.errors import Cause, SimulationError
 from erls.run import Run
 from erls.run_file import load_run, write_run
-from erls.runaway import LARGEST
-from erls.spin_stability import spin_warnings
+from erls.watches.runaway import LARGEST
+from erls.watches.spin_stability import spin_warnings
 
 SPIN_UP = scenes.ROOT / "data/spin_up/beam.toml"
 TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"

@@ -24,7 +24,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link, Payload, payload_invariants
 from erls.mechanism.second_order import link_second_order
 from erls.run import Run, node_positions
-from erls.spin_stability import critical_speed
+from erls.watches.spin_stability import critical_speed
 from fe_import import load_link, reduce_link
 
 DATA = scenes.ROOT / "data"
