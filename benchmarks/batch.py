@@ -16,8 +16,8 @@ import time
 from pathlib import Path
 
 import erls
+from erls.parallel.workers import IDLE
 from erls.run import Run
-from erls.workers import IDLE
 
 SCENE = Path(__file__).parents[1] / "data/l_shape/steel_flat.toml"
 SETTINGS = ["simulation.integrator=lobatto", "simulation.tolerance=1e-4", "simulation.duration=2.0"]

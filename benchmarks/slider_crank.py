@@ -15,7 +15,7 @@ import numpy as np
 import erls
 from erls.body_scenes import solve
 from erls.lie.so3 import Array
-from erls.range_watch import deflection_errors
+from erls.watches.deflection_range import deflection_errors
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "data" / "slider_crank"

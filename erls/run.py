@@ -43,7 +43,7 @@ class Run:
     certificate : Certificate or None
         Of a run with ``effects = "auto"``.
     second_order_error : float or None
-        Estimate of `erls.range_watch`, of all links [m]; None where it was not made.
+        Estimate of `erls.watches.deflection_range`, of all links [m]; None where it was not made.
 
     Examples
     --------

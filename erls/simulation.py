@@ -18,15 +18,15 @@ from erls.formulations.state_series import StateSeries
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
 from erls.kernels.jit import announcing
-from erls.mass_watch import indefinite_mass
 from erls.mechanism.chain import Mechanism
-from erls.output_watch import output_step, output_warnings
-from erls.range_watch import deflection_errors, deflection_warnings
 from erls.run import Run
 from erls.run_file import self_contained, write_run
-from erls.runaway import Runaway
 from erls.scene import Scene, load_scene
-from erls.spin_stability import missing_stiffening, planned_spin_warnings, spin_warnings
+from erls.watches.deflection_range import deflection_errors, deflection_warnings
+from erls.watches.mass import indefinite_mass
+from erls.watches.runaway import Runaway
+from erls.watches.spin_stability import missing_stiffening, planned_spin_warnings, spin_warnings
+from erls.watches.stored_output import output_step, output_warnings
 from fe_import.link import LinkDescription
 from fe_import.modal.file import ModalModel
 from fe_import.toml_file import choose
@@ -221,7 +221,7 @@ def _integrated(
 
         warn(static_warnings(formulation, solution, settings.effects_tolerance))
     if step is None and any(joint.drive.torque_limit < np.inf for joint in mechanism.joints):
-        from erls.limit_watch import limit_warnings
+        from erls.watches.motor_limits import limit_warnings
 
         warn(limit_warnings(formulation, solution, settings.tolerance))
     if modal and not planned and any(j.drive.reference(0.0) is None for j in mechanism.joints):

@@ -29,6 +29,7 @@ from erls.formulations.joint_frames import FrameMotion, attached, carried
 from erls.formulations.joint_turn import JointTurn, Motion, joint_turn
 from erls.formulations.link_inertia import LinkInertia, moment_about
 from erls.formulations.modal_inertia import modal_inertia
+from erls.formulations.node_reach import node_reach
 from erls.formulations.second_order import SecondOrderInertia
 from erls.formulations.second_order_compatibility import second_order_compatibility
 from erls.formulations.state_series import StateSeries
@@ -121,30 +122,7 @@ class Erls:
     @property
     def length_scales(self) -> Array:
         """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
-        theta = np.array([j.position for j in self.mechanism.joints])
-        places = self.compatibility.layout
-        _, d = self.compatibility.displacement(theta, np.zeros(self.elastic))
-        frames = poses(self.mechanism, theta)
-        world = [
-            link.model.nodes @ frame[:3, :3].T + frame[:3, 3]
-            for link, frame in zip(self.mechanism.links, frames, strict=True)
-        ]
-        scales = np.empty(self.joints + self.elastic)
-        axis_frame = np.eye(4)
-        for k, joint in enumerate(self.mechanism.joints):
-            axis_frame = (frames[k - 1] if k else np.eye(4)) @ joint.before
-            arms = np.vstack(world[k:]) - axis_frame[:3, 3]
-            reach = np.linalg.norm(np.cross(axis_frame[:3, 2], arms), axis=1).max()
-            scales[k] = max(reach, 1e-3) if joint.type.revolute else 1.0
-        scales[self.joints :] = 0.0
-        for k, link in enumerate(self.mechanism.links):
-            rows = d[6 * k : 6 * k + 6]
-            moved = np.einsum("nim,md->nid", link.model.translation_shapes[:, :, :6], rows)
-            moved[:, :, places.elastic_of[k]] += link.model.translation_shapes[:, :, 6:]
-            size = np.linalg.norm(moved, axis=1).max(axis=0)
-            scales[self.joints :] = np.maximum(scales[self.joints :], size)
-        scales[self.joints :] = np.maximum(scales[self.joints :], 1e-12)
-        return np.asarray(scales[self.free])
+        return np.asarray(node_reach(self.mechanism, self.compatibility)[self.free])
 
     def _expand(self, t: float, y: Array, v: Array, a: Array | None) -> tuple[Array, ...]:
         """θ, θ̇, θ̈ of all joints and q_d, q̇_d, q̈_d."""
@@ -203,9 +181,7 @@ class Erls:
             wrench, forces = inertia.forces(
                 chain.twists[k], twist_rate + chain.biases[k], q[modes], qd[modes], qdd[modes]
             )
-            weight, modal_weight = inertia.gravity(
-                chain.poses[k][:3, :3].T @ self.mechanism.gravity, q[modes]
-            )
+            weight, modal_weight = inertia.gravity(chain.poses[k][:3, :3].T @ self.mechanism.gravity, q[modes])
             wrenches.append(wrench - weight)
             modal[modes] = forces - modal_weight
         for k in range(self.joints - 1, 0, -1):
@@ -278,9 +254,7 @@ class Erls:
         force = self.residual(t, y, v, np.zeros(self.size))
         mass = self.mass_matrix(t, y)
         try:
-            return np.asarray(
-                la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False)
-            )
+            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
         except la.LinAlgError:
             raise self._singular(t, mass) from None
 
@@ -392,9 +366,7 @@ class Erls:
                 None if second is None else second.node(node),
             )
             rows = np.hstack([turning[k], np.zeros((6, self.elastic))])
-            link = FrameMotion(
-                chain.poses[k], rows, chain.twists[k], chain.biases[k] + turning[k] @ driven
-            )
+            link = FrameMotion(chain.poses[k], rows, chain.twists[k], chain.biases[k] + turning[k] @ driven)
             result.append(attached(carried(link, local), offset))
         return result
 

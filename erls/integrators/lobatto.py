@@ -21,7 +21,7 @@ is fitted to runs of 1.5 to 2 s of an L with 18 and 30 modes and of robots with 
 there the largest error of the tip came out at 0.3 to 4 times the tolerance. Errors of phase add up, so it grows with
 the length of a run: after 6000 rad of a vibration whose amplitude is near the tolerance it was ten times the tolerance.
 Joints that stick and slide cost up to five times the tolerance; motors that switch between their limits, where small
-vibrations decide when, up to a hundred times (`erls.limit_watch` warns of these).
+vibrations decide when, up to a hundred times (`erls.watches.motor_limits` warns of these).
 """
 
 from __future__ import annotations

@@ -96,7 +96,7 @@ def compiling_beside(module: str) -> Iterator[None]:
 
 
 def _tell_of(subpackage: str) -> None:
-    if subpackage in _told:
+    if subpackage in _told or not _listeners:
         return
     _told.add(subpackage)
     for tell in _listeners:

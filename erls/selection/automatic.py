@@ -19,7 +19,7 @@ from erls.scene import Scene
 from erls.selection.certify import certify
 from erls.selection.choice import Choice, choose_effects
 from erls.selection.stiffening import Addition, addition, can_stiffen, off_by, unstable
-from erls.spin_stability import UNSTABLE
+from erls.watches.spin_stability import UNSTABLE
 
 _KEPT = 0.1  # of the tolerance: what an estimate, scaled by what the certificate found, may take when a run is repeated
 

@@ -1,10 +1,10 @@
 """Whether links need geometric stiffening and foreshortening, with which ``auto`` does not start.
 
-Links that are linear in their own frame are off by what second order makes of their motion; `erls.range_watch`
-estimates that from the motion of the run, within a factor of about 2.5. Spins that take away the stiffness of a link
-need no run where drives prescribe them. ``auto`` is there to leave out what a scene does not need, and never to be
-slower than all effects: beyond its tolerance it warns, and adds these where links lose their stability without them, or
-where the user is strict.
+Links that are linear in their own frame are off by what second order makes of their motion;
+`erls.watches.deflection_range` estimates that from the motion of the run, within a factor of about 2.5. Spins that take
+away the stiffness of a link need no run where drives prescribe them. ``auto`` is there to leave out what a scene does
+not need, and never to be slower than all effects: beyond its tolerance it warns, and adds these where links lose their
+stability without them, or where the user is strict.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from erls.formulations import TREES, formulate
 from erls.mechanism.chain import Mechanism
 from erls.scene import Scene, Simulation
 from erls.selection.cost import cost_of, stiffened_cost
-from erls.spin_stability import UNSTABLE, planned_spin_warnings
+from erls.watches.spin_stability import UNSTABLE, planned_spin_warnings
 
 STIFFENING = frozenset({"geometric_stiffening", "foreshortening"})
 _SPEEDS = 61

@@ -14,7 +14,7 @@ from erls.scene import Scene, load_scene
 from erls.selection.choice import Choice, affordable, choose_effects
 from erls.selection.cuts import Cut, possible_cuts
 from erls.selection.sizes import EffectSize, effect_sizes
-from erls.spin_stability import missing_stiffening
+from erls.watches.spin_stability import missing_stiffening
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ import numpy as np
 
 from erls.formulations.quasi_static import QuasiStatic
 from erls.formulations.static_watch import static_error
-from erls.range_watch import NOTABLE, deflection_errors
 from erls.run import Run
-from erls.spin_stability import UNSTABLE
+from erls.watches.deflection_range import NOTABLE, deflection_errors
+from erls.watches.spin_stability import UNSTABLE
 
 
 def foretold_error(run: Run, linear: bool) -> float:

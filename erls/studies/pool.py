@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from erls.crew import Crew, reported
 from erls.errors import Cause, SceneError
-from erls.workers import possible
+from erls.parallel.crew import Crew, reported
+from erls.parallel.workers import possible
 from fe_import.errors import ReportedError
 
 A = TypeVar("A")
@@ -43,7 +43,7 @@ def run_all(
     progress : callable
         Called with (finished, all).
     workers : int, optional
-        Processes (`erls.crew`); as many as cores unless given. One runs in this process.
+        Processes (`erls.parallel.crew`); as many as cores unless given. One runs in this process.
     longest_last : bool
         Whether the last tasks take longest, so that several processes start with them.
 

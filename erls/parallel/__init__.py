@@ -1,0 +1,1 @@
+"""Worker processes, and how work is shared out among them."""
