@@ -14,7 +14,6 @@ from erls.errors import SceneError, SimulationError
 from erls.events import Stopper, cut
 from erls.formulations import FORMULATIONS, TREES, compile_kernels, formulate, integrator
 from erls.formulations.closed_chain import ClosedChain
-from erls.formulations.state_series import StateSeries
 from erls.formulations.substructures import solved
 from erls.integrators.base import Options, Solution
 from erls.kernels.jit import announcing
@@ -23,8 +22,10 @@ from erls.run import Run
 from erls.run_file import self_contained, write_run
 from erls.scene import Scene, load_scene
 from erls.watches.deflection_range import deflection_errors, deflection_warnings
+from erls.watches.impulses import impulse_warnings
 from erls.watches.mass import indefinite_mass
 from erls.watches.runaway import Runaway
+from erls.watches.small_displacements import range_warnings
 from erls.watches.spin_stability import missing_stiffening, planned_spin_warnings, spin_warnings
 from erls.watches.stored_output import output_step, output_warnings
 from fe_import.link import LinkDescription
@@ -33,11 +34,6 @@ from fe_import.toml_file import choose
 
 Progress = Callable[[float, float], None]  # (time, duration)
 
-_LARGE_DEFLECTION = (
-    0.1  # of the link's size; the second-order error of a small-displacement model is then about 1 %
-)
-_LARGE_ROTATION = 0.2  # rad
-_AT_ONCE = 1_000_000  # displacements in memory while states are looked at
 CHECKPOINT_S = 20.0  # a killed run loses at most this much work
 
 
@@ -232,60 +228,6 @@ def _integrated(
         failure.run = run
         raise failure
     return run
-
-
-def impulse_warnings(mechanism: Mechanism, duration: float) -> list[str]:
-    """Prescribed motions whose rate jumps would need an infinite force."""
-    result = []
-    drives = [(f"joint {joint.name!r}", joint.drive) for joint in mechanism.joints]
-    drives += [(f"loop {loop.name!r}", loop.freedom.drive) for loop in mechanism.loops if loop.freedom is not None]
-    for name, drive in drives:
-        if not drive.prescribed:
-            continue
-        for t in (b for b in drive.breakpoints if 0 <= b < duration):
-            before, after = drive.reference(t, left=True), drive.reference(t)
-            if (
-                before is not None
-                and after is not None
-                and abs(before[1] - after[1]) > 1e-9 * max(1, abs(after[1]))
-            ):
-                result.append(
-                    f"{name}: the prescribed rate jumps at t = {t:.6g} s; the links do not feel the "
-                    "blow (use a motion with continuous rate)"
-                )
-    return result
-
-
-def range_warnings(run: Run, seen: StateSeries) -> list[str]:
-    """Links whose displacement left the range of small displacements, in which a modal model holds."""
-    if seen.nodes is not None:
-        return []  # the links may deflect as they like
-    mechanism: Mechanism = run.formulation.mechanism
-    largest = np.zeros(len(mechanism.links))
-    turned = np.zeros(len(mechanism.links))
-    for k, link in enumerate(mechanism.links):
-        model, q = link.model, seen.modal[k]
-        second_order = link.second_order if "foreshortening" in mechanism.effects else None
-        per_pass = max(1, _AT_ONCE // model.translation_shapes[..., 0].size)
-        for some in np.split(q, range(per_pass, len(q), per_pass)):
-            moved = np.tensordot(some, model.translation_shapes, ([1], [2]))
-            if second_order is not None:
-                moved += second_order.displacements(np.arange(len(model.nodes)), some)
-            moved -= moved[:, link.inboard.node, None]
-            largest[k] = np.fmax(largest[k], np.linalg.norm(moved, axis=2).max())
-            if len(model.rotation_shapes):
-                rotations = np.tensordot(some, model.rotation_shapes, ([1], [2]))
-                turned[k] = np.fmax(turned[k], np.linalg.norm(rotations, axis=2).max())
-    result = []
-    for k, link in enumerate(mechanism.links):
-        size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
-        if largest[k] > _LARGE_DEFLECTION * size or turned[k] > _LARGE_ROTATION:
-            result.append(
-                f"link {link.name!r} moves by up to {largest[k]:.3g} m and turns by up to "
-                f"{np.degrees(turned[k]):.2g} deg against its rigid shape: beyond small displacements, expect errors "
-                "of second order in the deflection"
-            )
-    return result
 
 
 __all__ = ["SimulationError", "simulate"]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.formulations.elastic_basis import MIXING, elastic_basis
+from erls.formulations.decoupled_modes import MIXING, decoupled_modes
 from erls.formulations.packing import Packer, joint_numbers, step_parts
 from erls.kernels.chain import equations, layout
 from erls.kernels.contract import CompiledSystem, Factoring, acceleration_in
@@ -108,7 +108,7 @@ def compile_chain(chain: Erls, dense: int = DENSE) -> CompiledSystem | None:
             following = chain.compatibility.rows[k + 1].previous
             assert following is not None  # only the first joint sits on the ground
             out = twist_transform(inverse(mechanism.joints[k + 1].before)) @ following @ modes[:, 6:]
-        basis = elastic_basis(mass[6:, 6:], link.stiffness, link.damping)
+        basis = decoupled_modes(mass[6:, 6:], link.stiffness, link.damping)
         mixing = max(mixing, basis.mixing)
         rigid_basis, out_basis = mass[:6, 6:] @ basis.vectors, out @ basis.vectors
         shares = rigid_basis @ rigid_basis.T, out_basis @ rigid_basis.T, out_basis @ out_basis.T

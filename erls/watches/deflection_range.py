@@ -28,14 +28,12 @@ _STEP = 1e-5  # s, of central differences, as in `erls.link_loads`
 NOTABLE = 2e-3  # of the size of a link: errors above this make a run warn
 
 
-def deflection_errors(run: Run, samples: int | None = None) -> dict[str, DeflectionError]:
+def deflection_errors(run: Run) -> dict[str, DeflectionError]:
     """Estimated error of every flexible link that is linear in its frame: see `erls.formulations.deflection_watch`.
 
     Parameters
     ----------
     run : Run
-    samples : int, optional
-        Times to look at, instead of the usual number.
 
     Returns
     -------
@@ -57,8 +55,7 @@ def deflection_errors(run: Run, samples: int | None = None) -> dict[str, Deflect
     step = min(_STEP, (end - start) / 4)
     if not links or not step > 0:
         return {}
-    usual = _SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES
-    times = run.looks(samples or usual, step)
+    times = run.looks(_SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES, step)
     inner = replace(run, formulation=formulation)
     places = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
     ends = [end for loop in mechanism.loops for end in (loop.inner, loop.outer)]

@@ -13,7 +13,7 @@ import pytest
 import scenes
 
 from erls.formulations import erls_compiled
-from erls.formulations.elastic_basis import elastic_basis
+from erls.formulations.decoupled_modes import decoupled_modes
 from erls.formulations.erls import Erls
 from erls.formulations.erls_compiled import compile_chain
 from erls.formulations.ffr import Ffr
@@ -31,7 +31,7 @@ def _damping(chain: Erls, whole: np.ndarray) -> np.ndarray:
         part = np.ix_(places, places)
         modes = erls_compiled.combined_modes(link, chain.compatibility.rows[k].own)
         own_mass = (modes.T @ link.invariants.m @ modes)[6:, 6:]
-        vectors = elastic_basis(own_mass, link.stiffness, link.damping).vectors
+        vectors = decoupled_modes(own_mass, link.stiffness, link.damping).vectors
         if len(places):
             inverse = np.linalg.inv(vectors)
             result[part] = inverse.T @ np.diag(np.diag(vectors.T @ whole[part] @ vectors)) @ inverse
@@ -128,7 +128,7 @@ def test_mixing_bounds_the_rate_of_iterations() -> None:
         arms = rng.normal(size=(n, 3))
         mass, stiffness = np.eye(n) + arms @ arms.T, 10 ** rng.uniform(3, 8, n)
         damping = 0.1 * np.sqrt(stiffness) * rng.uniform(0, 1, n)
-        basis = elastic_basis(mass, stiffness, damping)
+        basis = decoupled_modes(mass, stiffness, damping)
         np.testing.assert_allclose(basis.vectors.T @ mass @ basis.vectors, np.eye(n), atol=1e-12)
         whole = basis.vectors.T @ np.diag(damping) @ basis.vectors
         beside = whole - np.diag(np.diag(whole))

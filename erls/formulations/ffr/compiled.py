@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.formulations.elastic_basis import MIXING, ElasticBasis, elastic_basis
+from erls.formulations.decoupled_modes import MIXING, DecoupledModes, decoupled_modes
 from erls.formulations.ffr.interface_motion import InterfaceMotion
 from erls.formulations.ffr.second_order import SecondOrderData
 from erls.formulations.packing import Packer, joint_numbers, step_parts
@@ -55,12 +55,12 @@ def _put_second_order(pack: Packer, chain: Ffr, k: int, outboard: InterfaceMotio
     }
 
 
-def _elastic_basis(chain: Ffr, k: int) -> ElasticBasis:
+def _decoupled_modes(chain: Ffr, k: int) -> DecoupledModes:
     link = chain.mechanism.links[k]
-    return elastic_basis(chain.data[k].elastic, link.stiffness, link.damping)
+    return decoupled_modes(chain.data[k].elastic, link.stiffness, link.damping)
 
 
-def _put_basis(pack: Packer, basis: ElasticBasis | None) -> dict[int, int]:
+def _put_basis(pack: Packer, basis: DecoupledModes | None) -> dict[int, int]:
     """Coordinates for `erls.kernels.ffr.link_by_link`."""
     if basis is None:
         return {}
@@ -96,7 +96,7 @@ def compile_frames(chain: Ffr, dense: int = DENSE) -> CompiledSystem:
     pack = Packer(np.zeros(layout.HEADER + links * layout.RECORD, dtype=np.int64), mechanism.gravity)
     free = {int(k): i for i, k in enumerate(chain.free_joints)}
     memory = shifted = 0
-    bases = [_elastic_basis(chain, k) if chain.size > dense else None for k in range(links)]
+    bases = [_decoupled_modes(chain, k) if chain.size > dense else None for k in range(links)]
     for k, (joint, data) in enumerate(zip(mechanism.joints, chain.data, strict=True)):
         e, drive, axes = data.size, joint.drive, _rotation_axes(chain, k)
         outboard = recursion.outboard[k + 1] if k + 1 < links else None

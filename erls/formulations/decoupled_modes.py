@@ -13,7 +13,7 @@ MIXING = 0.1  # rate at which iterations converge that leave out how damping cou
 
 
 @dataclass(frozen=True)
-class ElasticBasis:
+class DecoupledModes:
     """Coordinates z of a link, q_d = V z, in which its elastic mass is 1 and its stiffness diagonal.
 
     Attributes
@@ -33,16 +33,16 @@ class ElasticBasis:
     mixing: float
 
 
-def elastic_basis(mass: Array, stiffness: Array, damping: Array) -> ElasticBasis:
+def decoupled_modes(mass: Array, stiffness: Array, damping: Array) -> DecoupledModes:
     """Of an elastic block (e, e) of the mass matrix, with diagonals (e,) of stiffness and damping."""
     if not len(mass):
-        return ElasticBasis(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
+        return DecoupledModes(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
     squares, vectors = la.eigh(np.diag(stiffness), mass)
     turned = vectors.T @ (damping[:, None] * vectors)
     coupled = np.abs(turned - np.diag(np.diag(turned)))
     if not coupled.any():
-        return ElasticBasis(vectors, squares, np.diag(turned), 0.0)
+        return DecoupledModes(vectors, squares, np.diag(turned), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         coupled /= np.sqrt(2 * np.sqrt(np.abs(np.outer(squares, squares))))
     mixing = float(np.linalg.norm(coupled, 2)) if np.isfinite(coupled).all() else np.inf
-    return ElasticBasis(vectors, squares, np.diag(turned), mixing)
+    return DecoupledModes(vectors, squares, np.diag(turned), mixing)
