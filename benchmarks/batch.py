@@ -17,7 +17,7 @@ from pathlib import Path
 
 import erls
 from erls.parallel.workers import IDLE
-from erls.run import Run
+from erls.run.record import Run
 
 SCENE = Path(__file__).parents[1] / "data/l_shape/steel_flat.toml"
 SETTINGS = ["simulation.integrator=lobatto", "simulation.tolerance=1e-4", "simulation.duration=2.0"]

@@ -35,18 +35,18 @@ import scenes  # noqa: E402
 from effect_scenes import random_chain, random_led_chain  # noqa: E402
 
 import erls  # noqa: E402
-from erls.build import build_mechanism  # noqa: E402
+from erls.auto.automatic import named  # noqa: E402
+from erls.auto.certify import certify  # noqa: E402
+from erls.auto.choice import Choice, choose_effects  # noqa: E402
+from erls.auto.cuts import Cut, possible_cuts  # noqa: E402
+from erls.auto.outputs import Outputs, largest_distance, watched_nodes  # noqa: E402
+from erls.auto.probe import needed  # noqa: E402
+from erls.auto.static import may_follow, static_cut  # noqa: E402
+from erls.equations.registry import formulate  # noqa: E402
 from erls.errors import SimulationError  # noqa: E402
-from erls.formulations import formulate  # noqa: E402
 from erls.mechanism.chain import Mechanism  # noqa: E402
-from erls.run import Run  # noqa: E402
-from erls.selection.automatic import named  # noqa: E402
-from erls.selection.certify import certify  # noqa: E402
-from erls.selection.choice import Choice, choose_effects  # noqa: E402
-from erls.selection.cuts import Cut, possible_cuts  # noqa: E402
-from erls.selection.outputs import Outputs, largest_distance, watched_nodes  # noqa: E402
-from erls.selection.probe import needed  # noqa: E402
-from erls.selection.static import may_follow, static_cut  # noqa: E402
+from erls.run.record import Run  # noqa: E402
+from erls.scene.build import build_mechanism  # noqa: E402
 
 SHIPPED = [
     "l_shape/steel_flat.toml",

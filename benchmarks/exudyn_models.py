@@ -19,7 +19,7 @@ from exudyn.FEM import ObjectFFRFreducedOrderInterface
 from exudyn.rigidBodyUtilities import ComputeSkewMatrix
 from exudyn.utilities import SensorSuperElement
 
-from erls.formulations.ffr.body_frame import elastic_basis
+from erls.equations.ffr.body_frame import elastic_basis
 from erls.mechanism.chain import Mechanism, poses
 from erls.mechanism.links import Link
 

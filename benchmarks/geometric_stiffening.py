@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 import erls
-from erls.build import build_mechanism
-from erls.formulations.erls import Erls
-from erls.integrators.base import Options, Solution
-from erls.integrators.lobatto import lobatto
+from erls.equations.erls.chain import Erls
+from erls.integrate.base import Options, Solution
+from erls.integrate.lobatto import lobatto
+from erls.scene.build import build_mechanism
 
 ROOT = Path(__file__).parents[1]
 EFFECTS = ("all", "all,geometric_stiffening", "all,geometric_stiffening,foreshortening")

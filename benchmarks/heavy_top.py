@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "erls"))
 
 import heavy_top  # the system of the tests
 
-from erls.integrators.constrained import ConstrainedOptions
+from erls.integrate.constrained import ConstrainedOptions
 
 EXPECTED = {
     "R³×SO(3)": {

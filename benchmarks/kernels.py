@@ -25,12 +25,12 @@ sys.path.insert(0, str(ROOT / "tests/erls"))
 
 import scenes  # noqa: E402
 
-from erls.formulations.erls import Erls  # noqa: E402
-from erls.formulations.ffr import Ffr  # noqa: E402
-from erls.integrators.base import Integrator, Options  # noqa: E402
-from erls.integrators.generalized_alpha import generalized_alpha  # noqa: E402
-from erls.integrators.lobatto import lobatto  # noqa: E402
-from erls.kernels.contract import ACCELERATION, INTEGERS, REALS, RESIDUAL, pointer  # noqa: E402
+from erls.equations.compiled_system import ACCELERATION, INTEGERS, REALS, RESIDUAL, pointer  # noqa: E402
+from erls.equations.erls.chain import Erls  # noqa: E402
+from erls.equations.ffr.equations import Ffr  # noqa: E402
+from erls.integrate.base import Integrator, Options  # noqa: E402
+from erls.integrate.generalized_alpha import generalized_alpha  # noqa: E402
+from erls.integrate.lobatto import lobatto  # noqa: E402
 
 QUICK = "--quick" in sys.argv[1:]
 FORMULATION = Ffr if "--ffr" in sys.argv[1:] else Erls

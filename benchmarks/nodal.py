@@ -26,9 +26,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "erls"))
 import heavy_top  # the systems of the tests
 import test_nodal_dynamics as l_shape
 
-from erls.integrators.base import hermite
-from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
-from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
+from erls.integrate.base import hermite
+from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 
 
 def least(repeat: int, run: Callable[[], tuple[Any, float]]) -> tuple[Any, float]:

@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from erls.scene import load_scene
-from erls.simulation import simulate
+from erls.scene.chain import load_scene
+from erls.simulation.simulate import simulate
 
 ROOT = Path(__file__).parents[1]
 CASES = (

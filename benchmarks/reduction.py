@@ -28,10 +28,10 @@ from typing import Any
 import meshio
 import numpy as np
 
-import fe_import.build.solid
+import fe_import.models.solid
 import fe_import.reduce
 import fe_import.solver
-import fe_import.sparse
+import fe_import.solver.sparse
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.errors import FEImportError
@@ -62,13 +62,13 @@ face = "tip"
 fixed_interface_modes = {modes}
 """
 STAGES = [  # name, module, function; a stage within a stage counts for itself only
-    ("read mesh", fe_import.build.solid, "read_mesh"),
-    ("assembly", fe_import.build.solid, "assemble_solid"),
-    ("order of elimination", fe_import.sparse, "analyse"),
+    ("read mesh", fe_import.models.solid, "read_mesh"),
+    ("assembly", fe_import.models.solid, "assemble_solid"),
+    ("order of elimination", fe_import.solver.sparse, "analyse"),
     ("factorization", fixed_interface, "factorize"),
     ("constraint modes", sys.modules["fe_import.reduction.craig_bampton"], "constraint_modes"),
-    ("eigenmodes", fe_import.sparse, "lowest_eigenpairs"),
-    ("inertia counts", fe_import.sparse, "negative_pivots"),
+    ("eigenmodes", fe_import.solver.sparse, "lowest_eigenpairs"),
+    ("inertia counts", fe_import.solver.sparse, "negative_pivots"),
     ("invariants", fe_import.reduce, "inertia_invariants"),
     ("health checks", fe_import.reduce, "check_model"),
     ("health checks", fe_import.reduce, "check_basis"),
@@ -204,8 +204,9 @@ def ours(dofs: int, modes: int) -> dict[str, Any]:
     parts = fixed_interface.partition(model)
     fixed_interface.constraint_modes(parts)
     counting = Stages()
-    fe_import.sparse.negative_pivots = counting.wrap("count", fe_import.sparse.negative_pivots)
-    omega, _ = fe_import.sparse.lowest_modes(parts.inner_stiffness, parts.inner_mass, modes, "l", solve=parts.solve)
+    fe_import.solver.sparse.negative_pivots = counting.wrap("count", fe_import.solver.sparse.negative_pivots)
+    lowest = fe_import.solver.sparse.lowest_modes
+    omega, _ = lowest(parts.inner_stiffness, parts.inner_mass, modes, "l", solve=parts.solve)
     return {
         "program": "erls",
         "dofs": mesh.nodes.size,

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 import erls
-from erls.body_scenes import solve
-from erls.lie.so3 import Array
-from erls.watches.deflection_range import deflection_errors
+from erls.maths.so3 import Array
+from erls.run.bodies import solve
+from erls.run.watches.deflection_range import deflection_errors
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "data" / "slider_crank"

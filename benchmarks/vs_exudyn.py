@@ -28,9 +28,9 @@ import numpy as np
 import tomlkit
 
 import erls
-from erls.build import build_mechanism
-from erls.integrators import INTEGRATORS
-from erls.scene import Scene, load_scene
+from erls.scene.build import build_mechanism
+from erls.scene.chain import Scene, load_scene
+from erls.scene.integrators import INTEGRATORS
 from fe_import import load_link
 
 DATA = Path(__file__).resolve().parent.parent / "data"

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 from vs_exudyn import error, robot_scene
 
-from erls.build import build_mechanism
-from erls.formulations import formulate
-from erls.integrators import INTEGRATORS
-from erls.integrators.base import Options, Solution
-from erls.run import Run
-from erls.scene import Scene, load_scene
+from erls.equations.registry import formulate
+from erls.integrate.base import Options, Solution
+from erls.integrate.registry import integrator_named
+from erls.run.record import Run
+from erls.scene.build import build_mechanism
+from erls.scene.chain import Scene, load_scene
 
 DATA = Path(__file__).resolve().parent.parent / "data"
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
@@ -59,7 +59,7 @@ def study(scene: Scene, names: list[str], runs: int) -> None:
         return Run(scene, formulation, found, 0.0).position(point, at)
 
     def integrate(name: str, options: Options) -> Solution:
-        return INTEGRATORS[name](formulation, span, y, v, options, None)
+        return integrator_named(name)(formulation, span, y, v, options, None)
 
     tight = positions(integrate("lobatto", Options(tolerance=1e-9)))
     print(f"  reference: runs at 1e-9 and 1e-8 m differ by "

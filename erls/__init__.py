@@ -14,13 +14,13 @@ from typing import Any
 __all__ = ["load_run", "load_scene", "save_run", "section_forces", "simulate", "simulate_many", "stress"]
 
 _HOME = {
-    "load_scene": ("erls.scene", "load_scene"),
-    "simulate": ("erls.simulation", "simulate"),
-    "simulate_many": ("erls.batch", "simulate_many"),
-    "load_run": ("erls.run_file", "load_run"),
-    "save_run": ("erls.run_file", "write_run"),
-    "section_forces": ("erls.recover", "section_forces"),
-    "stress": ("erls.recover", "stress"),
+    "load_scene": ("erls.scene.chain", "load_scene"),
+    "simulate": ("erls.simulation.simulate", "simulate"),
+    "simulate_many": ("erls.simulation.batch", "simulate_many"),
+    "load_run": ("erls.run.file", "load_run"),
+    "save_run": ("erls.run.file", "write_run"),
+    "section_forces": ("erls.run.recovery", "section_forces"),
+    "stress": ("erls.run.recovery", "stress"),
 }
 
 

@@ -5,7 +5,7 @@ from typing import Any
 __all__ = ["load_link", "read_modal_file", "reduce_link", "write_modal_file"]
 
 _HOME = {
-    "load_link": "fe_import.link",
+    "load_link": "fe_import.description.link",
     "reduce_link": "fe_import.reduce",
     "read_modal_file": "fe_import.modal.file",
     "write_modal_file": "fe_import.modal.file",

@@ -13,23 +13,23 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from fe_import.build.model import build_model, unit_factors
+from fe_import.description.link import LinkFile, load_link
 from fe_import.errors import FEImportError
+from fe_import.files.toml import choose
 from fe_import.health.plausibility import plausible_link, plausible_materials
 from fe_import.health.report import check_basis, check_model, check_reduction, mode_residuals
 from fe_import.health.static_flexibility import check_static
-from fe_import.inertia import inertia_invariants, mass_properties
-from fe_import.link import LinkFile, load_link
 from fe_import.modal.file import SCHEMA_VERSION, ModalModel, read_modal_file, write_modal_file
+from fe_import.modal.inertia import inertia_invariants, mass_properties
 from fe_import.modal.model import HealthCheck
 from fe_import.model import Array, FEModel, IntArray
-from fe_import.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
+from fe_import.models.model import build_model, unit_factors
 from fe_import.recovery.recover import recovery_maps
 from fe_import.reduction import REDUCTIONS, Basis
+from fe_import.reduction.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
 from fe_import.second_order.compute import second_order
 from fe_import.solver import chosen_solver
 from fe_import.solver.watch import telling
-from fe_import.toml_file import choose
 
 
 def reduce_link(link: LinkFile | Path | str, tell: Callable[[str], None] | None = None) -> ModalModel:

@@ -21,17 +21,36 @@ os.environ.setdefault("ERLS_KERNELS", os.environ["ERLS_CACHE"])
 
 
 KERNELS = (
-    "import erls.kernels.nodal.matrix, erls.kernels.nodal.step, erls.kernels.nodal.system, erls.kernels.ffr.equations, "
-    "erls.kernels.ffr.solve, erls.kernels.ffr.factoring, erls.kernels.quasi_static.chain",
-    "import erls.kernels.chain.equations, erls.kernels.chain.elimination, erls.kernels.shifted.equations, "
-    "erls.kernels.stepping.generalized_alpha, erls.kernels.stepping.lobatto, erls.kernels.stepping.absent, "
-    "erls.kernels.loops.steps, erls.kernels.loops.system, erls.kernels.loops.nearest, "
-    "erls.kernels.stiffened.equations, erls.kernels.stiffened.elimination, erls.kernels.deviation.follow",
+    (
+        "equations.nodal.kernels.matrix",
+        "equations.nodal.kernels.system",
+        "equations.nodal.kernels.step",
+        "equations.ffr.compiled_functions",
+        "equations.ffr.solve",
+        "equations.ffr.factoring",
+        "equations.quasi_static.chain",
+    ),
+    (
+        "equations.erls.compiled_functions",
+        "equations.erls.elimination",
+        "equations.erls.shifted",
+        "integrate.stepping.generalized_alpha",
+        "integrate.stepping.lobatto",
+        "integrate.stepping.absent",
+        "integrate.stepping.loops",
+        "equations.loops.system",
+        "equations.loops.nearest",
+        "equations.erls.stiffened.compiled_functions",
+        "equations.erls.stiffened.elimination",
+        "auto.deviation",
+    ),
 )
+"""Modules with compiled code, shared out to two processes."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Compile before the workers of a session start, so that no test pays for it or tells of it."""
     if not hasattr(config, "workerinput") and not config.option.collectonly:
-        jobs = [subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[1]) for code in KERNELS]
+        imports = (f"import {', '.join(f'erls.{name}' for name in share)}" for share in KERNELS)
+        jobs = [subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[1]) for code in imports]
         assert [job.wait() for job in jobs] == [0, 0]

@@ -36,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _run(command: str, folder: Path) -> None:
     words = shlex.split(command)
-    code = "import sys; from erls.cli import main; sys.exit(main())"
+    code = "import sys; from erls.cli.main import main; sys.exit(main())"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-c", code, *words[1:]], cwd=folder, env=environment, capture_output=True, text=True
@@ -103,8 +103,8 @@ def test_example_scene_and_link_run(tmp_path: Path) -> None:
 
 def test_defaults_are_as_printed() -> None:
     """Fields marked #= in the annotated scene and link hold the default of the schema."""
-    from erls.scene import Simulation
-    from fe_import.link import Frame, Member
+    from erls.scene.chain import Simulation
+    from fe_import.description.link import Frame, Member
 
     simulation = Simulation(duration=1.0)
     assert (simulation.formulation, simulation.gauge) == ("erls", "joint-angle")
@@ -120,7 +120,7 @@ def test_drive_examples_are_valid() -> None:
     """The torque drive with every profile decodes and builds."""
     from erls.errors import SceneError
     from erls.mechanism.drives import DriveRecord, build_drive
-    from fe_import.toml_file import convert
+    from fe_import.files.toml import convert
 
     block = next(b for b in _blocks("toml") if "sine_burst" in b)
     drive = tomllib.loads(block)["drive"]
@@ -132,7 +132,7 @@ def test_drive_examples_are_valid() -> None:
 def test_shipped_files_have_a_header_and_are_valid(path: Path) -> None:
     """Each link and scene says what it shows, and loads."""
     from erls import load_scene
-    from erls.body_scenes import is_body_scene, load_body_scene
+    from erls.scene.bodies.read import is_body_scene, load_body_scene
     from fe_import import load_link
 
     text = path.read_text(encoding="utf-8")

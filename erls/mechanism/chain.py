@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.effects import DEFAULT
-from erls.lie.se3 import joint_pose, twist_cross, twist_transform
-from erls.lie.so3 import Array
+from erls.maths.se3 import joint_pose, twist_cross, twist_transform
+from erls.maths.so3 import Array
+from erls.mechanism.effects import DEFAULT
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
 from erls.mechanism.loops import Loop
@@ -44,7 +44,7 @@ class Mechanism:
     loops : tuple of Loop
         Joints that close the chain.
     effects : frozenset of str
-        Names from `erls.effects` that the equations of motion take into account.
+        Names from `erls.mechanism.effects` that the equations of motion take into account.
     bandwidth : float or None
         Frequency above which modes follow statically [Hz]; None: all of them vibrate.
     """

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.lie.se3 import pose
-from erls.lie.so3 import Array, rotation_x, rotation_z
+from erls.maths.se3 import pose
+from erls.maths.so3 import Array, rotation_x, rotation_z
 
 CONVENTIONS = ("standard", "modified")
 

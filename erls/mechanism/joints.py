@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.lie.se3 import twist_transform
-from erls.lie.so3 import Array
+from erls.maths.se3 import twist_transform
+from erls.maths.so3 import Array
 from erls.mechanism.drives import Drive
 
 

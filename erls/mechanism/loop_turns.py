@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.lie.se3 import inverse
-from erls.lie.so3 import Array
+from erls.maths.se3 import inverse
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, poses
 from erls.mechanism.loops import Loop
 

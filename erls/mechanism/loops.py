@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
 from erls.mechanism.drives import Drive
 from erls.mechanism.joints import JointForces, JointType
 

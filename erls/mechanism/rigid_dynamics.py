@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.lie.se3 import joint_pose
-from erls.lie.so3 import Array, cross
+from erls.maths.se3 import joint_pose
+from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import link_mass_properties
 

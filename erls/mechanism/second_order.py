@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.lie.so3 import Array, cross_all, skew
-from fe_import.inertia import mass_properties
+from erls.maths.so3 import Array, cross_all, skew
+from fe_import.modal.inertia import mass_properties
 from fe_import.modal.model import ModalModel
 from fe_import.model import IntArray
 from fe_import.second_order.composition import composed, composed_rotation, twice_turned

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from erls.lie.se3 import pose
-from erls.lie.so3 import Array
+from erls.maths.se3 import pose
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.curves import piecewise
 from erls.mechanism.drives import Drive

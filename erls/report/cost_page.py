@@ -7,7 +7,7 @@ import io
 
 import numpy as np
 
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
 from erls.report.tables import table

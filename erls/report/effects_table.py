@@ -5,10 +5,10 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from erls.effects import EFFECTS, in_order
+from erls.auto.sizes import FAILS, UNSTABLE, EffectSize
+from erls.auto.survey import Survey
+from erls.mechanism.effects import EFFECTS, in_order
 from erls.report.tables import table
-from erls.selection.sizes import FAILS, UNSTABLE, EffectSize
-from erls.selection.survey import Survey
 
 _LARGEST = 1e12  # N: beyond, a motion means nothing
 _MOST = 10.0  # times the peak

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
 
 _STYLE = """
 :root { color-scheme: light dark; }

@@ -7,20 +7,20 @@ from typing import Any
 
 import msgspec
 
-from erls.body_scenes import BodyScene, load_body_scene
-from erls.body_scenes.result_file import SCHEMA as RESULT_SCHEMA
-from erls.body_scenes.result_file import read_summary
 from erls.errors import Cause, SceneError
 from erls.report.body_page import result_report
 from erls.report.tables import modal_report, run_report, table
-from erls.run_file import SCHEMA as RUN_SCHEMA
-from erls.run_file import load_run
-from erls.scene import Scene, is_body_scene, load_scene
-from fe_import.hdf5.files import open_for_reading
-from fe_import.link import LinkFile, load_link
+from erls.run.bodies.result_file import SCHEMA as RESULT_SCHEMA
+from erls.run.bodies.result_file import read_summary
+from erls.run.file import SCHEMA as RUN_SCHEMA
+from erls.run.file import load_run
+from erls.scene.bodies.read import BodyScene, load_body_scene
+from erls.scene.chain import Scene, is_body_scene, load_scene
+from fe_import.description.link import LinkFile, load_link
+from fe_import.files.hdf5.files import open_for_reading
+from fe_import.files.toml import read_toml
 from fe_import.modal.file import SCHEMA as MODAL_SCHEMA
 from fe_import.modal.file import ModalModel, read_modal_file
-from fe_import.toml_file import read_toml
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -131,8 +131,8 @@ def _source(link: Any) -> str:
 
 
 def _link_info(link: LinkFile) -> tuple[dict[str, Any], str]:
-    from fe_import.build.model import build_model
-    from fe_import.inertia import mass_properties
+    from fe_import.modal.inertia import mass_properties
+    from fe_import.models.model import build_model
 
     model = build_model(link)
     rigid = model.rigid_body_modes()

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from erls.run import Run
-from fe_import.inertia import MassProperties
+from erls.run.record import Run
 from fe_import.modal.file import HealthCheck, ModalModel
+from fe_import.modal.inertia import MassProperties
 
 _SHOWN_MODES = 40
 

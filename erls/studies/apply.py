@@ -11,9 +11,9 @@ from tomlkit.container import Container
 from tomlkit.items import AoT, Comment, Item, Table, Whitespace
 
 from erls.errors import Cause, SceneError
-from erls.output_file import check_writable, replacing
-from erls.scene import load_scene
-from erls.scene_overrides import apply_override
+from erls.files.output import check_writable, replacing
+from erls.scene.chain import load_scene
+from erls.scene.overrides import apply_override
 
 ACCURACY_FIELDS = {"generalized_alpha": ("step",), "lobatto": ("tolerance",), "auto": ("tolerance",)}
 

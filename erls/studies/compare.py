@@ -11,16 +11,16 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from erls.equations.registry import FORMULATIONS, TREES
 from erls.errors import Cause, SceneError
-from erls.formulations import FORMULATIONS, TREES
-from erls.lie.so3 import Array
-from erls.scene import Scene, load_scene
-from erls.simulation import simulate
+from erls.maths.so3 import Array
+from erls.scene.chain import Scene, load_scene
+from erls.simulation.simulate import simulate
 from erls.studies.outputs import Outputs, run_outputs
 from erls.studies.pool import run_all
 from erls.studies.spectrum import Peak, amplitude_spectrum, peaks
 from fe_import.errors import ReportedError
-from fe_import.toml_file import choose
+from fe_import.files.toml import choose
 
 _SAMPLES = 1000
 _FELT = 0.05  # of the deflection: vibrations below drift apart by less than it matters
@@ -150,7 +150,7 @@ def compare(
             value=", ".join(names),
             remedy="two or more of " + ", ".join(COLUMNS),
         )
-    from erls.build import link_models
+    from erls.scene.build import link_models
 
     link_models(loaded, lambda text: None)  # reduced once, before the workers would do so at once
     tasks = [(str(path), (*overrides, *COLUMNS[name].overrides), COLUMNS[name].full_model) for name in names]

@@ -16,7 +16,7 @@ import numpy as np
 from erls.errors import Cause, SceneError
 from erls.studies.compare import COLUMNS, Comparison, compare, comparison_summary, distance
 from fe_import.errors import ReportedError
-from fe_import.toml_file import choose
+from fe_import.files.toml import choose
 
 JUDGE = "nodal"
 _NEGLIGIBLE = 1e-4  # of the largest deflection: a scene that hardly bends says nothing about an order

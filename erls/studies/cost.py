@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 
 from erls.errors import Cause, SceneError, SimulationError
-from erls.scene import Scene, load_scene
+from erls.scene.chain import Scene, load_scene
 from erls.studies.grid import Grid, checked, ladders
 from erls.studies.ladder import CostPoint, Ladder, Norm, climb, failed, overrides_of
 from erls.studies.mode_overrides import available_modes, count_field
 from erls.studies.pool import Finished, run_all
 from erls.studies.reference import Reference, default_reference, knows_second_order, make_reference
 from fe_import.errors import ReportedError
-from fe_import.toml_file import choose
+from fe_import.files.toml import choose
 
 _AS_CHEAP = 1.2  # times the shortest: what noise makes of equal times
 

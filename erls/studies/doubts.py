@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.formulations.quasi_static import QuasiStatic
-from erls.formulations.static_watch import static_error
-from erls.run import Run
-from erls.watches.deflection_range import NOTABLE, deflection_errors
-from erls.watches.spin_stability import UNSTABLE
+from erls.equations.quasi_static.formulation import QuasiStatic
+from erls.run.record import Run
+from erls.run.watches.deflection_range import NOTABLE, deflection_errors
+from erls.run.watches.spin_stability import UNSTABLE
+from erls.run.watches.static_following import static_error
 
 
 def foretold_error(run: Run, linear: bool) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 
-from erls.effects import DEFAULT, EFFECTS, in_order, named_effects
 from erls.errors import Cause, SceneError
+from erls.mechanism.effects import DEFAULT, EFFECTS, in_order, named_effects
 
 STIFFENING = ("geometric_stiffening", "foreshortening")
 NOTHING = "none"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from erls.errors import Cause, SceneError
-from erls.integrators import INTEGRATORS
-from erls.scene import Scene
+from erls.scene.chain import Scene
+from erls.scene.integrators import INTEGRATORS
 from erls.studies.effect_sets import STIFFENED, each_once, own_set, parse_sets
 from erls.studies.ladder import Setting
-from fe_import.toml_file import choose
+from fe_import.files.toml import choose
 
 FORMULATIONS = ("erls", "ffr")
 _SCIPY = ("rk45", "dop853", "radau", "bdf", "lsoda")

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from erls.errors import Cause, SimulationError
-from erls.scene import load_scene
-from erls.simulation import simulate
+from erls.scene.chain import load_scene
+from erls.simulation.simulate import simulate
 from erls.studies.doubts import foretold_error
 from erls.studies.effect_sets import as_field
 from erls.studies.reference import Reference, sampled

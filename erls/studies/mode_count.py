@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from erls.errors import Cause, SceneError
-from erls.lie.so3 import Array
-from erls.scene import Scene, load_scene
-from erls.simulation import simulate
+from erls.maths.so3 import Array
+from erls.scene.chain import Scene, load_scene
+from erls.simulation.simulate import simulate
 from erls.studies.mode_overrides import available_modes, count_field, default_counts
 from erls.studies.outputs import Outputs, run_outputs
 from erls.studies.pool import run_all
 from erls.studies.spectrum import amplitude_spectrum, peaks
 from fe_import.errors import ReportedError
-from fe_import.toml_file import choose
+from fe_import.files.toml import choose
 
 SUCCESSIVE = 3  # changes below the tolerance, one after the other, before a study says "converged"
 _SAMPLES = 1000

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from erls.scene import Scene
-from fe_import.link import load_link
-from fe_import.link_reduction import Reduction
+from erls.scene.chain import Scene
+from fe_import.description.link import load_link
+from fe_import.description.reduction import Reduction
 
 
 def available_modes(scene: Scene) -> dict[str, int]:
     """Elastic modes of each elastic link; reduces what is not in the cache, before workers would do so at once."""
-    from erls.build import link_models
+    from erls.scene.build import link_models
 
     models = link_models(scene, lambda text: None)
     return {

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from erls.formulations.base import State
-from erls.integrators.base import hermite
-from erls.lie.so3 import Array
-from erls.run import Run, node_positions
+from erls.equations.formulation import State
+from erls.integrate.base import hermite
+from erls.maths.so3 import Array
+from erls.run.record import Run, node_positions
 
 _NUDGE = 1e-4  # s; the second difference along a parabola of time has errors of its square and of rounding, both 1e-8
 

@@ -16,11 +16,11 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from erls.effects import DEFAULT, in_order, named_effects
 from erls.errors import Cause, SceneError
-from erls.lie.so3 import Array
-from erls.run import Run
-from erls.scene import Scene
+from erls.maths.so3 import Array
+from erls.mechanism.effects import DEFAULT, in_order, named_effects
+from erls.run.record import Run
+from erls.scene.chain import Scene
 from erls.studies.effect_sets import STIFFENING, label_of
 from erls.studies.refinement import Level, TooShort, refine
 from fe_import.errors import ReportedError
@@ -66,7 +66,7 @@ class Reference:
 
 def default_reference(scene: Scene) -> Kind:
     """The nodal formulation is the judge wherever it can run."""
-    from fe_import.link import load_link
+    from fe_import.description.link import load_link
 
     beams = all(
         link.rigid is not None
@@ -78,7 +78,7 @@ def default_reference(scene: Scene) -> Kind:
 
 def knows_second_order(scene: Scene) -> bool | None:
     """Whether all flexible links have second-order displacements; None when there is none."""
-    from erls.build import link_models
+    from erls.scene.build import link_models
 
     flexible = [model for model in link_models(scene, lambda text: None) if model.elastic_modes]
     return all(model.second_order is not None for model in flexible) if flexible else None

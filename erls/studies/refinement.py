@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from erls.lie.so3 import Array
-from erls.run import Run
-from erls.scene import Scene
-from erls.simulation import simulate
+from erls.maths.so3 import Array
+from erls.run.record import Run
+from erls.scene.chain import Scene
+from erls.simulation.simulate import simulate
 from fe_import.errors import ReportedError
 
 Clock = Callable[[], float]

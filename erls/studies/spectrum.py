@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.signal
 
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
 
 
 @dataclass(frozen=True)

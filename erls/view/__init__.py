@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.output_file import check_writable, replacing
-from erls.run import Run
+from erls.files.output import check_writable, replacing
+from erls.run.record import Run
 from erls.view.camera import Size
 from erls.view.checks import Progress, bad, check, drawing, no_picture, surveyed
 from erls.view.export import export_csv, export_paraview

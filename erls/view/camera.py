@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
 
 Size = tuple[int, int]
 Pixels = NDArray[np.uint8]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from erls.equations.formulation import State
 from erls.errors import Cause, SceneError, SimulationError
-from erls.formulations.base import State
-from erls.run import Run
+from erls.run.record import Run
 from erls.view.camera import Size
 from erls.view.stage import Motion
 

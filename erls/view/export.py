@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from erls.equations.formulation import Reaction, State
 from erls.errors import Cause, SceneError
-from erls.formulations.base import Reaction, State
-from erls.integrators.base import hermite
-from erls.lie.so3 import Array
-from erls.output_file import check_writable, not_writable, replacing, temporary_name
-from erls.run import Run, node_positions
+from erls.files.output import check_writable, not_writable, replacing, temporary_name
+from erls.integrate.base import hermite
+from erls.maths.so3 import Array
+from erls.run.record import Run, node_positions
 
 Progress = Callable[[int, int], None]  # (done, total)
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from erls.errors import Cause, SimulationError
-from erls.lie.so3 import Array
-from erls.output_file import replacing
-from erls.run import Run
+from erls.files.output import replacing
+from erls.maths.so3 import Array
+from erls.run.record import Run
 from erls.view.camera import Size
 from erls.view.checks import Progress, bad, check, drawing, surveyed
 from erls.view.stage import Stage

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
 from erls.view.camera import Camera, Pixels, Size, Walls, round_number, text_unit
 
 if TYPE_CHECKING:

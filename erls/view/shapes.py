@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from erls.formulations.base import State
-from erls.lie.se3 import inverse, pose
-from erls.lie.so3 import Array
+from erls.equations.formulation import State
+from erls.maths.se3 import inverse, pose
+from erls.maths.so3 import Array
 from erls.mechanism.links import Link
-from erls.run import Run, node_positions
+from erls.run.record import Run, node_positions
 from fe_import.model import IntArray
 
 _SMOOTH = math.cos(math.radians(20.0))  # a frame that turns more at a node has a corner there

@@ -8,9 +8,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from erls.formulations.base import State
-from erls.lie.so3 import Array
-from erls.run import Run, node_positions
+from erls.equations.formulation import State
+from erls.maths.so3 import Array
+from erls.run.record import Run, node_positions
 from erls.view.camera import Box, Camera, Pixels, Size, Walls, text_unit
 from erls.view.shapes import (
     SHARP,

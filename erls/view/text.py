@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from erls.formulations.base import State
-from erls.run import Run
+from erls.equations.formulation import State
+from erls.run.record import Run
 from erls.view.camera import Pixels, text_unit
 from erls.view.labels import Label, Sheet
 from erls.view.stage import POINTS, Stage, colour_map

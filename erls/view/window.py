@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
 from erls.view.stage import POINTS, Stage
 
 

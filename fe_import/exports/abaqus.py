@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from fe_import.description.link import Vector
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.abaqus_entries import read_entries
 from fe_import.exports.abaqus_substructure import is_substructure, read_substructure
@@ -16,7 +17,6 @@ from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import read_inp
 from fe_import.exports.points import MODAL, Points, points_of, rows_of
 from fe_import.exports.superelement import assembled, refuse_cut
-from fe_import.link import Vector
 
 
 class AbaqusOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

@@ -14,8 +14,8 @@ import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.entries import matrix_of_entries
+from fe_import.files.text import Rows, TextFile
 from fe_import.model import IntArray
-from fe_import.text_file import Rows, TextFile
 
 _HIGHEST_LABEL = 999_999_999  # of a user's node; what lies outside Abaqus made itself
 _FIXED = 1e30  # Abaqus writes 1e36 on the diagonal of a fixed dof

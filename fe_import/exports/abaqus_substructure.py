@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.errors import FEImportError
+from fe_import.files.text import TextFile
 from fe_import.model import Array, IntArray
-from fe_import.text_file import TextFile
 
 _MOST_NODES = 100_000
 

@@ -5,7 +5,7 @@ Rules for adding a format:
 1. One file with an `ExportFormat` and one line in the registry of ``fe_import/exports/__init__.py``.
 2. A reader knows its syntax only: which rows belong to which node, in which frame, in the file's own units. What is
    common to all (sizes, symmetry, definiteness, units, interfaces, masses) is checked and done after it, in
-   `fe_import.build.matrices` and `fe_import.health.report`.
+   `fe_import.models.matrices` and `fe_import.health.report`.
 3. Files are data from strangers: a declared size is held against the size of the file before memory is taken;
    truncated files, duplicate entries, numbers that are not finite are errors that name file and line or entry.
 4. A file whose name ends in ``.gz`` is read as it is.

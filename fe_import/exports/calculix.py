@@ -24,8 +24,8 @@ from fe_import.exports.frd_mesh import POSITIONS, is_frd, read_frd
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import InpMesh, read_inp
 from fe_import.exports.row_files import read_sets
+from fe_import.files.text import TextFile
 from fe_import.model import IntArray
-from fe_import.text_file import TextFile
 
 _ROW = re.compile(r"(\d{1,15})\.(\d{1,4})")  # as text: 4.10 is not 4.1
 _EQUATIONS = ("EQUATION", "MPC", "RIGID BODY", "TIE", "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTING COUPLING")

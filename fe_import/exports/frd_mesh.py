@@ -1,6 +1,6 @@
 """Nodes and elements of CalculiX results (``.frd``), for matrices whose deck is not at hand; sets come from a file.
 
-Positions have six digits there; `fe_import.build.export_positions` finds the others.
+Positions have six digits there; `fe_import.models.export_positions` finds the others.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 
 from fe_import.errors import shortened
 from fe_import.exports.inp_mesh import InpMesh
+from fe_import.files.text import TextFile
 from fe_import.model import IntArray
-from fe_import.text_file import TextFile
 
 POSITIONS = "six digits, of an .frd file"  # note of an export
 

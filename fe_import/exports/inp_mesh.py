@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fe_import.deck.parse import Deck, read_deck
-from fe_import.deck.sets import LostSet, indices
+from fe_import.abaqus.parse import Deck, read_deck
+from fe_import.abaqus.sets import LostSet, indices
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, IntArray
 
@@ -54,7 +54,7 @@ def read_inp(path: Path) -> InpMesh:
     Raises
     ------
     FEImportError
-        ``EXPORT``: what `fe_import.deck.parse` refuses, parts and assemblies, sets of what is not there.
+        ``EXPORT``: what `fe_import.abaqus.parse` refuses, parts and assemblies, sets of what is not there.
     """
     deck = read_deck(path, str(path), Cause.EXPORT)
     for keyword in ("PART", "INSTANCE"):

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from fe_import.exports.base import Export, ExportFormat, NoOptions
 from fe_import.exports.entries import matrix_of_entries
 from fe_import.exports.row_files import export_of_rows
-from fe_import.text_file import Rows, TextFile
+from fe_import.files.text import Rows, TextFile
 
 _CHOICES = (("matrix",), ("coordinate", "array"), ("real", "integer", "double"), ("general", "symmetric"))
 _REMEDY = "write a real matrix, coordinate or array, general or symmetric"

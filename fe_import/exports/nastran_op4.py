@@ -19,13 +19,13 @@ import msgspec
 import numpy as np
 import scipy.sparse as sp
 
+from fe_import.description.link import Vector
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.base import Export, ExportFormat
 from fe_import.exports.nastran_dmig import nastran_points
 from fe_import.exports.nastran_op4_layout import Op4Header, op4_layout
 from fe_import.exports.points import MODAL, rows_of
 from fe_import.exports.superelement import assembled
-from fe_import.link import Vector
 from fe_import.model import IntArray
 
 _BLOCK = 1_000_000

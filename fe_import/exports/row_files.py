@@ -26,8 +26,8 @@ from fe_import.exports.base import Export
 from fe_import.exports.dofs import COMPONENTS, MODAL, dof_map_of_rows
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import read_inp
+from fe_import.files.text import TextFile
 from fe_import.model import Array, IntArray
-from fe_import.text_file import TextFile
 
 _INTEGER = re.compile(r"\d{1,15}\Z")
 _NAMES = {name: k for k, name in enumerate(COMPONENTS)}

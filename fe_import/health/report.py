@@ -14,11 +14,11 @@ import scipy.sparse as sp
 from fe_import.errors import Cause, FEImportError
 from fe_import.health.rigid_motion import rigid_motion_as_eigenmodes, rigid_motion_by_stiffness
 from fe_import.health.rotation_terms import rotation_departure
-from fe_import.inertia import InertiaInvariants, mass_properties
+from fe_import.modal.inertia import InertiaInvariants, mass_properties
 from fe_import.modal.model import NO_LIMIT, HealthCheck
 from fe_import.model import Array, FEModel
 from fe_import.reduction import Basis
-from fe_import.sparse import modes_below
+from fe_import.solver.sparse import modes_below
 
 _ROUNDING = 1e-9  # symmetry, mass properties: sums of many terms of one sign in double precision
 GROUNDING = 1e-7  # exported matrices carry 6 to 14 digits; a real ground spring is far above

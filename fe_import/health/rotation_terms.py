@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fe_import.inertia import InertiaInvariants, mass_properties
+from fe_import.modal.inertia import InertiaInvariants, mass_properties
 
 
 def rotation_departure(invariants: InertiaInvariants) -> float:

@@ -1,6 +1,6 @@
 """Mesh files: everything that meshio reads -> a checked mesh of one solid element type with its named sets.
 
-meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX are read by `fe_import.mesh.abaqus`.
+meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX are read by `fe_import.abaqus.mesh`.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def _read(path: Path) -> RawMesh:
         )
     with unpacked(path) as plain:
         if plain.suffix.lower() == ".inp":
-            from fe_import.mesh.abaqus import read_abaqus
+            from fe_import.abaqus.mesh import read_abaqus
 
             return read_abaqus(plain, str(path))
         from fe_import.mesh.meshio_files import read_with_meshio  # meshio is heavy

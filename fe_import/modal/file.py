@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.hdf5.files import (
+from fe_import.files.hdf5.files import (
     Reader,
     open_for_reading,
     write_array,
@@ -20,8 +20,8 @@ from fe_import.hdf5.files import (
     write_attribute,
     write_strings,
 )
-from fe_import.inertia import InertiaInvariants, MassProperties
 from fe_import.modal.check import validate
+from fe_import.modal.inertia import InertiaInvariants, MassProperties
 from fe_import.modal.model import FixedInterfaceModes, HealthCheck, ModalModel
 from fe_import.model import IntArray, InterfaceNode
 from fe_import.recovery.file import read_recovery, write_recovery

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_import.inertia import InertiaInvariants, MassProperties, mass_properties
+from fe_import.modal.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.model import Array, IntArray, InterfaceNode
 from fe_import.recovery.maps import RecoveryMaps
 from fe_import.second_order.data import SecondOrder

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from fe_import.hdf5.files import Reader, write_array, write_attribute
+from fe_import.files.hdf5.files import Reader, write_array, write_attribute
 from fe_import.modal.identities import EXACT, Check
 from fe_import.recovery.maps import COMPONENTS, UNITS, RecoveryMaps
 

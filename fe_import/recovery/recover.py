@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from fe_import.description.link import Recovery
 from fe_import.errors import Cause, FEImportError
-from fe_import.inertia import turned
-from fe_import.link import Recovery
+from fe_import.files.toml import choose
+from fe_import.modal.inertia import turned
 from fe_import.modal.model import ModalModel
 from fe_import.model import Array, FEModel, IntArray, StressSource
 from fe_import.recovery.maps import SPIN_PAIRS, RecoveryMaps
 from fe_import.reduction.base import expanded
 from fe_import.reduction.free_body import free_body
-from fe_import.toml_file import choose
 
 
 def recovery_maps(model: FEModel, shapes: Array, wanted: Recovery, where: str) -> RecoveryMaps:

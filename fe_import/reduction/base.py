@@ -9,7 +9,7 @@ Rules for adding a method:
 4. Options that mean nothing to the method are refused (`refuse_fields`), not ignored.
 5. With ``options.static_correction`` the vectors span the static response to unit interface loads and to the inertia
    of rigid-body accelerations, or the option is refused.
-6. Nothing is orthonormalized or truncated here: that is common to all methods (`fe_import.modes`).
+6. Nothing is orthonormalized or truncated here: that is common to all methods (`fe_import.reduction.modes`).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
-from fe_import.link_reduction import Reduction
 from fe_import.modal.file import FixedInterfaceModes
 from fe_import.model import Array, FEModel, IntArray
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_import.link_reduction import Reduction
+from fe_import.description.reduction import Reduction
 from fe_import.model import Array, FEModel
 from fe_import.reduction.base import Basis, expanded, refuse_fields
 from fe_import.reduction.effective_mass import carried_shares, fixed_interface_table
@@ -18,7 +18,7 @@ from fe_import.reduction.fixed_interface import Partition, constraint_modes, par
 from fe_import.reduction.ranking import best_ranked
 from fe_import.reduction.residual import residual_vectors
 from fe_import.reduction.selection import below_frequency, carrying_mass, lowest_by_count
-from fe_import.sparse import lowest_modes
+from fe_import.solver.sparse import lowest_modes
 
 _REFUSED = {"free_modes": "the modes of this method have clamped interfaces; use fixed_interface_modes"}
 

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.inertia import mass_properties
+from fe_import.modal.inertia import mass_properties
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import interface_places
-from fe_import.sparse import Factorization, factorize
+from fe_import.solver.sparse import Factorization, factorize
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import interface_places
 from fe_import.reduction.rigid_modes import rigid_modes
-from fe_import.sparse import Factorization, factorize, lowest_modes, modes_below
+from fe_import.solver.sparse import Factorization, factorize, lowest_modes, modes_below
 
 
 @dataclass(frozen=True)

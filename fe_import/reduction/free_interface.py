@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_import.link_reduction import Reduction
+from fe_import.description.reduction import Reduction
 from fe_import.model import Array
 from fe_import.reduction.free_body import FreeBody
 from fe_import.reduction.selection import below_frequency, lowest_by_count

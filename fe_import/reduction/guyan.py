@@ -6,7 +6,7 @@ the first are of use (the L-shaped solid: one, to 0.3 %; the next five are 36 % 
 
 from __future__ import annotations
 
-from fe_import.link_reduction import Reduction
+from fe_import.description.reduction import Reduction
 from fe_import.model import FEModel
 from fe_import.reduction.base import Basis, expanded, no_fixed_interface_modes, refuse_fields
 from fe_import.reduction.fixed_interface import constraint_modes, partition

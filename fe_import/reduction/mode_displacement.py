@@ -7,7 +7,7 @@ health report shows by how much.
 
 from __future__ import annotations
 
-from fe_import.link_reduction import Reduction
+from fe_import.description.reduction import Reduction
 from fe_import.model import FEModel
 from fe_import.reduction.base import Basis, expanded, no_fixed_interface_modes, refuse_fields
 from fe_import.reduction.free_body import free_body

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
-from fe_import.link_reduction import Reduction
 from fe_import.model import FEModel
 from fe_import.reduction.base import Basis, expanded, no_fixed_interface_modes, refuse_fields
 

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 import scipy.linalg as la
 
+from fe_import.description.reduction import COMPONENTS, Ranking
 from fe_import.errors import Cause, FEImportError
-from fe_import.link_reduction import COMPONENTS, Ranking
+from fe_import.files.toml import choose
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import expanded
 from fe_import.reduction.fixed_interface import Partition
-from fe_import.sparse import dense_modes
-from fe_import.toml_file import choose
+from fe_import.solver.sparse import dense_modes
 
 CANDIDATES_PER_MODE = 4
 FEWEST_CANDIDATES = 40

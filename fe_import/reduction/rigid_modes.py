@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.inertia import mass_properties
+from fe_import.modal.inertia import mass_properties
 from fe_import.model import Array
 
 MASSLESS = 1e-12  # of the largest; the thinnest wire has 1e-8, rounding 1e-15

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
-from fe_import.link_reduction import Reduction
 from fe_import.model import Array
 
 DEFAULT_MODES = 12

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from fe_import.hdf5.files import Reader, write_array
+from fe_import.files.hdf5.files import Reader, write_array
 from fe_import.modal.identities import EXACT, Check
 from fe_import.second_order.data import SecondOrder
 

@@ -23,7 +23,7 @@ from fe_import.reduction.base import expanded
 from fe_import.second_order.composition import composed_rotation, twice_turned
 from fe_import.second_order.data import SecondOrder
 from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_modes, of_moments
-from fe_import.sparse import factorize
+from fe_import.solver.sparse import factorize
 
 _BLOCK_VALUES = 20_000_000  # entries of second-order fields held at a time
 

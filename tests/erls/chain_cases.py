@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import scenes
 
-from erls.effects import EFFECTS
-from erls.formulations.erls import Erls
-from erls.formulations.erls_compiled import compile_chain
-from erls.kernels.contract import CompiledSystem
+from erls.equations.compiled_system import CompiledSystem
+from erls.equations.erls.chain import Erls
+from erls.equations.erls.compiled import compile_chain
+from erls.mechanism.effects import EFFECTS
 
 INERTIAL = [name for name, effect in EFFECTS.items() if effect.in_equations]
 SINE = {"shape": "sine", "amplitude": 0.5, "frequency_hz": 1.0, "phase_deg": 30.0}

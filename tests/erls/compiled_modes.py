@@ -7,10 +7,10 @@ import math
 import numpy as np
 from small_systems import ElasticPendulum
 
-from erls.integrators.base import Array
-from erls.kernels import contract
-from erls.kernels.contract import CompiledSystem, IntArray
-from erls.kernels.jit import helper, kernel
+from erls.equations import compiled_system as contract
+from erls.equations.compiled_system import CompiledSystem, IntArray
+from erls.integrate.base import Array
+from erls.maths.jit import helper, kernel
 
 GRAVITY = ElasticPendulum.gravity
 

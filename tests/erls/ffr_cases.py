@@ -10,8 +10,8 @@ import chain_cases
 import numpy as np
 import scenes
 
-from erls.formulations.ffr import Ffr
-from erls.formulations.ffr.compiled import compile_frames
+from erls.equations.ffr.compiled import compile_frames
+from erls.equations.ffr.equations import Ffr
 from erls.mechanism.chain import Mechanism
 
 ON_MEAN_AXES = ("one link, payload, spring", "parallel axes with a slide", "axes that part", "controllers")

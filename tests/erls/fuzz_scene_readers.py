@@ -14,12 +14,12 @@ from fuzzing_facts import content, taken
 from fuzzing_hdf5 import edited
 
 import erls
-from erls.build import build_mechanism
 from erls.mechanism.tables import read_csv
 from erls.report.mode_page import Printed, read_printed
-from erls.run import Run
-from erls.run_file import load_run
-from erls.scene import SceneRecord, load_scene
+from erls.run.file import load_run
+from erls.run.record import Run
+from erls.scene.build import build_mechanism
+from erls.scene.chain import SceneRecord, load_scene
 
 SCENE = b"""gravity = [0.0, 0.0, -9.81]
 [simulation]

@@ -11,11 +11,11 @@ import numpy as np
 import scenes
 from chain_cases import PD, QUINTIC, SINE, SPRING, TORQUE
 
-from erls.formulations.closed_chain import ClosedChain
-from erls.formulations.closed_run import TiedCoordinates
-from erls.formulations.erls import Erls
-from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
-from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
+from erls.equations.erls.chain import Erls
+from erls.equations.loops.closed_chain import ClosedChain
+from erls.integrate.closed_loops import TiedCoordinates
+from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.mechanism.chain import poses
 
 AXIS = [0.3, -0.5, 0.8]

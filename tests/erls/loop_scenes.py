@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import scenes
 
-from erls.formulations.closed_chain import ClosedChain
-from erls.formulations.erls import Erls
-from erls.formulations.ffr import Ffr
-from erls.lie.so3 import Array
-from erls.run import Run
-from erls.simulation import simulate
+from erls.equations.erls.chain import Erls
+from erls.equations.ffr.equations import Ffr
+from erls.equations.loops.closed_chain import ClosedChain
+from erls.maths.so3 import Array
+from erls.run.record import Run
+from erls.simulation.simulate import simulate
 
 LENGTHS, GROUND = (0.15, 0.45, 0.35), 0.5
 MASSES = (0.3, 0.9, 0.7)

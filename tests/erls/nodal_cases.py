@@ -7,18 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from erls.integrators.base import Array
-from erls.integrators.constrained import ConstrainedOptions, ConstrainedState
-from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
-from erls.lie import motion_maps as motions
-from erls.lie.groups import R3_SO3, SE3, Group
-from erls.nodal.assembly import NodalSystem
-from erls.nodal.beam import Beam, Beams
-from erls.nodal.compiled import CompiledSystem
-from erls.nodal.joints import GROUND, Joint
-from erls.nodal.loads import NodalLoad, NodalLoads
-from erls.nodal.rigid_body import RigidBodies, RigidBody
-from erls.nodal.section import BeamSection
+from erls.equations.constrained_system import ConstrainedState
+from erls.equations.nodal.assembly import NodalSystem
+from erls.equations.nodal.beam import Beam, Beams
+from erls.equations.nodal.compiled import CompiledSystem
+from erls.equations.nodal.joints import GROUND, Joint
+from erls.equations.nodal.loads import NodalLoad, NodalLoads
+from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
+from erls.equations.nodal.section import BeamSection
+from erls.integrate.base import Array
+from erls.integrate.constrained import ConstrainedOptions
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths import motion_maps as motions
+from erls.maths.groups import R3_SO3, SE3, Group
 
 GROUPS: dict[str, Group] = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
 TIME, TO_A, TO_V, PERIOD = 0.7, 30.0, 4.0, 0.1
@@ -63,8 +64,8 @@ def evaluate(known: NodalSystem) -> dict[str, Array]:
     """By kernels at `state`: forces (n,), reactions (n,), violations (m,), and the factored iteration matrix with
     its scales, in the order of the unknowns.
     """
-    from erls.kernels.nodal import matrix
-    from erls.kernels.nodal import system as sums
+    from erls.equations.nodal.kernels import matrix
+    from erls.equations.nodal.kernels import system as sums
 
     compiled = CompiledSystem(known)
     work = compiled.work()

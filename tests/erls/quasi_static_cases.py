@@ -9,8 +9,8 @@ from pathlib import Path
 import chain_cases
 import numpy as np
 
-from erls.formulations.erls import Erls
-from erls.formulations.quasi_static import QuasiStatic, quasi_static
+from erls.equations.erls.chain import Erls
+from erls.equations.quasi_static.formulation import QuasiStatic, quasi_static
 
 BANDWIDTHS = {
     "one link": 100.0,

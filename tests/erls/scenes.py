@@ -7,10 +7,10 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from erls.build import build_mechanism
-from erls.formulations.erls import Erls
+from erls.equations.erls.chain import Erls
 from erls.mechanism.chain import Mechanism
-from erls.scene import is_body_scene, load_scene
+from erls.scene.build import build_mechanism
+from erls.scene.chain import is_body_scene, load_scene
 
 ROOT = Path(__file__).parents[2]
 SHARED = ROOT.parent / "shared"

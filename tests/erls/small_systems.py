@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from erls.integrators.base import Array, SecondOrderSystem
+from erls.equations.system import SecondOrderSystem
+from erls.integrate.base import Array
 
 
 class Modes(SecondOrderSystem):

@@ -12,10 +12,10 @@ import chain_cases
 import numpy as np
 import scenes
 
-from erls.effects import DEFAULT
-from erls.formulations.erls import Erls
+from erls.equations.erls.chain import Erls
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import with_rigid
+from erls.mechanism.effects import DEFAULT
+from erls.mechanism.without_effects import with_rigid
 
 STIFFENED = DEFAULT | {"geometric_stiffening", "foreshortening"}
 SOFT = 1e-4  # of the links' stiffness is left: otherwise it hides what second order adds

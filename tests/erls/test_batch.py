@@ -12,7 +12,7 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError
-from erls.run import Run
+from erls.run.record import Run
 
 TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"

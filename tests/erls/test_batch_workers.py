@@ -17,14 +17,14 @@ import scenes
 from pool_work import square
 
 import erls
-from erls.batch import _run, _Task
 from erls.errors import Cause, SceneError, SimulationError
-from erls.packed_run import LaterRun, PackedRun, packed
 from erls.parallel.crew import Crew, reported
 from erls.parallel.workers import IDLE
-from erls.run import Run
+from erls.run.record import Run
+from erls.simulation.batch import _run, _Task
+from erls.simulation.packed_run import LaterRun, PackedRun, packed
+from erls.simulation.variants import Variants
 from erls.studies.pool import run_all
-from erls.variants import Variants
 from fe_import.errors import ReportedError
 
 DATA = scenes.ROOT / "data"
@@ -41,8 +41,8 @@ def early(monkeypatch: pytest.MonkeyPatch) -> None:
         while self.members and self.waiting and not self.given:
             time.sleep(0.01)
 
-    monkeypatch.setattr("erls.batch._START_S", 0.0)
-    monkeypatch.setattr("erls.batch._READY_S", 0.0)
+    monkeypatch.setattr("erls.simulation.batch._START_S", 0.0)
+    monkeypatch.setattr("erls.simulation.batch._READY_S", 0.0)
     monkeypatch.setattr(Crew, "start", start_and_wait)
 
 
@@ -158,7 +158,7 @@ def test_failures_come_as_values(early: None) -> None:
 def test_an_interrupt_reaches_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C while this process and a worker are at a long run each: both are kept as far as they came."""
     long = ["simulation.duration=1000", "simulation.step=1e-3"]
-    monkeypatch.setattr("erls.batch._START_S", 0.1)
+    monkeypatch.setattr("erls.simulation.batch._START_S", 0.1)
     lead = Crew._exchange
 
     def then_interrupt(self: Crew, *given: object) -> None:
@@ -205,9 +205,9 @@ def test_workers_stay_until_they_do_not_fit(monkeypatch: pytest.MonkeyPatch) -> 
 SCRIPT = """
 import sys, time
 open("starts", "a").write("once ")
-import erls, erls.batch
+import erls, erls.simulation.batch
 from erls.parallel.crew import Crew
-from erls.packed_run import LaterRun
+from erls.simulation.packed_run import LaterRun
 from erls.studies.pool import run_all
 
 start = Crew.start
@@ -216,7 +216,7 @@ def start_and_wait(self, count):
     while self.members and self.waiting and not self.given:
         time.sleep(0.01)
 
-Crew.start, erls.batch._START_S = start_and_wait, 0.0
+Crew.start, erls.simulation.batch._START_S = start_and_wait, 0.0
 runs = erls.simulate_many(sys.argv[1], [["simulation.duration=0.01"]] * 6, workers=2)
 print(sum(isinstance(run, LaterRun) for run in runs), len({float(run.position("tip", 0.01)[2]) for run in runs}))
 print([done.result for done in run_all(abs, [-1, -2, -3], workers=2)[0]])

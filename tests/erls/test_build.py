@@ -10,12 +10,12 @@ import pytest
 import scenes
 from scipy.spatial.transform import Rotation
 
-from erls.build import Built, build_mechanism
 from erls.errors import Cause, SceneError
-from erls.lie.so3 import skew
+from erls.maths.so3 import skew
 from erls.mechanism.chain import Mechanism, poses
 from erls.mechanism.links import link_mass_properties
-from erls.scene import load_scene
+from erls.scene.build import Built, build_mechanism
+from erls.scene.chain import load_scene
 from fe_import.errors import Cause as FECause
 from fe_import.errors import FEImportError
 from fe_import.modal.file import write_modal_file

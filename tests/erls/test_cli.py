@@ -15,7 +15,7 @@ import h5py
 import pytest
 import scenes
 
-from erls.cli import main
+from erls.cli.main import main
 from erls.errors import Cause
 from fe_import.modal.file import read_modal_file
 
@@ -333,7 +333,7 @@ def test_out_of_memory(folder: Path, capsys: pytest.CaptureFixture[str], monkeyp
     def full(*_: Any, **__: Any) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("erls.simulation.build_mechanism", full)
+    monkeypatch.setattr("erls.simulation.simulate.build_mechanism", full)
     _, err = run(capsys, "simulate", "scene.toml", "-o", "r.h5", code=3)
     assert err.startswith("error: out of memory; ")
     found, _ = run_json(capsys, "simulate", "scene.toml", code=3)
@@ -349,7 +349,7 @@ def test_interrupted_before_the_run(
     def interrupt(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("erls.simulation.build_mechanism", interrupt)
+    monkeypatch.setattr("erls.simulation.simulate.build_mechanism", interrupt)
     assert run(capsys, "simulate", "scene.toml", code=130) == ("", "error: interrupted; start again\n")
     found, _ = run_json(capsys, "simulate", "scene.toml", code=130)
     assert found["error"]["cause"] == str(Cause.INTERRUPTED)
@@ -360,7 +360,7 @@ def test_progress_goes_to_stderr(
 ) -> None:
     """Plain lines every few seconds where stderr is no terminal."""
     clock = iter(range(0, 100000, 6))
-    monkeypatch.setattr("erls.terminal.time.monotonic", lambda: next(clock))
+    monkeypatch.setattr("erls.cli.terminal.time.monotonic", lambda: next(clock))
     _, err = run_json(capsys, "simulate", "scene.toml")
     shares = [float(s) for s in re.findall(r"^simulating: (\d+) %$", err, re.MULTILINE)]
     assert shares == sorted(shares)
@@ -374,7 +374,7 @@ ERLS = shutil.which("erls", path=str(Path(sys.executable).parent)) or shutil.whi
 
 
 def execute(*arguments: str, **settings: Any) -> subprocess.CompletedProcess[str]:
-    command = [ERLS] if ERLS else [sys.executable, "-c", "import sys; from erls.cli import main; sys.exit(main())"]
+    command = [ERLS] if ERLS else [sys.executable, "-c", "import sys; from erls.cli.main import main; sys.exit(main())"]
     return subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=60, **settings)
 
 
@@ -401,7 +401,7 @@ def test_a_reader_who_has_enough_is_no_error(folder: Path) -> None:
     """As in ``erls info link.toml | true``; and nobody listening to messages does not end a run."""
     reader, writer = os.pipe()
     os.close(reader)
-    command = "import sys; from erls.cli import main; sys.exit(main())"
+    command = "import sys; from erls.cli.main import main; sys.exit(main())"
     for arguments, pipe in ((["info", "link.toml"], "stdout"), (["simulate", "scene.toml", "-o", "r.h5"], "stderr")):
         streams: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, pipe: writer}
         done = subprocess.run([sys.executable, "-c", command, *arguments], timeout=60, **streams)
@@ -415,7 +415,7 @@ def test_help_needs_no_heavy_package() -> None:
     """Help answers at once: importing the command line imports none of them."""
     heavy = {"numpy", "scipy", "h5py", "pyvista", "vtkmodules", "matplotlib", "numba", "skfem", "meshio", "msgspec"}
     code = (
-        "import sys\nfrom erls.cli import main\nassert main(['simulate', '--help']) == 0\n"
+        "import sys\nfrom erls.cli.main import main\nassert main(['simulate', '--help']) == 0\n"
         f"print(sorted({heavy!r} & set(sys.modules)), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)

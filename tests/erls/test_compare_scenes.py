@@ -10,7 +10,7 @@ import pytest
 import scenes
 from body_scenes_data import STRIP, body_scene
 
-from erls.cli import main
+from erls.cli.main import main
 from erls.errors import Cause, SceneError
 from erls.report.scenes_page import scenes_csv, scenes_page, scenes_text
 from erls.studies.compare_scenes import SceneComparison, compare_scenes, scenes_summary

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.formulations.compatibility import (
+from erls.equations.erls.paper.compatibility import (
     GAUGES,
     Compatibility,
     compatibility_matrix,
@@ -16,7 +16,7 @@ from erls.formulations.compatibility import (
     layout,
     right_inverse,
 )
-from erls.lie.se3 import inverse
+from erls.maths.se3 import inverse
 from erls.mechanism.chain import Mechanism, poses
 
 STEP = 1e-5  # central differences: truncation ~ STEP² = 1e-10, rounding ~ 1e-16 / STEP = 1e-11, both relative

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from erls.cli import main
+from erls.cli.main import main
 from erls.studies.apply import write_copy
 from erls.studies.cost import CostStudy
 from erls.studies.grid import Grid

@@ -12,10 +12,10 @@ import pytest
 import scenes
 
 import erls
-from erls.effects import DEFAULT, Certificate
 from erls.errors import Cause, SceneError, SimulationError
+from erls.mechanism.effects import DEFAULT, Certificate
 from erls.report.cost_page import cost_page, cost_text
-from erls.scene import Scene
+from erls.scene.chain import Scene
 from erls.studies import ladder, refinement
 from erls.studies.cost import CostStudy, cheapest, cost_summary, recommendation, study_cost
 from erls.studies.doubts import foretold_error

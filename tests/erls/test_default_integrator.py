@@ -11,10 +11,12 @@ from compiled_modes import CompiledElasticPendulum
 from small_systems import DoublePendulum, ElasticPendulum, Modes
 
 from erls import load_scene, simulate
+from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause, SceneError
-from erls.integrators import FIXED_STEP, INTEGRATORS
-from erls.integrators.automatic import choose
-from erls.integrators.base import Options, SecondOrderSystem
+from erls.integrate.automatic import choose
+from erls.integrate.base import Options
+from erls.integrate.registry import integrator_named
+from erls.scene.integrators import FIXED_STEP
 
 DATA = Path(__file__).parents[2] / "data"
 SYSTEMS: dict[str, tuple[SecondOrderSystem, str, str]] = {
@@ -38,7 +40,7 @@ def test_the_choice_follows_the_system(kind: str) -> None:
 def test_what_it_chooses_meets_the_tolerance(omega: list[float], tolerance: float) -> None:
     """Within a factor of five, on free vibrations."""
     start = 0.1 / np.array(omega) ** 2
-    found = INTEGRATORS["auto"](Modes(omega), (0, 2), start, np.zeros(len(omega)), Options(tolerance=tolerance))
+    found = integrator_named("auto")(Modes(omega), (0, 2), start, np.zeros(len(omega)), Options(tolerance=tolerance))
     assert found.choice.startswith("lobatto" if len(omega) == 3 else "dop853")
     exact = start * np.cos(np.outer(found.t, omega))
     assert np.abs(found.y - exact).max() <= 5 * tolerance

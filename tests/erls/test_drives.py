@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from erls.errors import Cause, SceneError
 from erls.mechanism.drives import DriveRecord, build_drive
-from fe_import.toml_file import convert
+from fe_import.files.toml import convert
 
 MOVE = "motion = { shape = 'polynomial', from = 0.0, to_deg = 90, start = 0.5, duration = 1.0 }"
 PD = f"type = 'pd'\nproportional_gain = 200\nderivative_gain = 5\n{MOVE}"

@@ -13,19 +13,19 @@ import scenes
 from effect_scenes import random_chain
 
 import erls
-from erls.build import build_mechanism
-from erls.effects import ALL, DEFAULT, EFFECTS, conserves_energy, in_order, inconsistencies, named_effects
+from erls.equations.erls.chain import Erls
+from erls.equations.erls.paper.link_inertia import LinkInertia
+from erls.equations.ffr.body_frame import elastic_basis
+from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.standard_data import StandardData
 from erls.errors import Cause, SceneError, SimulationError
-from erls.formulations.erls import Erls
-from erls.formulations.ffr import Ffr
-from erls.formulations.ffr.body_frame import elastic_basis
-from erls.formulations.ffr.standard_data import StandardData
-from erls.formulations.link_inertia import LinkInertia
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import present, without
+from erls.mechanism.effects import ALL, DEFAULT, EFFECTS, conserves_energy, in_order, inconsistencies, named_effects
 from erls.mechanism.links import Link
-from erls.scene import load_scene
-from fe_import.inertia import InertiaInvariants
+from erls.mechanism.without_effects import present, without
+from erls.scene.build import build_mechanism
+from erls.scene.chain import load_scene
+from fe_import.modal.inertia import InertiaInvariants
 
 LINEAR = frozenset({"centrifugal_load", "coriolis", "inertia_first_order"})
 SQUARE = frozenset({"inertia_second_order", "spin_softening"})

@@ -14,18 +14,18 @@ import pytest
 import scenes
 
 import erls
-from erls.build import build_mechanism
-from erls.cli import main
-from erls.effects import DEFAULT
+from erls.auto.automatic import automatic, refuse_beyond
+from erls.auto.choice import choose_effects
+from erls.auto.cost import cost_of, stiffened_cost
+from erls.auto.stiffening import STIFFENING, can_stiffen
+from erls.cli.main import main
+from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
-from erls.formulations import formulate
 from erls.mechanism.chain import Mechanism
-from erls.run import Run
-from erls.scene import Scene, load_scene
-from erls.selection.automatic import automatic, refuse_beyond
-from erls.selection.choice import choose_effects
-from erls.selection.cost import cost_of, stiffened_cost
-from erls.selection.stiffening import STIFFENING, can_stiffen
+from erls.mechanism.effects import DEFAULT
+from erls.run.record import Run
+from erls.scene.build import build_mechanism
+from erls.scene.chain import Scene, load_scene
 
 DATA = scenes.ROOT / "data"
 SPIN_UP, FAST, L_SHAPE = (DATA / f for f in ("spin_up/beam.toml", "slider_crank/fast.toml", "l_shape/steel_tall.toml"))

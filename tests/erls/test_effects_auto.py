@@ -15,27 +15,27 @@ from effect_scenes import random_chain
 from small_systems import Modes
 
 import erls
-from erls.build import build_mechanism
-from erls.cli import main
-from erls.effects import DEFAULT, EFFECTS, Certificate
+from erls.auto import automatic as automatic_module
+from erls.auto.automatic import automatic
+from erls.auto.certify import certify
+from erls.auto.choice import Choice, affordable, choose_effects
+from erls.auto.coordinates import kept_places
+from erls.auto.cuts import RIGID, Cut
+from erls.auto.error_motion import Knots, error_motion
+from erls.auto.outputs import Outputs, effort_error, largest_distance, watched_nodes
+from erls.auto.probe import coarse_run
+from erls.auto.quick import quick
+from erls.cli.main import main
+from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
-from erls.formulations import formulate
-from erls.integrators.base import Options
-from erls.integrators.generalized_alpha import generalized_alpha
+from erls.integrate.base import Options
+from erls.integrate.generalized_alpha import generalized_alpha
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import with_rigid, without
-from erls.run import Run
-from erls.scene import Scene, load_scene
-from erls.selection import automatic as automatic_module
-from erls.selection.automatic import automatic
-from erls.selection.certify import certify
-from erls.selection.choice import Choice, affordable, choose_effects
-from erls.selection.coordinates import kept_places
-from erls.selection.cuts import RIGID, Cut
-from erls.selection.error_motion import Knots, error_motion
-from erls.selection.outputs import Outputs, effort_error, largest_distance, watched_nodes
-from erls.selection.probe import coarse_run
-from erls.selection.quick import quick
+from erls.mechanism.effects import DEFAULT, EFFECTS, Certificate
+from erls.mechanism.without_effects import with_rigid, without
+from erls.run.record import Run
+from erls.scene.build import build_mechanism
+from erls.scene.chain import Scene, load_scene
 
 WITHIN = 3.0  # actual error over certified one, from the specification
 

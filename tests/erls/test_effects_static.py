@@ -14,22 +14,22 @@ from effect_scenes import random_led_chain
 from small_systems import Modes
 
 import erls
-from erls.build import build_mechanism
+from erls.auto import automatic as automatic_module
+from erls.auto import choice as choice_module
+from erls.auto.automatic import automatic, named
+from erls.auto.certify import certify
+from erls.auto.choice import Choice, choose_effects
+from erls.auto.cuts import Cut
+from erls.auto.forced import forced_vibrations
+from erls.auto.outputs import Outputs, largest_distance, watched_nodes
+from erls.auto.probe import needed
+from erls.auto.static import may_follow, static_cut, vibrating_efforts
+from erls.equations.quasi_static.formulation import QuasiStatic
+from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
-from erls.formulations import formulate
-from erls.formulations.quasi_static import QuasiStatic
-from erls.run import Run
-from erls.scene import load_scene
-from erls.selection import automatic as automatic_module
-from erls.selection import choice as choice_module
-from erls.selection.automatic import automatic, named
-from erls.selection.certify import certify
-from erls.selection.choice import Choice, choose_effects
-from erls.selection.cuts import Cut
-from erls.selection.forced import forced_vibrations
-from erls.selection.outputs import Outputs, largest_distance, watched_nodes
-from erls.selection.probe import needed
-from erls.selection.static import may_follow, static_cut, vibrating_efforts
+from erls.run.record import Run
+from erls.scene.build import build_mechanism
+from erls.scene.chain import load_scene
 
 WITHIN = 3.0  # actual error over certified one, from the specification
 L_SHAPE, ROBOT = scenes.ROOT / "data/l_shape/steel_flat.toml", scenes.ROOT / "data/robot/two_link.toml"

@@ -10,11 +10,11 @@ import pytest
 import scenes
 from effect_scenes import random_chain
 
-from erls.cli import main
-from erls.effects import EFFECTS
+from erls.auto import sizes as sizes_module
+from erls.auto.sizes import FAILS, UNSTABLE
+from erls.cli.main import main
 from erls.errors import Cause, SimulationError
-from erls.selection import sizes as sizes_module
-from erls.selection.sizes import FAILS, UNSTABLE
+from erls.mechanism.effects import EFFECTS
 
 DATA = scenes.ROOT / "data"
 FLAT = DATA / "l_shape/steel_flat.toml"

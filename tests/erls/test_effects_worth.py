@@ -12,17 +12,17 @@ import scenes
 from small_systems import Modes
 
 import erls
-from erls.build import build_mechanism
-from erls.effects import FIRST, SECOND
-from erls.formulations import formulate
-from erls.mechanism.effects import without
-from erls.scene import load_scene
-from erls.selection import choice as choice_module
-from erls.selection.choice import Choice, choose_effects
-from erls.selection.cost import CALM, ITERATIONS, cost_of, count_steps
-from erls.selection.cuts import possible_cuts
-from erls.selection.outputs import Outputs, busiest, watched_nodes
-from erls.selection.resolution import Vibrations, resolution, vibrations
+from erls.auto import choice as choice_module
+from erls.auto.choice import Choice, choose_effects
+from erls.auto.cost import CALM, ITERATIONS, cost_of, count_steps
+from erls.auto.cuts import possible_cuts
+from erls.auto.outputs import Outputs, busiest, watched_nodes
+from erls.auto.resolution import Vibrations, resolution, vibrations
+from erls.equations.registry import formulate
+from erls.mechanism.effects import FIRST, SECOND
+from erls.mechanism.without_effects import without
+from erls.scene.build import build_mechanism
+from erls.scene.chain import load_scene
 
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"
 L_SHAPE = scenes.ROOT / "data/l_shape/steel_flat.toml"

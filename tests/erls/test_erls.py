@@ -10,9 +10,9 @@ import pytest
 import scenes
 
 import erls
+from erls.equations.erls.chain import Erls
+from erls.equations.erls.paper.compatibility import GAUGES
 from erls.errors import Cause, SimulationError
-from erls.formulations.compatibility import GAUGES
-from erls.formulations.erls import Erls
 from erls.mechanism.links import link_mass_properties
 
 KINDS = ("revolute", "mixed", "prescribed")

@@ -11,9 +11,9 @@ import pytest
 import scenes
 
 import erls
-from erls.cli import main
+from erls.cli.main import main
 from erls.errors import SceneError
-from erls.run_file import load_run, write_run
+from erls.run.file import load_run, write_run
 
 SPRING, LENGTH = 40.0, 0.1
 FOUR_BAR = scenes.ROOT / "data/four_bar/flexible.toml"

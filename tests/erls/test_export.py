@@ -10,7 +10,7 @@ from scenes import ROOT
 
 import erls
 from erls.errors import Cause, SceneError
-from erls.run import node_positions
+from erls.run.record import node_positions
 from erls.view.export import export_csv, export_paraview
 
 

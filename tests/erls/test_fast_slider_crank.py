@@ -9,8 +9,8 @@ import pytest
 import scenes
 
 import erls
-from erls.lie.so3 import Array
-from erls.run import Run
+from erls.maths.so3 import Array
+from erls.run.record import Run
 
 SCENE = scenes.ROOT / "data/slider_crank/fast.toml"
 REFERENCE = np.loadtxt(scenes.ROOT / "tests/data/fast_slider_crank.csv", delimiter=",")

@@ -10,7 +10,7 @@ import pytest
 import scenes
 
 from erls.errors import Cause, SceneError, SimulationError
-from erls.simulation import simulate
+from erls.simulation.simulate import simulate
 from fe_import.errors import Cause as FECause
 from fe_import.errors import ReportedError
 

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 import scenes
 
-from erls.cli import main
+from erls.cli.main import main
 from erls.errors import Cause
+from fe_import.description.link import load_link
 from fe_import.errors import Cause as FECause
-from fe_import.link import load_link
 from fe_import.modal.file import write_modal_file
 from fe_import.reduce import reduce_link
 
@@ -456,6 +456,6 @@ def test_a_faulty_joint_is_found_before_links_are_reduced(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A reduction may take minutes; what does not depend on it is checked first."""
-    monkeypatch.setattr("erls.build.reduce_cached", lambda *_: pytest.fail("reduced too early"))
+    monkeypatch.setattr("erls.scene.build.reduce_cached", lambda *_: pytest.fail("reduced too early"))
     for fault in ("table with NaN", "alpha twice", "point on an unknown link", "payload on an unknown point"):
         test_faulty_scene(fault, folder, capsys)

@@ -11,13 +11,13 @@ import scenes
 import scipy.linalg as la
 
 import erls
+from erls.equations.erls.chain import Erls
+from erls.equations.ffr.body_frame import BODY_FRAMES
+from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.interface_motion import InterfaceMotion, turn_factors
+from erls.equations.serial.equilibrium import held_equilibrium
 from erls.errors import Cause, SimulationError
-from erls.formulations.equilibrium import held_equilibrium
-from erls.formulations.erls import Erls
-from erls.formulations.ffr import Ffr
-from erls.formulations.ffr.body_frame import BODY_FRAMES
-from erls.formulations.ffr.interface_motion import InterfaceMotion, turn_factors
-from erls.lie.so3 import Array, skew
+from erls.maths.so3 import Array, skew
 from erls.mechanism.links import link_mass_properties
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 

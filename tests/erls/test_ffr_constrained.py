@@ -11,14 +11,14 @@ import scenes
 import scipy.linalg as la
 
 import erls
-from erls.formulations.ffr import Ffr
-from erls.formulations.ffr.body_frame import BODY_FRAMES
-from erls.formulations.ffr.constrained import Configuration, ConstrainedFfr
-from erls.integrators.base import metre_scales
-from erls.integrators.consistency import redundant_constraints, refuse_redundant
-from erls.integrators.constrained import ConstrainedOptions
-from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
-from erls.lie.so3 import Array
+from erls.equations.consistency import redundant_constraints, refuse_redundant
+from erls.equations.ffr.body_frame import BODY_FRAMES
+from erls.equations.ffr.constrained import Configuration, ConstrainedFfr
+from erls.equations.ffr.equations import Ffr
+from erls.equations.system import metre_scales
+from erls.integrate.constrained import ConstrainedOptions
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths.so3 import Array
 
 KINDS = ("revolute", "mixed", "prescribed")
 JOINT: dict[str, Any] = {

@@ -11,11 +11,11 @@ import scenes
 from scipy.integrate import solve_ivp
 
 import erls
+from erls.equations.ffr.body_frame import BODY_FRAMES, elastic_basis
+from erls.equations.ffr.standard_data import StandardData
 from erls.errors import SceneError
-from erls.formulations.ffr.body_frame import BODY_FRAMES, elastic_basis
-from erls.formulations.ffr.standard_data import StandardData
-from erls.lie.so3 import Array, skew
-from erls.run import Run
+from erls.maths.so3 import Array, skew
+from erls.run.record import Run
 
 DATA = scenes.ROOT / "data"
 SHIPPED = [str(p.relative_to(DATA)) for p in scenes.shipped()]

@@ -10,7 +10,7 @@ import pytest
 import scenes
 
 import erls
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
 ROBOT = scenes.ROOT / "data" / "robot"

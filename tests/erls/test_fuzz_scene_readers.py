@@ -12,5 +12,5 @@ CASES = {"run files": 100, "scenes": 150, "tables": 200}
 @pytest.mark.parametrize("group", GROUPS)
 def test_damaged_files(group: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """See `fuzzing` for what a reader may do."""
-    monkeypatch.setattr("erls.run_file._OUTPUT_TIMES", 11)
+    monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 11)
     check_reports(fuzz_group(GROUPS[group](), CASES[group]), CASES[group])

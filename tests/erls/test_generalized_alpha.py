@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from small_systems import DoublePendulum, ElasticPendulum, Law, Modes
 
 from erls.errors import Cause
-from erls.integrators.base import Array, Options
-from erls.integrators.generalized_alpha import generalized_alpha
+from erls.integrate.base import Array, Options
+from erls.integrate.generalized_alpha import generalized_alpha
 
 RADII = (0.0, 0.5, 0.8, 1.0)
 ONE, ZERO = np.ones(1), np.zeros(1)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from erls.errors import Cause
-from erls.integrators.base import Array
-from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.integrate.base import Array
+from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 
 # step, largest errors of position [m] and of the multiplier [N] after 0.1 s, over 2 s with ρ∞ = 0.8
 ERRORS = [

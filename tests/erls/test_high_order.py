@@ -11,14 +11,16 @@ from compiled_modes import CompiledElasticPendulum, TwinPendulum
 from small_systems import DoublePendulum, ElasticPendulum, Law, Modes
 
 from erls import load_scene
-from erls.build import build_mechanism
+from erls.equations.registry import formulate
+from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause
-from erls.formulations import formulate
-from erls.integrators import INTEGRATORS, lobatto
-from erls.integrators.base import Array, Options, SecondOrderSystem, Solution, hermite
+from erls.integrate import lobatto
+from erls.integrate.base import Array, Options, Solution, hermite
+from erls.integrate.registry import integrator_named
+from erls.scene.build import build_mechanism
 
 DATA = Path(__file__).parents[2] / "data"
-run = INTEGRATORS["lobatto"]
+run = integrator_named("lobatto")
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7)
 
 
@@ -41,7 +43,7 @@ def test_order_is_six(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lobatto, "_ITERATED", 1e-13)
     start, rest = np.array([1.0, 0.5]), np.zeros(2)
     system = DoublePendulum()
-    tight = INTEGRATORS["dop853"](system, (0, 1.0), start, rest, Options(rtol=1e-13, atol=1e-14))
+    tight = integrator_named("dop853")(system, (0, 1.0), start, rest, Options(rtol=1e-13, atol=1e-14))
     errors = []
     for step in (0.05, 0.025, 0.0125):
         found = run(system, (0, 1.0), start, rest, Options(step=step, tolerance=1.0))
@@ -166,7 +168,7 @@ def test_every_kind_of_system_agrees_with_an_explicit_method(kind: str) -> None:
     path, duration, *overrides = KINDS[kind]
     system, (y, v) = formulation(path, *overrides)
     times, at = (0.0, duration), np.linspace(0, duration, 50)
-    tight = INTEGRATORS["dop853"](system, times, y, v, Options(rtol=1e-10, atol=1e-12))
+    tight = integrator_named("dop853")(system, times, y, v, Options(rtol=1e-10, atol=1e-12))
     found = run(system, times, y, v, Options(tolerance=1e-6))
     assert (tight.failure, found.failure) == (None, None)
     ours, exact = (hermite(s.t, s.y, s.v, s.a, at)[0] for s in (found, tight))

@@ -1,4 +1,4 @@
-"""Every member of the registry keeps the contract of `erls.integrators.base`."""
+"""Every member of the registry keeps the contract of `erls.integrate.base`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from scipy.integrate import solve_ivp
 from small_systems import DoublePendulum, Law, Modes
 
 from erls.errors import Cause, SceneError, SimulationError
-from erls.integrators import DESCRIPTIONS, FIXED_STEP, INTEGRATORS
-from erls.integrators.base import Array, Options, Solution, hermite
+from erls.integrate.base import Array, Options, Solution, hermite
+from erls.integrate.registry import integrator_named
+from erls.scene.integrators import FIXED_STEP, INTEGRATORS
 
 ADAPTIVE = sorted(set(INTEGRATORS) - {"generalized_alpha"})
 MULTISTEP = {"bdf", "lsoda"}
@@ -42,7 +43,7 @@ def exact() -> Callable[[Array], tuple[Array, Array]]:
 
 
 def test_the_registry_is_described() -> None:
-    assert set(DESCRIPTIONS) == set(INTEGRATORS)
+    assert all(callable(integrator_named(name)) and entry.description for name, entry in INTEGRATORS.items())
     assert FIXED_STEP in INTEGRATORS
 
 
@@ -53,7 +54,7 @@ def test_errors_scale_with_tolerances(name: str, exact: Callable) -> None:
     """
     errors = []
     for rtol in (1e-5, 1e-8):
-        found = INTEGRATORS[name](
+        found = integrator_named(name)(
             DoublePendulum(), (0, END), START, np.zeros(2), Options(rtol=rtol, atol=rtol / 100, tolerance=rtol)
         )
         assert found.failure is None
@@ -65,7 +66,7 @@ def test_errors_scale_with_tolerances(name: str, exact: Callable) -> None:
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_motion_between_knots_is_as_accurate_as_at_knots(name: str, exact: Callable) -> None:
     """Threefold, or within the tolerance; velocities of multistep methods twentyfold (see scipy_ivp)."""
-    found = INTEGRATORS[name](DoublePendulum(), (0, END), START, np.zeros(2), options(name))
+    found = integrator_named(name)(DoublePendulum(), (0, END), START, np.zeros(2), options(name))
     at = np.random.default_rng(2).uniform(0, END, 1000)
     sampled = hermite(found.t, found.y, found.v, found.a, at)
     knots = (found.y, found.v)
@@ -90,14 +91,14 @@ def pulse(t: float, y: float, v: float) -> float:
 def test_a_short_push_is_met_exactly(name: str) -> None:
     """Piecewise constant acceleration is integrated to rounding, by BDF and LSODA to tolerance."""
     times, setting = (0.7003, 0.7013), Options(step=0.02) if name == "generalized_alpha" else Options()
-    found = INTEGRATORS[name](Law(pulse, times), (0, 1), ZERO, ZERO, setting)
+    found = integrator_named(name)(Law(pulse, times), (0, 1), ZERO, ZERO, setting)
     for t, a in zip(times, ([0, 1000], [1000, 0]), strict=True):
         np.testing.assert_allclose(found.a[found.t == t, 0], a, atol=1e-6)
     assert (np.diff(found.t) == 0).sum() == 2
     assert found.t[-1] == 1
     assert found.v[-1, 0] == pytest.approx(1, abs=1e-7)
     assert found.y[-1, 0] == pytest.approx(1 - 0.7008, abs=1e-7)
-    unaware = INTEGRATORS[name](Law(pulse), (0, 1), ZERO, ZERO, setting)
+    unaware = integrator_named(name)(Law(pulse), (0, 1), ZERO, ZERO, setting)
     assert abs(unaware.v[-1, 0] - 1) > 0.5  # without breakpoints it is stepped over
 
 
@@ -111,9 +112,9 @@ def test_units_of_coordinates_do_not_matter(name: str) -> None:
 
     force = lambda t: 1 + np.sin(t)  # noqa: E731
     start, setting = np.array([0.1, 0.0]), options(name)
-    metres = INTEGRATORS[name](Modes([3.0, 40.0], 0.1, force), (0, 1), start, np.zeros(2), setting)
+    metres = integrator_named(name)(Modes([3.0, 40.0], 0.1, force), (0, 1), start, np.zeros(2), setting)
     scaled = Scaled([3.0, 40.0], 0.1, lambda t: force(t) / unit)
-    other = INTEGRATORS[name](scaled, (0, 1), start / unit, np.zeros(2), setting)
+    other = integrator_named(name)(scaled, (0, 1), start / unit, np.zeros(2), setting)
     assert other.work == metres.work
     np.testing.assert_allclose(other.y * unit, metres.y, atol=1e-12)
 
@@ -122,7 +123,7 @@ def test_units_of_coordinates_do_not_matter(name: str) -> None:
 def test_the_observer_sees_every_step_and_inputs_stay(name: str) -> None:
     seen: list[tuple[float, Solution]] = []
     y, v = np.array([1.0]), np.array([0.0])
-    found = INTEGRATORS[name](Modes([5.0]), (0, 1), y, v, options(name), lambda t, k: seen.append((t, k())))
+    found = integrator_named(name)(Modes([5.0]), (0, 1), y, v, options(name), lambda t, k: seen.append((t, k())))
     assert len(seen) == found.work.steps
     assert [t for t, _ in seen] == sorted(t for t, _ in seen)
     for t, so_far in seen:
@@ -156,7 +157,7 @@ FAILURES = {
 @pytest.mark.parametrize("kind", FAILURES)
 def test_a_failed_run_keeps_what_was_computed(name: str, kind: str) -> None:
     law, cause = FAILURES[kind]
-    found = INTEGRATORS[name](Law(law), (0, 1), ONE, ZERO, options(name))
+    found = integrator_named(name)(Law(law), (0, 1), ONE, ZERO, options(name))
     assert found.failure is not None
     assert found.failure.cause is cause
     assert found.failure.where.startswith("t = 0.")
@@ -172,7 +173,7 @@ def test_an_observer_can_end_the_run(name: str) -> None:
         if t > 0.5:
             raise KeyboardInterrupt
 
-    found = INTEGRATORS[name](Modes([5.0]), (0, 1), ONE, ZERO, options(name), observer)
+    found = integrator_named(name)(Modes([5.0]), (0, 1), ONE, ZERO, options(name), observer)
     assert found.failure is not None
     assert found.failure.cause is Cause.INTERRUPTED
     assert found.failure.exit_code == 130
@@ -181,21 +182,21 @@ def test_an_observer_can_end_the_run(name: str) -> None:
 
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_failures_at_the_start_leave_one_knot(name: str) -> None:
-    infinite = INTEGRATORS[name](Law(lambda t, y, v: np.inf), (0, 1), ONE, ZERO, options(name))
+    infinite = integrator_named(name)(Law(lambda t, y, v: np.inf), (0, 1), ONE, ZERO, options(name))
     assert infinite.failure is not None
     assert infinite.failure.cause is Cause.NOT_FINITE
     assert infinite.t.tolist() == [0]
-    nothing = INTEGRATORS[name](Modes([2.0]), (1, 1), ONE, ZERO, options(name))
+    nothing = integrator_named(name)(Modes([2.0]), (1, 1), ONE, ZERO, options(name))
     assert nothing.failure is None
     assert (nothing.t.tolist(), nothing.a.tolist()) == ([1], [[-4]])
     with pytest.raises(SceneError):
-        INTEGRATORS[name](Modes([2.0]), (1, 0), ONE, ZERO, options(name))
+        integrator_named(name)(Modes([2.0]), (1, 0), ONE, ZERO, options(name))
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_a_motion_without_bound_ends_in_a_failure(name: str) -> None:
     """ÿ = 6 y² from rest at 1 is infinite at t = ∫₁^∞ dy/√(4 (y³ − 1)) = 1.214325..."""
-    found = INTEGRATORS[name](Law(lambda t, y, v: 6 * y * y), (0, 2), ONE, ZERO, options(name))
+    found = integrator_named(name)(Law(lambda t, y, v: 6 * y * y), (0, 2), ONE, ZERO, options(name))
     assert found.failure is not None
     expected = Cause.NEWTON_FAILED if name == "generalized_alpha" else Cause.STEP_TOO_SMALL
     assert found.failure.cause is expected

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from small_systems import Modes
 
+from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
-from erls.integrators.base import Options, breakpoints, hermite, legs, metre_scales
+from erls.integrate.base import Options, breakpoints, hermite, legs
 
 ROUNDING = 1e-12  # a few hundred operations on numbers of size 1 to 30
 

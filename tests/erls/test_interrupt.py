@@ -14,18 +14,18 @@ import pytest
 import scenes
 
 from erls.errors import Cause
-from erls.run_file import load_run
+from erls.run.file import load_run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX systems")
 
 # tells when a reduction starts and when the first step is done, so that tests need not guess
 START = """
 import sys
-import erls.build
-import erls.simulation
-from erls.cli import Progress, main
+import erls.scene.build
+import erls.simulation.simulate
+from erls.cli.main import Progress, main
 
-erls.simulation.CHECKPOINT_S = {checkpoint}
+erls.simulation.simulate.CHECKPOINT_S = {checkpoint}
 advance = Progress.advance
 
 def tell(self, done, total):
@@ -33,13 +33,13 @@ def tell(self, done, total):
     print("stepping", file=sys.stderr, flush=True)
     advance(self, done, total)
 
-reduce_cached = erls.build.reduce_cached
+reduce_cached = erls.scene.build.reduce_cached
 
 def tell_reduction(*arguments):
     print("reducing", file=sys.stderr, flush=True)
     return reduce_cached(*arguments)
 
-Progress.advance, erls.build.reduce_cached = tell, tell_reduction
+Progress.advance, erls.scene.build.reduce_cached = tell, tell_reduction
 sys.exit(main())
 """
 

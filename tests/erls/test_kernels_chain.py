@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.formulations.erls import Erls
-from erls.integrators.base import Options
-from erls.integrators.generalized_alpha import generalized_alpha
+from erls.equations.erls.chain import Erls
+from erls.integrate.base import Options
+from erls.integrate.generalized_alpha import generalized_alpha
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-12

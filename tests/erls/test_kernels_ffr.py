@@ -15,16 +15,17 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.build import build_mechanism
-from erls.formulations import formulate
-from erls.formulations.erls import Erls
-from erls.formulations.ffr import Ffr, interface_motion
-from erls.formulations.substructures import Substructured
-from erls.integrators.base import Options
-from erls.integrators.generalized_alpha import generalized_alpha
-from erls.integrators.lobatto import lobatto
-from erls.kernels.ffr.nodes import turn_factors
-from erls.scene import load_scene
+from erls.equations.erls.chain import Erls
+from erls.equations.ffr import interface_motion
+from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.nodes import turn_factors
+from erls.equations.registry import formulate
+from erls.equations.substructures import Substructured
+from erls.integrate.base import Options
+from erls.integrate.generalized_alpha import generalized_alpha
+from erls.integrate.lobatto import lobatto
+from erls.scene.build import build_mechanism
+from erls.scene.chain import load_scene
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-12

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from chain_cases import evaluate
 
+from erls.equations.loops.closed_chain import ClosedChain
 from erls.errors import Cause, SimulationError
-from erls.formulations.closed_chain import ClosedChain
-from erls.formulations.closed_run import Watch, loop_integrator
-from erls.integrators.base import Options, Solution
+from erls.integrate.base import Options, Solution
+from erls.integrate.closed_loops import Watch, loop_integrator
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-12

@@ -16,18 +16,18 @@ import pytest
 from test_nodal_dynamics import _l_shape
 from test_nodal_scene import _rigid_chain
 
-from erls.build import build_mechanism
+from erls.equations.nodal.assembly import NodalSystem
+from erls.equations.nodal.compiled import has_kernels
+from erls.equations.nodal.equations import Nodal
+from erls.equations.nodal.loads import NodalLoads
 from erls.errors import Cause
-from erls.formulations.nodal.equations import Nodal
-from erls.integrators.base import Array
-from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
-from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
-from erls.integrators.saddle import dense
-from erls.nodal.assembly import NodalSystem
-from erls.nodal.compiled import has_kernels
-from erls.nodal.loads import NodalLoads
-from erls.scene import load_scene
-from erls.simulation import simulate
+from erls.integrate.base import Array
+from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths.saddle import dense
+from erls.scene.build import build_mechanism
+from erls.scene.chain import load_scene
+from erls.simulation.simulate import simulate
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import nodal_reference

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.formulations import erls_compiled
-from erls.formulations.decoupled_modes import decoupled_modes
-from erls.formulations.erls import Erls
-from erls.formulations.erls_compiled import compile_chain
-from erls.formulations.ffr import Ffr
-from erls.formulations.ffr.compiled import compile_frames
-from erls.integrators.base import Options
-from erls.integrators.generalized_alpha import generalized_alpha
-from erls.integrators.lobatto import lobatto
+from erls.equations.erls import compiled as erls_compiled
+from erls.equations.erls.chain import Erls
+from erls.equations.erls.compiled import compile_chain
+from erls.equations.ffr.compiled import compile_frames
+from erls.equations.ffr.equations import Ffr
+from erls.equations.serial.decoupled_modes import decoupled_modes
+from erls.integrate.base import Options
+from erls.integrate.generalized_alpha import generalized_alpha
+from erls.integrate.lobatto import lobatto
 
 
 def _damping(chain: Erls, whole: np.ndarray) -> np.ndarray:

@@ -16,10 +16,10 @@ import scenes
 import stiffened_cases
 
 import erls
+from erls.equations.erls.chain import Erls
 from erls.errors import SimulationError
-from erls.formulations.erls import Erls
-from erls.integrators.base import Options
-from erls.integrators.generalized_alpha import generalized_alpha
+from erls.integrate.base import Options
+from erls.integrate.generalized_alpha import generalized_alpha
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through some hundred terms
 LIKE_TWIN = 1e-12

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-from erls.lie.se3 import inverse, joint_pose, pose, twist_cross, twist_transform
-from erls.lie.so3 import cross, fixed_axes, skew
+from erls.maths.se3 import inverse, joint_pose, pose, twist_cross, twist_transform
+from erls.maths.so3 import cross, fixed_axes, skew
 
 RNG = np.random.default_rng(11)
 

@@ -10,18 +10,18 @@ import pytest
 from scipy.integrate import solve_ivp
 from small_systems import DoublePendulum
 
+from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.nodal.joints import GROUND, Joint, Motion
+from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.errors import Cause
-from erls.integrators.base import Array, Solution
-from erls.integrators.constrained import ConstrainedOptions
-from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
-from erls.integrators.saddle import Scales, scaled_matrix
-from erls.lie import motion_maps as motions
-from erls.lie.groups import R3_SO3, SE3, Group
-from erls.lie.se3 import pose
-from erls.lie.so3 import rotation_x, rotation_y
-from erls.nodal.assembly import NodalSystem, Nodes
-from erls.nodal.joints import GROUND, Joint, Motion
-from erls.nodal.rigid_body import RigidBodies, RigidBody
+from erls.integrate.base import Array, Solution
+from erls.integrate.constrained import ConstrainedOptions
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths import motion_maps as motions
+from erls.maths.groups import R3_SO3, SE3, Group
+from erls.maths.saddle import Scales, scaled_matrix
+from erls.maths.se3 import pose
+from erls.maths.so3 import rotation_x, rotation_y
 
 GROUPS = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
 ABOUT_Y = pose(rotation_x(-np.pi / 2))  # its z axis is y

@@ -13,11 +13,11 @@ import scipy.linalg as la
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from erls.lie import motion_maps, rotation_maps
-from erls.lie.coefficients import inverse_coefficient, stumpff, stumpff_derivative, stumpff_second_derivative
-from erls.lie.groups import R3_SO3, SE3, SO3, Group, product, vectors
-from erls.lie.se3 import twist_cross, twist_transform
-from erls.lie.so3 import Array, skew
+from erls.maths import motion_maps, rotation_maps
+from erls.maths.coefficients import inverse_coefficient, stumpff, stumpff_derivative, stumpff_second_derivative
+from erls.maths.groups import R3_SO3, SE3, SO3, Group, product, vectors
+from erls.maths.se3 import twist_cross, twist_transform
+from erls.maths.so3 import Array, skew
 
 GROUPS = {g.name: g for g in (SO3, SE3, R3_SO3)} | {"a product": product(vectors(2), SE3, SO3)}
 TURNS = {

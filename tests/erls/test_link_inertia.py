@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.formulations.link_inertia import LinkInertia, moment_about
-from erls.lie.so3 import skew
+from erls.equations.erls.paper.link_inertia import LinkInertia, moment_about
+from erls.maths.so3 import skew
 from erls.mechanism.links import payload_invariants, rigid_model
-from fe_import.build.model import build_model
-from fe_import.link import load_link
+from fe_import.description.link import load_link
 from fe_import.modal.file import ModalModel
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_model
 
 STEP = 1e-5  # central differences of a quadratic energy are exact but for rounding, 1e-16 / STEP relative

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import scenes
 
+from erls.equations.loops.closed_chain import ClosedChain
 from erls.errors import SceneError
-from erls.formulations.closed_chain import ClosedChain
-from erls.lie.so3 import Array
-from erls.run import Run
-from erls.scene import load_scene
-from erls.simulation import simulate
+from erls.maths.so3 import Array
+from erls.run.record import Run
+from erls.scene.chain import load_scene
+from erls.simulation.simulate import simulate
 from fe_import.errors import ReportedError
 
 INNER, OUTER, GROUND = 0.25, 0.35, 0.2

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 import scenes
 
+from erls.equations.erls.chain import Erls
+from erls.equations.ffr.equations import Ffr
+from erls.equations.formulation import TreeFormulation
+from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.loops.rows import LoopRows
 from erls.errors import Cause, SimulationError
-from erls.formulations.base import TreeFormulation
-from erls.formulations.closed_chain import ClosedChain
-from erls.formulations.erls import Erls
-from erls.formulations.ffr import Ffr
-from erls.formulations.loop_rows import LoopRows
-from erls.lie.se3 import pose
-from erls.lie.so3 import Array, fixed_axes, skew
-from erls.link_loads import link_loads
+from erls.maths.se3 import pose
+from erls.maths.so3 import Array, fixed_axes, skew
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import link_mass_properties
 from erls.mechanism.loops import LOOP_TYPES, Loop, LoopEnd
+from erls.run.link_loads import link_loads
 
 STEP = 1e-6
 OFFSET = pose(fixed_axes(0.3, -0.5, 0.8), np.array([0.02, -0.01, 0.03]))
@@ -243,7 +243,7 @@ def test_shipped_flexible_scenes_start(path: str) -> None:
     Links bend by up to 1.2 mm over 0.35 m: a few δ²/L, 1e-5 m.
     """
     from erls import load_scene
-    from erls.simulation import simulate
+    from erls.simulation.simulate import simulate
 
     changes = ["simulation.duration=0.01", "simulation.step=1e-3"]
     runs = [

@@ -12,11 +12,11 @@ import scenes
 from loop_scenes import GROUND, LENGTHS, MASSES
 from scipy.integrate import solve_ivp
 
+from erls.equations.loops.closed_chain import ClosedChain
 from erls.errors import Cause, SimulationError
-from erls.formulations.closed_chain import ClosedChain
-from erls.lie.so3 import Array
-from erls.run import Run
-from erls.run_file import load_run, write_run
+from erls.maths.so3 import Array
+from erls.run.file import load_run, write_run
+from erls.run.record import Run
 
 RATE = 360.0  # deg/s
 PLANAR = ("translation along z", "rotation about x", "rotation about y")
@@ -261,7 +261,7 @@ def test_spatial_loop_with_a_ball_joint(tmp_path: Path) -> None:
 def test_run_file_keeps_loops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run read again answers alike, reactions of loops included."""
     run = loop_scenes.run(tmp_path, loop_scenes.four_bar(), duration=0.02)
-    monkeypatch.setattr("erls.run_file._OUTPUT_TIMES", 5)
+    monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 5)
     write_run(tmp_path / "loop.run.h5", run)
     again = load_run(tmp_path / "loop.run.h5")
     assert again.loop_names == ("pivot",)
@@ -322,7 +322,7 @@ def test_joints_near_the_ground_keep_their_start(tmp_path: Path) -> None:
 def test_scenes_of_the_folder_close(tmp_path: Path) -> None:
     """The shipped rigid four-bar runs as its header says."""
     from erls import load_scene
-    from erls.simulation import simulate
+    from erls.simulation.simulate import simulate
 
     changes = ["simulation.duration=0.05", "simulation.step=5e-3"]
     run = simulate(load_scene(scenes.ROOT / "data/four_bar/rigid.toml", changes))

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from erls.equations.nodal.assembly import NodalSystem
+from erls.equations.nodal.beam import Beam, Beams, lumped, straight
+from erls.equations.nodal.joints import GROUND, Joint
+from erls.equations.nodal.loads import NodalLoad, NodalLoads
+from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
+from erls.equations.nodal.section import BeamSection, beam_section
+from erls.equations.nodal.statics import Statics, solve_statics
 from erls.errors import Cause, SceneError
-from erls.lie import motion_maps as motions
-from erls.lie.se3 import pose
-from erls.lie.so3 import Array, fixed_axes, rotation_z
-from erls.nodal.assembly import NodalSystem
-from erls.nodal.beam import Beam, Beams, lumped, straight
-from erls.nodal.joints import GROUND, Joint
-from erls.nodal.loads import NodalLoad, NodalLoads
-from erls.nodal.rigid_body import RigidBodies, RigidBody
-from erls.nodal.section import BeamSection, beam_section
-from erls.nodal.statics import Statics, solve_statics
+from erls.maths import motion_maps as motions
+from erls.maths.se3 import pose
+from erls.maths.so3 import Array, fixed_axes, rotation_z
 
 UP = np.array([0.0, 0.0, 1.0])
 NONE = np.zeros(3)

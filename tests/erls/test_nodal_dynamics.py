@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from erls.integrators.base import Array, hermite
-from erls.integrators.constrained import ConstrainedOptions, ConstrainedSolution
-from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
-from erls.lie.se3 import pose
-from erls.lie.so3 import rotation_x
-from erls.nodal.assembly import NodalSystem
-from erls.nodal.beam import Beams, lumped, straight
-from erls.nodal.joints import GROUND, Joint
-from erls.nodal.rigid_body import RigidBodies
-from erls.nodal.section import BeamSection, beam_section
+from erls.equations.nodal.assembly import NodalSystem
+from erls.equations.nodal.beam import Beams, lumped, straight
+from erls.equations.nodal.joints import GROUND, Joint
+from erls.equations.nodal.rigid_body import RigidBodies
+from erls.equations.nodal.section import BeamSection, beam_section
+from erls.integrate.base import Array, hermite
+from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths.se3 import pose
+from erls.maths.so3 import rotation_x
 
 WEIGHT = np.array([0, 0, -9.81])
 UP = np.array([0.0, 0.0, 1.0])

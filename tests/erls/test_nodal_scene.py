@@ -11,13 +11,13 @@ import scenes
 from test_nodal_dynamics import _l_shape, _swing
 
 from erls.errors import Cause, SceneError
-from erls.integrators.base import Array, hermite
+from erls.integrate.base import Array, hermite
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.rigid_dynamics import inverse_dynamics
-from erls.run import Run
-from erls.run_file import load_run, write_run
-from erls.scene import load_scene
-from erls.simulation import simulate
+from erls.run.file import load_run, write_run
+from erls.run.record import Run
+from erls.scene.chain import load_scene
+from erls.simulation.simulate import simulate
 from erls.studies.outputs import run_outputs
 from fe_import.errors import ReportedError
 
@@ -287,7 +287,7 @@ def test_a_damaged_description_in_a_run_file(tmp_path: Path) -> None:
     """It is reported as such."""
     import h5py
 
-    from fe_import.hdf5.files import write_strings
+    from fe_import.files.hdf5.files import write_strings
 
     scenes.l_link(tmp_path)
     write_run(tmp_path / "run.h5", _run(scenes.l_scene(tmp_path, **_simulation(2e-3, 1e-3))))

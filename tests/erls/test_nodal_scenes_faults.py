@@ -13,10 +13,11 @@ import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
 
 from erls import load_scene
-from erls.body_scenes import load_body_scene, solve
-from erls.body_scenes.result_file import read_summary, write_result
-from erls.cli import main
+from erls.cli.main import main
 from erls.errors import Cause, SceneError, SimulationError
+from erls.run.bodies import solve
+from erls.run.bodies.result_file import read_summary, write_result
+from erls.scene.bodies.read import load_body_scene
 from fe_import.errors import ReportedError
 
 CLAMP, BEAM, LOAD = STRIP["connections"][0], STRIP["beams"][0], STRIP["loads"][0]

@@ -11,8 +11,10 @@ import pytest
 import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
 
-from erls.body_scenes import analyses, load_body_scene, schema, solve
-from erls.body_scenes.result import Motion, Rest
+from erls.run.bodies import solve
+from erls.run.bodies.result import Motion, Rest
+from erls.scene.bodies import analyses, schema
+from erls.scene.bodies.read import load_body_scene
 
 EI_Y, EI_Z = 1e6 * 0.1 * 0.02**3 / 12, 1e6 * 0.02 * 0.1**3 / 12
 GA = 5e5 * 0.1 * 0.02 * 5 / 6

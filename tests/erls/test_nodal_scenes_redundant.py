@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from body_scenes_data import STRIP, body_scene
 
-from erls.body_scenes import solve
-from erls.body_scenes.result import Motion, Rest
-from erls.cli import main
+from erls.cli.main import main
 from erls.errors import Cause, SimulationError
+from erls.run.bodies import solve
+from erls.run.bodies.result import Motion, Rest
 
 BEND = np.radians(30.0)
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.body_scenes import load_body_scene, solve
-from erls.body_scenes.result import Motion, Rest
 from erls.errors import Cause, SimulationError
+from erls.run.bodies import solve
+from erls.run.bodies.result import Motion, Rest
+from erls.scene.bodies.read import load_body_scene
 
 DATA = scenes.ROOT / "data"
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from body_scenes_data import body_scene
 
-from erls.body_scenes import solve
-from erls.body_scenes.result import Rest
-from erls.cli import main
+from erls.cli.main import main
 from erls.errors import Cause, SimulationError
+from erls.run.bodies import solve
+from erls.run.bodies.result import Rest
 
 LENGTH, E, AREA, BEND = 2.0, 1e9, 1e-3, 1e-8
 EULER = np.pi**2 * E * BEND / LENGTH**2
@@ -143,7 +143,7 @@ def test_sparse_and_dense_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     """The same modes from Arnoldi iteration."""
     results = []
     for limit in (300, 10):
-        monkeypatch.setattr("erls.nodal.spectrum.DENSE_UP_TO", limit)
+        monkeypatch.setattr("erls.equations.nodal.spectrum.DENSE_UP_TO", limit)
         buckling = _found(tmp_path, _column("clamped", "hinged", count=2)).modes
         free = _found(tmp_path, _column("clamped", "hinged", type="frequencies", load=0.5, count=3)).modes
         results.append([*(m["load"] for m in buckling), *(m["frequency_hz"] for m in free)])

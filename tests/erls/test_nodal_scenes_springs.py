@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from body_scenes_data import PENDULUM, body_scene
 
-from erls.body_scenes import solve
-from erls.body_scenes.result import Motion
+from erls.equations.nodal.assembly import NodalSystem
+from erls.equations.nodal.elements import Elements
+from erls.equations.nodal.springs import Spring, Springs
+from erls.equations.nodal.turning_springs import TurningSpring, TurningSprings
 from erls.errors import Cause
-from erls.lie import motion_maps as motions
-from erls.lie import rotation_maps as rotations
-from erls.nodal.assembly import NodalSystem
-from erls.nodal.elements import Elements
-from erls.nodal.springs import Spring, Springs
-from erls.nodal.turning_springs import TurningSpring, TurningSprings
+from erls.maths import motion_maps as motions
+from erls.maths import rotation_maps as rotations
+from erls.run.bodies import solve
+from erls.run.bodies.result import Motion
 from fe_import.errors import ReportedError
 
 SLIDE = {"name": "slide", "type": "prismatic", "node": "bob", "axis": [1, 0, 0]}

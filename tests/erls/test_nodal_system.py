@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
+from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.nodal.joints import CONDITIONS, GROUND, Joint
+from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
+from erls.equations.nodal.scatter import DENSE_UP_TO
 from erls.errors import Cause, SceneError, SimulationError
-from erls.integrators.constrained import ConstrainedOptions
-from erls.integrators.lie_generalized_alpha import lie_generalized_alpha
-from erls.lie import motion_maps as motions
-from erls.lie.groups import R3_SO3, SE3, Group
-from erls.lie.so3 import Array
-from erls.nodal.assembly import NodalSystem, Nodes
-from erls.nodal.joints import CONDITIONS, GROUND, Joint
-from erls.nodal.rigid_body import RigidBodies, RigidBody
-from erls.nodal.scatter import DENSE_UP_TO
+from erls.integrate.constrained import ConstrainedOptions
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths import motion_maps as motions
+from erls.maths.groups import R3_SO3, SE3, Group
+from erls.maths.so3 import Array
 
 GROUPS = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
 G = np.array([0.3, -0.2, -9.81])
@@ -173,7 +173,7 @@ def test_sparse_and_dense_assembly_agree(monkeypatch: pytest.MonkeyPatch) -> Non
     assert 6 * count > DENSE_UP_TO
     runs = []
     for limit in (DENSE_UP_TO, 10**6):
-        monkeypatch.setattr("erls.nodal.scatter.DENSE_UP_TO", limit)
+        monkeypatch.setattr("erls.equations.nodal.scatter.DENSE_UP_TO", limit)
         system, q, v = _chain(count)
         assert hasattr(system.mass_matrix(0.0, q), "tocsc") == (limit == DENSE_UP_TO)
         runs.append(lie_generalized_alpha(system, (0, 0.05), q, v, ConstrainedOptions(step=2e-3)))

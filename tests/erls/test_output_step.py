@@ -15,11 +15,12 @@ from small_systems import ElasticPendulum
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
-from erls.integrators import INTEGRATORS
-from erls.integrators.base import Options, Solution, hermite_knots
-from erls.integrators.driver import Recorder
-from erls.scene import Simulation
-from erls.watches.stored_output import FEWEST, output_error, output_step
+from erls.integrate.base import Options, Solution, hermite_knots
+from erls.integrate.driver import Recorder
+from erls.integrate.registry import integrator_named
+from erls.run.watches.stored_output import FEWEST, output_error, output_step
+from erls.scene.chain import Simulation
+from erls.scene.integrators import INTEGRATORS
 
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"
 FLAT = scenes.ROOT / "data/l_shape/steel_flat.toml"
@@ -89,7 +90,7 @@ def test_every_integrator_keeps_the_same_motion(name: str) -> None:
     """What is kept lies on the interpolated motion of the run that keeps all; the last knot is among it."""
     start, still = np.array([0.3, 0.01]), np.zeros(2)
     runs = [
-        INTEGRATORS[name](ElasticPendulum(50.0), (0, 1), start, still, Options(1e-3, output_step=apart))
+        integrator_named(name)(ElasticPendulum(50.0), (0, 1), start, still, Options(1e-3, output_step=apart))
         for apart in (None, 0.05)
     ]
     np.testing.assert_allclose(runs[1].t, np.linspace(0, 1, 21), atol=1e-12)
@@ -186,7 +187,7 @@ def test_an_observer_sees_the_last_knot_and_a_failed_run_keeps_it() -> None:
 
     options = Options(1e-2, output_step=0.1)
     system = ElasticPendulum(50.0)
-    found = INTEGRATORS["generalized_alpha"](system, (0, 1), np.array([0.3, 0.0]), np.zeros(2), options, look)
+    found = integrator_named("generalized_alpha")(system, (0, 1), np.array([0.3, 0.0]), np.zeros(2), options, look)
     assert found.failure is not None
     np.testing.assert_allclose(found.t, [0, 0.1, 0.2, 0.3, 0.36], atol=1e-12)
     assert found.t[-1] == seen[-1]
@@ -198,7 +199,7 @@ def test_memory_does_not_grow_with_steps() -> None:
     for step in (1e-4, 1e-5):
         tracemalloc.start()
         start, options = np.array([0.3, 0.01]), Options(step, output_step=0.1)
-        run = INTEGRATORS["generalized_alpha"](CompiledElasticPendulum(50.0), (0, 5), start, np.zeros(2), options)
+        run = integrator_named("generalized_alpha")(CompiledElasticPendulum(50.0), (0, 5), start, np.zeros(2), options)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert run.work.steps == round(5 / step)

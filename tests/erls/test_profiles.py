@@ -15,7 +15,7 @@ from erls.mechanism.curves import Sum, merged, tolerance
 from erls.mechanism.motions import Motion
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import Load, build_loads
-from fe_import.toml_file import convert
+from fe_import.files.toml import convert
 
 SCENE = "arm.toml"
 

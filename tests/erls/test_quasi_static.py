@@ -11,15 +11,15 @@ import scenes
 import scipy.optimize
 
 import erls
-from erls.build import build_mechanism
+from erls.equations.erls.chain import Erls
+from erls.equations.quasi_static.formulation import QuasiStatic
+from erls.equations.registry import formulate
 from erls.errors import Cause, SceneError, SimulationError
-from erls.formulations import formulate
-from erls.formulations.erls import Erls
-from erls.formulations.quasi_static import QuasiStatic
-from erls.formulations.static_watch import static_error
-from erls.integrators.base import hermite
-from erls.run import Run
-from erls.run_file import load_run, write_run
+from erls.integrate.base import hermite
+from erls.run.file import load_run, write_run
+from erls.run.record import Run
+from erls.run.watches.static_following import static_error
+from erls.scene.build import build_mechanism
 
 FLAT, ROBOT = scenes.ROOT / "data/l_shape/steel_flat.toml", scenes.ROOT / "data/robot/two_link.toml"
 TIGHT = ["simulation.integrator=lobatto", "simulation.tolerance=1e-8"]

@@ -10,9 +10,9 @@ import pytest
 import scenes
 
 import erls
-from erls.formulations.assumed_bow import assumed_second_order
-from erls.formulations.deflection_watch import LinkMotion, deflection_error
-from erls.watches.deflection_range import deflection_errors, deflection_warnings
+from erls.run.watches.assumed_bow import assumed_second_order
+from erls.run.watches.deflection_estimate import LinkMotion, deflection_error
+from erls.run.watches.deflection_range import deflection_errors, deflection_warnings
 
 DATA = scenes.ROOT / "data"
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 import erls
 from erls.errors import Cause, ReportedError
-from erls.recover import export_recovery, recovery_places
-from erls.run import Run
+from erls.run.record import Run
+from erls.run.recovery import export_recovery, recovery_places
 
 Array = NDArray[np.float64]
 ENDS = {"recovery": {"nodes": ["root", "tip"]}}

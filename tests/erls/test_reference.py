@@ -11,9 +11,9 @@ import scenes
 import scipy.linalg as la
 
 import erls
-import erls.build
-from erls.formulations.erls import Erls
-from erls.run import Run
+import erls.scene.build
+from erls.equations.erls.chain import Erls
+from erls.run.record import Run
 
 DATA = scenes.ROOT / "data"
 EULER = {"theory": "euler-bernoulli"}
@@ -74,7 +74,7 @@ def test_table_3_with_fitted_material(runs: dict[str, Run]) -> None:
 def test_natural_frequencies_of_test_3() -> None:
     """Joint free, hub inertia, elbow mass: in plane and out of plane within 0.5 %."""
     scene = erls.load_scene(DATA / "l_shape/torque.toml", ['joints.0.drive={type="free"}'])
-    equations = Erls(erls.build.build_mechanism(scene).mechanism)
+    equations = Erls(erls.scene.build.build_mechanism(scene).mechanism)
     y, v = equations.initial_state()
     stiffness, _ = equations.stiffness_and_damping(0.0, y, v)
     squared = la.eigh(stiffness, equations.mass_matrix(0.0, y), eigvals_only=True)

@@ -11,7 +11,7 @@ import scenes
 from scipy.special import ellipkinc
 
 import erls
-from erls.formulations.erls import Erls
+from erls.equations.erls.chain import Erls
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
 RIGID_L = [{"name": "l", "model": "link.toml", "flexible": False}]

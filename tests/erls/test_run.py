@@ -13,9 +13,9 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError
-from erls.integrators.base import hermite
+from erls.integrate.base import hermite
 from erls.mechanism.chain import poses
-from erls.run import Run
+from erls.run.record import Run
 
 END = 0.05
 TIMES = np.array([[0.0, 0.0107, 0.02], [0.0333, 0.0499, END]])

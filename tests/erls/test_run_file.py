@@ -15,11 +15,11 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
-from erls.run import Run
-from erls.run_file import load_run, write_run
-from erls.scene import load_scene
+from erls.run.file import load_run, write_run
+from erls.run.record import Run
+from erls.scene.chain import load_scene
 from fe_import.errors import ReportedError
-from fe_import.hdf5.files import write_strings
+from fe_import.files.hdf5.files import write_strings
 
 TIMES = np.linspace(0.0, 0.02, 11)
 BODY = {"mass": 0.5, "centre_of_mass": [0.2, 0, 0], "inertia": [1e-3, 2e-3, 2e-3]}
@@ -57,7 +57,7 @@ def chain(folder: Path) -> Path:
 def _few_output_times() -> Iterator[None]:
     """Files are written often here."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("erls.run_file._OUTPUT_TIMES", 51)
+        patch.setattr("erls.run.file._OUTPUT_TIMES", 51)
         yield
 
 
@@ -222,7 +222,7 @@ def test_a_failing_write_leaves_the_old_file(run: Run, tmp_path: Path, monkeypat
             raise problem
 
         with monkeypatch.context() as patch:
-            patch.setattr("erls.run_file._fill_output", fail)
+            patch.setattr("erls.run.file._fill_output", fail)
             with pytest.raises(expected) as caught:
                 write_run(path, failed(run))
         if isinstance(caught.value, SceneError):

@@ -10,10 +10,10 @@ import scenes
 
 import erls
 from erls.errors import Cause, SimulationError
-from erls.run import Run
-from erls.run_file import load_run, write_run
-from erls.watches.runaway import LARGEST
-from erls.watches.spin_stability import spin_warnings
+from erls.run.file import load_run, write_run
+from erls.run.record import Run
+from erls.run.watches.runaway import LARGEST
+from erls.run.watches.spin_stability import spin_warnings
 
 SPIN_UP = scenes.ROOT / "data/spin_up/beam.toml"
 TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"
@@ -57,7 +57,7 @@ def test_a_beam_that_lost_stability(changes: list[str]) -> None:
 
 def test_whatever_the_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The end is the first step beyond the limit, not that of the compiled steps that passed it."""
-    from erls.integrators import generalized_alpha_compiled
+    from erls.integrate import generalized_alpha_compiled
 
     first = failed(SPIN_UP, SPINNING)[1]
     second = failed(SPIN_UP, [*SPINNING, "simulation.duration=10.2"])[1]  # 8 steps before the end

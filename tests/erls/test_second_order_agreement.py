@@ -23,11 +23,11 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.effects import ALL
-from erls.formulations.erls import Erls
-from erls.formulations.ffr import Ffr
-from erls.lie.so3 import Array
+from erls.equations.erls.chain import Erls
+from erls.equations.ffr.equations import Ffr
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.effects import ALL
 
 SIZES = 1e-3 * 2.0 ** -np.arange(5)
 

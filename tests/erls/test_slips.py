@@ -8,8 +8,8 @@ import pytest
 import scenes
 
 import erls
-from erls.effects import DEFAULT, named_effects
 from erls.errors import Cause, SceneError
+from erls.mechanism.effects import DEFAULT, named_effects
 from fe_import.errors import Cause as LinkCause
 from fe_import.errors import FEImportError
 

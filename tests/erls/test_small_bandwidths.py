@@ -7,7 +7,7 @@ import pytest
 import scenes
 
 import erls
-from erls.run import Run
+from erls.run.record import Run
 
 FLAT = scenes.ROOT / "data/l_shape/steel_flat.toml"
 

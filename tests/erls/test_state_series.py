@@ -10,8 +10,8 @@ import pytest
 import scenes
 
 import erls
-from erls.formulations.base import Formulation, State
-from erls.formulations.state_series import state_series
+from erls.equations.formulation import Formulation, State
+from erls.equations.serial.state_series import state_series
 
 TIMES = np.array([0.0, 0.03, 0.11, 0.4])
 

@@ -16,9 +16,9 @@ import pytest
 from body_scenes_data import body_scene
 from scipy.integrate import solve_bvp
 
-from erls.body_scenes import solve
-from erls.body_scenes.result import Rest
-from erls.lie.so3 import Array
+from erls.maths.so3 import Array
+from erls.run.bodies import solve
+from erls.run.bodies.result import Rest
 from fe_import.elements.sections import rectangle_torsion_constant
 
 LENGTH, HEIGHT, THICK, E, NU = 0.508, 12.377e-3, 3.2024e-3, 71.7e9, 0.31

@@ -14,17 +14,17 @@ import scenes
 import scipy.linalg as la
 
 import erls
-from erls.build import build_mechanism
-from erls.effects import ALL, DEFAULT
+from erls.equations.erls.chain import Erls
+from erls.equations.ffr.constrained import ConstrainedFfr
+from erls.equations.ffr.equations import Ffr
 from erls.errors import SimulationError
-from erls.formulations.erls import Erls
-from erls.formulations.ffr import Ffr
-from erls.formulations.ffr.constrained import ConstrainedFfr
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.effects import ALL, DEFAULT
 from erls.mechanism.links import Link, Payload, payload_invariants
 from erls.mechanism.second_order import link_second_order
-from erls.run import Run, node_positions
-from erls.watches.spin_stability import critical_speed
+from erls.run.record import Run, node_positions
+from erls.run.watches.spin_stability import critical_speed
+from erls.scene.build import build_mechanism
 from fe_import import load_link, reduce_link
 
 DATA = scenes.ROOT / "data"

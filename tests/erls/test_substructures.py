@@ -11,12 +11,12 @@ import pytest
 import scenes
 
 import erls
-from erls.build import build_mechanism
 from erls.errors import SceneError
-from erls.link_loads import link_loads
+from erls.run.link_loads import link_loads
+from erls.scene.build import build_mechanism
+from fe_import.description.link import load_link
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import load_link
-from fe_import.substructures import split_link
+from fe_import.models.substructures import split_link
 
 RANKING = {"driving": ["root.ry"], "observed": ["tip.uz"], "count": 2}
 

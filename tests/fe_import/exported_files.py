@@ -14,9 +14,9 @@ import scipy.sparse as sp
 from link_files import merged, write_toml
 from solid_meshes import box
 
+from fe_import.description.link import LinkFile, load_link
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import LinkFile, load_link
 from fe_import.mesh.solid_mesh import SolidMesh
 from fe_import.reduce import reduce_link
 

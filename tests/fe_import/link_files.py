@@ -12,7 +12,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 from solid_meshes import box
 
-from fe_import.link import LinkFile, load_link
+from fe_import.description.link import LinkFile, load_link
 from fe_import.modal.file import ModalModel
 from fe_import.model import FEModel
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 from link_files import SOLID, Array, boundary, frame_link, interface_shapes, solid_link, straight_link
 
-from fe_import.link import LinkFile
+from fe_import.description.link import LinkFile
 from fe_import.modal.file import ModalModel
 from fe_import.model import FEModel
 

@@ -12,9 +12,9 @@ import scipy.linalg as la
 from link_files import FRAME, merged, write_toml
 from numpy.typing import NDArray
 
-from fe_import.build.model import build_model
-from fe_import.link import LinkFile, load_link
+from fe_import.description.link import LinkFile, load_link
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
 
 Array = NDArray[np.float64]
 Table = dict[str, Any]

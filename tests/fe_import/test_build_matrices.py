@@ -11,12 +11,12 @@ import scipy.sparse as sp
 from exported_files import MARKET, Fault, check_fault, link_matrices, market, raw, written
 from link_files import FRAME, frame_link, merged, solid_link, write_toml
 
-from fe_import.build.model import build_model
+from fe_import.description.link import LinkFile, load_link
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.dofs import COMPONENTS
 from fe_import.exports.row_files import node_frames
-from fe_import.link import LinkFile, load_link
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 
 ROOT = Path(__file__).parents[2]

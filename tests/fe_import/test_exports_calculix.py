@@ -30,16 +30,16 @@ from exported_files import (
 from link_files import boundary, dense
 from solid_meshes import box
 
-from fe_import.build.model import build_model
+from fe_import.description.link import load_link
 from fe_import.elements.solid import assemble_solid
 from fe_import.errors import Cause
 from fe_import.exports.calculix import read_calculix
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import read_inp
-from fe_import.link import load_link
 from fe_import.mesh.solid_mesh import SolidMesh
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
-from fe_import.sparse import lowest_modes
+from fe_import.solver.sparse import lowest_modes
 
 ROOT = Path(__file__).parents[2]
 EXPORTS = ROOT.parent / "shared" / "fe_exports"

@@ -29,9 +29,9 @@ from exported_files import (
     written,
 )
 
-from fe_import.build.model import build_model
 from fe_import.errors import Cause
 from fe_import.exports.row_files import node_frames
+from fe_import.models.model import build_model
 
 BAD, UNREADABLE = Cause.EXPORT, Cause.NOT_READABLE
 

@@ -21,12 +21,12 @@ import scipy.linalg as la
 from link_files import merged, random_rotation, write_toml
 from superelements import Reduced, condensed, description, dmig, frame_model, grid_cards, punch
 
+from fe_import.description.link import load_link
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.nastran_cards import read_cards
 from fe_import.exports.nastran_dmig import DmigOptions, read_dmig
 from fe_import.exports.nastran_grid import CARDS, grid_points
 from fe_import.exports.nastran_op4 import Op4Options, read_op4
-from fe_import.link import load_link
 from fe_import.modal.model import ModalModel
 from fe_import.reduce import reduce_link
 

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import pytest
 from link_files import FRAME, SOLID, frame_link, merged, write_box, write_toml
 
+from fe_import.description.link import LinkDescription, load_link
 from fe_import.errors import Cause, FEImportError, ReportedError, shortened
-from fe_import.link import LinkDescription, load_link
+from fe_import.files.toml import choose, convert, read_toml
 from fe_import.reduce import reduce_link
-from fe_import.toml_file import choose, convert, read_toml
 
 NODES = FRAME["frame"]["nodes"]
 MEMBER = FRAME["frame"]["members"][0]
@@ -305,7 +305,7 @@ def test_files_that_are_no_files(tmp_path: Path) -> None:
 
 
 def test_files_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fe_import.toml_file._MAX_BYTES", 10)
+    monkeypatch.setattr("fe_import.files.toml._MAX_BYTES", 10)
     path = write_toml(tmp_path / "big.toml", {"name": "longer than ten bytes"})
     with pytest.raises(FEImportError, match="too large") as caught:
         read_toml(path)

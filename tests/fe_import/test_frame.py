@@ -22,7 +22,7 @@ from fe_import.elements.frame import (
     local_axes,
 )
 from fe_import.elements.sections import Circular, Rectangular, SectionConstants, section_constants
-from fe_import.inertia import mass_properties
+from fe_import.modal.inertia import mass_properties
 from fe_import.model import FEModel
 
 E, NU, RHO = 2.1e11, 0.3, 7850.0

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from exported_files import CALCULIX, FRD, Fault, Files, check_fault, frd_files, link_matrices, written
 
-from fe_import.build.model import build_model
+from fe_import.description.link import load_link
 from fe_import.errors import Cause
 from fe_import.exports.frd_mesh import read_frd
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import read_inp
-from fe_import.link import load_link
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 
 ROOT = Path(__file__).parents[2]

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.hdf5.files import (
+from fe_import.files.hdf5.files import (
     Reader,
     open_for_reading,
     write_array,
@@ -460,7 +460,7 @@ FULL_DISK = """
 import resource, signal, sys
 import numpy as np
 from fe_import.errors import Cause, FEImportError
-from fe_import.hdf5.files import write_array, write_atomically
+from fe_import.files.hdf5.files import write_array, write_atomically
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
 try:

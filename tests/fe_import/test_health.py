@@ -12,16 +12,16 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from link_files import FRAME, dense, frame_link, solid_link, straight_link
 
-from fe_import.build.model import build_model
+from fe_import.description.link import LinkFile, Reduction
 from fe_import.errors import Cause, FEImportError
 from fe_import.health.report import check_basis, check_model, mode_residuals
 from fe_import.health.rigid_motion import rigid_motion_as_eigenmodes, rigid_motion_by_stiffness
-from fe_import.link import LinkFile, Reduction
 from fe_import.model import FEModel
-from fe_import.modes import orthonormal_modes, reduced_matrices
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 from fe_import.reduction import REDUCTIONS
-from fe_import.sparse import modes_below
+from fe_import.reduction.modes import orthonormal_modes, reduced_matrices
+from fe_import.solver.sparse import modes_below
 
 
 def value(model_health: object, start: str) -> float:

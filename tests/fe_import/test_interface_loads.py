@@ -8,8 +8,8 @@ import msgspec
 import numpy as np
 
 from benchmarks.interface_loads import Case, errors, first_frequency, frame_case, full_history, oscillations, peaks
-from fe_import.build.model import build_model
-from fe_import.link import LinkFile
+from fe_import.description.link import LinkFile
+from fe_import.models.model import build_model
 
 STRESS = 2
 

@@ -24,11 +24,11 @@ from link_files import (
     write_toml,
 )
 
-from fe_import.build.model import build_model
+from fe_import.description.link import Reduction, load_link
 from fe_import.errors import FEImportError
-from fe_import.inertia import MassProperties, mass_properties
-from fe_import.link import Reduction, load_link
+from fe_import.modal.inertia import MassProperties, mass_properties
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 
 ONLY_CONSTRAINT = {"method": "craig-bampton", "fixed_interface_modes": 0}

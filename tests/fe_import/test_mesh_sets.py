@@ -11,11 +11,11 @@ import pytest
 from link_files import solid_link
 from solid_meshes import box
 
-from fe_import.build.model import build_model
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.read import read_mesh
 from fe_import.mesh.solid_mesh import SolidMesh
+from fe_import.models.model import build_model
 
 TYPES = sorted(SOLID_ELEMENTS)
 ABAQUS = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8R", "hex20": "C3D20"}

@@ -15,7 +15,7 @@ import pytest
 from modal_models import same, synthetic_model
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.hdf5.files import open_for_reading, write_atomically
+from fe_import.files.hdf5.files import open_for_reading, write_atomically
 from fe_import.modal.file import (
     ModalModel,
     read_modal_file,

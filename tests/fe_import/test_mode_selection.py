@@ -17,18 +17,18 @@ from link_table import HAND, HUB, LINKS, held_flexibility, modal_flexibility, no
 
 import fe_import.reduction.effective_mass
 import fe_import.reduction.selection
-from fe_import.build.model import build_model
+from fe_import.description.link import load_link
+from fe_import.description.reduction import COMPONENTS, SELECTIONS, Ranking
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import load_link
-from fe_import.link_reduction import COMPONENTS, SELECTIONS, Ranking
 from fe_import.modal.file import ModalModel
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model
 from fe_import.reduction import REDUCTIONS
 from fe_import.reduction.effective_mass import carried_shares
 from fe_import.reduction.fixed_interface import constraint_modes, partition
 from fe_import.reduction.ranking import best_ranked
-from fe_import.sparse import lowest_modes
+from fe_import.solver.sparse import lowest_modes
 
 ACCEPTED = {
     "craig-bampton": set(SELECTIONS),

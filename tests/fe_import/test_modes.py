@@ -13,14 +13,14 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from link_files import Array, dense, frame_link, free_frequencies, merged, solid_link, straight_link
 
-import fe_import.sparse
-from fe_import.build.model import build_model
+import fe_import.solver.sparse
+from fe_import.description.link import Damping, Rayleigh
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import Damping, Rayleigh
-from fe_import.modes import damping_ratios
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model
+from fe_import.reduction.modes import damping_ratios
 from fe_import.solver.lanczos import NotConverged
-from fe_import.sparse import dense_modes, factorize, lowest_modes, polishing
+from fe_import.solver.sparse import dense_modes, factorize, lowest_modes, polishing
 
 OPTIONS: list[dict[str, Any]] = [
     {},
@@ -195,13 +195,13 @@ def test_lowest_modes_find_both_of_a_pair(count: int) -> None:
 def test_a_missed_mode_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lanczos that returns one member of the second pair only: Sylvester's count tells."""
     stiffness, mass = chain(400)
-    true = fe_import.sparse.lowest_eigenpairs
+    true = fe_import.solver.sparse.lowest_eigenpairs
 
     def lazy(solve: Any, mass: sp.csc_array, count: int) -> tuple[Array, Array]:
         mu, modes = true(solve, mass, count + 1)
         return np.delete(mu, 2), np.delete(modes, 2, axis=1)
 
-    monkeypatch.setattr(fe_import.sparse, "lowest_eigenpairs", lazy)
+    monkeypatch.setattr(fe_import.solver.sparse, "lowest_eigenpairs", lazy)
     with pytest.raises(FEImportError, match="were missed") as caught:
         lowest_modes(stiffness, mass, 9, "chain")
     assert caught.value.cause is Cause.EIGENSOLVER
@@ -212,7 +212,7 @@ def test_a_missed_mode_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_wrong_mode_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Eigenpairs that do not satisfy the equation, and a solver that gives up."""
     stiffness, mass = chain(400)
-    true = fe_import.sparse.lowest_eigenpairs
+    true = fe_import.solver.sparse.lowest_eigenpairs
 
     def sloppy(*arguments: Any) -> tuple[Array, Array]:
         mu, modes = true(*arguments)
@@ -222,7 +222,7 @@ def test_a_wrong_mode_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
         raise NotConverged
 
     for broken, words in ((sloppy, "did not converge"), (failing, "modes of the chain")):
-        monkeypatch.setattr(fe_import.sparse, "lowest_eigenpairs", broken)
+        monkeypatch.setattr(fe_import.solver.sparse, "lowest_eigenpairs", broken)
         with pytest.raises(FEImportError, match=words) as caught:
             lowest_modes(stiffness, mass, 9, "chain")
         assert caught.value.cause is Cause.EIGENSOLVER

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from link_files import frame_link, solid_link, write_box
 
+from fe_import.description.link import Material, load_link
 from fe_import.errors import Cause, FEImportError
 from fe_import.health.plausibility import plausible_link, plausible_materials
-from fe_import.link import Material, load_link
 from fe_import.mesh.read import read_mesh
 from fe_import.modal.model import HealthCheck
 from fe_import.reduce import reduce_link

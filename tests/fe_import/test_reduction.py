@@ -25,14 +25,14 @@ from link_files import (
     straight_link,
 )
 
-from fe_import.build.model import build_model
+from fe_import.description.link import LinkFile, load_link
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import LinkFile, load_link
 from fe_import.modal.file import ModalModel, read_modal_file, write_modal_file
 from fe_import.model import FEModel
-from fe_import.modes import reduced_matrices
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model
 from fe_import.reduction import REDUCTIONS
+from fe_import.reduction.modes import reduced_matrices
 
 MASSES = pytest.mark.parametrize("mass", ["consistent", "lumped"])
 COMPLETE = set(REDUCTIONS) - {"guyan"}  # keeps no inner motion of its own

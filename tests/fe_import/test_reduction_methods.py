@@ -15,13 +15,13 @@ import scipy.linalg as la
 from link_files import Array, dense, frame_link, free_frequencies, straight_link
 from link_table import LINKS, every_mode, held_flexibility, modal_flexibility, nodal_fields, relative
 
-import fe_import.sparse
-from fe_import.build.model import build_model
+import fe_import.solver.sparse
+from fe_import.description.link import load_link
+from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import load_link
-from fe_import.link_reduction import Reduction
 from fe_import.modal.file import ModalModel, read_modal_file, write_modal_file
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model
 from fe_import.reduction import REDUCTIONS
 from fe_import.reduction.free_body import free_body
@@ -156,13 +156,13 @@ def test_both_of_every_pair(tmp_path: Path, elements: int) -> None:
 def test_a_missed_mode_of_a_free_link_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A solver that loses the second of the first pair: seven are found below where the full model has eight."""
     body = free_body(build_model(straight_link(tmp_path, 1.0, 110)), "l")
-    true = fe_import.sparse.lowest_eigenpairs
+    true = fe_import.solver.sparse.lowest_eigenpairs
 
     def lazy(*arguments: Any) -> tuple[Array, Array]:
         mu, modes = true(*arguments)
         return np.delete(mu, 1), np.delete(modes, 1, axis=1)
 
-    monkeypatch.setattr(fe_import.sparse, "lowest_eigenpairs", lazy)
+    monkeypatch.setattr(fe_import.solver.sparse, "lowest_eigenpairs", lazy)
     with pytest.raises(FEImportError, match="modes of the free link were missed") as caught:
         body.modes(12)
     assert caught.value.cause is Cause.EIGENSOLVER

@@ -13,12 +13,12 @@ from link_files import Array, frame_link, solid_link, straight_link
 from modal_models import same
 from scipy.spatial.transform import Rotation
 
-from fe_import.build.model import build_model
+from fe_import.description.link import LinkFile
 from fe_import.elements.solid_stress import SolidStress
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import LinkFile
 from fe_import.modal.file import ModalModel, read_modal_file, validate, write_modal_file
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 from fe_import.second_order.beams import POINTS, line_fields
 from fe_import.second_order.composition import twice_turned

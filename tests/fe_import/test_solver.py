@@ -19,14 +19,14 @@ import scipy.sparse.linalg as spla
 from solid_meshes import box
 
 import fe_import.solver
-import fe_import.sparse
+import fe_import.solver.sparse
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.errors import Cause, FEImportError
 from fe_import.reduce import reduce_link, reduction_summary
 from fe_import.solver import SOLVERS, SingularMatrix, analyse, memory, multifrontal, watch
 from fe_import.solver.dense import dense_modes
 from fe_import.solver.lanczos import block_size
-from fe_import.sparse import factorize, lowest_modes, modes_below
+from fe_import.solver.sparse import factorize, lowest_modes, modes_below
 
 STEEL = SolidMaterial(2.1e11, 0.3, 7850.0)
 INSTALLED = [s.name for s in SOLVERS.values() if not s.package or importlib.util.find_spec("sksparse")]
@@ -330,7 +330,7 @@ def test_too_large_jobs_are_refused_before_they_start(job: str, monkeypatch: pyt
     unstarted = replace(SOLVERS["multifrontal"], factorize=lambda *_: pytest.fail("started"))
     monkeypatch.setitem(SOLVERS, "multifrontal", unstarted)
     for name in ("negative_pivots", "lowest_eigenpairs", "dense_modes"):
-        monkeypatch.setattr(fe_import.sparse, name, lambda *_: pytest.fail("started"))
+        monkeypatch.setattr(fe_import.solver.sparse, name, lambda *_: pytest.fail("started"))
     jobs = {
         "factorize": lambda: factorize(model.stiffness, "cube", model.positions),
         "modes": lambda: lowest_modes(model.stiffness, model.mass, 4, "cube", positions=model.positions),
@@ -353,13 +353,13 @@ def test_too_large_jobs_are_refused_before_they_start(job: str, monkeypatch: pyt
 def test_an_untrusted_count_is_taken_elsewhere(wrong: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A second shift is tried where the first met a small pivot, and the modes are judged there."""
     model = clamped(*MESHES["beam of tet10"])
-    count, shifts = fe_import.sparse.modes_below, []
+    count, shifts = fe_import.solver.sparse.modes_below, []
 
     def doubtful(stiffness: sp.csc_array, mass: sp.csc_array, shift: float, **options: Any) -> int | None:
         shifts.append(shift)
         return None if len(shifts) == 1 else count(stiffness, mass, shift, **options) + wrong
 
-    monkeypatch.setattr(fe_import.sparse, "modes_below", doubtful)
+    monkeypatch.setattr(fe_import.solver.sparse, "modes_below", doubtful)
     with pytest.raises(FEImportError, match="were missed") if wrong else contextlib.nullcontext():
         lowest_modes(model.stiffness, model.mass, 10, "beam", positions=model.positions)
     assert len(set(shifts)) == 2
@@ -400,7 +400,7 @@ def test_available_memory_is_the_smallest_limit(tmp_path: Path, monkeypatch: pyt
 def test_long_jobs_are_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Size and time before, percentages on the way; nothing to anyone else."""
     model = clamped(*MESHES["cube of hex20"])
-    monkeypatch.setattr(fe_import.sparse, "_ANNOUNCED", 0.0)
+    monkeypatch.setattr(fe_import.solver.sparse, "_ANNOUNCED", 0.0)
     monkeypatch.setattr(watch, "_INTERVAL", 0.0)
     heard: list[str] = []
     with watch.telling(heard.append), watch.telling(None):
@@ -420,7 +420,7 @@ def test_long_jobs_are_announced(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_reduction_says_so_at_the_door(monkeypatch: pytest.MonkeyPatch) -> None:
     """Through `reduce_link`: the solver in the provenance, messages to the caller, refusal of what does not fit."""
     link = Path(__file__).parents[2] / "data/l_shape/links/solid.toml"
-    monkeypatch.setattr(fe_import.sparse, "_ANNOUNCED", 0.0)
+    monkeypatch.setattr(fe_import.solver.sparse, "_ANNOUNCED", 0.0)
     heard: list[str] = []
     model = reduce_link(link, heard.append)
     assert model.provenance["solver"] == reduction_summary(model)["solver"] == "multifrontal"

@@ -11,11 +11,11 @@ import scipy.linalg as la
 from link_files import SOLID, Array, boundary, dense, frame_link, interface_shapes, straight_link
 from link_table import LINKS, held_flexibility, modal_flexibility, nodal_fields, relative
 
-from fe_import.build.model import build_model
+from fe_import.description.link import LinkFile
 from fe_import.errors import Cause, FEImportError
-from fe_import.link import LinkFile
 from fe_import.modal.file import ModalModel, read_modal_file, write_modal_file
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model
 from fe_import.reduction.free_body import free_body
 

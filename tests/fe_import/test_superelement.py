@@ -13,11 +13,11 @@ from link_files import frame_link, solid_link, write_toml
 from superelements import Reduced, condensed, description, frame_model, punch
 
 import erls
-from fe_import.build.model import build_model
+from fe_import.description.link import LinkFile, load_link
 from fe_import.health.rotation_terms import rotation_departure
-from fe_import.link import LinkFile, load_link
 from fe_import.modal.file import read_modal_file, write_modal_file
 from fe_import.modal.model import ModalModel
+from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 
 ROOT = Path(__file__).parents[2]

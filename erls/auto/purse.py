@@ -1,0 +1,91 @@
+"""Whether deciding what to leave out pays: estimated times, by counting (`erls.auto.cost`)."""
+
+from __future__ import annotations
+
+from erls.auto import certify, probe
+from erls.auto.cost import (
+    CALM,
+    FIXED,
+    FOLLOWING,
+    ITERATIONS,
+    PREPARE,
+    STATE,
+    Cost,
+    cost_of,
+    count_steps,
+    effort_cost,
+    forced_cost,
+)
+from erls.auto.static import may_follow
+from erls.equations.formulation import Formulation
+from erls.equations.registry import formulate
+from erls.mechanism.chain import Mechanism
+from erls.scene.chain import Scene
+
+_IN_VAIN = 0.08  # of the run: what looks may cost that find nothing to leave out
+_FOLLOWED = 4  # iterations of a step of the certificate
+
+
+class Purse:
+    """Estimated times [s]: of the run, of what was spent on looks, and what they won."""
+
+    def __init__(self, scene: Scene, formulation: Formulation) -> None:
+        self.settings, self.mechanism = scene.record.simulation, formulation.mechanism
+        self.cost = cost_of(formulation)
+        self.steps = count_steps(scene, self.mechanism)
+        self.forced = may_follow(self.mechanism, self.settings)
+        self.effort = effort_cost(formulation)
+        self.spent = self.won = 0.0
+        self.followed = certify.FEWEST
+        self.set_calm(self.forced)
+
+    def set_calm(self, calm: bool) -> None:
+        """Whether steps need few iterations."""
+        fixed = self.settings.integrator == "generalized_alpha"  # others are counted as they are
+        self.iterations = CALM if calm and fixed else ITERATIONS
+
+    @property
+    def may_pay(self) -> bool:
+        """Whether the shortest decision costs less than the run."""
+        if self.forced:
+            vain = self.amplitudes > _IN_VAIN * (self.run + FIXED)
+            return not vain and self.certificate + self.amplitudes < self.run - FOLLOWING * self.cost.links
+        shortest = self.look(self.cost, probe.FEWEST) + self.comparison
+        return self.affords(shortest) and self.certificate + shortest < self.run
+
+    @property
+    def run(self) -> float:
+        """With all effects."""
+        return self.steps * self.cost.step(self.iterations)
+
+    @property
+    def certificate(self) -> float:
+        """Of what was left out."""
+        places = 2 * (certify.PLACES * STATE + certify.EFFORTS * self.effort + PREPARE)
+        step = _FOLLOWED * self.cost.iteration + self.cost.evaluation
+        return self.followed * step + places * self.cost.links + self.amplitudes
+
+    @property
+    def amplitudes(self) -> float:
+        """Of what prescribed motions set off."""
+        return forced_cost(self.cost) if self.forced else 0.0
+
+    def look(self, cost: Cost, count: int) -> float:
+        """One coarse run."""
+        return count * cost.coarse_step + PREPARE * cost.links
+
+    @property
+    def comparison(self) -> float:
+        """Of two coarse runs."""
+        return 2 * (probe.PLACES * STATE + probe.EFFORTS * self.effort) * self.cost.links
+
+    def affords(self, price: float) -> bool:
+        """Whether looks may cost so much more, when this one finds nothing to leave out."""
+        return self.spent + price <= _IN_VAIN * self.run + self.won / 2
+
+    def saved(self, less: Mechanism) -> float:
+        """By the mechanism without what was chosen."""
+        if less.bandwidth is not None:
+            return self.run - FOLLOWING * self.cost.links
+        cost = cost_of(formulate(less, self.settings))
+        return self.run - self.steps * cost.step(self.iterations)

@@ -1,0 +1,109 @@
+"""What a compiled system offers: M(y, t) a = f(t, y, v) as functions on arrays, for integrators that are compiled too.
+
+All constants of a system lie in two arrays, ``reals`` and ``integers``, laid out as its author likes; ``scratch`` is
+memory that its functions may use within a call. Coordinates and norms are those of
+`erls.integrate.base.SecondOrderSystem`, of which this is the compiled form:
+
+    residual(reals, integers, scratch, t, y, v, a, out)              out (n,)   = M a - f
+    mass_matrix(reals, integers, scratch, t, y, out)                 out (n, n) = M
+    stiffness_and_damping(reals, integers, scratch, t, y, v, k, c)   k, c (n, n): stiff parts of -∂f/∂y and -∂f/∂v
+    acceleration(reals, integers, scratch, t, y, v, out) -> status   out (n,) = M⁻¹ f; status 0, or 1 + the number of a
+                                                                     coordinate whose motion nothing resists
+
+A system may know better than dense factors how to solve (M + α C + β K) x = b with its mass, damping and stiffness at a
+state; α and β are real or complex, like ``factors`` and ``b``:
+
+    factor(reals, integers, scratch, t, y, v, α, β, factors) -> status
+    solve(reals, integers, factors, b)                               b (n,) becomes x
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from erls.maths.jit import ENABLED
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+REALS: Any
+INTEGERS: Any
+MATRIX: Any
+RESIDUAL: Any
+MASS_MATRIX: Any
+STIFFNESS_AND_DAMPING: Any
+ACCELERATION: Any
+COMPLEX: Any
+FACTOR: Any
+SOLVE: Any
+FACTOR_COMPLEX: Any
+SOLVE_COMPLEX: Any
+if ENABLED:
+    from numba import types as _t
+
+    REALS, INTEGERS, MATRIX = _t.float64[::1], _t.int64[::1], _t.float64[:, ::1]
+    _constants = (REALS, INTEGERS, REALS, _t.float64)
+    RESIDUAL = _t.void(*_constants, REALS, REALS, REALS, REALS)
+    MASS_MATRIX = _t.void(*_constants, REALS, MATRIX)
+    STIFFNESS_AND_DAMPING = _t.void(*_constants, REALS, REALS, MATRIX, MATRIX)
+    ACCELERATION = _t.int64(*_constants, REALS, REALS, REALS)
+    COMPLEX = _t.complex128[::1]
+    FACTOR = _t.int64(*_constants, REALS, REALS, _t.float64, _t.float64, REALS)
+    SOLVE = _t.void(REALS, INTEGERS, REALS, REALS)
+    FACTOR_COMPLEX = _t.int64(*_constants, REALS, REALS, _t.complex128, _t.complex128, COMPLEX)
+    SOLVE_COMPLEX = _t.void(REALS, INTEGERS, COMPLEX, COMPLEX)
+else:
+    REALS = INTEGERS = MATRIX = RESIDUAL = MASS_MATRIX = STIFFNESS_AND_DAMPING = ACCELERATION = None
+    COMPLEX = FACTOR = SOLVE = FACTOR_COMPLEX = SOLVE_COMPLEX = None
+
+
+def pointer(signature: Any) -> Any:
+    """Type of an argument that is a function of this signature."""
+    if not ENABLED:
+        return None
+    from numba import types
+
+    return types.FunctionType(signature)
+
+
+@dataclass(frozen=True)
+class Factoring:
+    """How a system solves with its iteration matrices; ``size`` is that of ``factors``, which start as zeros."""
+
+    size: int
+    factor: Callable[..., int]
+    solve: Callable[..., None]
+    factor_complex: Callable[..., int]
+    solve_complex: Callable[..., None]
+
+
+@dataclass(frozen=True)
+class CompiledSystem:
+    """A system in compiled form; see the module's docstring for the functions."""
+
+    size: int
+    reals: Array
+    integers: IntArray
+    scratch: Array
+    residual: Callable[..., None]
+    mass_matrix: Callable[..., None]
+    stiffness_and_damping: Callable[..., None]
+    load_acceleration: Callable[[], Callable[..., int]]
+    factoring: Factoring | None = field(default=None, kw_only=True)
+
+    @cached_property
+    def acceleration(self) -> Callable[..., int]:
+        """Compiled when it is asked for: implicit integrators do without."""
+        return self.load_acceleration()
+
+
+def acceleration_in(module: str) -> Callable[[], Callable[..., int]]:
+    """What loads ``acceleration`` from a module of kernels."""
+    return lambda: getattr(import_module(module), "acceleration")  # noqa: B009

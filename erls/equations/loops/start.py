@@ -1,0 +1,164 @@
+"""Where a chain with loops begins: the undeformed links put together, and rates that keep them so.
+
+Joints next to the ground keep their coordinates and rates, as far as that leaves the others free to follow; driven
+joints keep them before all others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from erls.equations.loops.rows import Closure
+from erls.errors import Cause, SimulationError
+from erls.maths.so3 import Array
+from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.equations.loops.closed_chain import ClosedChain
+
+_CLOSED = 1e-11  # of the size of the mechanism
+_DEPENDENT = 1e-6  # share of a joint's motion that others cannot make up for: below, it does not decide anything
+_NUDGES = (0.0, 0.1, -0.1)  # rad or reaches, to leave singular guesses (links in line)
+_ALTERNATE = 0.6180339887498949  # no two joints are nudged alike
+
+
+@dataclass(frozen=True)
+class Start:
+    """A closed configuration.
+
+    Attributes
+    ----------
+    y : (n,) array
+        Links undeformed.
+    held, following : int arrays
+        Free joints, by their place in y, that keep their initial coordinates, and those that close the loops.
+    """
+
+    y: Array
+    held: IntArray
+    following: IntArray
+
+
+def find_start(chain: ClosedChain) -> Start:
+    """Close the loops on the undeformed chain.
+
+    Raises
+    ------
+    SimulationError
+        LOOP_OPEN: the links do not reach; names the loop and says how far it is from closing.
+    """
+    count = len(chain.tree.free_joints)
+    given = np.zeros(chain.size)
+    given[:count] = [chain.mechanism.joints[k].position for k in chain.tree.free_joints]
+    every = np.arange(count)
+    best: tuple[float, str] = (np.inf, "")
+    for some in (True, False):
+        for nudge in _NUDGES:
+            guess = given.copy()
+            guess[:count] += _nudges(chain, nudge)
+            moving = _following(chain, _joint_rows(chain, guess + _spread(chain))) if some else every
+            if some:
+                guess[np.setdiff1d(every, moving)] = given[np.setdiff1d(every, moving)]
+            y = _closed(chain, guess, moving)
+            found = chain.closure(0.0, y, np.zeros(chain.size))
+            gap, where = _gap(chain, found)
+            if gap <= _CLOSED * chain.reach:
+                following = _following(chain, _joint_rows(chain, y))
+                return Start(y, np.setdiff1d(every, following), following)
+            if gap < best[0]:
+                best = (gap, where)
+    raise SimulationError(
+        Cause.LOOP_OPEN,
+        f"the links do not reach: {best[1]} stays open",
+        where="loops",
+        value=f"{best[0]:.3g} m",
+        limit=f"{_CLOSED * chain.reach:.3g} m",
+        remedy="check lengths, position and axis of the loop, and start nearer to a closed position: "
+        "joints.initial.position",
+    )
+
+
+def start_velocity(chain: ClosedChain, y: Array) -> Array:
+    """(n,) given rates, joints that follow adapted, elastic coordinates as little as may be."""
+    v = np.zeros(chain.size)
+    joints = chain.tree.free_joints
+    v[: len(joints)] = [chain.mechanism.joints[k].rate for k in joints]
+    following = chain.start.following
+    found = chain.closure(0.0, y, v)
+    rows = _joint_rows(chain, y)[:, following]
+    v[following] -= np.linalg.lstsq(rows, chain.row_metres * found.rate, rcond=_DEPENDENT)[0] / chain.metres[following]
+    return chain.closed(0.0, y, v)[1]
+
+
+def _nudges(chain: ClosedChain, size: float) -> Array:
+    joints = [chain.mechanism.joints[k] for k in chain.tree.free_joints]
+    unit = np.array([1.0 if joint.type.revolute else chain.reach for joint in joints])
+    return np.asarray(size * unit * np.cos(2 * np.pi * _ALTERNATE * np.arange(len(unit))))
+
+
+def _spread(chain: ClosedChain) -> Array:
+    """(n,) a displacement to a general position, where joints depend on each other only if they always do."""
+    result = np.zeros(chain.size)
+    result[: len(chain.tree.free_joints)] = _nudges(chain, 0.05)
+    return result
+
+
+def _joint_rows(chain: ClosedChain, y: Array) -> Array:
+    """(m, joints) conditions over the free joints, in metres per metre."""
+    found = chain.closure(0.0, y, np.zeros(chain.size))
+    rows = chain.scaled_rows(found, np.arange(len(chain.row_metres)))
+    return np.asarray(rows[:, : len(chain.tree.free_joints)])
+
+
+def _following(chain: ClosedChain, rows: Array) -> IntArray:
+    """Joints whose motion decides that of the loops: from the outer end inward, free ones first."""
+    joints = [chain.mechanism.joints[k] for k in chain.tree.free_joints]
+    order = sorted(range(len(joints)), key=lambda k: (joints[k].drive.kind != "free", -k))
+    basis = np.zeros((len(rows), 0))
+    result: list[int] = []
+    for k in order:
+        rest = rows[:, k]
+        for _ in range(2):  # once more against rounding
+            rest = rest - basis @ (basis.T @ rest)
+        size = float(np.linalg.norm(rest))
+        if size > _DEPENDENT:
+            basis = np.column_stack([basis, rest / size])
+            result.append(k)
+    return np.array(sorted(result), dtype=np.int64)
+
+
+def _gap(chain: ClosedChain, found: Closure) -> tuple[float, str]:
+    """Largest opening [m] and its name; a joint that is back to front is open by the size of the mechanism."""
+    wrong = chain.rows.upside_down(found)
+    if wrong:
+        return chain.reach, f"loop {wrong[0]!r} (back to front)"
+    gaps = np.abs(chain.openings(found))
+    return float(gaps.max()), chain.rows.names[int(gaps.argmax())]
+
+
+def _closed(chain: ClosedChain, guess: Array, moving: IntArray) -> Array:
+    """(n,) the joints ``moving`` turned until the loops are closed as well as may be."""
+    from scipy.optimize import least_squares  # here: slow to import
+
+    if not len(moving):
+        return guess
+    y, still = guess.copy(), np.zeros(chain.size)
+    unit = chain.metres[moving]
+
+    def gaps(x: Array) -> Array:
+        y[moving] = x / unit
+        return chain.openings(chain.closure(0.0, y, still))
+
+    def slope(x: Array) -> Array:
+        y[moving] = x / unit
+        return _joint_rows(chain, y)[:, moving]
+
+    tolerances = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
+    x = least_squares(gaps, guess[moving] * unit, slope, max_nfev=100, **tolerances).x
+    for _ in range(3):  # to rounding
+        x = x - np.linalg.lstsq(slope(x), gaps(x), rcond=1e-9)[0]
+    y[moving] = x / unit
+    return y

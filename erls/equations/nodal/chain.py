@@ -1,0 +1,205 @@
+"""A chain of links as one system of nodes, elements and joints, at its initial joint coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from erls.equations.nodal.actuators import Actuator, Actuators, Turned
+from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.nodal.beam import Beams
+from erls.equations.nodal.elements import Elements
+from erls.equations.nodal.joints import GROUND, Joint, Motion
+from erls.equations.nodal.parts import LinkParts, node_at
+from erls.equations.nodal.rigid_body import RigidBodies
+from erls.maths import motion_maps as motions
+from erls.maths.se3 import inverse, pose
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.chain import poses as link_poses
+from erls.mechanism.rigid_dynamics import inverse_dynamics
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where a joint sits: nodes (`GROUND` for the ground) and the pose of its frames there."""
+
+    inner: int
+    outer: int
+    inner_frame: Array
+    outer_frame: Array
+
+
+class ChainSystem(NodalSystem):
+    """A `NodalSystem` that keeps the joint coordinates beside the frames.
+
+    Parameters
+    ----------
+    poses : (k, 4, 4) array
+    elements : sequence of Elements
+        Those that are no actuators.
+    actuators : sequence of Actuators
+        Together in the order of the joints.
+    joints : sequence of Joint
+    """
+
+    def __init__(
+        self, poses: Array, elements: Sequence[Elements], actuators: Sequence[Actuators], joints: Sequence[Joint]
+    ) -> None:
+        self.actuators = tuple(actuators)
+        super().__init__(poses, [*elements, *actuators], joints)
+
+    def joint_motion(self, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """(joints,) coordinates, rates and accelerations."""
+        found = []
+        v, a = v.reshape(-1, 6), a.reshape(-1, 6)
+        for group, turned in zip(self.actuators, q.memory[-len(self.actuators) :], strict=True):
+            ends = (x[group.nodes].reshape(len(group.nodes), -1) for x in (v, a))
+            found.append((turned.angles, *group.motion(q.poses[group.nodes], turned, *ends)))
+        first, second, third = (np.concatenate(x) for x in zip(*found, strict=True))
+        return first, second, third
+
+    def stored(self, t: float, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """(12 k + joints,) frames, then joint coordinates, with first and second derivatives."""
+        frames, joints = super().stored(t, q, v, a), self.joint_motion(q, v, a)
+        first, second, third = (np.concatenate(pair) for pair in zip(frames, joints, strict=True))
+        return first, second, third
+
+    def from_stored(self, y: Array, v: Array) -> tuple[Nodes, Array]:
+        """Configuration and velocity from what `stored` gives, interpolated or not; rotations made orthogonal."""
+        place, rate = (x[: 12 * self.count].reshape(-1, 12) for x in (y, v))
+        left, _, right = np.linalg.svd(place[:, 3:].reshape(-1, 3, 3))
+        turn = left @ right
+        back = np.swapaxes(turn, 1, 2)
+        spin = back @ rate[:, 3:].reshape(-1, 3, 3)
+        twist = np.empty((self.count, 6))
+        twist[:, :3] = (back @ rate[:, :3, None])[:, :, 0]
+        twist[:, 3:] = (spin - np.swapaxes(spin, 1, 2))[:, [2, 0, 1], [1, 2, 0]] / 2
+        ends = np.cumsum([0, *(len(g.joints) for g in self.actuators)]) + 12 * self.count
+        built = self.start.memory[-len(self.actuators) :]
+        angles = [Turned(y[a:b], m.rows) for (a, b), m in zip(pairwise(ends), built, strict=True)]
+        near = replace(self.start, memory=(*self.start.memory[: -len(angles)], *angles))
+        return self.at(motions.poses(turn, place[:, :3]), near), twist.ravel()
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The system with what belongs to links and joints.
+
+    Attributes
+    ----------
+    system : ChainSystem
+    beams : Beams or None
+    nodes : tuple of slice
+        Of each link.
+    elements : tuple of int
+        First beam element of each link.
+    seats : tuple of Seat
+    """
+
+    system: ChainSystem
+    beams: Beams | None
+    nodes: tuple[slice, ...]
+    elements: tuple[int, ...]
+    seats: tuple[Seat, ...]
+
+    def held(self, coordinates: Array) -> NodalSystem:
+        """The same nodes and links, with all joints held and nothing acting in them."""
+        joints = [
+            replace(joint, motion=_constant(float(c)), breakpoints=())
+            for joint, c in zip(self.system.rows.joints, coordinates, strict=True)
+        ]
+        passive = self.system.elements[: -len(self.system.actuators)]
+        return NodalSystem(self.system.start.poses, passive, joints)
+
+
+def build_chain(mechanism: Mechanism, links: Sequence[LinkParts]) -> Chain:
+    """Number nodes and elements link by link, and place them at the initial joint coordinates."""
+    frames = link_poses(mechanism, np.array([j.position for j in mechanism.joints]))
+    ends = np.cumsum([0, *(len(part.nodes) for part in links)]).tolist()
+    nodes = tuple(slice(a, b) for a, b in pairwise(ends))
+    poses = np.concatenate(
+        [[frame @ pose(position=x) for x in part.nodes] for frame, part in zip(frames, links, strict=True)]
+    )
+    beams = [
+        replace(b, nodes=(first + b.nodes[0], first + b.nodes[1]), frames=frame @ b.frames)
+        for frame, part, first in zip(frames, links, ends[:-1], strict=True)
+        for b in part.beams
+    ]
+    bodies = [
+        replace(b, node=first + b.node) for part, first in zip(links, ends[:-1], strict=True) for b in part.bodies
+    ]
+    passive: list[Elements] = []
+    elastic = Beams(beams, poses, mechanism.gravity) if beams else None
+    if elastic is not None:
+        passive.append(elastic)
+    if bodies:
+        passive.append(RigidBodies(bodies, mechanism.gravity))
+    seats = _seats(mechanism, links, ends)
+    system = ChainSystem(poses, passive, _actuators(mechanism, seats), _joints(mechanism, seats))
+    firsts = np.cumsum([0, *(len(part.beams) for part in links)])[:-1].tolist()
+    return Chain(system, elastic, nodes, tuple(firsts), seats)
+
+
+def _seats(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int]) -> tuple[Seat, ...]:
+    result = []
+    for k, (joint, link) in enumerate(zip(mechanism.joints, mechanism.links, strict=True)):
+        outer = node_at(links[k], link.inboard.node, f"link {link.name!r}")
+        place = links[k].nodes[outer]
+        inner, before = GROUND, joint.before
+        carrier = mechanism.links[k - 1].outboard if k else None
+        if carrier is not None:
+            node = node_at(links[k - 1], carrier.node, f"link {mechanism.links[k - 1].name!r}")
+            inner, before = firsts[k - 1] + node, pose(position=-links[k - 1].nodes[node]) @ joint.before
+        after = pose(position=-place) @ inverse(joint.after)
+        result.append(Seat(inner, firsts[k] + outer, before, after))
+    return tuple(result)
+
+
+def _joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
+    result = []
+    for joint, seat in zip(mechanism.joints, seats, strict=True):
+        motion: Motion | None = None
+        if joint.drive.prescribed:
+            motion = joint.drive.reference  # type: ignore[assignment]
+        kind = "revolute" if joint.type.revolute else "prismatic"
+        ends = seat.inner, seat.outer, seat.inner_frame, seat.outer_frame
+        result.append(Joint(joint.name, kind, *ends, motion, joint.drive.breakpoints if motion else ()))
+    return result
+
+
+def _actuators(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Actuators]:
+    """That of the first joint, which stands on the ground, then the others."""
+    lead = _FeedForward(mechanism)
+    found = []
+    for k, (joint, seat) in enumerate(zip(mechanism.joints, seats, strict=True)):
+        nodes = (seat.outer,) if seat.inner == GROUND else (seat.inner, seat.outer)
+        found.append(Actuator(joint, nodes, seat.inner_frame, seat.outer_frame, lead.of(k)))
+    return [Actuators(group) for group in (found[:1], found[1:]) if group]
+
+
+class _FeedForward:
+    """What the rigid chain needs for the wanted motions; joints without one are held where they begin."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        self._known: tuple[float, Array] = (np.nan, np.zeros(0))
+
+    def of(self, k: int) -> Callable[[float], float]:
+        """Torque of joint ``k`` over time."""
+        if not self._mechanism.joints[k].drive.feed_forward:
+            return lambda t: 0.0
+        return lambda t: float(self._at(t)[k])
+
+    def _at(self, t: float) -> Array:
+        if self._known[0] != t:
+            wanted = np.array([j.drive.reference(t) or (j.position, 0.0, 0.0) for j in self._mechanism.joints])
+            self._known = (t, inverse_dynamics(self._mechanism, *wanted.T))
+        return self._known[1]
+
+
+def _constant(coordinate: float) -> Motion:
+    return lambda t: (coordinate, 0.0, 0.0)

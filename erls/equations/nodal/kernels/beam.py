@@ -1,0 +1,254 @@
+"""Geometrically exact beams on SE(3): the formulas of `erls.equations.nodal.beam`, element by element."""
+
+from __future__ import annotations
+
+import math
+
+from erls.equations.compiled_system import Array
+from erls.equations.nodal.kernels.contract import Model, Work
+from erls.equations.nodal.kernels.motions import (
+    bracket,
+    change,
+    change_transposed,
+    cobracket,
+    pair_minus,
+    pair_plus,
+    pair_scaled,
+    series,
+    series_transposed,
+    transformed,
+    transposed,
+)
+from erls.equations.nodal.kernels.rotations import (
+    Three,
+    exponential,
+    inverse_coefficient,
+    logarithm_near,
+    stumpff,
+    tangent_coefficients,
+    value,
+)
+from erls.equations.nodal.kernels.vectors import (
+    Rotation,
+    Twist,
+    Vector,
+    add,
+    back_product,
+    cross,
+    dot,
+    minus,
+    nine,
+    of_matrix,
+    plus,
+    product,
+    scaled,
+    times,
+    turned,
+    unit,
+    vector,
+)
+from erls.maths.jit import inlined, part
+
+_POINTS = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))  # of Gauss's rule on a length of one
+_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+_HALF = (0.5, 0.0, 0.0)
+_NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@inlined
+def _section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rotation]:
+    """Frame of the section at an end in the world."""
+    node = model.beam_nodes[e, side]
+    turn = nine(poses, node, 3)
+    place = plus(vector(poses, node, 0), times(turn, vector(model.beam_frames, e, 12 * side)))
+    return place, product(turn, nine(model.beam_frames, e, 12 * side + 3))
+
+
+@inlined
+def bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple[Vector, Vector]:
+    """d of element e near that in ``before``; also written into ``out``."""
+    place, turn = _section(model, poses, e, 0)
+    end, end_turn = _section(model, poses, e, 1)
+    psi = logarithm_near(back_product(turn, end_turn), vector(before, e, 3))
+    u = value(-0.5, inverse_coefficient(dot(psi, psi))[0], psi, turned(turn, minus(end, place)))
+    out[e, 0], out[e, 1], out[e, 2] = u
+    out[e, 3], out[e, 4], out[e, 5] = psi
+    return u, psi
+
+
+@inlined
+def _inward(model: Model, e: int, side: int, force: Twist) -> Twist:
+    """Wrench on a section as one on its node."""
+    frames = model.beam_frames
+    return transposed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), force[0], force[1])
+
+
+@inlined
+def _outward(model: Model, e: int, side: int, table: Array) -> Twist:
+    """Twist of a section from those of the nodes."""
+    at, frames = 6 * model.beam_nodes[e, side], model.beam_frames
+    v, w = (table[at], table[at + 1], table[at + 2]), (table[at + 3], table[at + 4], table[at + 5])
+    return transformed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), v, w)
+
+
+@inlined
+def _section_force(model: Model, e: int, u: Vector, psi: Vector) -> Twist:
+    built = model.beam_built
+    return of_matrix(model.beam_stiffness, e, minus(u, vector(built, e, 0)), minus(psi, vector(built, e, 3)))
+
+
+@inlined
+def beam_forces(model: Model, work: Work, before: Array) -> None:
+    """Add inertia and internal forces less weight to ``work.force``, from poses, twists and rates there."""
+    out = work.force
+    for e in range(len(model.beam_nodes)):
+        u, psi = bend(model, work.poses, before, work.bent, e)
+        b = inverse_coefficient(dot(psi, psi))
+        push = _section_force(model, e, u, psi)
+        direct = _NONE
+        if model.beam_moving[e]:
+            direct, along = _inertia(model, work, e, u, psi, b)
+            push = pair_plus(push, along)
+        outer = series_transposed(_HALF, b, u, psi, push[0], push[1])
+        inner = pair_plus(direct, pair_minus(cobracket(u, psi, push[0], push[1]), outer))
+        for side in range(2):
+            force = _inward(model, e, side, inner if side == 0 else outer)
+            at = 6 * model.beam_nodes[e, side]
+            add(out, at, force[0])
+            add(out, at + 3, force[1])
+
+
+@inlined
+def _inertia(model: Model, work: Work, e: int, u: Vector, psi: Vector, b: Three) -> tuple[Twist, Twist]:
+    """Inertia less weight as a wrench on the first section, and one along d."""
+    c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
+    a0, a1 = _outward(model, e, 0, work.rate), _outward(model, e, 1, work.rate)
+    apart, pull = pair_minus(c1, c0), pair_minus(a1, a0)
+    eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
+    gain = pair_plus(bracket(u, psi, a0[0], a0[1]), series(_HALF, b, u, psi, pull[0], pull[1]))
+    gain = pair_plus(gain, change(_HALF, b, u, psi, eta[0], eta[1], apart[0], apart[1]))
+    gain = pair_plus(gain, bracket(eta[0], eta[1], c0[0], c0[1]))
+    _, turn = _section(model, work.poses, e, 0)
+    down = turned(turn, vector(model.gravity, 0, 0))
+    angle = dot(psi, psi)
+    direct = along = _NONE
+    for k in range(3):
+        x, weight = _POINTS[k], _WEIGHTS[k]
+        xu, xpsi = scaled(x, u), scaled(x, psi)
+        c = stumpff(x * x * angle)
+        f, g = tangent_coefficients(c)
+        r = exponential(xpsi, c[0], c[1])
+        p = value(-f[0], g[0], xpsi, xu)
+        carried = transformed(p, r, c0[0], c0[1])
+        own = pair_scaled(x, series(f, g, xu, xpsi, eta[0], eta[1]))
+        nu = pair_plus(carried, own)
+        rate = pair_plus(transformed(p, r, a0[0], a0[1]), pair_scaled(x, series(f, g, xu, xpsi, gain[0], gain[1])))
+        curve = change(f, g, xu, xpsi, scaled(x, eta[0]), scaled(x, eta[1]), eta[0], eta[1])
+        rate = pair_plus(rate, pair_scaled(x, curve))
+        rate = pair_minus(rate, bracket(own[0], own[1], carried[0], carried[1]))
+        force = of_matrix(model.beam_inertia, e, minus(rate[0], turned(r, down)), rate[1])
+        momentum = of_matrix(model.beam_inertia, e, nu[0], nu[1])
+        force = pair_minus(force, cobracket(nu[0], nu[1], momentum[0], momentum[1]))
+        force = pair_scaled(weight, force)
+        direct = pair_plus(direct, transposed(p, r, force[0], force[1]))
+        along = pair_plus(along, pair_scaled(x, series_transposed(f, g, xu, xpsi, force[0], force[1])))
+    return direct, along
+
+
+@part
+def _column(table: Array, j: int) -> Twist:
+    return (table[0, j], table[1, j], table[2, j]), (table[3, j], table[4, j], table[5, j])
+
+
+@part
+def _set_column(table: Array, j: int, a: Twist) -> None:
+    table[0, j], table[1, j], table[2, j] = a[0]
+    table[3, j], table[4, j], table[5, j] = a[1]
+
+
+@part
+def _add_power(out: Array, table: Array, j: int, scale: float, force: Twist) -> None:
+    """out[:, j] += scale · tableᵀ force."""
+    n, m = force
+    for i in range(12):
+        linear = table[0, i] * n[0] + table[1, i] * n[1] + table[2, i] * n[2]
+        out[i, j] += scale * (linear + table[3, i] * m[0] + table[4, i] * m[1] + table[5, i] * m[2])
+
+
+@inlined
+def _unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
+    """Twists of both sections when coordinate j of the nodes moves alone."""
+    side = j // 6
+    frames = model.beam_frames
+    moved = transformed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), unit(j % 6), unit(j % 6 - 3))
+    if side == 0:
+        return moved, _NONE
+    return _NONE, moved
+
+
+@inlined
+def beam_derivatives(model: Model, work: Work, e: int) -> None:
+    """Mass, damping and stiffness of element e at ``work``'s poses, bends and twists."""
+    mass, damping, stiffness, rows = work.mass, work.damping, work.stiffness, work.rows
+    u, psi = vector(work.bent, e, 0), vector(work.bent, e, 3)
+    b = inverse_coefficient(dot(psi, psi))
+    push = _section_force(model, e, u, psi)
+    for j in range(12):
+        for i in range(12):
+            mass[i, j] = damping[i, j] = stiffness[i, j] = 0.0
+        c0, c1 = _unit_twist(model, e, j)
+        apart = pair_minus(c1, c0)
+        eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
+        _set_column(rows, j, eta)
+    for j in range(12):
+        eta = _column(rows, j)
+        force = of_matrix(model.beam_stiffness, e, eta[0], eta[1])
+        _add_power(stiffness, rows, j, 1.0, force)
+        # derivative of Pᵀ σ at fixed σ as d moves along η
+        outer = change_transposed(_HALF, b, u, psi, eta[0], eta[1], push[0], push[1])
+        inner = pair_minus(cobracket(eta[0], eta[1], push[0], push[1]), outer)
+        for side in range(2):
+            n, m = _inward(model, e, side, inner if side == 0 else outer)
+            for i in range(3):
+                stiffness[6 * side + i, j] += n[i]
+                stiffness[6 * side + 3 + i, j] += m[i]
+    if model.beam_moving[e]:
+        _inertia_derivatives(model, work, e, u, psi)
+
+
+@inlined
+def _inertia_derivatives(model: Model, work: Work, e: int, u: Vector, psi: Vector) -> None:
+    rows, shape = work.rows, work.shape
+    c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
+    apart = pair_minus(c1, c0)
+    b = inverse_coefficient(dot(psi, psi))
+    eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
+    _, turn = _section(model, work.poses, e, 0)
+    down = turned(turn, vector(model.gravity, 0, 0))
+    for k in range(3):
+        x, weight = _POINTS[k], _WEIGHTS[k]
+        xu, xpsi = scaled(x, u), scaled(x, psi)
+        c = stumpff(x * x * dot(psi, psi))
+        f, g = tangent_coefficients(c)
+        r = exponential(xpsi, c[0], c[1])
+        p = value(-f[0], g[0], xpsi, xu)
+        pull = turned(r, down)
+        own = pair_scaled(x, series(f, g, xu, xpsi, eta[0], eta[1]))
+        nu = pair_plus(transformed(p, r, c0[0], c0[1]), own)
+        momentum = of_matrix(model.beam_inertia, e, nu[0], nu[1])
+        for j in range(12):
+            q = _column(rows, j)
+            q = pair_scaled(x, series(f, g, xu, xpsi, q[0], q[1]))
+            if j < 6:
+                first = _unit_twist(model, e, j)[0]
+                q = pair_plus(q, transformed(p, r, first[0], first[1]))
+            _set_column(shape, j, q)
+        for j in range(12):
+            q = _column(shape, j)
+            heavy = of_matrix(model.beam_inertia, e, q[0], q[1])
+            _add_power(work.mass, shape, j, weight, heavy)
+            tilt = of_matrix(model.beam_inertia, e, cross(q[1], pull), (0.0, 0.0, 0.0))
+            _add_power(work.stiffness, shape, j, weight, tilt)
+            spin = cobracket(nu[0], nu[1], heavy[0], heavy[1])
+            spin = pair_plus(spin, cobracket(q[0], q[1], momentum[0], momentum[1]))
+            _add_power(work.damping, shape, j, -weight, spin)

@@ -1,0 +1,102 @@
+"""Rigid bodies and loads at nodes: the formulas of `erls.equations.nodal.rigid_body` and
+`erls.equations.nodal.loads`.
+"""
+
+from __future__ import annotations
+
+from erls.equations.compiled_system import Array
+from erls.equations.nodal.kernels.contract import Model, Work
+from erls.equations.nodal.kernels.motions import cobracket, pair_minus, pair_plus
+from erls.equations.nodal.kernels.vectors import (
+    Twist,
+    Vector,
+    add,
+    cross,
+    minus,
+    nine,
+    of_matrix,
+    scaled,
+    three,
+    turned,
+    unit,
+    vector,
+)
+from erls.maths.jit import inlined, part
+
+_ZERO = (0.0, 0.0, 0.0)
+
+
+@inlined
+def _weight(model: Model, poses: Array, node: int) -> Vector:
+    return turned(nine(poses, node, 3), vector(model.gravity, 1, 0))
+
+
+@inlined
+def body_forces(model: Model, work: Work) -> None:
+    """Add inertia less weight to ``work.force``."""
+    for k in range(len(model.body_nodes)):
+        node = model.body_nodes[k]
+        at = 6 * node
+        v, w = three(work.twist, at), three(work.twist, at + 3)
+        pull = minus(three(work.rate, at), _weight(model, work.poses, node))
+        momentum = of_matrix(model.bodies, k, v, w)
+        force = of_matrix(model.bodies, k, pull, three(work.rate, at + 3))
+        force = pair_minus(force, cobracket(v, w, momentum[0], momentum[1]))
+        add(work.force, at, force[0])
+        add(work.force, at + 3, force[1])
+
+
+@inlined
+def body_derivatives(model: Model, work: Work, k: int) -> None:
+    """Mass, damping and stiffness of body k in the first six rows and columns."""
+    node = model.body_nodes[k]
+    v, w = three(work.twist, 6 * node), three(work.twist, 6 * node + 3)
+    momentum = of_matrix(model.bodies, k, v, w)
+    down = _weight(model, work.poses, node)
+    for j in range(6):
+        a, b = unit(j), unit(j - 3)
+        heavy = of_matrix(model.bodies, k, a, b)
+        _fill(work.mass, j, 1.0, heavy)
+        spin = cobracket(v, w, heavy[0], heavy[1])
+        _fill(work.damping, j, -1.0, pair_plus(spin, cobracket(a, b, momentum[0], momentum[1])))
+        _fill(work.stiffness, j, 1.0, of_matrix(model.bodies, k, cross(b, down), _ZERO))
+
+
+@part
+def _fill(out: Array, j: int, scale: float, column: Twist) -> None:
+    for i in range(3):
+        out[i, j] = scale * column[0][i]
+        out[3 + i, j] = scale * column[1][i]
+
+
+@inlined
+def _load(model: Model, poses: Array, k: int, factor: float) -> Twist:
+    """In node axes."""
+    force, moment = scaled(factor, vector(model.loads, k, 0)), scaled(factor, vector(model.loads, k, 3))
+    if model.load_dead[k]:
+        turn = nine(poses, model.load_nodes[k], 3)
+        return turned(turn, force), turned(turn, moment)
+    return force, moment
+
+
+@inlined
+def load_forces(model: Model, work: Work, sample: Array) -> None:
+    """Subtract loads from ``work.force``; their factors follow the joints in ``sample``."""
+    first = len(model.joint_nodes)
+    for k in range(len(model.load_nodes)):
+        at = 6 * model.load_nodes[k]
+        force, moment = _load(model, work.poses, k, -sample[first + k])
+        add(work.force, at, force)
+        add(work.force, at + 3, moment)
+
+
+@inlined
+def load_derivatives(model: Model, work: Work, sample: Array, k: int) -> None:
+    """Stiffness of load k in the first six rows and columns: dead ones turn in the node's axes."""
+    for j in range(6):
+        for i in range(6):
+            work.mass[i, j] = work.damping[i, j] = work.stiffness[i, j] = 0.0
+    if model.load_dead[k]:
+        force, moment = _load(model, work.poses, k, sample[len(model.joint_nodes) + k])
+        for j in range(3):
+            _fill(work.stiffness, 3 + j, 1.0, (cross(unit(j), force), cross(unit(j), moment)))

@@ -1,0 +1,63 @@
+"""What reports see of a nodal link: its frame, the nodes of its modal model, and the nearest modal coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from erls.equations.nodal.beam import Beams, Bent
+from erls.equations.nodal.parts import LinkParts, node_at
+from erls.maths import rotation_maps as rotations
+from erls.maths.se3 import pose
+from erls.maths.so3 import Array
+from erls.mechanism.links import Link
+
+
+@dataclass(frozen=True)
+class LinkState:
+    """Link frame in the world (4, 4), which goes with the inboard node; places of the model's nodes (n, 3) in the world
+    [m]; modal coordinates (m,) whose displacements come nearest to them and to their rotations.
+    """
+
+    frame: Array
+    nodes: Array
+    modal: Array
+
+
+class LinkView:
+    """Where to look for a link.
+
+    Parameters
+    ----------
+    link : Link
+    parts : LinkParts
+    nodes : slice
+        Its nodes in the system.
+    first : int
+        Its first beam element there.
+    """
+
+    def __init__(self, link: Link, parts: LinkParts, nodes: slice, first: int) -> None:
+        self._model = model = link.model
+        inboard = node_at(parts, link.inboard.node, f"link {link.name!r}")
+        self._inboard, self._back = nodes.start + inboard, pose(position=-parts.nodes[inboard])
+        self._elements, self._fractions = first + parts.elements, parts.fractions
+        self._axes = np.array([b.frames[0, :3, :3] for b in parts.beams])[parts.elements] if parts.beams else None
+        reach = float(np.linalg.norm(np.ptp(model.nodes, axis=0))) or 1.0
+        self._reach = reach
+        shapes = np.concatenate([model.translation_shapes, reach * model.rotation_shapes]).reshape(-1, model.modes)
+        self._nearest = np.linalg.pinv(shapes)
+
+    def at(self, poses: Array, beams: Beams | None, bent: Bent | None) -> LinkState:
+        """At poses (k, 4, 4) of all nodes."""
+        frame = poses[self._inboard] @ self._back
+        model = self._model
+        if self._axes is None or beams is None or bent is None:
+            return LinkState(frame, model.nodes @ frame[:3, :3].T + frame[:3, 3], np.zeros(model.modes))
+        sections = beams.sections_at(poses[beams.nodes], bent, self._elements, self._fractions)
+        nodes = sections[:, :3, 3]
+        moved = (nodes - frame[:3, 3]) @ frame[:3, :3] - model.nodes
+        turned = frame[:3, :3].T @ sections[:, :3, :3] @ np.swapaxes(self._axes, 1, 2)
+        turns = rotations.log(turned[model.rotation_nodes])
+        return LinkState(frame, nodes, self._nearest @ np.concatenate([moved, self._reach * turns]).ravel())

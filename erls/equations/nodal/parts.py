@@ -1,0 +1,162 @@
+"""One link as nodes, beam elements and rigid bodies, in its mesh frame.
+
+Elements with consistent mass interpolate motion as they do strains; lumped ones are massless between rigid bodies at
+their nodes. Euler-Bernoulli members get `STIFF_SHEAR` times their shear stiffness.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from erls.equations.nodal.beam import Beam, lumped
+from erls.equations.nodal.rigid_body import RigidBody
+from erls.equations.nodal.scatter import IntArray
+from erls.equations.nodal.section import BeamSection, beam_section
+from erls.errors import Cause, SceneError
+from erls.maths import motion_maps as motions
+from erls.maths.se3 import pose
+from erls.maths.so3 import Array
+from erls.mechanism.links import Link, link_mass_properties
+from fe_import.description.link import Frame
+from fe_import.elements.frame import FrameElement
+from fe_import.models.frame import FrameMesh
+from fe_import.models.frame_parts import FrameParts, frame_parts
+
+STIFF_SHEAR = 1e4  # shear then counts 1e-7 of the bending of a slender member
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class LinkParts:
+    """Nodes, elements and bodies of a link, numbered within it.
+
+    Attributes
+    ----------
+    nodes : (k, 3) array
+        In the mesh frame, whose axes their frames take [m].
+    beams : list of Beam
+        Sections in the mesh frame.
+    bodies : list of RigidBody
+    elements, fractions : (n,) arrays
+        Where the nodes of the modal model lie: element, and share of its length. Empty for a rigid link.
+    """
+
+    nodes: Array
+    beams: list[Beam]
+    bodies: list[RigidBody]
+    elements: IntArray
+    fractions: Array
+
+
+def link_parts(link: Link, elements: int | None) -> LinkParts:
+    """Parts of a link, with ``elements`` in each member unless it is left to the description.
+
+    Raises
+    ------
+    SceneError
+        The link is not made of beams, has modal damping, or a payload between nodes.
+    """
+    where = f"link {link.name!r}"
+    if link.elastic_modes == 0:
+        body = link_mass_properties(link)
+        rigid = RigidBody(0, body.mass, _symmetric(body.inertia), body.centre_of_mass - link.inboard.position)
+        return LinkParts(link.inboard.position[None], [], [rigid], np.zeros(0, dtype=np.int64), np.zeros(0))
+    if link.description is None or link.description.frame is None:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "the nodal formulation needs links made of beams, or rigid ones",
+            where=where,
+            value="solid, exported or reduced elsewhere",
+            remedy="give 'model' with a table [frame], 'flexible = false', or use another formulation",
+        )
+    if link.damping.any():
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "the nodal formulation has no modes that could be damped",
+            where=where,
+            value="modal damping",
+            remedy="set damping = { ratio = 0.0 } for the link, or use another formulation",
+        )
+    frame = link.description.frame
+    parts = frame_parts(link.description, frame, where, elements)
+    own = frame_parts(link.description, frame, where).mesh
+    places = _places(own, parts.mesh)
+    return LinkParts(parts.mesh.nodes, *_beams_and_bodies(link, parts, places), *places)
+
+
+def _places(own: FrameMesh, mesh: FrameMesh) -> tuple[IntArray, Array]:
+    """Element of ``mesh``, and share of its length, where each node of the link's own mesh lies."""
+    elements, fractions = np.zeros(len(own.nodes), dtype=np.int64), np.zeros(len(own.nodes))
+    for before, after in zip(own.members, mesh.members, strict=True):
+        chain = [own.elements[before[0]].nodes[0], *(own.elements[e].nodes[1] for e in before)]
+        along = np.linspace(0.0, len(after), len(chain))
+        within = np.clip(np.floor(along + _SAME), 0, len(after) - 1).astype(np.int64)
+        elements[chain], fractions[chain] = after[0] + within, along - within
+    return elements, fractions
+
+
+def node_at(parts: LinkParts, number: int, where: str) -> int:
+    """Node that carries a node of the modal model.
+
+    Raises
+    ------
+    SceneError
+        There is none.
+    """
+    if not parts.beams:
+        return 0
+    end = round(float(parts.fractions[number]))
+    if abs(parts.fractions[number] - end) > _SAME:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "a payload sits between the nodes",
+            where=where,
+            value=f"node {number}",
+            remedy="let simulation.elements_per_member be a multiple of the link's own elements",
+        )
+    return parts.beams[int(parts.elements[number])].nodes[end]
+
+
+def _beams_and_bodies(
+    link: Link, parts: FrameParts, places: tuple[IntArray, Array]
+) -> tuple[list[Beam], list[RigidBody]]:
+    beams = [_beam(e, parts.frame, parts.mesh.nodes) for e in parts.mesh.elements]
+    bodies = [RigidBody(m.node, m.mass, _symmetric(m.inertia)) for m in parts.masses]
+    meshed = LinkParts(parts.mesh.nodes, beams, [], *places)
+    for payload in link.payloads:
+        node = node_at(meshed, payload.node, f"link {link.name!r}")
+        bodies.append(RigidBody(node, payload.mass, payload.inertia, payload.offset))
+    if parts.frame.mass == "lumped":
+        poses = np.array([pose(position=x) for x in parts.mesh.nodes])
+        bodies += lumped(beams, poses)
+        beams = [replace(b, section=BeamSection(b.section.stiffness, np.zeros((6, 6)))) for b in beams]
+    return beams, [b for b in bodies if b.mass or b.inertia.any()]
+
+
+def _beam(e: FrameElement, frame: Frame, nodes: Array) -> Beam:
+    s, density = e.section, e.density
+    shear = e.shear_modulus * s.area * (1.0 if frame.theory == "timoshenko" else STIFF_SHEAR)
+    rotary = (density * s.inertia_y, density * s.inertia_z)
+    section = beam_section(
+        e.youngs_modulus * s.area,
+        (s.shear_factor_y * shear, s.shear_factor_z * shear),
+        e.shear_modulus * s.torsion_constant,
+        (e.youngs_modulus * s.inertia_y, e.youngs_modulus * s.inertia_z),
+        density * s.area,
+        rotary,
+    )
+    if not frame.rotary_inertia:
+        inertia = section.inertia.copy()
+        inertia[4, 4] = inertia[5, 5] = 0.0
+        if frame.mass == "lumped":
+            inertia[3, 3] = 0.0
+        section = BeamSection(section.stiffness, inertia)
+    axes = e.axes.T
+    ends = nodes[list(e.nodes)]
+    return Beam(e.nodes, motions.poses(np.array([axes, axes]), ends), section)
+
+
+def _symmetric(matrix: Array) -> Array:
+    return (matrix + matrix.T) / 2

@@ -1,0 +1,1 @@
+"""Scenes of bodies as nodes, elements and joints."""

@@ -1,0 +1,181 @@
+"""Static equilibrium of nodal systems: load steps, Newton's method under trust control, three tangents.
+
+At a load parameter t, which loads and prescribed motions read as the time, forces balance: g(t, q) + Bᵀ λ = 0, Φ = 0.
+A load step that does not converge is halved. The tangent is
+
+- ``full``: the exact derivative, under trust control. Beams that turn far in one correction stretch as well, and the
+  forces of that stretch would spoil the next derivative by their change of direction. Where the next correction with
+  the same matrix would not be half as long (the natural monotonicity test of P. Deuflhard, Newton Methods for
+  Nonlinear Problems, 2004, sec. 3.3), one with the material tangent takes the stretch out; the last ones are Newton's;
+- ``material``: without the change of the directions of internal forces. It converges linearly, from farther away;
+- ``frozen``: the material tangent at the start of each load step, factored once for it. Slender beams in coarse meshes
+  need many small load steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.system import metre_scales
+from erls.errors import Cause, SceneError, SimulationError
+from erls.maths.saddle import Saddle, Scales
+from erls.maths.so3 import Array
+from erls.scene.bodies.analyses import TANGENTS
+
+MAX_ITERATIONS = 60
+SHRINK = 0.5  # of a correction: what the next one may be for the exact tangent to be trusted
+SMALLEST_STEP = 1e-4  # of the load parameter
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """One configuration at rest: load parameter, multipliers (m,) of the joints, iterations since the one before."""
+
+    t: float
+    q: Nodes
+    multipliers: Array
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Statics:
+    """Equilibria in the order of load parameters, what they took, and why there are no more; ``cut_steps`` counts load
+    steps that had to be halved.
+    """
+
+    path: tuple[Equilibrium, ...]
+    factorizations: int
+    cut_steps: int
+    failure: SimulationError | None = None
+
+
+def solve_statics(
+    system: NodalSystem,
+    start: Nodes,
+    steps: int = 1,
+    tangent: str = "full",
+    tolerance: float = 1e-12,
+    end: float = 1.0,
+) -> Statics:
+    """Equilibria at load parameters from ``end / steps`` to ``end`` in equal steps.
+
+    Parameters
+    ----------
+    system : NodalSystem
+        On SE(3); the tangent is that of its elements.
+    start : Nodes
+        Where iteration starts.
+    steps : int
+        Load steps.
+    tangent : str
+        A member of `TANGENTS`.
+    tolerance : float
+        Last correction, of the size of the mechanism.
+    end : float
+        Last load parameter; 0 for the equilibrium without loads that grow.
+
+    Returns
+    -------
+    Statics
+        With ``failure`` of cause NO_EQUILIBRIUM where even small load steps fail; what was found is kept.
+
+    Raises
+    ------
+    SceneError
+        With cause BAD_FIELD when there is no such tangent.
+    """
+    if tangent not in TANGENTS:
+        remedy = f"must be one of {', '.join(TANGENTS)}"
+        raise SceneError(Cause.BAD_FIELD, "there is no such tangent", where="tangent", value=tangent, remedy=remedy)
+    solver = _Solver(system, tangent, tolerance)
+    at, q, multipliers = 0.0, start, np.zeros(system.constraints)
+    found: list[Equilibrium] = []
+    step, used = end / steps, 0
+    failure = None
+    if end == 0:
+        result = solver.balance(0.0, q, multipliers)
+        if result is not None:
+            return Statics((Equilibrium(0.0, *result, solver.iterations),), solver.factorizations, solver.cuts)
+        failure = solver.failure(0.0)
+    while failure is None and at < end * (1 - 1e-12):
+        target = min(at + step, end)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a step too far, which is found and cut
+            result = solver.balance(target, q, multipliers)
+        used += solver.iterations
+        if result is None:
+            step, solver.cuts = step / 2, solver.cuts + 1
+            if step < SMALLEST_STEP * end:
+                failure = solver.failure(target)
+                break
+            continue
+        q, multipliers = result
+        at = target
+        if abs(at * steps / end - round(at * steps / end)) < 1e-9:
+            found.append(Equilibrium(at, q, multipliers, used))
+            step, used = end / steps, 0
+        else:
+            step = min(step, (np.floor(at * steps / end + 1e-9) + 1) * end / steps - at)
+    return Statics(tuple(found), solver.factorizations, solver.cuts, failure)
+
+
+class _Solver:
+    """Newton's method at one load parameter after another."""
+
+    def __init__(self, system: NodalSystem, tangent: str, tolerance: float) -> None:
+        self.system, self.tangent, self.metres = system, tangent, metre_scales(system)
+        self.goal = tolerance * float(np.linalg.norm(np.ptp(system.start.poses[:, :3, 3], axis=0)).clip(1e-300))
+        self.rest = np.zeros(system.size)
+        self.iterations = self.factorizations = self.cuts = 0
+        self.size = 0.0
+
+    def balance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Nodes, Array] | None:
+        """Equilibrium at ``t``, or None."""
+        saddle: Saddle | None = None
+        self.iterations = 0
+        exact = self.tangent == "full"
+        right = self.imbalance(t, q, multipliers)
+        while self.iterations < MAX_ITERATIONS:
+            if saddle is None or self.tangent != "frozen":
+                saddle = self.factor(t, q, multipliers, exact)
+            if saddle.singular is not None:
+                return None
+            self.iterations += 1
+            correction = saddle.solve(saddle.scaled(*right))
+            self.size = float(np.linalg.norm(correction))
+            if not np.isfinite(self.size):
+                return None
+            move, change = saddle.unscaled(correction)
+            q, multipliers = self.system.compose(q, -move), multipliers - change
+            right = self.imbalance(t, q, multipliers)
+            if float(np.abs(correction[: self.system.size]).max(initial=0.0)) <= self.goal:
+                return q, multipliers
+            if self.tangent == "full":
+                left = float(np.linalg.norm(saddle.solve(saddle.scaled(*right)))) / self.size
+                exact = left <= (SHRINK if exact else 1.0)
+        return None
+
+    def imbalance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Array, Array]:
+        """Forces (n,) and joints (m,) out of balance."""
+        forces = self.system.residual(t, q, self.rest, self.rest)
+        return forces + self.system.constraint_matrix(t, q).T @ multipliers, self.system.constraint(t, q)
+
+    def factor(self, t: float, q: Nodes, multipliers: Array, exact: bool) -> Saddle:
+        """The exact or the material tangent, in metres and units of its own stiffness."""
+        stiffness, _ = self.system.stiffness_and_damping(t, q, self.rest, self.rest, multipliers, material=not exact)
+        rows = self.system.constraint_matrix(t, q)
+        self.factorizations += 1
+        return Saddle(stiffness, rows.T, rows, Scales(self.metres, abs(stiffness), rows), 1.0)
+
+    def failure(self, t: float) -> SimulationError:
+        """Small load steps failed too."""
+        return SimulationError(
+            Cause.NO_EQUILIBRIUM,
+            f"no equilibrium beyond load parameter {t:.4g}: corrections of {self.size:.3g} m do not shrink",
+            where=f"load parameter {t:.9g}",
+            value=f"step {SMALLEST_STEP:g}",
+            limit=f"{MAX_ITERATIONS} iterations",
+            remedy="check the supports; look for buckling there; or let the motion be computed in time",
+        )

@@ -1,0 +1,48 @@
+"""How far the coordinates of a chain move its nodes: metres per radian, per metre, per unit of a mode."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from erls.equations.erls.paper.compatibility import Compatibility
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism, poses
+
+
+def node_reach(mechanism: Mechanism, compatibility: Compatibility) -> Array:
+    """Largest displacement of any node per unit of each coordinate, from the initial configuration.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    compatibility : Compatibility
+        Of its links.
+
+    Returns
+    -------
+    (joints + elastic,) array
+        Of θ, then of q_d.
+    """
+    places = compatibility.layout
+    joints, elastic = len(mechanism.joints), sum(link.elastic_modes for link in mechanism.links)
+    theta = np.array([joint.position for joint in mechanism.joints])
+    _, d = compatibility.displacement(theta, np.zeros(elastic))
+    frames = poses(mechanism, theta)
+    world = [
+        link.model.nodes @ frame[:3, :3].T + frame[:3, 3] for link, frame in zip(mechanism.links, frames, strict=True)
+    ]
+    scales = np.empty(joints + elastic)
+    for k, joint in enumerate(mechanism.joints):
+        axis_frame = (frames[k - 1] if k else np.eye(4)) @ joint.before
+        arms = np.vstack(world[k:]) - axis_frame[:3, 3]
+        reach = np.linalg.norm(np.cross(axis_frame[:3, 2], arms), axis=1).max()
+        scales[k] = max(reach, 1e-3) if joint.type.revolute else 1.0
+    scales[joints:] = 0.0
+    for k, link in enumerate(mechanism.links):
+        rows = d[6 * k : 6 * k + 6]
+        moved = np.einsum("nim,md->nid", link.model.translation_shapes[:, :, :6], rows)
+        moved[:, :, places.elastic_of[k]] += link.model.translation_shapes[:, :, 6:]
+        size = np.linalg.norm(moved, axis=1).max(axis=0)
+        scales[joints:] = np.maximum(scales[joints:], size)
+    scales[joints:] = np.maximum(scales[joints:], 1e-12)
+    return scales

@@ -1,0 +1,79 @@
+"""The mechanism at many times at once, as arrays: what looks along a whole run needs no `State` of every instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from erls.equations.formulation import Formulation, State
+from erls.maths.so3 import Array
+
+
+@dataclass(frozen=True)
+class StateSeries:
+    """States at k times.
+
+    Attributes
+    ----------
+    times : (k,) array
+    poses : list of (k, 4, 4) arrays
+        Link frames in the world, link by link.
+    modal : list of (k, m) arrays
+        Modal coordinates of each link (6 rigid-body, then elastic).
+    coordinates, angles, rates : (k, n) arrays
+        Joint coordinates θ, physical joint angles and their rates [rad or m].
+    nodes : list of (k, n, 3) arrays, or None
+        As in `State`.
+    """
+
+    times: Array
+    poses: list[Array]
+    modal: list[Array]
+    coordinates: Array
+    angles: Array
+    rates: Array
+    nodes: list[Array] | None = None
+
+    def states(self) -> list[State]:
+        """One by one."""
+        per_link = [list(zip(*parts, strict=True)) for parts in (self.poses, self.modal, self.nodes or [])]
+        joints = zip(self.coordinates, self.angles, self.rates, strict=True)
+        return [
+            State(t, list(per_link[0][k]), list(per_link[1][k]), *joint, list(per_link[2][k]) if self.nodes else None)
+            for k, (t, joint) in enumerate(zip(self.times.tolist(), joints, strict=True))
+        ]
+
+
+@runtime_checkable
+class _ManyAtOnce(Protocol):
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries | None:
+        """States at times (k,) with coordinates and rates (k, n); None where they are found one by one."""
+
+
+def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> StateSeries:
+    """States of a formulation at k times.
+
+    Parameters
+    ----------
+    formulation : Formulation
+        One with a method ``series`` gives them all at once.
+    t : (k,) array
+    y, v : (k, n) arrays
+    """
+    found = formulation.series(t, y, v) if isinstance(formulation, _ManyAtOnce) else None
+    if found is not None:
+        return found
+    states = [formulation.state(*at) for at in zip(t.tolist(), y, v, strict=True)]
+    links = range(len(formulation.mechanism.links))
+    places = [np.array([s.nodes[k] for s in states if s.nodes is not None]) for k in links]
+    return StateSeries(
+        times=t,
+        poses=[np.array([s.poses[k] for s in states]) for k in links],
+        modal=[np.array([s.modal[k] for s in states]) for k in links],
+        coordinates=np.array([s.coordinates for s in states]),
+        angles=np.array([s.angles for s in states]),
+        rates=np.array([s.rates for s in states]),
+        nodes=places if any(s.nodes is not None for s in states) else None,
+    )

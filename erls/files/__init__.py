@@ -1,0 +1,1 @@
+"""Output files, refused early and written completely or not at all."""

@@ -1,0 +1,1 @@
+"""Integrators: the contract, the walk through legs, and the methods."""

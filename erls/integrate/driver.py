@@ -1,0 +1,220 @@
+"""What integrators share: the walk from breakpoint to breakpoint, the record of knots, the end of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from erls.equations.system import SecondOrderSystem
+from erls.errors import Cause, SimulationError
+from erls.integrate.base import Array, Leg, Observer, Solution, StopRun, Work, legs
+from erls.integrate.thinning import thinned
+
+
+class Recorder:
+    """Knots and work of a run so far, in an array that grows.
+
+    Parameters
+    ----------
+    size : int
+        Number of coordinates n.
+    observer : callable or None
+        See rule 7 of `erls.integrate.base`.
+    capacity : int
+        Knots to reserve.
+    apart : float or None
+        Of the knots that the observer was told of keep the states at these distances in time [s] beside the ends of all
+        legs (`erls.integrate.thinning`), so that memory stays flat however many steps there are; None keeps all.
+    beside : int
+        Numbers to keep beside y, v, a of each knot.
+    """
+
+    def __init__(
+        self, size: int, observer: Observer | None, capacity: int = 1024, apart: float | None = None, beside: int = 0
+    ) -> None:
+        self.work = Work()
+        self.warnings: list[str] = []
+        self._size, self._observer, self._apart = size, observer, apart
+        self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
+        self._begun = 0.0
+        # how many knots are kept, accepted steps, and, where knots are dropped, the last one that was looked at and
+        # those after it: one object, so that an interrupt finds all or nothing
+        self._kept: tuple[int, int, tuple[Array, Array]] = 0, 0, (self._t[:0], self._rows[:0])
+
+    def begin(self, t: float, *parts: Array) -> None:
+        """Add a copy of the knot y, v, a (and what is kept beside it) at which a leg begins; the last leg ends."""
+        row = np.concatenate(parts)[None]
+        if not self._kept[0]:
+            self._begun = t
+        times, rows = self._waiting()
+        rest = (np.array([t]), row) if self._apart is not None else self._kept[2]
+        self._store(np.append(times[-1:], t), np.concatenate([rows[-1:], row]), 0, rest)
+
+    def append(self, t: float, *parts: Array) -> None:
+        """Add a copy of a knot."""
+        self._add(np.array([t]), np.concatenate(parts)[None], 0)
+
+    def extend(self, t: Array, knots: Array, steps: int | None = None, beside: Array | None = None) -> None:
+        """Add knots (k, 3, n) of y, v, a at ``t`` (k,), by default one per accepted step, and tell the observer.
+
+        ``beside`` (k, m) is kept beside them.
+        """
+        rows = knots.reshape(len(t), 3 * self._size)
+        self._add(t, rows if beside is None else np.hstack([rows, beside]), len(t) if steps is None else steps)
+        if len(t):
+            self._tell(float(t[-1]))
+
+    def accept(self, t: float) -> None:
+        """Count an accepted step, whose knots were added, and tell the observer."""
+        knots, steps, rest = self._kept
+        self._kept = knots, steps + 1, rest
+        self._tell(t)
+
+    def _add(self, t: Array, rows: Array, steps: int) -> None:
+        knots, before, (times, states) = self._kept
+        if self._apart is None:
+            self._store(t, rows, steps, (times, states))
+        else:
+            self._kept = knots, before + steps, (np.concatenate([times, t]), np.concatenate([states, rows]))
+
+    def _tell(self, t: float) -> None:
+        whole: Sequence[float] | None = ()
+        try:
+            if self._observer is not None:
+                whole = self._observer(t, self.solution)
+        except StopRun as stop:
+            whole = stop.args
+            raise
+        except SimulationError as problem:
+            whole = problem.whole
+            raise
+        finally:
+            self._thin(whole or ())
+
+    def _thin(self, whole: Sequence[float]) -> None:
+        """Drop what need not be kept, once the observer has seen it."""
+        times, rows = self._kept[2]
+        if self._apart is None or len(times) < 2:
+            return
+        t, kept = thinned(times, rows, self._size, self._begun, self._apart, whole)
+        first = int(self._stored(t))
+        self._store(t[first:], kept[first:], 0, (times[-1:].copy(), rows[-1:].copy()))
+
+    def _stored(self, t: Array) -> bool:
+        """Whether the first of some knots is the last one that is kept for good."""
+        return bool(self._kept[0] and len(t) and self._t[self._kept[0] - 1] == t[0])
+
+    def _waiting(self) -> tuple[Array, Array]:
+        """Times and rows of knots that are not kept for good."""
+        times, rows = self._kept[2]
+        first = int(self._stored(times))
+        return times[first:], rows[first:]
+
+    def _store(self, t: Array, rows: Array, steps: int, rest: tuple[Array, Array]) -> None:
+        start, before, _ = self._kept
+        end = start + len(t)
+        while end > len(self._t):
+            self._t = np.concatenate([self._t, np.empty(len(self._t))])
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._t[start:end], self._rows[start:end] = t, rows
+        self._kept = end, before + steps, rest
+
+    @property
+    def steps(self) -> int:
+        """Accepted steps."""
+        return self._kept[1]
+
+    @property
+    def observed(self) -> bool:
+        """Whether anybody looks on."""
+        return self._observer is not None
+
+    @property
+    def time(self) -> float | None:
+        """Time of the last knot."""
+        knots, _, (times, _) = self._kept
+        if len(times):
+            return float(times[-1])
+        return float(self._t[knots - 1]) if knots else None
+
+    def solution(self, failure: SimulationError | None = None) -> Solution:
+        """The run so far; later knots leave its arrays unchanged."""
+        t, rows = self._so_far()
+        y, v, a = (rows[:, i * self._size : (i + 1) * self._size] for i in range(3))
+        return Solution(t, y, v, a, replace(self.work, steps=self.steps), failure, tuple(self.warnings))
+
+    def _so_far(self) -> tuple[Array, Array]:
+        """Times and rows."""
+        knots = self._kept[0]
+        t, rows = self._t[:knots], self._rows[:knots]
+        more = self._waiting()
+        if len(more[0]):
+            t, rows = np.concatenate([t, more[0]]), np.concatenate([rows, more[1]])
+        return t, rows
+
+
+Advance = Callable[[Leg, Array, Array, Array, Recorder], tuple[Array, Array]]
+
+
+def not_finite(t: float, values: Array) -> SimulationError:
+    """Failure because ``values`` (n,) holds an infinity or NaN at time ``t``."""
+    bad = int(np.argmin(np.isfinite(values)))
+    return SimulationError(
+        Cause.NOT_FINITE,
+        f"coordinate {bad} (counted from 0) is no longer finite",
+        where=f"t = {t:.9g} s",
+        value=float(values[bad]),
+        remedy="check forces, drives and initial velocities; end the run before a motion without bound",
+    )
+
+
+def integrate_legs(
+    system: SecondOrderSystem,
+    times: tuple[float, float],
+    y: Array,
+    v: Array,
+    recorder: Recorder,
+    advance: Advance,
+) -> Solution:
+    """Walk over all legs and turn whatever ends the run early into the failure of its solution.
+
+    Parameters
+    ----------
+    advance : callable
+        ``advance(leg, y, v, a, recorder) -> (y, v)`` adds the knots after the first one of a leg and returns
+        the state at its end; raises `SimulationError` when it cannot.
+    """
+    failure: SimulationError | None = None
+    y, v = np.array(y, dtype=float), np.array(v, dtype=float)
+    start, end = times
+    walk = legs(system, times) or [Leg(start, end, start, end)]
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
+        try:
+            for leg in walk:
+                recorder.work.rhs_calls += 1
+                a = system.acceleration(leg.first, y, v)
+                if not np.isfinite(a).all():
+                    raise not_finite(leg.start, a)
+                recorder.begin(leg.start, y, v, a)
+                if system.size == 0:  # every motion is prescribed and no link deforms: nothing to integrate
+                    recorder.append(leg.end, y, v, a)
+                    recorder.accept(leg.end)
+                elif leg.end > leg.start:
+                    y, v = advance(leg, y, v, a, recorder)
+        except StopRun:
+            pass
+        except KeyboardInterrupt:
+            failure = SimulationError(
+                Cause.INTERRUPTED,
+                "the run was interrupted",
+                remedy="the motion up to this time was kept",
+            )
+        except SimulationError as error:
+            failure = error
+    if recorder.time is None:  # failed at once; a solution always has a knot
+        recorder.append(start, y, v, np.zeros_like(y))
+    if failure is not None and not failure.where:
+        failure.where = f"t = {recorder.time:.9g} s"
+    return recorder.solution(failure)

@@ -1,0 +1,282 @@
+"""The stages of a step of Lobatto IIIA: their start, iteration, factors and error (`erls.integrate.stepping.lobatto`).
+
+Arrays: numbers in ``known``, counts in ``counts``; ``stages`` and ``last`` (stages + 1, 3, n) hold y, v, a at the nodes
+of the present and of the last step; ``coefficients``, ``matrices`` and ``vectors`` are named below. ``own_solve`` and
+``own_solve_complex`` are the system's way of solving (`erls.equations.compiled_system.Factoring`), ``way`` what they
+need: its
+constants, factors in real and in complex numbers, room for n complex numbers. Without such factors, ``matrices`` holds
+dense ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from erls.equations.compiled_system import Array, IntArray
+from erls.integrate.stepping.dense import add_product, factor_complex, factor_real, solve_complex, solve_real
+from erls.maths.jit import helper, part
+
+# known: the leg, settings of a run, then what steps leave behind
+END, FIRST, LAST = 0, 1, 2
+LARGEST, SMALLEST, TOLERANCE, GOAL, ROUNDING = 3, 4, 5, 6, 7
+T, H, BEFORE, RATE, NEXT = range(8, 13)  # BEFORE: the last step; NEXT: the one to try
+KNOWN = 13
+# counts
+FACTORED, USUAL, EXCESS, REASON, HISTORY, SUSPECT, DIAGONAL = range(7)  # DIAGONAL: stiffness and damping
+MAX_ITERATIONS, REFRESH_COST = 7, 8
+RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED, CALM = range(9, 14)  # CALM: steps since one was rejected
+COUNTS = 14
+SINGULAR, NOT_FINITE, SLOW, INACCURATE = 1, 2, 3, 4  # reasons
+# blocks of coefficients (4, 4), of `erls.integrate.lobatto`; the last one has the rows below it
+RATES, PLACES, INTO_RE, INTO_IM, BACK_RE, BACK_IM, FORETELL, ROWS = range(8)
+NODES, DIFFERENCE, LAMBDA_RE, LAMBDA_IM = range(4)
+# blocks of matrices (n, n), transposed
+MASS, DAMPING, STIFFNESS, FILTER, SOLVERS = range(5)
+# rows of vectors (n,); the residuals of the stages are followed by the changes of their accelerations
+METRES, PART_RE, PART_IM, RESIDUALS = range(4)
+
+SLOWEST, FASTEST = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
+GROWTH, SHRINK, SAFETY = 2.0, 0.2, 0.9  # of steps
+PATIENCE = 3  # steps without growth after one that was rejected
+KEPT, WORTH = 0.95, 1.2  # bounds on a change of the step that is not worth new factors
+
+
+@helper
+def foretell(
+    known: Array,
+    counts: IntArray,
+    coefficients: Array,
+    stages: Array,
+    last: Array,
+    matrices: Array,
+    vectors: Array,
+    own_solve: Callable[..., None] | None,
+    own_solve_complex: Any,
+    way: Any,
+) -> None:
+    """Stages from the polynomial through the last ones, made to fulfil the linear part of the equations.
+
+    What is extrapolated is M a + C v + K y: smooth also where vibrations are not resolved.
+    """
+    m, n = stages.shape[0] - 1, stages.shape[2]
+    nodes, basis = coefficients[ROWS, NODES], coefficients[FORETELL]
+    h = known[H]
+    for i in range(1, m + 1):
+        x = 1.0 + nodes[i] * h / known[BEFORE]
+        for j in range(m + 1):
+            weight = 1.0
+            for k in range(m + 1):
+                if k != j:
+                    weight *= (x - nodes[k]) / (nodes[j] - nodes[k])
+            basis[i, j] = weight if counts[HISTORY] else (1.0 if j == m else 0.0)
+    for i in range(1, m + 1):
+        for q in range(n):
+            stages[i, 2, q] = stages[0, 2, q]
+    combine(h, coefficients, stages)
+    difference = vectors[PART_RE]
+    for i in range(1, m + 1):
+        out = vectors[RESIDUALS + i - 1]
+        out[:] = 0.0
+        for kind in range(3):
+            now = stages[i, 2 - kind]
+            for q in range(n):
+                difference[q] = now[q]
+            for j in range(m + 1):
+                weight, before = basis[i, j], last[j, 2 - kind]
+                for q in range(n):
+                    difference[q] -= weight * before[q]
+            if kind > 0 and counts[DIAGONAL]:
+                matrix = matrices[kind]
+                for q in range(n):
+                    out[q] += matrix[q, q] * difference[q]
+            else:
+                add_product(matrices[kind], difference, out)
+    correct(h, coefficients, stages, matrices, vectors, own_solve, own_solve_complex, way)
+
+
+@part
+def combine(h: float, coefficients: Array, stages: Array) -> None:
+    """Positions and velocities of the stages from their accelerations."""
+    m, n = stages.shape[0] - 1, stages.shape[2]
+    nodes, rates, places = coefficients[ROWS, NODES], coefficients[RATES], coefficients[PLACES]
+    y, v = stages[0, 0], stages[0, 1]
+    for i in range(1, m + 1):
+        step = h * nodes[i]
+        y_out, v_out = stages[i, 0], stages[i, 1]
+        for q in range(n):
+            y_out[q], v_out[q] = y[q] + step * v[q], v[q]
+        for j in range(m + 1):
+            to_y, to_v, a = h * h * places[i, j], h * rates[i, j], stages[j, 2]
+            for q in range(n):
+                y_out[q] += to_y * a[q]
+                v_out[q] += to_v * a[q]
+
+
+@part
+def pairs(stages: int) -> int:
+    """Eigenvalues, of which conjugate ones count once."""
+    return (stages + 1) // 2
+
+
+@helper
+def solve(
+    k: int,
+    real: bool,
+    matrices: Array,
+    re: Array,
+    im: Array,
+    own_solve: Callable[..., None] | None,
+    own_solve_complex: Any,
+    way: Any,
+) -> None:
+    """Replace re + i im by the solution with the matrix of eigenvalue k, or with the filter where k is -1."""
+    reals, integers, own, own_complex, mixed = way
+    # a system that is not compiled has no way of its own: what follows is then left out of the compiled code
+    if own_solve is not None:  # noqa: SIM102
+        if own.shape[1] > 0:
+            if real:
+                own_solve(reals, integers, own[k + 1], re)
+                return
+            for i in range(len(re)):
+                mixed[i] = re[i] + 1j * im[i]
+            own_solve_complex(reals, integers, own_complex[k], mixed)
+            for i in range(len(re)):
+                re[i], im[i] = mixed[i].real, mixed[i].imag
+            return
+    if real:
+        solve_real(matrices[FILTER if k < 0 else SOLVERS + 2 * k], re)
+    else:
+        solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
+
+
+@helper
+def correct(
+    h: float,
+    coefficients: Array,
+    stages: Array,
+    matrices: Array,
+    vectors: Array,
+    own_solve: Callable[..., None] | None,
+    own_solve_complex: Any,
+    way: Any,
+) -> float:
+    """One iteration from the residuals of the stages; the largest change of a position, and of h v [metres]."""
+    m, n = stages.shape[0] - 1, stages.shape[2]
+    re, im = vectors[PART_RE], vectors[PART_IM]
+    into_re, into_im = coefficients[INTO_RE], coefficients[INTO_IM]
+    back_re, back_im = coefficients[BACK_RE], coefficients[BACK_IM]
+    changes = vectors[RESIDUALS + m :]
+    for j in range(m):
+        for i in range(n):
+            changes[j, i] = 0.0
+    for k in range(pairs(m)):
+        re[:] = 0.0
+        im[:] = 0.0
+        for j in range(m):
+            p, q, out = into_re[k, j], into_im[k, j], vectors[RESIDUALS + j]
+            for i in range(n):
+                re[i] += p * out[i]
+                im[i] += q * out[i]
+        solve(k, coefficients[ROWS, LAMBDA_IM, k] == 0.0, matrices, re, im, own_solve, own_solve_complex, way)
+        for j in range(m):
+            p, q, change = back_re[j, k], back_im[j, k], changes[j]
+            for i in range(n):
+                change[i] -= p * re[i] - q * im[i]
+    rates, places, metres = coefficients[RATES], coefficients[PLACES], vectors[METRES]
+    largest = 0.0
+    for i in range(1, m + 1):
+        re[:] = 0.0
+        im[:] = 0.0
+        for j in range(1, m + 1):
+            to_y, to_v, change = h * h * places[i, j], h * rates[i, j], changes[j - 1]
+            for q in range(n):
+                re[q] += to_y * change[q]
+                im[q] += to_v * change[q]
+        y, v, a, change = stages[i, 0], stages[i, 1], stages[i, 2], changes[i - 1]
+        total = 0.0
+        for q in range(n):
+            y[q] += re[q]
+            v[q] += im[q]
+            a[q] += change[q]
+            largest = max(largest, metres[q] * max(abs(re[q]), h * abs(im[q])))
+            total += re[q] + im[q] + change[q]
+        if not math.isfinite(total):
+            return math.inf
+    return largest
+
+
+@helper
+def factor(h: float, coefficients: Array, matrices: Array) -> int:
+    """Dense factors for steps of ``h``; 0, or 1 + the coordinate at which elimination broke down."""
+    n = matrices.shape[1]
+    mass, damping, stiffness, real = matrices[MASS], matrices[DAMPING], matrices[STIFFNESS], matrices[FILTER]
+    for i in range(n):
+        for j in range(n):
+            real[i, j] = mass[i, j] + h * damping[i, j] + h * h * stiffness[i, j]
+    status = factor_real(real)
+    for k in range(pairs(coefficients[RATES].shape[0] - 1)):
+        p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
+        pp, qq = p * p - q * q, 2 * p * q
+        re, im = matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1]
+        for i in range(n):
+            for j in range(n):
+                re[i, j] = mass[i, j] + p * damping[i, j] + pp * stiffness[i, j]
+                im[i, j] = q * damping[i, j] + qq * stiffness[i, j]
+        status = max(status, factor_real(re) if q == 0.0 else factor_complex(re, im))
+    return status
+
+
+@helper
+def is_diagonal(matrix: Array) -> bool:
+    """Whether all entries off the diagonal are zero."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            if matrix[i, j] != 0.0 or matrix[j, i] != 0.0:
+                return False
+    return True
+
+
+@helper
+def halfway(h: float, stages: Array) -> None:
+    """Place half a step ahead, into the first stage."""
+    for q in range(stages.shape[2]):
+        stages[1, 0, q] = stages[0, 0, q] + h / 2 * stages[0, 1, q]
+
+
+@helper
+def transpose(matrix: Array) -> None:
+    """In place."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            matrix[i, j], matrix[j, i] = matrix[j, i], matrix[i, j]
+
+
+@helper
+def judge(
+    h: float,
+    coefficients: Array,
+    stages: Array,
+    matrices: Array,
+    vectors: Array,
+    own_solve: Callable[..., None] | None,
+    own_solve_complex: Any,
+    way: Any,
+) -> float:
+    """Estimated error of a step [metres]: (M + h C + h² K)⁻¹ M h² times the highest difference of the accelerations."""
+    m, n = stages.shape[0] - 1, stages.shape[2]
+    weights, metres = coefficients[ROWS, DIFFERENCE], vectors[METRES]
+    difference, error = vectors[PART_RE], vectors[PART_IM]
+    for q in range(n):
+        total = 0.0
+        for j in range(m + 1):
+            total += weights[j] * stages[j, 2, q]
+        difference[q] = h * h * total
+        error[q] = 0.0
+    add_product(matrices[MASS], difference, error)
+    solve(-1, True, matrices, error, difference, own_solve, own_solve_complex, way)
+    largest = 0.0
+    for q in range(n):
+        largest = max(largest, metres[q] * abs(error[q]))
+    return largest

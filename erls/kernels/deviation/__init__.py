@@ -1,1 +1,0 @@
-"""The error that leaving out effects makes, followed along a computed motion."""

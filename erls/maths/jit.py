@@ -1,0 +1,159 @@
+"""Compilation by Numba, kept on disk; with ``ERLS_JIT=0`` the same functions run as plain Python.
+
+The code lies in the folder ``ERLS_KERNELS``, or ``ERLS_CACHE`` like reductions, or the user's cache folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import platformdirs
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_PART = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+_EQUATIONS = "the equations of motion"
+_SUBJECTS = {"auto": "the certificate of what auto leaves out", "integrate": "the integrators"}
+_ROOT = Path(__file__).parents[1]
+_IMPORT = re.compile(r"^\s*from (erls[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
+_listeners: list[Callable[[str], None]] = []
+_told: set[str] = set()  # subjects
+ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
+
+
+@cache
+def folder(module: str) -> Path:
+    """Folder for the compiled code of this very source: Numba does not notice changes in what a function calls."""
+    import numba
+
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
+    for name in _reads(module):
+        digest.update(_file(name).read_bytes())
+    given = os.environ.get("ERLS_KERNELS") or os.environ.get("ERLS_CACHE")
+    base = Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
+    return base / f"kernels-{_subject(module)}-{digest.hexdigest()[:16]}"
+
+
+def _file(module: str) -> Path:
+    return _ROOT.joinpath(*module.split(".")[1:]).with_suffix(".py")
+
+
+@cache
+def _reads(module: str) -> list[str]:
+    """A module of kernels and all that it imports, directly or not."""
+    found: set[str] = set()
+    waiting = {module}
+    while waiting:
+        name = waiting.pop()
+        found.add(name)
+        for base, names in _IMPORT.findall(_file(name).read_text(encoding="utf-8")):
+            ends = {base, *(f"{base}.{each}" for each in re.findall(r"\w+", names))}
+            waiting |= {end for end in ends if _file(end).is_file()} - found
+    return sorted(found)
+
+
+def _subject(module: str) -> str:
+    """What a module of kernels belongs to: a formulation, or the integrators."""
+    return "-".join(module.split(".")[1:]).replace("_", "-")
+
+
+@contextmanager
+def announcing(tell: Callable[[str], None]) -> Iterator[None]:
+    """Have ``tell`` called when something is compiled for the first time, which takes some seconds."""
+    _listeners.append(tell)
+    try:
+        yield
+    finally:
+        _listeners.remove(tell)
+
+
+def compiled_before(module: str) -> bool:
+    """Whether code for this source lies on disk; otherwise the first use compiles for some seconds."""
+    return not ENABLED or folder(module).is_dir()
+
+
+@contextmanager
+def compiling_beside(module: str) -> Iterator[None]:
+    """While kernels are compiled here, have those of another module compiled too, by a process of their own."""
+    if compiled_before(module) or (os.cpu_count() or 1) < 2:
+        yield
+        return
+    _tell_of(module)
+    process = subprocess.Popen(
+        [sys.executable, "-c", f"import {module}"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        yield
+    except BaseException:
+        process.terminate()
+        raise
+    finally:
+        process.wait()  # whatever became of it: what it has not compiled is compiled here
+
+
+def _tell_of(module: str) -> None:
+    subject = next((words for part, words in _SUBJECTS.items() if f".{part}." in f"{module}."), _EQUATIONS)
+    if subject in _told or not _listeners:
+        return
+    _told.add(subject)
+    for tell in _listeners:
+        tell(f"compiling {subject} (once on this machine)")
+
+
+def _on_disk(function: Any) -> bool:
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-{function.__code__.co_firstlineno}"
+    return any(folder(function.__module__).glob(f"*/{name}.*"))
+
+
+def helper(function: F) -> F:
+    """A function that kernels call; compiled within them."""
+    return _njit(function) if ENABLED else function
+
+
+def part(function: F) -> F:
+    """A helper of kernels that are not ``counted``: without a way in from Python, a third of its compilation."""
+    return _njit(function, **_PART) if ENABLED else function
+
+
+def reordered(function: F) -> F:
+    """A `part` whose sums may be taken in any order, so that processors take several terms at once."""
+    return _njit(function, **_PART, fastmath={"reassoc", "contract"}) if ENABLED else function
+
+
+def inlined(function: F) -> F:
+    """A `part` that becomes one with its caller: for what takes many arrays."""
+    return _njit(function, **_PART, forceinline=True) if ENABLED else function
+
+
+def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
+    """A function with a fixed signature (of `erls.equations.compiled_system`), compiled when its module is imported.
+
+    Unless ``counted``, it keeps no count of who refers to its arrays: atomic operations, which many arrays make dear.
+    """
+    return lambda function: _njit(function, signature, _nrt=counted) if ENABLED else function
+
+
+def _njit(function: Any, *signature: Any, **options: Any) -> Any:
+    import numba
+
+    before = numba.config.CACHE_DIR
+    if signature and not _on_disk(function):
+        _tell_of(function.__module__)
+    numba.config.CACHE_DIR = str(folder(function.__module__))
+    try:
+        return numba.njit(*signature, cache=True, error_model="numpy", nogil=True, **options)(function)
+    finally:
+        numba.config.CACHE_DIR = before

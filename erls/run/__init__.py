@@ -1,0 +1,1 @@
+"""What a run holds, and what is asked of it: states, files, events, stresses, watches."""

@@ -1,0 +1,1 @@
+"""What scenes of bodies give: motions, equilibria, buckling loads, frequencies."""

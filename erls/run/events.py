@@ -1,0 +1,128 @@
+"""Events: when a coordinate of the motion crosses a value, and runs that end there.
+
+A crossing is looked for between the knots of a run, so that one there and back within a step is not seen; its time is
+the root of the interpolated motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from erls.integrate.base import Solution, StopRun
+from erls.scene.chain import Event
+from erls.scene.check import OF_POINTS
+
+if TYPE_CHECKING:
+    from erls.run.record import Run
+
+@dataclass(frozen=True)
+class Happening:
+    """An event that happened.
+
+    Attributes
+    ----------
+    name : str
+    time : float
+        [s]
+    rising : bool
+        Whether the coordinate grew past the value.
+    """
+
+    name: str
+    time: float
+    rising: bool
+
+
+def event_value(event: Event) -> float:
+    """Value that the coordinate crosses [m, rad, m/s or rad/s]."""
+    return float(np.radians(event.value_deg) if event.value is None else event.value)  # type: ignore[arg-type]
+
+
+def happenings(run: Run, since: float | None = None) -> tuple[Happening, ...]:
+    """What happened in a run, in the order of time.
+
+    Parameters
+    ----------
+    run : Run
+    since : float, optional
+        Knots from this time on; all of them unless given.
+    """
+    events = run.scene.record.events
+    if not events:
+        return ()
+    s = run.solution
+    first = 0 if since is None else int(np.searchsorted(s.t, since))
+    knots = range(first, len(s.t))
+    states = [run.formulation.state(float(s.t[k]), s.y[k], s.v[k]) for k in knots]
+    found = []
+    for event in events:
+        height = _height(run, event)
+        values = [height(state) for state in states]
+        for k, (before, after) in enumerate(pairwise(values), start=first):
+            rising = before < 0 <= after
+            if s.t[k] < s.t[k + 1] and (
+                (rising and event.direction != "falling") or (before > 0 >= after and event.direction != "rising")
+            ):
+                found.append(Happening(event.name, _root(run, height, float(s.t[k]), float(s.t[k + 1])), rising))
+    return tuple(sorted(found, key=lambda happening: happening.time))
+
+
+class Stopper:
+    """Finds events as knots pass, and ends a run at the first one that says so; to be called by its observer."""
+
+    def __init__(self, run: Callable[[Solution], Run], names: set[str]) -> None:
+        self._run, self._names = run, names
+        self._since = 0.0
+        self.happened: Happening | None = None
+
+    def look(self, solution: Solution) -> list[float]:
+        """Times of events since the last look; their steps are to be kept, so that the run shows them.
+
+        Raises
+        ------
+        StopRun
+            With these times, where an event stops the run.
+        """
+        times = []
+        for happening in happenings(self._run(solution), self._since):
+            times.append(happening.time)
+            if happening.name in self._names:
+                self.happened = happening
+                raise StopRun(*times)
+        self._since = float(solution.t[-1])
+        return times
+
+
+def cut(solution: Solution, time: float) -> Solution:
+    """A solution up to its first knot at or after a time."""
+    knots = int(np.searchsorted(solution.t, time)) + 1
+    parts = {f.name: getattr(solution, f.name) for f in fields(solution)}
+    own: dict[str, Any] = {name: part[:knots] for name, part in parts.items() if isinstance(part, np.ndarray)}
+    return replace(solution, **own)
+
+
+def _height(run: Run, event: Event) -> Callable[..., float]:
+    """The coordinate less the value, of a state."""
+    value = event_value(event)
+    if event.joint:
+        number, what = run.joint_names.index(event.joint), {"angle": "angles", "rate": "rates"}[event.coordinate]
+        return lambda state: float(getattr(state, what)[number]) - value
+    number, axis = run.point_names.index(event.point), OF_POINTS.index(event.coordinate)
+    return lambda state: float(run.point_position(state, number)[axis]) - value
+
+
+def _root(run: Run, height: Callable[..., float], start: float, end: float) -> float:
+    from scipy.optimize import brentq  # here: only events need it
+
+    def at(t: float) -> float:
+        return height(run.states([t])[0])
+
+    ends = at(start), at(end)
+    if ends[0] * ends[1] > 0:  # rounding of the interpolation: the crossing is at an end
+        return start if abs(ends[0]) < abs(ends[1]) else end
+    return float(brentq(at, start, end, xtol=1e-12))

@@ -1,0 +1,173 @@
+"""Stress and section forces of a link during a run.
+
+They need a modal file with recovery maps (table ``[recovery]`` of the link description). What the modes of the scene
+carry is corrected by the static answer of all others to the loads of the run (mode acceleration): see
+`fe_import.recovery.maps`.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from erls.equations.substructures import solved
+from erls.errors import Cause, SceneError
+from erls.files.output import replacing
+from erls.maths.so3 import Array
+from erls.mechanism.links import Link
+from erls.run.link_loads import link_loads
+from erls.run.record import Run
+from fe_import.files.toml import choose
+from fe_import.modal.model import ModalModel
+from fe_import.recovery.maps import UNITS, RecoveryMaps, spin_products
+from fe_import.recovery.recover import mode_acceleration, required_maps
+
+
+def recovery_places(run: Run, link: str) -> RecoveryMaps:
+    """Where stress or section forces of a link are known: nodes, elements, axes.
+
+    Raises
+    ------
+    SceneError
+        No such link.
+    FEImportError
+        The link holds nothing to recover from.
+    """
+    return required_maps(_link(run, link)[1].model, f"link {link!r}")
+
+
+def stress(run: Run, link: str, t: ArrayLike, *, static_correction: bool = True) -> Array:
+    """Nodal stress of a solid link.
+
+    Parameters
+    ----------
+    run : Run
+    link : str
+    t : float or array
+        Times within the run [s].
+    static_correction : bool
+        Add what the modes left out carry (mode acceleration).
+
+    Returns
+    -------
+    (..., p, 6) array
+        xx, yy, zz, xy, yz, zx [Pa] in mesh axes, at the nodes ``recovery_places(run, link).nodes``.
+
+    Raises
+    ------
+    SceneError
+        No such link, a frame link, a time outside the run.
+    FEImportError
+        The link holds nothing to recover from.
+    """
+    return _recovered(run, link, t, "stress", static_correction)
+
+
+def section_forces(run: Run, link: str, t: ArrayLike, *, static_correction: bool = True) -> Array:
+    """Section forces of a frame link.
+
+    Parameters and errors are those of `stress`.
+
+    Returns
+    -------
+    (..., p, 6) array
+        N, V_y, V_z [N], T, M_y, M_z [N m] in the local axes of the element, at the element ends of
+        ``recovery_places(run, link)``: what the part at larger local x does to the part at smaller x.
+
+    Examples
+    --------
+    >>> import erls
+    >>> run = erls.simulate(erls.load_scene("data/l_shape/steel_tall.toml", ["simulation.duration=0.01"]))
+    >>> erls.section_forces(run, "l", 0.01)
+    Traceback (most recent call last):
+    ...
+    fe_import.errors.FEImportError: link 'l': this link holds nothing to recover stress or section forces from; add a \
+table [recovery] to its link description and reduce it again
+    """
+    return _recovered(run, link, t, "section forces", static_correction)
+
+
+def export_recovery(run: Run, link: str, path: Path | str, t: ArrayLike, *, static_correction: bool = True) -> None:
+    """Write a CSV table: time, node, element (counted from 0; empty for nodal stress), position, six components.
+
+    Parameters and errors are those of `stress`; NOT_WRITABLE.
+    """
+    times = np.asarray(t, dtype=float).ravel()
+    maps, model = recovery_places(run, link), _link(run, link)[1].model
+    values = _recovered(run, link, times, maps.quantity, static_correction)
+    units = [f"{name} [{unit}]" for name, unit in zip(maps.components, UNITS[maps.quantity], strict=True)]
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["t [s]", "node", "element", "x [m]", "y [m]", "z [m]", *units])
+        for time, places in zip(times.tolist(), values, strict=True):
+            for node, element, row in zip(maps.nodes.tolist(), maps.elements.tolist(), places, strict=True):
+                where = model.nodes[node].tolist()
+                rows.writerow([time, node, "" if element < 0 else element, *where, *row.tolist()])
+
+
+def _recovered(run: Run, link: str, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
+    """(..., p, 6) components at the places of the link's recovery maps."""
+    maps = recovery_places(run, link)
+    if _link(run, link)[1].pieces:
+        return _of_pieces(run, _link(run, link)[1], t, quantity, static_correction)
+    if maps.quantity != quantity:
+        other = "section_forces" if maps.quantity == "section forces" else "stress"
+        raise SceneError(
+            Cause.BAD_FIELD,
+            f"this link has {maps.quantity}, not {quantity}",
+            where=f"link {link!r}",
+            remedy=f"ask for erls.{other}",
+        )
+    number, record = _link(run, link)
+    times = np.asarray(t, dtype=float)
+    if static_correction:
+        found = link_loads(run, number, times.ravel())
+        modes, loads, spin = mode_acceleration(record.model)
+        values = np.tensordot(found.modal, modes, (1, 2)) + np.tensordot(found.interfaces, loads, (1, 2))
+        values += np.tensordot(spin_products(found.omega), spin, (1, 2))
+    else:
+        values = np.tensordot(run.modal_coordinates(link, times.ravel()), maps.modes, (1, 2))
+    return np.asarray(values.reshape(*times.shape, len(maps.nodes), 6))
+
+
+def _of_pieces(run: Run, link: Link, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
+    """(..., p, 6) components at the places of a split link."""
+    solved_for = replace(run, formulation=solved(run.formulation))
+    parts = [_recovered(solved_for, piece.name, t, quantity, static_correction) for piece in link.pieces]
+    return np.stack([parts[piece][..., at, :] for piece, at in _places_in_pieces(link)], axis=-2)
+
+
+def _places_in_pieces(link: Link) -> list[tuple[int, int]]:
+    """Piece and place in its maps of each place of a split link: at the same node, along the same element."""
+    maps = required_maps(link.model, f"link {link.name!r}")
+    names = {number: name for name, number in link.model.node_names.items()}
+    known: dict[str, list[tuple[Array, tuple[int, int]]]] = {}
+    for number, piece in enumerate(link.pieces):
+        own = required_maps(piece.model, piece.name)
+        own_names = {k: name for name, k in piece.model.node_names.items()}
+        for at, (node, element) in enumerate(zip(own.nodes.tolist(), own.elements.tolist(), strict=True)):
+            away = _direction(piece.model, node, element)
+            known.setdefault(own_names[node], []).append((away, (number, at)))
+    result = []
+    for node, element in zip(maps.nodes.tolist(), maps.elements.tolist(), strict=True):
+        away = _direction(link.model, node, element)
+        candidates = known[names[node]]
+        result.append(candidates[int(np.argmax([way @ away for way, _ in candidates]))][1])
+    return result
+
+
+def _direction(model: ModalModel, node: int, element: int) -> Array:
+    """(3,) unit vector from a node along an element of a frame that ends there."""
+    first, second = model.lines[element].tolist()
+    along = model.nodes[second if first == node else first] - model.nodes[node]
+    return np.asarray(along / np.linalg.norm(along))
+
+
+def _link(run: Run, name: str) -> tuple[int, Link]:
+    choose(name, run.link_names, "link", SceneError)
+    number = run.link_names.index(name)
+    return number, run.formulation.mechanism.links[number]

@@ -1,0 +1,61 @@
+"""Motors at their limit during a run: what an adaptive integrator does not see."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from erls.equations.formulation import Formulation
+from erls.equations.substructures import solved
+from erls.integrate.base import Array, Solution
+from erls.mechanism.rigid_dynamics import inverse_dynamics
+
+_LOOKS = 500  # at most
+_WORST = 100  # times the tolerance, in runs of one arm whose motor switches between its limits
+
+
+def limit_warnings(formulation: Formulation, solution: Solution, tolerance: float) -> list[str]:
+    """Of motors that reached their limit, and left it, under `lobatto`.
+
+    When a motor leaves its limit follows from the rate of the joint, with all its small vibrations. An error of these,
+    harmless for positions, so becomes one of the impulse that the motor gives, and that stays in the motion.
+
+    Parameters
+    ----------
+    formulation : Formulation
+    solution : Solution
+    tolerance : float
+        That the integrator was given [m].
+    """
+    mechanism = formulation.mechanism
+    result = []
+    for place, k in enumerate(getattr(solved(formulation), "free_joints", ())):
+        joint = mechanism.joints[k]
+        if not math.isfinite(joint.drive.torque_limit):
+            continue
+        wanted = _wanted(formulation, solution, place, int(k))
+        beyond = np.abs(wanted) > joint.drive.torque_limit
+        sides = np.sign(wanted[beyond])
+        if beyond.any() and (not beyond.all() or np.ptp(sides) > 0):
+            result.append(
+                f"the motor of joint {joint.name!r} reaches its limit of {joint.drive.torque_limit:.3g} and leaves it "
+                f"again; small vibrations decide when, so the motion may be off by up to some {_WORST} times the "
+                f"tolerance of {tolerance:.3g} m: see whether it changes with a tenth of that"
+            )
+    return result
+
+
+def _wanted(formulation: Formulation, solution: Solution, place: int, k: int) -> Array:
+    """Force that the drive of joint k, coordinate ``place``, asks of its motor, at some knots."""
+    mechanism = formulation.mechanism
+    drive = mechanism.joints[k].drive
+    every = max(1, len(solution.t) // _LOOKS)
+    result = []
+    for t, y, v in zip(solution.t[::every], solution.y[::every, place], solution.v[::every, place], strict=True):
+        torque = drive.torque(float(t), float(y), float(v))
+        if drive.feed_forward:
+            goals = [j.drive.reference(float(t)) or (j.position, 0.0, 0.0) for j in mechanism.joints]
+            torque += float(inverse_dynamics(mechanism, *np.array(goals).T)[k])
+        result.append(torque)
+    return np.array(result)

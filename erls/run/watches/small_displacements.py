@@ -1,0 +1,45 @@
+"""Displacements beyond the range in which a modal model holds, after a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from erls.equations.serial.state_series import StateSeries
+from erls.mechanism.chain import Mechanism
+from erls.run.record import Run
+
+_LARGE_DEFLECTION = 0.1  # of the link's size; the second-order error of a small-displacement model is then about 1 %
+_LARGE_ROTATION = 0.2  # rad
+_AT_ONCE = 1_000_000  # displacements in memory while states are looked at
+
+
+def range_warnings(run: Run, seen: StateSeries) -> list[str]:
+    """Links whose displacement left the range of small displacements, in which a modal model holds."""
+    if seen.nodes is not None:
+        return []  # the links may deflect as they like
+    mechanism: Mechanism = run.formulation.mechanism
+    largest = np.zeros(len(mechanism.links))
+    turned = np.zeros(len(mechanism.links))
+    for k, link in enumerate(mechanism.links):
+        model, q = link.model, seen.modal[k]
+        second_order = link.second_order if "foreshortening" in mechanism.effects else None
+        per_pass = max(1, _AT_ONCE // model.translation_shapes[..., 0].size)
+        for some in np.split(q, range(per_pass, len(q), per_pass)):
+            moved = np.tensordot(some, model.translation_shapes, ([1], [2]))
+            if second_order is not None:
+                moved += second_order.displacements(np.arange(len(model.nodes)), some)
+            moved -= moved[:, link.inboard.node, None]
+            largest[k] = np.fmax(largest[k], np.linalg.norm(moved, axis=2).max())
+            if len(model.rotation_shapes):
+                rotations = np.tensordot(some, model.rotation_shapes, ([1], [2]))
+                turned[k] = np.fmax(turned[k], np.linalg.norm(rotations, axis=2).max())
+    result = []
+    for k, link in enumerate(mechanism.links):
+        size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
+        if largest[k] > _LARGE_DEFLECTION * size or turned[k] > _LARGE_ROTATION:
+            result.append(
+                f"link {link.name!r} moves by up to {largest[k]:.3g} m and turns by up to "
+                f"{np.degrees(turned[k]):.2g} deg against its rigid shape: beyond small displacements, expect errors "
+                "of second order in the deflection"
+            )
+    return result

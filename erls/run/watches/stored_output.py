@@ -1,0 +1,86 @@
+"""What ``output_step`` leaves of a run, and whether motion between the stored states can be told from them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from erls.equations.serial.state_series import state_series
+from erls.errors import SimulationError
+from erls.integrate.base import Array, hermite
+from erls.run.record import Run, node_positions
+from erls.scene.chain import Simulation
+
+IntArray = NDArray[np.int64]
+
+FEWEST = 200
+"""Stretches of a run, at the least, at whose ends states are stored: what looks along a run needs as many."""
+
+_PLACES = 40
+_ORDER = 64  # halving the distance of knots divides the error of quintic interpolation by as much, once it resolves
+
+
+def output_step(settings: Simulation) -> float | None:
+    """Distance of the states that a run stores [s]: that of the scene, or a part of it that makes them enough."""
+    if settings.output_step is None:
+        return None
+    longest = min(settings.output_step, settings.duration)
+    return longest / max(1, math.ceil(FEWEST * longest / settings.duration * (1 - 1e-9)))
+
+
+def output_error(run: Run) -> float:
+    """Largest distance of points (interfaces, where none are named) from interpolation between stored states [m].
+
+    It is estimated at some of these, from interpolation without them and, over twice the distance, without their
+    neighbours; 0 where all steps were kept.
+    """
+    apart = output_step(run.scene.record.simulation)
+    t = run.solution.t
+    if apart is None or len(t) < 5:
+        return 0.0
+    even = np.abs(np.diff(t) - apart) <= 1e-6 * apart
+    middles = np.flatnonzero(even[:-3] & even[1:-2] & even[2:-1] & even[3:]) + 2
+    if not len(middles):
+        return 0.0
+    middles = middles[np.unique(np.linspace(0, len(middles) - 1, _PLACES).astype(np.int64))]
+    try:
+        with np.errstate(all="ignore"):  # a run that failed may hold anything
+            stored, near, far = (_places(run, middles, reach) for reach in (0, 1, 2))
+    except (SimulationError, np.linalg.LinAlgError):
+        return 0.0
+    twice, fourfold = (float(np.linalg.norm(x - stored, axis=-1).max(initial=0.0)) for x in (near, far))
+    if not 0 < twice < np.inf:
+        return 0.0
+    return twice * float(np.clip(twice / fourfold, 1 / _ORDER, 1.0)) if fourfold < np.inf else twice
+
+
+def output_warnings(run: Run) -> list[str]:
+    """At most one: between stored states motion is not resolved to the tolerance of the scene."""
+    settings = run.scene.record.simulation
+    found = output_error(run)
+    if found <= settings.tolerance:
+        return []
+    return [
+        f"simulation.output_step = {settings.output_step:.4g} s: between stored states, {output_step(settings):.4g} s "
+        f"apart, interpolation is off by about {found:.2g} m; states, events, energies and warnings do not suffer: "
+        "ask at its multiples, or give a smaller one"
+    ]
+
+
+def _places(run: Run, middles: IntArray, reach: int) -> Array:
+    """(k, p, 3) positions of points at some knots, interpolated from those ``reach`` before and after; 0 for their own.
+    """
+    s = run.solution
+    found = []
+    for k in middles.tolist():
+        ends = [k - reach, k + reach] if reach else [k]
+        found.append([x[0] for x in hermite(s.t[ends], s.y[ends], s.v[ends], s.a[ends], s.t[[k]])])
+    y, v = (np.array(part) for part in zip(*found, strict=True))
+    states = state_series(run.formulation, s.t[middles], y, v).states()
+    mechanism = run.formulation.mechanism
+    nodes = [(p.link, np.array([p.node])) for p in mechanism.points] or [
+        (k, np.array([i.node for i in link.model.interface_nodes])) for k, link in enumerate(mechanism.links)
+    ]
+    return np.array([np.concatenate([node_positions(run, state, *own) for own in nodes]) for state in states])

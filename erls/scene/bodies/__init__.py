@@ -1,0 +1,1 @@
+"""Scenes of bodies, beams and connections in any arrangement."""

@@ -1,0 +1,90 @@
+"""What is to be found of a scene of bodies: its motion, equilibria, buckling loads or natural frequencies.
+
+Each analysis is one record, which a scene selects by ``type = "..."`` in its table ``simulation``.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+TANGENTS = ("full", "material", "frozen")  # see `erls.equations.nodal.statics`
+GROUPS = ("SE(3)", "R3xSO(3)")
+
+
+class _Analysis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="type"):
+    """Base of all analyses."""
+
+
+class Dynamics(_Analysis, frozen=True, tag="dynamics"):
+    """The motion from the initial velocities on, by Lie-group generalized-α.
+
+    Attributes
+    ----------
+    duration, step : float
+        [s]; the step is a thousandth of the duration, at most 1 ms, unless given.
+    group : str
+        Where every node moves: ``SE(3)``, equations in its own axes; or ``R3xSO(3)``, positions in the world's axes.
+    spectral_radius : float
+        ρ∞: 1 no numerical damping, 0 the most.
+    iteration_matrix : str
+        ``auto``, ``update`` or ``frozen``, see `erls.integrate.constrained.ConstrainedOptions`.
+    newton_tolerance : float
+        Iterations stop at an estimated error below this [m]; with 0 at a small residual alone.
+    residual_tolerance : float
+        What a small residual is, against the inertia and loads of the nodes and the forces of the connections.
+    """
+
+    duration: float
+    step: float | None = None
+    group: str = "SE(3)"
+    spectral_radius: float = 0.8
+    iteration_matrix: str = "auto"
+    newton_tolerance: float = 1e-11
+    residual_tolerance: float = 1e-10
+
+
+class _AtRest(_Analysis, frozen=True):
+    """What all analyses at rest share.
+
+    Attributes
+    ----------
+    load_steps : int
+        Equal steps of the load parameter.
+    tangent : str
+        ``full``, ``material`` or ``frozen``, see `erls.equations.nodal.statics`.
+    """
+
+    load_steps: int = 1
+    tangent: str = "full"
+
+
+class StaticSteps(_AtRest, frozen=True, tag="statics"):
+    """Equilibria at load parameters from 1 / ``load_steps`` to 1.
+
+    Attributes
+    ----------
+    compare_tangents : bool
+        Report what each of the tangents takes.
+    """
+
+    compare_tangents: bool = False
+
+
+class Buckling(_AtRest, frozen=True, tag="buckling"):
+    """The ``count`` lowest load parameters at which the equilibrium at ``load`` becomes unstable, from the rate at
+    which its stiffness changes with the load there.
+    """
+
+    count: int = 4
+    load: float = 0.0
+
+
+class Frequencies(_AtRest, frozen=True, tag="frequencies"):
+    """The ``count`` lowest natural frequencies about the equilibrium at the load parameter ``load``."""
+
+    count: int = 6
+    load: float = 1.0
+
+
+AtRest = StaticSteps | Buckling | Frequencies
+Analysis = Dynamics | StaticSteps | Buckling | Frequencies

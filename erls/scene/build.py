@@ -1,0 +1,373 @@
+"""From a scene to its mechanism: links reduced or read, placed on Denavit-Hartenberg frames, loaded with payloads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import platformdirs
+
+from erls.errors import Cause, SceneError
+from erls.maths.se3 import inverse, pose
+from erls.maths.so3 import Array, fixed_axes
+from erls.mechanism.chain import Mechanism, Point
+from erls.mechanism.dh import DHRow, split
+from erls.mechanism.drives import build_drive
+from erls.mechanism.effects import ALL, inconsistencies, named_effects
+from erls.mechanism.joints import JOINT_TYPES, Joint
+from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model, truncated
+from erls.mechanism.place import Place
+from erls.mechanism.without_effects import without
+from erls.scene.build_joints import angle, joint_forces, reflected_inertia
+from erls.scene.build_loops import build_loops
+from erls.scene.build_substructures import piece_links, piece_models, piece_warnings
+from erls.scene.chain import Joint as JointRecord
+from erls.scene.chain import Link as LinkRecord
+from erls.scene.chain import Scene
+from fe_import.description.link import LinkDescription, load_link
+from fe_import.errors import FEImportError, ReportedError
+from fe_import.files.toml import choose
+from fe_import.modal.file import ModalModel, read_modal_file
+from fe_import.model import InterfaceNode
+from fe_import.models.model import inertia_matrix
+from fe_import.reduce import reduce_cached
+from fe_import.reduction.modes import damping_ratios
+from fe_import.solver.watch import telling
+
+Message = Callable[[str], None]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Built:
+    """A mechanism, and what the user should know about how it came about."""
+
+    mechanism: Mechanism
+    warnings: tuple[str, ...]
+
+
+def cache_folder() -> Path:
+    """Folder of reductions made on the fly: ``ERLS_CACHE``, or the user's cache folder."""
+    import os
+
+    given = os.environ.get("ERLS_CACHE")
+    return Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
+
+
+def build_mechanism(
+    scene: Scene,
+    tell: Message = lambda text: None,
+    models: Sequence[ModalModel] | None = None,
+    descriptions: Sequence[LinkDescription | None] = (),
+    pieces: Sequence[Sequence[ModalModel]] = (),
+) -> Built:
+    """Read or reduce the links and put the mechanism together.
+
+    Parameters
+    ----------
+    scene : Scene
+    tell : callable
+        Told about each step that takes time.
+    models : sequence of ModalModel, optional
+        Modal models of the links, instead of the ones that the scene names (a run file holds its own).
+    descriptions : sequence of LinkDescription or None
+        With ``models``: descriptions of the links that are made of beams, as far as they are known.
+    pieces : sequence of sequences of ModalModel
+        With ``models``: those of the substructures of each link; empty for a link in one piece.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Naming file, field, value and remedy.
+    """
+    record, file = scene.record, str(scene.path)
+    joints = _joints(scene)  # first: a faulty one is found before time goes into reductions
+    if models is None:
+        models, descriptions = link_models(scene, tell), _beam_descriptions(scene)
+        pieces = _pieces(scene, models, tell)
+    links = [
+        replace(_link(link, model, k, len(models), file), description=description)
+        for k, (link, model, description) in enumerate(
+            zip(record.links, models, descriptions or [None] * len(models), strict=True)
+        )
+    ]
+    links = [
+        replace(link, pieces=piece_links(given, link, own, f"{file}: links[{k}]")) if own else link
+        for k, (link, given, own) in enumerate(zip(links, record.links, pieces or [()] * len(links), strict=True))
+    ]
+    warnings = [w for joint, link in zip(joints, links, strict=True) for w in _arm_warnings(joint, link)]
+    warnings += [w for link in links for w in piece_warnings(link)]
+    points = [_point(scene, k, links) for k in range(len(record.points))]
+    links = _with_payloads(scene, links, points)
+    chain = Mechanism(
+        name=scene.name,
+        joints=tuple(joints),
+        links=tuple(links),
+        points=tuple(points),
+        gravity=np.array(record.gravity),
+        static_start=record.initial.deformation == "static",
+        bandwidth=record.simulation.bandwidth,
+    )
+    effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
+    chain = without(replace(chain, loops=build_loops(scene, chain), effects=effects), ALL - effects)
+    return Built(chain, (*warnings, *inconsistencies(effects, record.simulation.formulation)))
+
+
+def _joints(scene: Scene) -> list[Joint]:
+    """The joints, on their Denavit-Hartenberg rows and mesh poses."""
+    record = scene.record
+    before = pose(fixed_axes(*np.radians(record.base.rotation_deg)), np.array(record.base.position))
+    result: list[Joint] = []
+    for k, (joint, link) in enumerate(zip(record.joints, record.links, strict=True)):
+        place = f"{scene.path}: joints[{k}]"
+        first, second = split(_dh_row(joint, place))
+        mesh = link.mesh_pose
+        mesh_pose = pose(fixed_axes(*np.radians(mesh.rotation_deg)), np.array(mesh.position))
+        after = second @ mesh_pose if mesh.frame == "dh" else mesh_pose
+        result.append(_joint(joint, before @ first, after, Place(scene.folder, place)))
+        before = inverse(mesh_pose) if mesh.frame == "dh" else inverse(mesh_pose) @ second
+    return result
+
+
+def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
+    """Modal model of every link; links from the same source in the same modes share one."""
+    made: dict[tuple[object, ...], ModalModel] = {}
+    result = []
+    for k, link in enumerate(scene.record.links):
+        key = (
+            link.model,
+            link.modal_file,
+            link.flexible,
+            link.elastic_modes,
+            json.dumps(link.reduction, sort_keys=True, default=str),
+            link.name if link.rigid else "",
+        )
+        if key not in made:
+            made[key] = _modal_model(scene, k, link, tell)
+        result.append(made[key])
+    return result
+
+
+def _pieces(scene: Scene, models: Sequence[ModalModel], tell: Message) -> list[tuple[ModalModel, ...]]:
+    """Modal models of the substructures of each link; none for a link in one piece."""
+    result: list[tuple[ModalModel, ...]] = []
+    solves_pieces = scene.record.simulation.formulation != "nodal"
+    for k, (link, model) in enumerate(zip(scene.record.links, models, strict=True)):
+        if link.substructures == 1 or not link.flexible or not solves_pieces:
+            result.append(())
+            continue
+        description = load_link(scene.folder / link.model, {**link.reduction, "form": "orthonormal"})
+        with telling(tell):
+            result.append(piece_models(link, description, model, cache_folder(), f"{scene.path}: links[{k}]"))
+        tell(f"{link.name}: {link.substructures} substructures")
+    return result
+
+
+def _beam_descriptions(scene: Scene) -> list[LinkDescription | None]:
+    """Descriptions of the links that are made of beams."""
+    found = [load_link(scene.folder / link.model).description if link.model else None for link in scene.record.links]
+    return [d if d is not None and d.frame is not None else None for d in found]
+
+
+def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> ModalModel:
+    """The link's modal model in the modes that the scene asks for."""
+    place = f"{scene.path}: links[{k}]"
+    if link.rigid is not None:
+        rigid = link.rigid
+        return rigid_model(
+            link.name,
+            rigid.mass,
+            np.array(rigid.centre_of_mass),
+            inertia_matrix(rigid.inertia, f"{place}.rigid.inertia", SceneError),
+            {n: np.array(p) for n, p in rigid.points.items()},
+        )
+    if link.modal_file:
+        path = scene.folder / link.modal_file
+        model = _within(f"{place}.modal_file", lambda: read_modal_file(path))
+        if model.form != "orthonormal":
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "this modal file is in physical form; ERLS needs rigid-body and elastic modes apart",
+                where=f"{place}.modal_file",
+                value=link.modal_file,
+                remedy="reduce with form = 'orthonormal'",
+            )
+    else:
+        path = scene.folder / link.model
+        description = _within(f"{place}.model", lambda: load_link(path, {**link.reduction, "form": "orthonormal"}))
+        with telling(tell):
+            model, cached = reduce_cached(description, cache_folder())
+        tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({path.name})")
+    wanted = 0 if not link.flexible else link.elastic_modes
+    if wanted is None:
+        return model
+    if wanted > model.elastic_modes:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "the modal model has fewer elastic modes",
+            where=f"{place}.elastic_modes",
+            value=wanted,
+            limit=model.elastic_modes,
+            remedy="ask for fewer, or reduce with more",
+        )
+    return truncated(model, wanted)
+
+
+def _within(place: str, read: Callable[[], T]) -> T:
+    """Say which field of the scene named a file that cannot be read."""
+    try:
+        return read()
+    except FEImportError as problem:
+        if problem.cause in (Cause.FILE_NOT_FOUND, Cause.NOT_READABLE):
+            problem.remedy = f"named by {place}; " + problem.remedy
+        raise
+
+
+def _dh_row(joint: JointRecord, place: str) -> DHRow:
+    at = Place(Path(), f"{place}.dh")
+    dh = joint.dh
+    return DHRow(
+        dh.convention,
+        at.number("a", dh.a),
+        angle(at, "alpha", dh.alpha, dh.alpha_deg),
+        at.number("d", dh.d),
+        angle(at, "theta", dh.theta, dh.theta_deg),
+    )
+
+
+def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joint:
+    kind = JOINT_TYPES[joint.type]
+    place = replace(place, revolute=kind.revolute)
+    drive = build_drive(joint.drive, place.folder, place.field("drive"), kind.revolute)
+    start = place.at("initial")
+    position = angle(start, "position", joint.initial.position, joint.initial.position_deg)
+    rate = angle(start, "rate", joint.initial.rate, joint.initial.rate_deg)
+    if drive.prescribed:
+        if any(getattr(joint.initial, f) is not None for f in joint.initial.__struct_fields__):
+            raise place.error(
+                "initial",
+                "a prescribed motion fixes its own start",
+                remedy="remove 'initial', or change the motion",
+            )
+        position, rate, _ = drive.reference(0.0)  # type: ignore[misc]
+    forces, rotor = joint_forces(joint, place), reflected_inertia(joint, place)
+    return Joint(joint.name, kind, before, after, forces, rotor, drive, position, rate)
+
+
+def _link(link: LinkRecord, model: ModalModel, k: int, count: int, file: str) -> Link:
+    place = f"{file}: links[{k}]"
+    names = [i.name for i in model.interface_nodes]
+    inboard = _interface(model, link.inboard or names[0], f"{place}.inboard")
+    others = [n for n in names if n != inboard.name]
+    outboard: InterfaceNode | None = None
+    if k < count - 1 or link.outboard:
+        if not link.outboard and not others:
+            raise SceneError(
+                Cause.BAD_REFERENCE,
+                "this link has no second interface for the next joint",
+                where=f"{place}.outboard",
+                value=link.name,
+                remedy="add an interface to the link description",
+            )
+        outboard = _interface(model, link.outboard or others[0], f"{place}.outboard")
+    omega = 2 * np.pi * model.frequencies_hz
+    ratios = model.damping_ratios
+    if link.damping is not None:
+        ratios = damping_ratios(link.damping, omega, place)
+    return Link(
+        name=link.name,
+        model=model,
+        invariants=model.invariants,
+        inboard=inboard,
+        outboard=outboard,
+        stiffness=np.diag(model.stiffness)[6:].copy(),
+        damping=(2 * ratios * omega)[6:],
+    )
+
+
+def _interface(model: ModalModel, name: str, where: str) -> InterfaceNode:
+    choose(name, [i.name for i in model.interface_nodes], where, SceneError)
+    found = model.interface(name)
+    if found is None:
+        raise ReportedError(Cause.BAD_REFERENCE, "no such interface", where=where, value=name)
+    return found
+
+
+def _arm_warnings(joint: Joint, link: Link) -> list[str]:
+    """A joint axis that misses its interface is bridged by a rigid arm; often a wrong mesh pose."""
+    frame = inverse(joint.after)
+    arm = link.inboard.position - frame[:3, 3]
+    off_axis = arm - (arm @ frame[:3, 2]) * frame[:3, 2]
+    size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
+    if np.linalg.norm(off_axis) <= 1e-6 * max(size, 1e-9):
+        return []
+    return [
+        f"link {link.name!r}: interface {link.inboard.name!r} lies {np.linalg.norm(off_axis):.4g} m off the axis of "
+        f"joint {joint.name!r}; a rigid arm bridges the gap (check mesh_pose if this is not meant)"
+    ]
+
+
+def _point(scene: Scene, k: int, links: list[Link]) -> Point:
+    """Resolve a named point to a node of a link."""
+    point, place = scene.record.points[k], f"{scene.path}: points[{k}]"
+    number = [link.name for link in links].index(point.link)
+    model = links[number].model
+    if point.position is not None:
+        distance = np.linalg.norm(model.nodes - np.array(point.position), axis=1)
+        node = int(distance.argmin())
+        limit = 0.05 * float(np.linalg.norm(np.ptp(model.nodes, axis=0)))
+        if distance[node] > limit:
+            raise SceneError(
+                Cause.BAD_REFERENCE,
+                "no mesh node near this position",
+                where=f"{place}.position",
+                value=point.position,
+                limit=f"{limit:.4g} m, nearest {distance[node]:.4g} m",
+                remedy="positions are in the link's mesh frame",
+            )
+        return Point(point.name, number, node)
+    known = {**{i.name: i.node for i in model.interface_nodes}, **model.node_names}
+    choose(point.node, known, f"{place}.node", SceneError)
+    return Point(point.name, number, known[point.node])
+
+
+def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list[Link]:
+    """Payloads on points, and motors on the outboard interface before their joint."""
+    result = list(links)
+    names = {p.name: p for p in points}
+
+    def add(
+        number: int, node: int, offset: Array, mass: float, inertia: Array, place: str, motor: bool = False
+    ) -> None:
+        link = result[number]
+        turning = node in link.model.rotation_nodes
+        if not turning and (inertia.any() or offset.any()):
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "this node has no rotation, so it cannot carry an inertia or an offset",
+                where=place,
+                value=link.name,
+                remedy="put the payload on an interface, or give mass only",
+            )
+        extra = payload_invariants(link.model, node, offset, mass, inertia)
+        payloads = (*link.payloads, Payload(node, offset, mass, inertia, motor))
+        result[number] = replace(link, invariants=link.invariants + extra, payloads=payloads)
+
+    for k, payload in enumerate(scene.record.payloads):
+        place = f"{scene.path}: payloads[{k}]"
+        point = names[payload.point]
+        mass = Place(scene.folder, place).not_negative("mass", payload.mass)
+        inertia = inertia_matrix(payload.inertia, f"{place}.inertia", SceneError)
+        add(point.link, point.node, np.array(payload.offset), mass, inertia, place)
+    for k, joint in enumerate(scene.record.joints):
+        place = f"{scene.path}: joints[{k}].motor"
+        mass = Place(scene.folder, place).not_negative("mass", joint.motor.mass)
+        inertia = inertia_matrix(joint.motor.inertia, f"{place}.inertia", SceneError)
+        outboard = links[k - 1].outboard if k else None
+        if outboard is not None and (mass or inertia.any()):  # the first motor stands on the ground
+            add(k - 1, outboard.node, np.zeros(3), mass, inertia, place, motor=True)
+    return result

@@ -1,0 +1,114 @@
+"""Closing joints of a scene: their frames on links and ground, where the initial coordinates put them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from erls.errors import Cause, SceneError
+from erls.maths.se3 import inverse, pose
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism, poses
+from erls.mechanism.drives import build_drive
+from erls.mechanism.joints import JOINT_TYPES
+from erls.mechanism.loop_turns import turning_signs
+from erls.mechanism.loops import LOOP_TYPES, Loop, LoopEnd, LoopFreedom
+from erls.mechanism.place import Place
+from erls.scene.build_joints import angle, joint_forces, reflected_inertia
+from erls.scene.chain import Loop as LoopRecord
+from erls.scene.chain import Scene
+from fe_import.files.toml import choose
+
+
+def build_loops(scene: Scene, mechanism: Mechanism) -> tuple[Loop, ...]:
+    """Closing joints of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    mechanism : Mechanism
+        The chain, without its loops.
+
+    Raises
+    ------
+    SceneError
+        BAD_REFERENCE, BAD_FIELD: naming file, field, value and remedy.
+    """
+    frames = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
+    return tuple(
+        _loop(record, mechanism, frames, Place(scene.folder, f"{scene.path}: loops[{k}]"))
+        for k, record in enumerate(scene.record.loops)
+    )
+
+
+def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Place) -> Loop:
+    place = at.where
+    names = [link.name for link in mechanism.links]
+    number = names.index(record.link)
+    node = _node(mechanism, number, record.node, f"{place}.node")
+    if record.axis is None:  # parallel to the joint that carries the link
+        axis = (frames[number] @ inverse(mechanism.joints[number].after))[:3, 2]
+    else:
+        axis = np.array(record.axis) / np.linalg.norm(record.axis)
+    turn = _along(axis)
+    outer = LoopEnd(number, node, pose(frames[number][:3, :3].T @ turn))
+    if record.to_link:
+        other = names.index(record.to_link)
+        to_node = _node(mechanism, other, record.to_node, f"{place}.to_node")
+        inner = LoopEnd(other, to_node, pose(frames[other][:3, :3].T @ turn))
+    else:
+        position = frames[number][:3, :3] @ mechanism.links[number].model.nodes[node] + frames[number][:3, 3]
+        inner = LoopEnd(None, 0, pose(turn, position if record.position is None else np.array(record.position)))
+    start = frames[number] @ outer.frame
+    start[:3, 3] = frames[number][:3, :3] @ mechanism.links[number].model.nodes[node] + frames[number][:3, 3]
+    base = inner.frame
+    if inner.link is not None:
+        base = frames[inner.link] @ pose(position=mechanism.links[inner.link].model.nodes[inner.node]) @ inner.frame
+    loop = Loop(record.name, LOOP_TYPES[record.type], inner, outer)
+    if record.type not in JOINT_TYPES:
+        return loop
+    slide = float((inverse(base) @ start)[2, 3])
+    return replace(loop, freedom=_freedom(record, mechanism, loop, slide, at))
+
+
+def _freedom(record: LoopRecord, mechanism: Mechanism, loop: Loop, slide: float, place: Place) -> LoopFreedom:
+    """``slide``: how far along its axis the outer frame is at the initial joint coordinates."""
+    kind = JOINT_TYPES[record.type]
+    place = replace(place, revolute=kind.revolute)
+    zero = 0.0
+    if record.coordinate is not None or record.coordinate_deg is not None:
+        zero = angle(place, "coordinate", record.coordinate, record.coordinate_deg)
+        zero -= 0.0 if kind.revolute else slide
+    drive = build_drive(record.drive, place.folder, place.field("drive"), kind.revolute)
+    freedom = LoopFreedom(kind, zero, joint_forces(record, place), reflected_inertia(record, place), drive)
+    if freedom.counts_turns and not turning_signs(mechanism, loop)[1]:
+        raise place.error(
+            "drive" if drive.kind == "pd" else "stiffness",
+            "turns of this joint cannot be counted: joints of the chain between its links turn about other axes",
+            remedy="put the spring or controller on a joint of the chain, or drive this one by a torque or a motion",
+        )
+    return freedom
+
+
+def _node(mechanism: Mechanism, number: int, name: str, where: str) -> int:
+    model = mechanism.links[number].model
+    known = {**{i.name: i.node for i in model.interface_nodes}, **model.node_names}
+    choose(name, known, where, SceneError)
+    if known[name] not in model.rotation_nodes:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "this node has no rotation, so it cannot carry a joint",
+            where=where,
+            value=name,
+            remedy="close the loop at an interface of the link",
+        )
+    return known[name]
+
+
+def _along(axis: Array) -> Array:
+    """(3, 3) frame with z along a unit vector and x as near as may be to an axis of the world."""
+    near = np.eye(3)[int(np.abs(axis).argmin())]
+    x = near - axis * (axis @ near)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(axis, x), axis])

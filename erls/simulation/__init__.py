@@ -1,0 +1,1 @@
+"""A scene in, its run out: one run, many variants, runs made by other processes."""

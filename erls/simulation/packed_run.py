@@ -1,0 +1,86 @@
+"""A run on its way from one process to another: its scene and its knots, from which the rest is made again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from erls.equations.formulation import Formulation
+from erls.equations.quasi_static.formulation import QuasiStatic
+from erls.equations.registry import formulate
+from erls.integrate.base import Solution
+from erls.mechanism.effects import Certificate
+from erls.run.record import Run
+from erls.scene.build import build_mechanism
+from erls.scene.chain import Scene
+from erls.simulation.simulate import models_of
+
+
+@dataclass(frozen=True)
+class PackedRun:
+    """What a `Run` is without its formulation.
+
+    Attributes
+    ----------
+    scene, solution, wall_s, warnings, certificate
+        Of the run; ``solution`` in the coordinates of all modes where some follow statically, since those of the
+        others depend on how modes are scaled.
+    """
+
+    scene: Scene
+    solution: Solution
+    wall_s: float
+    warnings: tuple[str, ...]
+    certificate: Certificate | None
+
+
+def packed(run: Run) -> PackedRun:
+    """A run to be sent."""
+    s = run.solution
+    if isinstance(run.formulation, QuasiStatic):
+        y, v, a = (run.formulation.stored(values) for values in (s.y, s.v, s.a))
+        s = replace(s, y=y, v=v, a=a)
+    return PackedRun(run.scene, s, run.wall_s, run.warnings, run.certificate)
+
+
+def unpacked(run: PackedRun, like: Run | None) -> Run:
+    """A run that was sent.
+
+    Parameters
+    ----------
+    run : PackedRun
+    like : Run, optional
+        One with the same links, whose modal models serve again.
+    """
+    if like is not None and run.scene.record.simulation.bandwidth is None:
+        return LaterRun.of(run, like)
+    formulation, s = formulated(run.scene, like), run.solution
+    if isinstance(formulation, QuasiStatic):
+        y, v, a = (formulation.restored(values) for values in (s.y, s.v, s.a))
+        s = replace(s, y=y, v=v, a=a)
+    return Run(run.scene, formulation, s, run.wall_s, run.warnings, run.certificate)
+
+
+def formulated(scene: Scene, like: Run | None) -> Formulation:
+    """The equations of motion of a scene; modal models of a run with the same links serve again."""
+    built = build_mechanism(scene) if like is None else build_mechanism(scene, lambda text: None, *models_of(like))
+    return formulate(built.mechanism, scene.record.simulation)
+
+
+class LaterRun(Run):
+    """A `Run` whose formulation is put together when it is first asked for: many are never asked."""
+
+    @classmethod
+    def of(cls, run: PackedRun, like: Run) -> LaterRun:
+        """The run, with the modal models of one with the same links."""
+        result = cls.__new__(cls)
+        vars(result).update(vars(run), _like=like)
+        return result
+
+    def __getattr__(self, name: str) -> Any:
+        """What is not there yet."""
+        if name != "formulation" or "_like" not in vars(self):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        made = formulated(self.scene, vars(self)["_like"])
+        vars(self)["formulation"] = made
+        return made

@@ -1,0 +1,73 @@
+"""Variants of one scene, one after the other: what their links share is read once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from erls.equations.registry import formulate
+from erls.integrate.choice import compile_kernels
+from erls.run.record import Run
+from erls.scene.build import build_mechanism
+from erls.scene.chain import Scene, load_scene
+from erls.simulation.packed_run import PackedRun, unpacked
+from erls.simulation.simulate import Progress, simulate
+from fe_import.errors import ReportedError
+
+_MOST_KEPT = 8  # sets of links
+
+
+class Variants:
+    """Simulates variants of a scene.
+
+    Parameters
+    ----------
+    scene : Path or str
+    """
+
+    def __init__(self, scene: Path | str) -> None:
+        self.scene = scene
+        self._runs: dict[tuple[bytes, bool], Run] = {}
+
+    def run(self, overrides: Sequence[str], progress: Progress) -> Run | ReportedError:
+        """The run of a variant, or its failure.
+
+        Parameters
+        ----------
+        overrides : sequence of str
+        progress : callable
+            As of `erls.simulation.simulate.simulate`; called once before the start, too.
+        """
+        try:
+            progress(0.0, 0.0)
+            scene = load_scene(self.scene, overrides)
+            run = simulate(scene, progress=progress, like=self._runs.get(_links(scene)))
+        except ReportedError as problem:
+            return problem
+        self._know(run)
+        return run
+
+    def prepare(self, overrides: Sequence[str]) -> None:
+        """Read and compile what a variant needs."""
+        scene = load_scene(self.scene, overrides)
+        formulation = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
+        compile_kernels(formulation, scene.record.simulation)
+
+    def unpacked(self, sent: PackedRun) -> Run:
+        """A run that was computed by another process."""
+        run = unpacked(sent, self._runs.get(_links(sent.scene)))
+        self._know(run)
+        return run
+
+    def _know(self, run: Run) -> None:
+        """Have later runs with the same links share those of this one."""
+        self._runs.setdefault(_links(run.scene), run)
+        if len(self._runs) > _MOST_KEPT:
+            self._runs.pop(next(iter(self._runs)))
+
+
+def _links(scene: Scene) -> tuple[bytes, bool]:
+    """What modal models depend on; substructures are left whole in the nodal formulation."""
+    return msgspec.json.encode(scene.record.links), scene.record.simulation.formulation == "nodal"

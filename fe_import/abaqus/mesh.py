@@ -1,0 +1,82 @@
+"""Mesh of an Abaqus or CalculiX deck (.inp) with all its sets. Names are those of the deck, as first written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fe_import.abaqus.parse import Deck, read_deck
+from fe_import.abaqus.sets import LostSet, indices, surface_nodes
+from fe_import.errors import Cause, FEImportError
+from fe_import.mesh.raw import Block, RawMesh
+
+
+def read_abaqus(path: Path, name: str) -> RawMesh:
+    """Read a deck.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+        To name in messages.
+
+    Raises
+    ------
+    FEImportError
+        ``NOT_READABLE``: what `fe_import.abaqus.parse` refuses.
+    """
+    try:
+        deck = read_deck(path, name, Cause.NOT_READABLE)
+    except FEImportError as problem:
+        problem.message = f"cannot be read as a mesh: {problem.message}"
+        raise
+    place = {label: k for k, label in enumerate(deck.points)}
+    blocks, numbers = [], []
+    for kind, cells in deck.elements.items():
+        known = deck.types[kind]
+        if known.shape:
+            rows = [[place[node] for node in nodes] for nodes in cells.values()]
+            array = np.array(rows, dtype=np.int64).reshape(len(rows), known.nodes)
+            blocks.append(Block(known.shape, known.dimension, array))
+            numbers.append({label: k for k, label in enumerate(cells)})
+    mesh = RawMesh(np.array(list(deck.points.values()), dtype=float).reshape(-1, 3), blocks)
+    _add_element_sets(deck, numbers, mesh)
+    _add_node_sets(deck, place, mesh)
+    _add_surfaces(deck, place, mesh)
+    return mesh
+
+
+def _add_element_sets(deck: Deck, numbers: list[dict[int, int]], mesh: RawMesh) -> None:
+    for key, shown in deck.element_sets.names.items():
+        try:
+            members = deck.element_sets.members(key)
+            indices(members - deck.kinds.keys(), {}, "element")
+        except LostSet as reason:
+            mesh.lost[shown] = str(reason)
+            continue
+        mesh.cell_sets[shown] = [
+            np.array(sorted(own[label] for label in members & own.keys()), dtype=np.int64) for own in numbers
+        ]
+
+
+def _add_node_sets(deck: Deck, place: dict[int, int], mesh: RawMesh) -> None:
+    for key, shown in deck.node_sets.names.items():
+        try:
+            mesh.point_sets[shown] = indices(deck.node_sets.members(key), place, "node")
+        except LostSet as reason:
+            mesh.lost[shown] = str(reason)
+
+
+def _add_surfaces(deck: Deck, place: dict[int, int], mesh: RawMesh) -> None:
+    connectivity = {label: nodes for cells in deck.elements.values() for label, nodes in cells.items()}
+    for shown, (by_nodes, rows) in deck.surfaces.items():
+        try:
+            members = surface_nodes(rows, deck.element_sets, connectivity, deck.node_sets, by_nodes)
+            found = indices(members, place, "node")
+        except LostSet as reason:
+            mesh.lost.setdefault(shown, str(reason))
+            continue
+        if not np.array_equal(mesh.point_sets.setdefault(shown, found), found):
+            mesh.lost[shown] = "a node set and a surface with other nodes have this name"
+            del mesh.point_sets[shown]

@@ -1,0 +1,1 @@
+"""Link descriptions (TOML): schema, defaults, checks."""

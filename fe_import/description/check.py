@@ -1,0 +1,138 @@
+"""What a link description must satisfy beyond the types of its fields."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from fe_import.description.reduction import check_reduction_options
+from fe_import.elements.sections import check_section
+from fe_import.errors import Cause, FEImportError, ReportedError
+from fe_import.files.toml import choose
+
+if TYPE_CHECKING:
+    from fe_import.description.link import Damping, LinkDescription
+
+COUPLINGS = ("rigid", "averaged")
+WEIGHTS = ("area", "uniform")
+
+
+def _fail(where: str, message: str, value: Any = None, remedy: str = "", limit: Any = None) -> FEImportError:
+    return FEImportError(Cause.BAD_FIELD, message, where=where, value=value, limit=limit, remedy=remedy)
+
+
+_CHOICES = {
+    "frame.theory": ("timoshenko", "euler-bernoulli"),
+    "frame.mass": ("consistent", "lumped"),
+    "frame.torsion": ("saint-venant", "polar"),
+}
+
+
+def check_link(link: LinkDescription, file: str) -> None:
+    """Check the conditions that the types cannot state.
+
+    Raises
+    ------
+    FEImportError
+        Naming file, field, value and remedy.
+    """
+    if [link.frame, link.solid, link.matrices].count(None) != 2:
+        message = "give exactly one of the tables 'frame', 'solid' and 'matrices'"
+        raise _fail(file, message, remedy="a link has one model")
+    for field, options in _CHOICES.items():
+        table, name = field.split(".")
+        record = getattr(link, table)
+        if record is not None and getattr(record, name) not in options:
+            raise _fail(
+                f"{file}: {field}", "unknown choice", getattr(record, name), remedy="one of " + ", ".join(options)
+            )
+    for name, m in link.materials.items():
+        place = f"{file}: materials.{name}"
+        for field in ("youngs_modulus", "density"):
+            value = getattr(m, field)
+            if not (math.isfinite(value) and value > 0):
+                raise _fail(f"{place}.{field}", f"{field} must be positive", value, "give a value above 0")
+        if not -1 < m.poissons_ratio < 0.5:
+            raise _fail(
+                f"{place}.poissons_ratio", "Poisson's ratio out of range", m.poissons_ratio, "between -1 and 0.5"
+            )
+    for name, section in link.sections.items():
+        check_section(section, f"{file}: sections.{name}")
+    for table, nodes in (("frame", link.frame), ("solid", link.solid), ("matrices", link.matrices)):
+        for name, position in nodes.nodes.items() if nodes is not None else ():
+            place = f"{file}: {table}.nodes.{name}"
+            if not name or "\0" in name:
+                raise _fail(place, "a name must not be empty", name, "name the node")
+            if not isinstance(position, int) and not all(map(math.isfinite, position)):
+                raise _fail(place, "a position must be finite", position, "give three numbers")
+    if link.matrices is not None:
+        for field in ("materials", "sections"):
+            if getattr(link, field):
+                message = "exported matrices hold stiffness and mass already"
+                raise _fail(f"{file}: {field}", message, remedy="remove the table")
+    if not link.interfaces:
+        raise _fail(f"{file}: interfaces", "a link needs at least one interface", remedy="add [[interfaces]]")
+    seen: set[str] = set()
+    for k, i in enumerate(link.interfaces):
+        if i.name in seen or not i.name:
+            raise _fail(f"{file}: interfaces[{k}].name", "interface names must differ", i.name, "rename one")
+        seen.add(i.name)
+        choose(i.coupling, COUPLINGS, f"{file}: interfaces[{k}].coupling")
+        if i.weights:
+            choose(i.weights, WEIGHTS, f"{file}: interfaces[{k}].weights")
+            if i.coupling != "averaged":
+                message, remedy = "only averages have weights", 'remove it, or use coupling = "averaged"'
+                raise _fail(f"{file}: interfaces[{k}].weights", message, i.weights, remedy)
+        if i.position is not None and not all(map(math.isfinite, i.position)):
+            raise _fail(
+                f"{file}: interfaces[{k}].position", "a position must be finite", i.position, "give three numbers"
+            )
+    check_reduction_options(link.reduction, seen, f"{file}: reduction")
+    if link.reduction.form == "physical" and _stated(link.damping):
+        message = "the physical form carries no modal damping"
+        raise _fail(f"{file}: damping", message, remedy="remove it, or use form = 'orthonormal'")
+    if link.reduction.form == "physical" and link.recovery is not None:
+        message = "the physical form carries no recovery data"
+        raise _fail(f"{file}: recovery", message, remedy="remove it, or use form = 'orthonormal'")
+    for k, p in enumerate(link.masses):
+        if not (math.isfinite(p.mass) and p.mass >= 0):
+            raise _fail(f"{file}: masses[{k}].mass", "a mass cannot be negative", p.mass, "give 0 or more")
+    check_damping(link.damping, f"{file}: damping")
+
+
+def check_damping(d: Damping, where: str, error: type[ReportedError] = FEImportError) -> None:
+    """Refuse damping that is stated twice, negative, or more than critical.
+
+    Raises
+    ------
+    ReportedError
+        Of class ``error``, BAD_FIELD.
+    """
+    given = _stated(d)
+    if len(given) > 1:
+        kinds = " and ".join(given)
+        raise error(Cause.BAD_FIELD, "more than one kind of damping", where=where, value=kinds, remedy="keep one")
+    for field, value in _damping_numbers(d):
+        place = f"{where}.{field}"
+        if not (math.isfinite(value) and value >= 0):
+            message = "damping cannot be negative"
+            raise error(Cause.BAD_FIELD, message, where=place, value=value, remedy="give 0 or more")
+        if value > 1 and "rayleigh" not in field:
+            message, remedy = "a damping ratio above 1 is more than critical", "for 2 percent give 0.02"
+            raise error(Cause.BAD_FIELD, message, where=place, value=value, limit=1, remedy=remedy)
+
+
+def _stated(d: Damping) -> list[str]:
+    """Kinds of damping that are given."""
+    return [n for n in ("ratio", "ratios", "rayleigh") if getattr(d, n) is not None]
+
+
+def _damping_numbers(d: Damping) -> Iterator[tuple[str, float]]:
+    if d.ratio is not None:
+        yield "ratio", d.ratio
+    for k, value in enumerate(d.ratios or []):
+        yield f"ratios[{k}]", value
+    if d.rayleigh is not None:
+        yield "rayleigh.alpha", d.rayleigh.alpha
+        yield "rayleigh.beta", d.rayleigh.beta

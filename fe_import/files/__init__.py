@@ -1,0 +1,1 @@
+"""Files from strangers and for users: text, TOML, HDF5."""

@@ -1,0 +1,134 @@
+"""From the description of a solid link to its finite-element model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fe_import.description.link import LinkDescription, LinkFile, Solid
+from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_stress import solid_stress
+from fe_import.errors import Cause, FEImportError
+from fe_import.files.toml import choose
+from fe_import.interfaces.coupling import couple_interfaces
+from fe_import.interfaces.faces import InterfaceFace, interface_face
+from fe_import.mesh.read import read_mesh
+from fe_import.mesh.solid_mesh import SolidMesh, surface_triangles
+from fe_import.model import FEModel
+
+
+def solid_model(link: LinkFile) -> FEModel:
+    """Read the mesh, assemble mass and stiffness, and let each interface node move its face.
+
+    Raises
+    ------
+    FEImportError
+        A faulty mesh, set, material or interface.
+    """
+    description, where = link.description, str(link.path)
+    solid = description.solid
+    if solid is None:
+        raise FEImportError(Cause.BAD_FIELD, "not a solid link", where=where)
+    path = link.folder / solid.mesh
+    if "\0" in solid.mesh or not path.is_file():
+        raise FEImportError(
+            Cause.FILE_NOT_FOUND,
+            "no such mesh file",
+            where=f"{where}: solid.mesh",
+            value=solid.mesh,
+            remedy="give a path that starts at the folder of the link description",
+        )
+    mesh = read_mesh(path)
+    materials = _materials(description, solid, mesh, where)
+    mass, stiffness = assemble_solid(mesh, materials)
+    lame = np.empty((len(mesh.elements), 2))
+    for material in materials:
+        lame[slice(None) if material.elements is None else material.elements] = material.lame
+    coupled = couple_interfaces(mesh.nodes, _faces(description, mesh, where), where)
+    return FEModel(
+        name=description.name,
+        nodes=coupled.nodes,
+        dof_map=coupled.dof_map,
+        mass=coupled.extended(mass),
+        stiffness=coupled.extended(stiffness),
+        interface_nodes=coupled.interface_nodes,
+        independent=coupled.independent,
+        coupling=coupled.coupling,
+        node_names=_named_nodes(solid, mesh, where),
+        triangles=surface_triangles(mesh),
+        kind="solid",
+        source=where,
+        stress=solid_stress(mesh, lame),
+    )
+
+
+def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[SolidMaterial]:
+    if bool(solid.material) == bool(solid.regions):
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            "give exactly one of 'material' and 'regions'",
+            where=f"{where}: solid",
+            remedy="one material for the whole mesh, or one per element set",
+        )
+    if solid.material:
+        choose(solid.material, link.materials, f"{where}: solid.material")
+        m = link.materials[solid.material]
+        return [SolidMaterial(m.youngs_modulus, m.poissons_ratio, m.density)]
+    result = []
+    for k, region in enumerate(solid.regions):
+        choose(region.material, link.materials, f"{where}: solid.regions[{k}].material")
+        if region.set in mesh.lost_sets and region.set not in mesh.element_sets:
+            raise FEImportError(
+                Cause.MESH,
+                f"set {region.set!r} of the mesh is not usable: {mesh.lost_sets[region.set]}",
+                where=f"{where}: solid.regions[{k}].set",
+                remedy="mend the set in the mesh file",
+            )
+        choose(region.set, mesh.element_sets, f"{where}: solid.regions[{k}].set")
+        m = link.materials[region.material]
+        elements = mesh.element_sets[region.set]
+        result.append(SolidMaterial(m.youngs_modulus, m.poissons_ratio, m.density, elements))
+    return result
+
+
+def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[InterfaceFace]:
+    result = []
+    for k, interface in enumerate(link.interfaces):
+        place = f"{where}: interfaces[{k}]"
+        if interface.node or not interface.face:
+            raise FEImportError(
+                Cause.INTERFACE,
+                "an interface of a solid link sits on a face",
+                where=place,
+                value=interface.node or None,
+                remedy="give face = SET",
+            )
+        position = None if interface.position is None else np.asarray(interface.position, dtype=float)
+        try:
+            weights = interface.weights or ("area" if interface.coupling == "averaged" else "uniform")
+            face = interface_face(mesh, interface.name, interface.face, position, interface.coupling, weights)
+            result.append(face)
+        except FEImportError as problem:  # found in the mesh, to be mended in the description
+            problem.where = f"{place}.face"
+            problem.remedy = problem.remedy or "name a face of the mesh with 3 nodes or more, not on one line"
+            raise
+    return result
+
+
+def _named_nodes(solid: Solid, mesh: SolidMesh, where: str) -> dict[str, int]:
+    """Mesh nodes nearest to the named positions."""
+    result = {}
+    limit = 0.05 * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    for name, position in solid.nodes.items():
+        distance = np.linalg.norm(mesh.nodes - np.asarray(position), axis=1)
+        nearest = int(distance.argmin())
+        if not distance[nearest] <= limit:
+            raise FEImportError(
+                Cause.BAD_REFERENCE,
+                "no mesh node near this position",
+                where=f"{where}: solid.nodes.{name}",
+                value=tuple(position),
+                limit=f"{limit:.4g}, nearest {distance[nearest]:.4g}",
+                remedy="positions are in the mesh's frame and units",
+            )
+        result[name] = nearest
+    return result
