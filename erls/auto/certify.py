@@ -16,7 +16,8 @@ from erls.auto.static import vibrating_efforts
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved
 from erls.equations.system import metre_scales
-from erls.integrate.base import Array, hermite
+from erls.integrate.base import hermite
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import Certificate
 from erls.run.record import Run

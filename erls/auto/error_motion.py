@@ -23,7 +23,7 @@ from erls.auto.quick import quick
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Array
+from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 RADIUS = 0.7  # numerical damping of what the steps do not resolve

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg as la
 
-from erls.integrate.base import Array, Leg, legs
+from erls.integrate.base import Leg, legs
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 
 KNOTS = 512  # of s(t), all legs together

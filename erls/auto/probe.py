@@ -21,8 +21,9 @@ from erls.equations.registry import formulate
 from erls.equations.substructures import solved
 from erls.equations.system import metre_scales
 from erls.errors import Cause
-from erls.integrate.base import Array, Options, hermite
+from erls.integrate.base import Options, hermite
 from erls.integrate.choice import integrator
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.record import Run
 from erls.scene.chain import Scene, Simulation

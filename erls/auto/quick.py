@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from erls.integrate.base import Array
+from erls.maths.so3 import Array
 
 
 class Quick:

@@ -19,7 +19,8 @@ import scipy.linalg as la
 
 from erls.auto.forced import Forced, all_prescribed, forced_vibrations
 from erls.equations.system import metre_scales
-from erls.integrate.base import Array, legs
+from erls.integrate.base import legs
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 
 _RIGID = 1e-9  # of the largest ω²

@@ -11,7 +11,7 @@ from erls.auto.quick import quick
 from erls.equations.formulation import Formulation
 from erls.equations.registry import formulate
 from erls.equations.system import metre_scales
-from erls.integrate.base import Array
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split
 from erls.scene.chain import Scene, Simulation

@@ -13,7 +13,7 @@ def simulate_bodies(
 ) -> None:
     """Solve a scene of bodies, print and write what it gives."""
     from erls.errors import SimulationError
-    from erls.run.bodies import solve
+    from erls.run.bodies.solve import solve
     from erls.run.bodies.result import Motion
     from erls.run.bodies.result_file import write_result
     from erls.scene.bodies.analyses import Dynamics

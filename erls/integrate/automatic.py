@@ -14,9 +14,10 @@ import numpy as np
 
 from erls.equations.system import SecondOrderSystem
 from erls.errors import SimulationError
-from erls.integrate.base import Array, Observer, Options, Solution
+from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.lobatto import lobatto
 from erls.integrate.scipy_ivp import explicit_step_limit, scipy_method
+from erls.maths.so3 import Array
 
 FEW_STEPS = 300  # of dop853, at its limit of stability: as many as an implicit method of order 6 needs anyway
 _TIGHTER = 1e-2  # tolerances of a step of dop853, per wish for the whole run

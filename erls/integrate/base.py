@@ -33,8 +33,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from erls.equations.system import Array, MovingSystem, SecondOrderSystem
+from erls.equations.system import MovingSystem, SecondOrderSystem
 from erls.errors import Cause, SceneError, SimulationError
+from erls.maths.so3 import Array
 
 _HAIR = 1e-12  # of the largest time, or of 1 s: breakpoints this close are one
 

@@ -13,7 +13,7 @@ from erls.equations.loops import tree
 from erls.equations.loops.closed_chain import OPEN
 from erls.equations.loops.closure import closure
 from erls.errors import SimulationError
-from erls.integrate.base import Array, Leg
+from erls.integrate.base import Leg
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.constrained_run import ConstrainedRecorder
 from erls.integrate.lie_formulas import (
@@ -33,6 +33,7 @@ from erls.integrate.lie_formulas import (
 )
 from erls.integrate.lie_steps import start_of_leg
 from erls.integrate.stepping import loops as loop
+from erls.maths.so3 import Array
 
 if TYPE_CHECKING:
     from erls.equations.loops.compiled import CompiledLoops

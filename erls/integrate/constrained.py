@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from erls.equations.system import Array
 from erls.errors import Cause, SceneError
 from erls.integrate.base import Options, Solution
+from erls.maths.so3 import Array
 from erls.scene.integrators import MATRICES, STARTS
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from erls.equations.constrained_system import ConstrainedState, ConstrainedSystem
 from erls.errors import SimulationError
-from erls.integrate.base import Array, Observer
+from erls.integrate.base import Observer
 from erls.integrate.constrained import ConstrainedSolution
 from erls.integrate.driver import Recorder
+from erls.maths.so3 import Array
 
 
 class ConstrainedRecorder(Recorder):

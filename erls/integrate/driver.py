@@ -9,8 +9,9 @@ import numpy as np
 
 from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Array, Leg, Observer, Solution, StopRun, Work, legs
+from erls.integrate.base import Leg, Observer, Solution, StopRun, Work, legs
 from erls.integrate.thinning import thinned
+from erls.maths.so3 import Array
 
 
 class Recorder:

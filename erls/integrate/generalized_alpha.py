@@ -27,8 +27,9 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Array, Leg, Observer, Options, Solution
+from erls.integrate.base import Leg, Observer, Options, Solution
 from erls.integrate.driver import Recorder, integrate_legs, not_finite
+from erls.maths.so3 import Array
 
 if TYPE_CHECKING:
     from erls.equations.compiled_system import CompiledSystem

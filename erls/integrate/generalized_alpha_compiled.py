@@ -8,10 +8,11 @@ import time
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.integrate.base import Array, Leg
+from erls.integrate.base import Leg
 from erls.integrate.driver import Recorder
 from erls.integrate.stepping import generalized_alpha as loop
 from erls.integrate.stepping.absent import FACTORING
+from erls.maths.so3 import Array
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts
 _SINGLE = 32  # first steps of an observed run, each looked at: a short run is seen step by step

@@ -11,7 +11,7 @@ import numpy as np
 from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
 from erls.equations.system import metre_scales
 from erls.errors import SimulationError
-from erls.integrate.base import Array, Leg
+from erls.integrate.base import Leg
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.constrained_run import ConstrainedRecorder
 from erls.integrate.lie_formulas import (
@@ -31,6 +31,7 @@ from erls.integrate.lie_formulas import (
 )
 from erls.integrate.lie_steps import start_of_leg
 from erls.maths.jit import ENABLED
+from erls.maths.so3 import Array
 from erls.scene.integrators import MATRICES, STARTS
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts

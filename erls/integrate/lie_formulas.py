@@ -10,9 +10,10 @@ import numpy as np
 
 from erls.equations.constrained_system import Configuration, ConstrainedSystem
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Array, Leg
+from erls.integrate.base import Leg
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.driver import not_finite
+from erls.maths.so3 import Array
 
 MAX_HALVINGS = 12
 MAX_ITERATIONS = 10

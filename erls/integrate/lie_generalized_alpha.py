@@ -24,12 +24,13 @@ import numpy as np
 from erls.equations.consistency import consistent_start, refuse_redundant
 from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Array, Leg, Observer, StopRun, legs
+from erls.integrate.base import Leg, Observer, StopRun, legs
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.constrained_run import ConstrainedRecorder
 from erls.integrate.lie_compiled import compiled_steps
 from erls.integrate.lie_formulas import FAILED, GROWTH, INACCURATE, MAX_HALVINGS, Limit, Steps
 from erls.integrate.lie_steps import NumpySteps
+from erls.maths.so3 import Array
 
 _SAFETY, _LARGEST_CHANGE = 0.9, 4.0  # of an adaptive step
 _FIRST, _SMALLEST = 1 / 64, 1e-6  # adaptive steps, of the largest

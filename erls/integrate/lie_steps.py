@@ -10,7 +10,7 @@ from erls.equations.consistency import consistent_acceleration, consistent_veloc
 from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
 from erls.equations.system import metre_scales
 from erls.errors import SimulationError
-from erls.integrate.base import Array, Leg
+from erls.integrate.base import Leg
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.constrained_run import ConstrainedRecorder
 from erls.integrate.driver import not_finite
@@ -33,6 +33,7 @@ from erls.integrate.lie_formulas import (
     too_slow,
 )
 from erls.maths.saddle import Saddle, Scales
+from erls.maths.so3 import Array
 
 
 class NumpySteps:

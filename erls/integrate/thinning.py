@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from erls.integrate.base import Array, hermite_knots
+from erls.integrate.base import hermite_knots
+from erls.maths.so3 import Array
 
 _HAIR = 1e-9  # of the distance: a knot this near to an output time stands for it
 

@@ -9,8 +9,8 @@ from small_systems import ElasticPendulum
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import CompiledSystem, IntArray
-from erls.integrate.base import Array
 from erls.maths.jit import helper, kernel
+from erls.maths.so3 import Array
 
 GRAVITY = ElasticPendulum.gravity
 

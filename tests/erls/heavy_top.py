@@ -9,11 +9,11 @@ import numpy as np
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.joints import GROUND, Joint
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
-from erls.integrate.base import Array
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.groups import R3_SO3, SE3
 from erls.maths.se3 import pose
+from erls.maths.so3 import Array
 
 GROUPS = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
 SPINS = {"fast": np.array([0.0, 150.0, -4.61538]), "slow": np.array([0.0, 1.5, -0.0461538])}

@@ -15,11 +15,11 @@ from erls.equations.nodal.joints import GROUND, Joint
 from erls.equations.nodal.loads import NodalLoad, NodalLoads
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.equations.nodal.section import BeamSection
-from erls.integrate.base import Array
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths import motion_maps as motions
 from erls.maths.groups import R3_SO3, SE3, Group
+from erls.maths.so3 import Array
 
 GROUPS: dict[str, Group] = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
 TIME, TO_A, TO_V, PERIOD = 0.7, 30.0, 4.0, 0.1

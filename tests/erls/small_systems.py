@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from erls.equations.system import SecondOrderSystem
-from erls.integrate.base import Array
+from erls.maths.so3 import Array
 
 
 class Modes(SecondOrderSystem):

@@ -8,8 +8,9 @@ from scipy.integrate import solve_ivp
 from small_systems import DoublePendulum, ElasticPendulum, Law, Modes
 
 from erls.errors import Cause
-from erls.integrate.base import Array, Options
+from erls.integrate.base import Options
 from erls.integrate.generalized_alpha import generalized_alpha
+from erls.maths.so3 import Array
 
 RADII = (0.0, 0.5, 0.8, 1.0)
 ONE, ZERO = np.ones(1), np.zeros(1)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from erls.errors import Cause
-from erls.integrate.base import Array
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.maths.so3 import Array
 
 # step, largest errors of position [m] and of the multiplier [N] after 0.1 s, over 2 s with ρ∞ = 0.8
 ERRORS = [

@@ -15,8 +15,9 @@ from erls.equations.registry import formulate
 from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause
 from erls.integrate import lobatto
-from erls.integrate.base import Array, Options, Solution, hermite
+from erls.integrate.base import Options, Solution, hermite
 from erls.integrate.registry import integrator_named
+from erls.maths.so3 import Array
 from erls.scene.build import build_mechanism
 
 DATA = Path(__file__).parents[2] / "data"

@@ -10,8 +10,9 @@ from scipy.integrate import solve_ivp
 from small_systems import DoublePendulum, Law, Modes
 
 from erls.errors import Cause, SceneError, SimulationError
-from erls.integrate.base import Array, Options, Solution, hermite
+from erls.integrate.base import Options, Solution, hermite
 from erls.integrate.registry import integrator_named
+from erls.maths.so3 import Array
 from erls.scene.integrators import FIXED_STEP, INTEGRATORS
 
 ADAPTIVE = sorted(set(INTEGRATORS) - {"generalized_alpha"})

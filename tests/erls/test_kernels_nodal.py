@@ -21,10 +21,10 @@ from erls.equations.nodal.compiled import has_kernels
 from erls.equations.nodal.equations import Nodal
 from erls.equations.nodal.loads import NodalLoads
 from erls.errors import Cause
-from erls.integrate.base import Array
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.saddle import dense
+from erls.maths.so3 import Array
 from erls.scene.build import build_mechanism
 from erls.scene.chain import load_scene
 from erls.simulation.simulate import simulate

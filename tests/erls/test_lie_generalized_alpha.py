@@ -14,14 +14,14 @@ from erls.equations.nodal.assembly import NodalSystem, Nodes
 from erls.equations.nodal.joints import GROUND, Joint, Motion
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.errors import Cause
-from erls.integrate.base import Array, Solution
+from erls.integrate.base import Solution
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths import motion_maps as motions
 from erls.maths.groups import R3_SO3, SE3, Group
 from erls.maths.saddle import Scales, scaled_matrix
 from erls.maths.se3 import pose
-from erls.maths.so3 import rotation_x, rotation_y
+from erls.maths.so3 import Array, rotation_x, rotation_y
 
 GROUPS = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
 ABOUT_Y = pose(rotation_x(-np.pi / 2))  # its z axis is y

@@ -12,11 +12,11 @@ from erls.equations.nodal.beam import Beams, lumped, straight
 from erls.equations.nodal.joints import GROUND, Joint
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.equations.nodal.section import BeamSection, beam_section
-from erls.integrate.base import Array, hermite
+from erls.integrate.base import hermite
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.se3 import pose
-from erls.maths.so3 import rotation_x
+from erls.maths.so3 import Array, rotation_x
 
 WEIGHT = np.array([0, 0, -9.81])
 UP = np.array([0.0, 0.0, 1.0])

@@ -11,7 +11,8 @@ import scenes
 from test_nodal_dynamics import _l_shape, _swing
 
 from erls.errors import Cause, SceneError
-from erls.integrate.base import Array, hermite
+from erls.integrate.base import hermite
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 from erls.run.file import load_run, write_run

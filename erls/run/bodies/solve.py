@@ -11,11 +11,11 @@ from erls.equations.nodal.assembly import Nodes
 from erls.equations.nodal.redundant import refuse_open
 from erls.equations.nodal.scenes.build import Assembly, assemble
 from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
-from erls.equations.nodal.statics import TANGENTS, Statics, solve_statics
+from erls.equations.nodal.statics import Statics, solve_statics
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.run.bodies.result import Motion, Rest, work
-from erls.scene.bodies.analyses import AtRest, Buckling, Dynamics, Frequencies, StaticSteps
+from erls.scene.bodies.analyses import TANGENTS, AtRest, Buckling, Dynamics, Frequencies, StaticSteps
 from erls.scene.bodies.read import BodyScene, load_body_scene
 
 Progress = Callable[[float, float], None]

@@ -8,7 +8,8 @@ import numpy as np
 
 from erls.equations.formulation import Formulation
 from erls.equations.substructures import solved
-from erls.integrate.base import Array, Solution
+from erls.integrate.base import Solution
+from erls.maths.so3 import Array
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
 _LOOKS = 500  # at most

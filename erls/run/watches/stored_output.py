@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from erls.equations.serial.state_series import state_series
 from erls.errors import SimulationError
-from erls.integrate.base import Array, hermite
+from erls.integrate.base import hermite
+from erls.maths.so3 import Array
 from erls.run.record import Run, node_positions
 from erls.scene.chain import Simulation
 
