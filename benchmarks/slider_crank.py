@@ -14,7 +14,7 @@ import numpy as np
 
 import erls
 from erls.maths.so3 import Array
-from erls.run.bodies import solve
+from erls.run.bodies.solve import solve
 from erls.run.watches.deflection_range import deflection_errors
 
 ROOT = Path(__file__).parents[1]

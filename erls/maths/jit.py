@@ -138,6 +138,11 @@ def inlined(function: F) -> F:
     return _njit(function, **_PART, forceinline=True) if ENABLED else function
 
 
+def generated(function: F) -> F:
+    """A `part` whose source is made at import and not kept on disk: it becomes one with its caller."""
+    return _njit(function, **_PART, forceinline=True, cache=False) if ENABLED else function
+
+
 def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
     """A function with a fixed signature (of `erls.equations.compiled_system`), compiled when its module is imported.
 
@@ -154,6 +159,7 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
         _tell_of(function.__module__)
     numba.config.CACHE_DIR = str(folder(function.__module__))
     try:
-        return numba.njit(*signature, cache=True, error_model="numpy", nogil=True, **options)(function)
+        settings = {"cache": True, "error_model": "numpy", "nogil": True, **options}
+        return numba.njit(*signature, **settings)(function)
     finally:
         numba.config.CACHE_DIR = before

@@ -12,7 +12,7 @@ from body_scenes_data import STRIP, body_scene
 
 from erls.cli.main import main
 from erls.errors import Cause, SimulationError
-from erls.run.bodies import solve
+from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Motion, Rest
 
 BEND = np.radians(30.0)

@@ -10,7 +10,7 @@ import pytest
 import scenes
 
 from erls.errors import Cause, SimulationError
-from erls.run.bodies import solve
+from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Motion, Rest
 from erls.scene.bodies.read import load_body_scene
 

@@ -12,7 +12,7 @@ from body_scenes_data import body_scene
 
 from erls.cli.main import main
 from erls.errors import Cause, SimulationError
-from erls.run.bodies import solve
+from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Rest
 
 LENGTH, E, AREA, BEND = 2.0, 1e9, 1e-3, 1e-8

@@ -16,7 +16,7 @@ from erls.equations.nodal.turning_springs import TurningSpring, TurningSprings
 from erls.errors import Cause
 from erls.maths import motion_maps as motions
 from erls.maths import rotation_maps as rotations
-from erls.run.bodies import solve
+from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Motion
 from fe_import.errors import ReportedError
 

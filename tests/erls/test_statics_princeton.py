@@ -17,7 +17,7 @@ from body_scenes_data import body_scene
 from scipy.integrate import solve_bvp
 
 from erls.maths.so3 import Array
-from erls.run.bodies import solve
+from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Rest
 from fe_import.elements.sections import rectangle_torsion_constant
 

@@ -43,7 +43,7 @@ def solve(scene: BodyScene | Path | str, progress: Progress = lambda done, total
 
     Examples
     --------
-    >>> from erls.scene.bodies import solve
+    >>> from erls.run.bodies.solve import solve
     >>> bool(abs(solve("data/statics/roll_up.toml").position("tip")).max() < 1e-10)  # back at the root
     True
     """

@@ -49,7 +49,7 @@ def load_body_scene(path: Path | str, overrides: Iterable[str] = ()) -> BodyScen
 
     Examples
     --------
-    >>> from erls.scene.bodies import load_body_scene
+    >>> from erls.scene.bodies.read import load_body_scene
     >>> load_body_scene("data/statics/roll_up.toml", ["beams.strip.elements=8"]).record.beams[0].elements
     8
     """

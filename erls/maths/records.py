@@ -1,0 +1,128 @@
+"""Typed records in flat memory: constants and working memory of equations, with named fields instead of offsets.
+
+A record is a NamedTuple whose fields are annotated `int`, `float`, `Vector`, `Matrix` or `Stack` (arrays of one, two,
+three axes). Compiled functions are handed flat arrays, since those alone fit every system behind one function pointer;
+where they begin they make records of them, which are views: nothing is copied. A table in ``integers`` says where in
+the flat numbers each array lies and what its shape is; it is made here from the record's declaration, as is the
+function that reads it.
+
+1. Declare the record, with shapes and units of its fields.
+2. ``read = reader(Record)`` beside it.
+3. ``at = memory.put(Record(...))`` when a system is made; one `Memory` for constants, one for working memory.
+4. ``record = read(numbers, integers, at)`` in a compiled function, and in Python.
+
+The numbers may be real or complex: a record of complex numbers is read by the same function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
+
+import numpy as np
+
+from erls.maths.jit import generated
+from erls.maths.so3 import Array
+from fe_import.model import IntArray
+
+Vector = Annotated[Array, 1]
+Matrix = Annotated[Array, 2]
+Stack = Annotated[Array, 3]
+Indices = Annotated[IntArray, 1]
+
+R = TypeVar("R", bound=NamedTuple)
+
+
+def _axes(kind: Any) -> int | None:
+    """Axes of an array, 0 of a real number, None of an integer."""
+    return None if kind is int else 0 if kind is float else int(kind.__metadata__[0])
+
+
+def _fields(record: type[Any]) -> list[tuple[str, int | None, bool]]:
+    """Name, axes, and whether it lies in the integers, of each field."""
+    hints = get_type_hints(record, include_extras=True)
+    return [(name, _axes(kind), kind is Indices) for name, kind in hints.items()]
+
+
+def table_size(record: type[Any]) -> int:
+    """Integers that say where a record lies: of records put one after the other, the distance of their tables."""
+    return sum(1 if axes is None else 1 + axes for _, axes, _ in _fields(record))
+
+
+def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
+    """The function that makes a record of flat numbers and a table.
+
+    Parameters
+    ----------
+    record : NamedTuple class
+
+    Returns
+    -------
+    callable
+        ``read(numbers, integers, at)`` with the place of the table.
+    """
+    parts, place = [], 0
+    for _, axes, whole in _fields(record):
+        if axes is None:
+            parts.append(f"integers[at + {place}]")
+            place += 1
+            continue
+        start = f"integers[at + {place}]"
+        dims = [f"integers[at + {place + 1 + k}]" for k in range(axes)]
+        flat = "integers" if whole else "numbers"
+        if axes == 0:
+            parts.append(f"{flat}[{start}]")
+        else:
+            piece = f"{flat}[{start} : {start} + {' * '.join(dims)}]"
+            parts.append(piece if axes == 1 else f"{piece}.reshape(({', '.join(dims)}))")
+        place += 1 + axes
+    source = f"def read(numbers, integers, at):\n    return {record.__name__}({', '.join(parts)})\n"
+    names: dict[str, Any] = {record.__name__: record, "__name__": __name__}
+    exec(compile(source, f"<reader of {record.__qualname__}>", "exec"), names)
+    return generated(names["read"])
+
+
+class Memory:
+    """Flat numbers that grow by records, whose tables go to integers shared with other memories.
+
+    Parameters
+    ----------
+    integers : list of int
+        Where tables go.
+    """
+
+    def __init__(self, integers: list[int]) -> None:
+        self.integers = integers
+        self._parts: list[Array] = []
+        self._size = 0
+
+    def put(self, record: NamedTuple) -> int:
+        """Store a record; the place of its table."""
+        at = len(self.integers)
+        table: list[int] = []
+        whole: list[tuple[int, IntArray]] = []  # places in the table of what lies in the integers themselves
+        for value, (name, axes, is_whole) in zip(record, _fields(type(record)), strict=True):
+            if axes is None:
+                table.append(int(value))
+                continue
+            array = np.asarray(value)
+            if array.ndim != axes:
+                raise ValueError(f"{type(record).__name__}.{name} has {array.ndim} axes instead of {axes}")
+            if is_whole:
+                whole.append((len(table), array))
+                table += [0, *array.shape]
+                continue
+            flat = np.ascontiguousarray(array, dtype=float).ravel()
+            table += [self._size, *array.shape]
+            self._parts.append(flat)
+            self._size += len(flat)
+        self.integers += table
+        for place, array in whole:
+            self.integers[at + place] = len(self.integers)
+            self.integers += [int(i) for i in array]
+        return at
+
+    @property
+    def numbers(self) -> Array:
+        """What was put there."""
+        return np.concatenate([np.zeros(0), *self._parts])
