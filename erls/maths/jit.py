@@ -45,6 +45,8 @@ def folder(module: str) -> Path:
 
 
 def _file(module: str) -> Path:
+    if not module.startswith("erls."):  # kernels of somebody else
+        return Path(str(sys.modules[module].__file__))
     return _ROOT.joinpath(*module.split(".")[1:]).with_suffix(".py")
 
 

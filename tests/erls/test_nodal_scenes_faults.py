@@ -106,7 +106,7 @@ def test_no_equilibrium(tmp_path: Path) -> None:
 def test_chains_and_bodies_are_told_apart(tmp_path: Path) -> None:
     """`load_scene` says where scenes of bodies go."""
     path = body_scene(tmp_path, STRIP)
-    with pytest.raises(SceneError, match=r"erls\.body_scenes\.solve"):
+    with pytest.raises(SceneError, match=r"erls.run.bodies.solve"):
         load_scene(path)
 
 

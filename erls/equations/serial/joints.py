@@ -1,0 +1,83 @@
+"""Motion of joints, and the forces of drives, springs, dampers, friction and rotors along them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from erls.equations.serial.records import Joint, JointState
+from erls.equations.serial.time_curves import curve
+from erls.maths.jit import part
+from erls.maths.so3 import Array
+from fe_import.model import IntArray
+
+
+@part
+def step_pose(step: Array, slides: int, coordinate: Any, pose: Array) -> None:
+    """Pose (12,) over a joint at its coordinate; ``step`` as of `Joint`."""
+    if slides:
+        for i in range(12):
+            pose[i] = step[0, i] + coordinate * step[1, i]
+    else:
+        c, s = np.cos(coordinate), np.sin(coordinate)
+        for i in range(12):
+            pose[i] = step[0, i] + c * step[1, i] + s * step[2, i]
+
+
+@part
+def move_joint(
+    joint: Joint, state: JointState, reals: Array, integers: IntArray, t: float, y: Array, v: Array, a: Array
+) -> None:
+    """θ, θ̇, θ̈ from the state or, prescribed, from time, and the pose; θ̈ = 0 where it is free and ``a`` is empty."""
+    coordinate = state.coordinate
+    if joint.place >= 0:
+        coordinate[0], coordinate[1] = y[joint.place], v[joint.place]
+        coordinate[2] = a[joint.place] if len(a) else 0.0
+    else:
+        coordinate[0], coordinate[1], coordinate[2] = curve(reals, integers, joint.motion, t)
+    step_pose(joint.step, joint.slides, coordinate[0], state.pose)
+
+
+@part
+def wanted(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any, rate: Any, feed: Any) -> Any:
+    """Force that the drive of a joint asks of its motor; ``feed`` is what `feed_forward` found."""
+    force = 0.0 * angle
+    if joint.load >= 0:
+        force += curve(reals, integers, joint.load, t)[0]
+    elif joint.motion >= 0:
+        goal, goal_rate, _ = curve(reals, integers, joint.motion, t)
+        force += joint.gain * (goal - angle) + joint.rate_gain * (goal_rate - rate)
+    if joint.feeds:
+        force += feed
+    return force
+
+
+@part
+def effort(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any, rate: Any, feed: Any) -> Any:
+    """Force of drive, spring, damper and friction along a joint."""
+    force = wanted(joint, reals, integers, t, angle, rate, feed)
+    if force.real > joint.limit.real:
+        force = 0.0 * force + joint.limit
+    elif force.real < -joint.limit.real:
+        force = 0.0 * force - joint.limit
+    force -= joint.stiffness * (angle - joint.rest) + joint.damping * rate
+    if joint.friction != 0.0:
+        force -= joint.friction * np.tanh(rate / joint.transition)
+    return force
+
+
+@part
+def gains(
+    joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any, rate: Any, feed: Any
+) -> tuple[Any, Any]:
+    """-∂effort/∂angle and -∂effort/∂rate."""
+    stiffness, damping = joint.stiffness, joint.damping
+    if joint.friction != 0.0:
+        ratio = rate / joint.transition
+        if abs(ratio.real) < 300.0:  # beyond, cosh overflows
+            damping += joint.friction / joint.transition / np.cosh(ratio) ** 2
+    if abs(wanted(joint, reals, integers, t, angle, rate, feed).real) <= joint.limit.real:  # else it gives no more
+        stiffness += joint.gain
+        damping += joint.rate_gain
+    return stiffness, damping

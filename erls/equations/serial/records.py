@@ -1,0 +1,157 @@
+"""What formulations of links on joints share, as records: joints, modes, the rigid links of feed-forward.
+
+Links are numbered so that every one comes after that which it stands on, its parent. ``integers[0]`` is the place of a
+`Serial`, whose fields are the places of the first record of each kind; those of the other links follow.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from erls.maths.records import Matrix, Vector, reader, table_size
+
+
+class Serial(NamedTuple):
+    """What every mechanism of links on joints has.
+
+    Attributes
+    ----------
+    links : int
+    joints, joint_states, modes : int
+        Places of the first `Joint`, `JointState` and `Modes`.
+    feeds : int
+        Whether a drive feeds forward; then ``rigid_links``, ``rigid_states`` are places of the first of these.
+    rigid_links, rigid_states : int
+    own : int
+        Place of the record of the formulation.
+    gravity : (3,) array
+        World axes [m/s²].
+    """
+
+    links: int
+    joints: int
+    joint_states: int
+    modes: int
+    feeds: int
+    rigid_links: int
+    rigid_states: int
+    own: int
+    gravity: Vector
+
+
+class Joint(NamedTuple):
+    """The joint that carries a link: its motion, and what acts along it.
+
+    Attributes
+    ----------
+    place : int
+        Of its coordinate among the independent ones; -1 where it is prescribed.
+    slides : int
+        1 for a slide, 0 for a turn.
+    motion, load : int
+        Places of the curves of the prescribed or wanted coordinate and of the given force; -1 without.
+    feeds, acts : int
+        Whether the drive feeds forward; whether drive, spring, damper, friction or rotor act.
+    stiffness, rest, damping, friction, transition : float
+        Of `erls.mechanism.joints.JointForces`.
+    rotor : float
+        Inertia along the joint [kg m² or kg].
+    gain, rate_gain, limit : float
+        Of the controller, and the most that the motor gives.
+    held : float
+        Coordinate where feed-forward holds a joint without wanted motion.
+    step : (3, 12) array
+        Pose of the frame behind the joint in the frame before it: constant, cosine and sine part; of a slide constant
+        and rising part.
+    screw : (6,) array
+        Motion subspace S: twist of unit rate, in the frame behind the joint.
+    """
+
+    place: int
+    slides: int
+    motion: int
+    load: int
+    feeds: int
+    acts: int
+    stiffness: float
+    rest: float
+    damping: float
+    friction: float
+    transition: float
+    rotor: float
+    gain: float
+    rate_gain: float
+    limit: float
+    held: float
+    step: Matrix
+    screw: Vector
+
+
+class JointState(NamedTuple):
+    """Motion of a joint.
+
+    Attributes
+    ----------
+    coordinate : (3,) array
+        θ, θ̇, θ̈.
+    pose : (12,) array
+        Of the frame behind the joint in that before it, see `erls.maths.spatial`.
+    feed : (1,) array
+        Force that feeds forward.
+    """
+
+    coordinate: Vector
+    pose: Vector
+    feed: Vector
+
+
+class Modes(NamedTuple):
+    """Elastic coordinates of a link.
+
+    Attributes
+    ----------
+    first : int
+        Place of the first one among the independent coordinates.
+    mass : (e, e) array
+        M_ee [generalized].
+    stiffness, damping : (e,) arrays
+    decoupled : (e, e) array
+        V with Vᵀ M_ee V = 1 and Vᵀ K V diagonal, for matrices that are solved link by link.
+    decoupled_stiffness, decoupled_damping : (e,) arrays
+        Diagonals of Vᵀ K V and Vᵀ C V.
+    """
+
+    first: int
+    mass: Matrix
+    stiffness: Vector
+    damping: Vector
+    decoupled: Matrix
+    decoupled_stiffness: Vector
+    decoupled_damping: Vector
+
+
+class RigidLink(NamedTuple):
+    """A link of the rigid mechanism, for feed-forward: parent (-1 on the ground), ``step`` and ``screw`` as of `Joint`,
+    rigid mass matrix (6, 6) in its frame.
+    """
+
+    parent: int
+    step: Matrix
+    screw: Vector
+    mass: Matrix
+
+
+class RigidState(NamedTuple):
+    """Motion of a rigid link: pose (12,), twist (6,) and its rate (6,), wrench (6,), momentum (6,)."""
+
+    pose: Vector
+    twist: Vector
+    twist_rate: Vector
+    wrench: Vector
+    momentum: Vector
+
+
+read_serial, read_joint, read_joint_state = reader(Serial), reader(Joint), reader(JointState)
+read_modes, read_rigid_link, read_rigid_state = reader(Modes), reader(RigidLink), reader(RigidState)
+JOINT, JOINT_STATE, MODES = table_size(Joint), table_size(JointState), table_size(Modes)
+RIGID_LINK, RIGID_STATE = table_size(RigidLink), table_size(RigidState)
