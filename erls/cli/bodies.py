@@ -13,9 +13,9 @@ def simulate_bodies(
 ) -> None:
     """Solve a scene of bodies, print and write what it gives."""
     from erls.errors import SimulationError
-    from erls.run.bodies.solve import solve
     from erls.run.bodies.result import Motion
     from erls.run.bodies.result_file import write_result
+    from erls.run.bodies.solve import solve
     from erls.scene.bodies.analyses import Dynamics
     from erls.scene.bodies.read import load_body_scene
 

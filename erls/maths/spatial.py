@@ -1,8 +1,8 @@
 """Motions and forces of rigid frames on arrays: six numbers, the linear three first, the angular three after them.
 
 A pose is twelve numbers: the rotation of a frame against the one before it, row after row, then its place there. Where
-``out`` is the argument itself, the result takes its place. After R. Featherstone, Rigid Body Dynamics Algorithms, ch. 2,
-with the linear part first. For any scalar.
+``out`` is the argument itself, the result takes its place. After R. Featherstone, Rigid Body Dynamics Algorithms,
+ch. 2, with the linear part first. For any scalar.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ from body_scenes_data import PENDULUM, STRIP, body_scene
 from erls import load_scene
 from erls.cli.main import main
 from erls.errors import Cause, SceneError, SimulationError
-from erls.run.bodies.solve import solve
 from erls.run.bodies.result_file import read_summary, write_result
+from erls.run.bodies.solve import solve
 from erls.scene.bodies.read import load_body_scene
 from fe_import.errors import ReportedError
 

@@ -11,8 +11,8 @@ import pytest
 import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
 
-from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Motion, Rest
+from erls.run.bodies.solve import solve
 from erls.scene.bodies import analyses, schema
 from erls.scene.bodies.read import load_body_scene
 

@@ -12,8 +12,8 @@ from body_scenes_data import STRIP, body_scene
 
 from erls.cli.main import main
 from erls.errors import Cause, SimulationError
-from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Motion, Rest
+from erls.run.bodies.solve import solve
 
 BEND = np.radians(30.0)
 

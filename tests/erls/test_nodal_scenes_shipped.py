@@ -10,8 +10,8 @@ import pytest
 import scenes
 
 from erls.errors import Cause, SimulationError
-from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Motion, Rest
+from erls.run.bodies.solve import solve
 from erls.scene.bodies.read import load_body_scene
 
 DATA = scenes.ROOT / "data"

@@ -12,8 +12,8 @@ from body_scenes_data import body_scene
 
 from erls.cli.main import main
 from erls.errors import Cause, SimulationError
-from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Rest
+from erls.run.bodies.solve import solve
 
 LENGTH, E, AREA, BEND = 2.0, 1e9, 1e-3, 1e-8
 EULER = np.pi**2 * E * BEND / LENGTH**2

@@ -16,8 +16,8 @@ from erls.equations.nodal.turning_springs import TurningSpring, TurningSprings
 from erls.errors import Cause
 from erls.maths import motion_maps as motions
 from erls.maths import rotation_maps as rotations
-from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Motion
+from erls.run.bodies.solve import solve
 from fe_import.errors import ReportedError
 
 SLIDE = {"name": "slide", "type": "prismatic", "node": "bob", "axis": [1, 0, 0]}

@@ -17,8 +17,8 @@ from body_scenes_data import body_scene
 from scipy.integrate import solve_bvp
 
 from erls.maths.so3 import Array
-from erls.run.bodies.solve import solve
 from erls.run.bodies.result import Rest
+from erls.run.bodies.solve import solve
 from fe_import.elements.sections import rectangle_torsion_constant
 
 LENGTH, HEIGHT, THICK, E, NU = 0.508, 12.377e-3, 3.2024e-3, 71.7e9, 0.31

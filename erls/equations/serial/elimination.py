@@ -2,14 +2,14 @@
 
 With the segments of `erls.equations.serial.segments` in decoupled coordinates D = 1 + α C_d + β K_d is diagonal. A link
 and all that it bears act on its parent with the force H̃ μ + f, μ their motion without the joint's own. Elastic
-coordinates x of a link feel what it bears through few ports z = P x: the reach N of the links on it, and E, F of inertia
-that changes. With h the forces at ports and g the motion of the link,
+coordinates x of a link feel what it bears through few ports z = P x: the reach N of the links on it, and E, F of
+inertia that changes. With h the forces at ports and g the motion of the link,
 
     D x + Bᵀ g + Pᵀ (Q z + Q_g g + h) = b,   so   (1 + G Q) z = P D⁻¹ b - G h - (G_B + G Q_g) g,   G = P D⁻¹ Pᵀ,
 
 and the link without its elastic coordinates has the inertia I - B D⁻¹ Bᵀ + ... on g. Then its joint goes
-(R. Featherstone, Rigid Body Dynamics Algorithms, ch. 7: articulated bodies). What C has beside its diagonal in decoupled
-coordinates is left out. Numbers α, β may be complex.
+(R. Featherstone, Rigid Body Dynamics Algorithms, ch. 7: articulated bodies). What C has beside its diagonal in
+decoupled coordinates is left out. Numbers α, β may be complex.
 """
 
 from __future__ import annotations
@@ -116,7 +116,9 @@ CONDENSED = table_size(Condensed)
 
 @part
 def invert(a: Array) -> float:
-    """Replace the right half of a (n, 2 n) by the inverse of the left one; -1.0 where a real determinant is negative."""
+    """Replace the right half of a (n, 2 n) by the inverse of the left one; -1.0 where a real determinant is
+    negative.
+    """
     n, sign = a.shape[0], 1.0
     for i in range(n):
         for j in range(n):
@@ -309,7 +311,8 @@ def substitute(
 
 @part
 def _collect(work: Condensed, decoupled: Array, b: Array) -> None:
-    """Add to ``load`` what forces on the elastic coordinates and at the ports put on the link; ``free`` gets z at g = 0.
+    """Add to ``load`` what forces on the elastic coordinates and at the ports put on the link; ``free`` gets z at g
+    = 0.
 
     ``forces`` holds those on the decoupled coordinates.
     """
