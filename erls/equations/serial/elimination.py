@@ -311,8 +311,7 @@ def substitute(
 
 @part
 def _collect(work: Condensed, decoupled: Array, b: Array) -> None:
-    """Add to ``load`` what forces on the elastic coordinates and at the ports put on the link; ``free`` gets z at g
-    = 0.
+    """Add to ``load`` what forces on elastic coordinates and at ports put on the link; ``free`` gets z at g = 0.
 
     ``forces`` holds those on the decoupled coordinates.
     """

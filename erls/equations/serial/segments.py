@@ -93,8 +93,9 @@ SEGMENT = table_size(Segment)
 
 
 @part
-def fill_mass_matrix(serial: Serial, segments: int, reals: Array, integers: IntArray, scratch: Array, out: Array) ->
-None:
+def fill_mass_matrix(
+    serial: Serial, segments: int, reals: Array, integers: IntArray, scratch: Array, out: Array
+) -> None:
     """M from segments in coordinates of the links, whose first one has its table at ``segments``."""
     out[:, :] = 0.0
     for k in range(serial.links):
