@@ -111,7 +111,10 @@ class FreeDrive(_Record, frozen=True, tag="free"):
 class TorqueDrive(_Record, frozen=True, tag="torque"):
     """A torque (force, at a prismatic joint) over time.
 
-    profiles: one or more shapes, which add up.
+    Attributes
+    ----------
+    profiles : list of Load
+        One or more shapes, which add up.
     """
 
     profiles: tuple[Load, ...]
@@ -124,9 +127,12 @@ class TorqueDrive(_Record, frozen=True, tag="torque"):
 
 
 class MotionDrive(_Record, frozen=True, tag="motion"):
-    """A prescribed motion; the torque follows from it.
+    """A prescribed motion; the run reports the torque that it takes.
 
-    motion: shape of the joint's coordinate.
+    Attributes
+    ----------
+    motion : Motion
+        Shape of the joint's coordinate.
     """
 
     motion: Motion
@@ -139,11 +145,18 @@ class MotionDrive(_Record, frozen=True, tag="motion"):
 class PDDrive(_Record, frozen=True, tag="pd"):
     """A proportional-derivative controller that follows a motion.
 
-    motion: shape of the wanted coordinate.
-    proportional_gain: torque per deviation, N m/rad or N/m.
-    derivative_gain: torque per deviation of the rate, N m s/rad or N s/m.
-    feed_forward: add the torque that the rigid chain would need.
-    torque_limit: largest total torque either way, N m or N; none unless given.
+    Attributes
+    ----------
+    motion : Motion
+        Shape of the wanted coordinate.
+    proportional_gain : float
+        Torque per deviation [N m/rad or N/m].
+    derivative_gain : float
+        Torque per deviation of the rate [N m s/rad or N s/m].
+    feed_forward : bool
+        Add the torque that the rigid chain would need (inverse dynamics).
+    torque_limit : float, optional
+        Largest total torque either way [N m or N]; none unless given.
     """
 
     motion: Motion

@@ -31,13 +31,18 @@ _REST_TO_REST: dict[int, tuple[float, ...]] = {
 class Polynomial(ProfileRecord, frozen=True, tag="polynomial"):
     """One motion from rest to rest.
 
-    from: coordinate before the motion, rad or m.
-    from_deg: the same in degrees.
-    to: coordinate after it, rad or m.
-    to_deg: the same in degrees.
-    start: time at which it starts, s.
-    duration: how long it takes, s.
-    degree: 3 (acceleration jumps at the ends), 5 (acceleration is continuous) or 7 (jerk is continuous too).
+    Attributes
+    ----------
+    from_, from_deg : float
+        Coordinate before the motion [rad or m], or in degrees; give one.
+    to, to_deg : float
+        Coordinate after it [rad or m], or in degrees; give one.
+    start : float
+        Time at which it starts [s].
+    duration : float
+        How long it takes [s].
+    degree : int
+        3 (acceleration jumps at the ends), 5 (acceleration is continuous) or 7 (jerk is continuous too).
     """
 
     duration: float
@@ -61,10 +66,14 @@ class Polynomial(ProfileRecord, frozen=True, tag="polynomial"):
 class Waypoints(ProfileRecord, frozen=True, tag="waypoints"):
     """Motions from rest to rest through a list of coordinates.
 
-    times: times of the stops, s.
-    values: coordinates at the stops, rad or m.
-    values_deg: the same in degrees.
-    degree: 3, 5 or 7, of each leg, see polynomial.
+    Attributes
+    ----------
+    times : list of float
+        Times of the stops [s].
+    values, values_deg : list of float
+        Coordinates at the stops [rad or m], or in degrees; give one.
+    degree : int
+        3, 5 or 7, of each leg, see polynomial.
     """
 
     times: tuple[float, ...]
@@ -84,13 +93,18 @@ class Sine(ProfileRecord, frozen=True, tag="sine"):
 
     The rate jumps at the start unless the phase is 90 or -90 degrees.
 
-    amplitude: rad or m.
-    amplitude_deg: the same in degrees.
-    frequency_hz: cycles per second.
-    offset: coordinate about which it swings, rad or m; 0 unless given.
-    offset_deg: the same in degrees.
-    phase_deg: phase at the start, degrees.
-    start: time at which it starts, s.
+    Attributes
+    ----------
+    amplitude, amplitude_deg : float
+        [rad or m], or in degrees; give one.
+    frequency_hz : float
+        Cycles per second [Hz].
+    offset, offset_deg : float, optional
+        Coordinate about which it swings [rad or m], or in degrees; 0 unless given.
+    phase_deg : float
+        Phase at the start [deg].
+    start : float
+        Time at which it starts [s].
     """
 
     frequency_hz: float
@@ -124,14 +138,20 @@ class SpinUp(ProfileRecord, frozen=True, tag="spin_up"):
     With x the share of the ramp that has passed, the rate is rate · s(x): ``polynomial`` takes the s of a motion from
     rest to rest of that degree, ``sine`` x - sin(2πx)/2π, whose slope is a whole wave.
 
-    rate: rate that is reached, rad/s or m/s.
-    rate_deg: the same in degrees per second.
-    duration: how long it takes to reach it, s.
-    from: coordinate before, rad or m; 0 unless given.
-    from_deg: the same in degrees.
-    start: time at which it starts, s.
-    ramp: "polynomial" or "sine".
-    degree: of the polynomial, 3 (acceleration has kinks at the ends), 5 or 7.
+    Attributes
+    ----------
+    rate, rate_deg : float
+        Rate that is reached [rad/s or m/s], or in degrees per second; give one.
+    duration : float
+        How long it takes to reach it [s].
+    from_, from_deg : float, optional
+        Coordinate before [rad or m], or in degrees; 0 unless given.
+    start : float
+        Time at which it starts [s].
+    ramp : str
+        ``polynomial`` or ``sine``.
+    degree : int, optional
+        Of the polynomial: 3 (acceleration has kinks at the ends), 5 or 7; 7 unless given.
     """
 
     duration: float
@@ -168,14 +188,20 @@ class SpinUp(ProfileRecord, frozen=True, tag="spin_up"):
 class MotionTable(ProfileRecord, frozen=True, tag="table"):
     """A motion through at least 4 samples, by a cubic spline with continuous rate and acceleration.
 
-    file: CSV file, relative to the scene; first column time.
-    column: column of the coordinate in the file; column 0 is the time.
-    degrees: the file holds degrees.
-    times: times of the samples instead of a file, s.
-    values: coordinates at these times, rad or m.
-    values_deg: the same in degrees.
-    rates: rate at the first and at the last sample, rad/s or m/s; at rest unless given.
-    rates_deg: the same in degrees per second.
+    Attributes
+    ----------
+    file : str, optional
+        CSV file with the time in its first column; the path starts at the scene.
+    column : int
+        Column of the coordinate in the file; column 0 is the time.
+    degrees : bool
+        The file holds degrees.
+    times : list of float, optional
+        Times of the samples instead of a file [s].
+    values, values_deg : list of float, optional
+        Coordinates at these times [rad or m], or in degrees.
+    rates, rates_deg : (2,) floats, optional
+        Rate at the first and at the last sample [rad/s or m/s], or in degrees per second; at rest unless given.
     """
 
     file: str | None = None

@@ -24,7 +24,10 @@ class ProfileRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 class Constant(ProfileRecord, frozen=True, tag="constant"):
     """The same load at all times.
 
-    value: load, N m or N.
+    Attributes
+    ----------
+    value : float
+        Load [N m or N].
     """
 
     value: float
@@ -37,9 +40,14 @@ class Constant(ProfileRecord, frozen=True, tag="constant"):
 class Step(ProfileRecord, frozen=True, tag="step"):
     """A load that jumps from zero to its value.
 
-    start: time of the jump, s.
-    value: load from then on, N m or N.
-    end: time at which it jumps back to zero, s; never unless given.
+    Attributes
+    ----------
+    start : float
+        Time of the jump [s].
+    value : float
+        Load from then on [N m or N].
+    end : float, optional
+        Time at which it jumps back to zero [s]; never unless given.
     """
 
     start: float
@@ -60,11 +68,18 @@ class Step(ProfileRecord, frozen=True, tag="step"):
 class Trapezoid(ProfileRecord, frozen=True, tag="trapezoid"):
     """A load that rises linearly, holds and falls linearly; zero outside.
 
-    start: time at which it begins to rise, s.
-    rise: duration of the rise, s; 0 is a jump.
-    hold: duration at full load, s; may be 0.
-    fall: duration of the fall, s; 0 is a jump.
-    value: full load, N m or N.
+    Attributes
+    ----------
+    start : float
+        Time at which it begins to rise [s].
+    rise : float
+        Duration of the rise [s]; 0 is a jump.
+    hold : float
+        Duration at full load [s]; may be 0.
+    fall : float
+        Duration of the fall [s]; 0 is a jump.
+    value : float
+        Full load [N m or N].
     """
 
     start: float
@@ -97,11 +112,18 @@ class Trapezoid(ProfileRecord, frozen=True, tag="trapezoid"):
 class SineBurst(ProfileRecord, frozen=True, tag="sine_burst"):
     """A number of cycles of a sine; zero outside.
 
-    start: time of the first cycle, s.
-    amplitude: largest load, N m or N.
-    frequency_hz: cycles per second.
-    cycles: number of cycles, not necessarily whole.
-    phase_deg: phase at the start, degrees.
+    Attributes
+    ----------
+    start : float
+        Time of the first cycle [s].
+    amplitude : float
+        Largest load [N m or N].
+    frequency_hz : float
+        Cycles per second [Hz].
+    cycles : float
+        Number of cycles, not necessarily whole.
+    phase_deg : float
+        Phase at the start [deg].
     """
 
     start: float
@@ -129,11 +151,18 @@ class SineBurst(ProfileRecord, frozen=True, tag="sine_burst"):
 class LoadTable(ProfileRecord, frozen=True, tag="table"):
     """A load from samples; before the first and after the last one the end values hold.
 
-    file: CSV file, relative to the scene; first column time.
-    column: column of the load in the file; column 0 is the time.
-    times: times of the samples instead of a file, s.
-    values: loads at these times, N m or N.
-    interpolation: "linear", "cubic" (C² spline, not-a-knot ends, at least 4 samples) or "hold" (steps).
+    Attributes
+    ----------
+    file : str, optional
+        CSV file with the time in its first column; the path starts at the scene.
+    column : int
+        Column of the load in the file; column 0 is the time.
+    times : list of float, optional
+        Times of the samples instead of a file [s].
+    values : list of float, optional
+        Loads at these times [N m or N].
+    interpolation : str
+        ``linear``, ``cubic`` (C² spline, not-a-knot ends, at least 4 samples) or ``hold`` (steps).
     """
 
     file: str | None = None

@@ -90,14 +90,36 @@ class Simulation(_Record, frozen=True):
 
 
 class Base(_Record, frozen=True):
-    """Pose of the first Denavit-Hartenberg frame in the world; rotation about fixed x, then y, then z."""
+    """Pose of the first Denavit-Hartenberg frame in the world.
+
+    Attributes
+    ----------
+    position : (3,) floats
+        Of its origin [m].
+    rotation_deg : (3,) floats
+        About fixed x, then y, then z [deg].
+    """
 
     position: Vector = (0.0, 0.0, 0.0)
     rotation_deg: Vector = (0.0, 0.0, 0.0)
 
 
 class DH(_Record, frozen=True):
-    """Denavit-Hartenberg row; ``convention`` is ``standard`` or ``modified``, with no default."""
+    """Denavit-Hartenberg row of a joint: from the frame of the link before to that of its own link.
+
+    Attributes
+    ----------
+    convention : str
+        ``standard``: Rz(θ) Tz(d) Tx(a) Rx(α); or ``modified`` (Craig): Rx(α) Tx(a) Rz(θ) Tz(d). There is no default.
+    a : float
+        Length along x [m].
+    alpha, alpha_deg : float, optional
+        Twist about x [rad], or in degrees; 0 unless given.
+    d : float
+        Offset along z [m]; the coordinate of a prismatic joint adds to it.
+    theta, theta_deg : float, optional
+        Turn about z [rad], or in degrees; 0 unless given. The coordinate of a revolute joint adds to it.
+    """
 
     convention: str
     a: float = 0.0
@@ -109,7 +131,15 @@ class DH(_Record, frozen=True):
 
 
 class JointInitial(_Record, frozen=True):
-    """Joint coordinate and rate at time 0; ``_deg`` for revolute joints."""
+    """Joint coordinate and rate at time 0; refused where a motion is prescribed, which fixes its own start.
+
+    Attributes
+    ----------
+    position, position_deg : float, optional
+        Coordinate [rad or m], or in degrees; 0 unless given.
+    rate, rate_deg : float, optional
+        Rate [rad/s or m/s], or in degrees per second; 0 unless given.
+    """
 
     position: float | None = None
     position_deg: float | None = None
@@ -118,15 +148,33 @@ class JointInitial(_Record, frozen=True):
 
 
 class Friction(_Record, frozen=True):
-    """Coulomb friction ``force`` [N m or N], smooth around zero over ``transition_rate`` [rad/s or m/s]."""
+    """Coulomb friction, smooth around zero: ``force`` · tanh(rate / ``transition_rate``).
+
+    Attributes
+    ----------
+    force : float
+        Friction at large rates [N m or N].
+    transition_rate : float
+        Rate at which it reaches 76 % of that [rad/s or m/s].
+    """
 
     force: float
     transition_rate: float = 0.01
 
 
 class Motor(_Record, frozen=True):
-    """Rotor inertia [kg m²] behind a gear (reflected inertia: rotor_inertia · gear_ratio²), and the motor's own
-    ``mass`` and ``inertia`` (about its centre, mesh axes), which sit on the outboard interface of the link before.
+    """The motor of a joint; its rotor acts on the joint, its mass sits on the outboard interface of the link before.
+
+    Attributes
+    ----------
+    rotor_inertia : float
+        Of the rotor about its axis [kg m²]; rotor_inertia · gear_ratio² is reflected to the joint.
+    gear_ratio : float
+        Turns of the rotor per turn of the joint, or rad/m.
+    mass : float
+        Of the motor [kg].
+    inertia : (3,) floats or (3, 3) floats
+        Of the motor about its centre [kg m²], mesh axes of the link before: [Ixx, Iyy, Izz], or a symmetric matrix.
     """
 
     rotor_inertia: float = 0.0
@@ -136,14 +184,46 @@ class Motor(_Record, frozen=True):
 
 
 class Rotor(_Record, frozen=True):
-    """Rotor inertia [kg m²] behind a gear (reflected inertia: rotor_inertia · gear_ratio²), of a closing joint."""
+    """The rotor of a closing joint.
+
+    Attributes
+    ----------
+    rotor_inertia : float
+        Of the rotor about its axis [kg m²]; rotor_inertia · gear_ratio² is reflected to the joint.
+    gear_ratio : float
+        Turns of the rotor per turn of the joint, or rad/m.
+    """
 
     rotor_inertia: float = 0.0
     gear_ratio: float = 1.0
 
 
 class Joint(_Record, frozen=True):
-    """A joint between the link before it (or the ground) and its own link."""
+    """A joint between the link before it (or the ground) and its own link; it moves about or along its z axis.
+
+    Attributes
+    ----------
+    name : str
+        What reports, events and ``--set`` call it.
+    dh : DH
+        Its Denavit-Hartenberg row.
+    type : str
+        ``revolute`` turns about z, ``prismatic`` slides along z.
+    initial : JointInitial
+        Coordinate and rate at time 0.
+    drive : DriveRecord
+        What moves it; nothing unless given.
+    stiffness : float
+        Of a spring in the joint [N m/rad or N/m].
+    rest, rest_deg : float, optional
+        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
+    damping : float
+        Viscous damping [N m s/rad or N s/m].
+    friction : Friction, optional
+        Coulomb friction; none unless given.
+    motor : Motor
+        Rotor inertia, and the mass of the motor.
+    """
 
     name: str
     dh: DH
@@ -159,7 +239,20 @@ class Joint(_Record, frozen=True):
 
 
 class RigidBody(_Record, frozen=True):
-    """A rigid link: mass [kg], centre of mass, inertia about it, and named positions, all in the link's frame."""
+    """A rigid link, in the link's frame.
+
+    Attributes
+    ----------
+    mass : float
+        [kg]
+    points : dict of (3,) floats
+        Named positions [m]. Each is an interface, where joints may sit, and a node for points and loops: the first is
+        the inboard one, the second the outboard one, unless the link names others.
+    centre_of_mass : (3,) floats
+        [m]
+    inertia : (3,) floats or (3, 3) floats
+        About the centre of mass [kg m²]: [Ixx, Iyy, Izz], or a symmetric matrix.
+    """
 
     mass: float
     points: dict[str, Vector]
@@ -170,7 +263,14 @@ class RigidBody(_Record, frozen=True):
 class MeshPose(_Record, frozen=True):
     """Pose of the link's mesh frame.
 
-    ``frame``: in the link's Denavit-Hartenberg frame (``dh``), or in the frame of its inboard joint (``joint``).
+    Attributes
+    ----------
+    position : (3,) floats
+        Of its origin [m].
+    rotation_deg : (3,) floats
+        About fixed x, then y, then z [deg].
+    frame : str
+        In which frame: the link's Denavit-Hartenberg frame, ``dh``, or the frame of its inboard joint, ``joint``.
     """
 
     position: Vector = (0.0, 0.0, 0.0)
@@ -179,14 +279,35 @@ class MeshPose(_Record, frozen=True):
 
 
 class Link(_Record, frozen=True):
-    """A link: exactly one of ``model`` (link description, reduced on the fly), ``modal_file`` and ``rigid``.
+    """A link: exactly one of ``model``, ``modal_file`` and ``rigid``.
 
-    ``elastic_modes`` keeps only the lowest ones; ``flexible = false`` none. ``reduction`` replaces fields of that table
-    of the link description. ``inboard`` and ``outboard`` name the
-    interfaces where the joints sit; the first and the second one unless given. ``damping`` replaces that of the
-    modal file. ``substructures`` splits a link made of beams into so many rigidly joined pieces, each with a frame of
-    its own that turns with the deformation (formulation ``ffr``; ``nodal`` needs none); mode counts then hold for
-    every piece.
+    Attributes
+    ----------
+    name : str
+        What reports, points, loops and ``--set`` call it.
+    model : str
+        Link description, reduced on the fly; the path starts at the scene.
+    modal_file : str
+        Modal file; the path starts at the scene.
+    rigid : RigidBody, optional
+        A rigid link, stated here.
+    flexible : bool
+        False: rigid, with the mass of the model.
+    elastic_modes : int, optional
+        Keep only the lowest elastic modes of the model; all unless given.
+    substructures : int
+        Of ``ffr``: rigidly joined pieces of a link made of beams, each with a frame of its own that turns with the
+        deformation; mode counts then hold for every piece. ``nodal`` needs none.
+    reduction : dict
+        With ``model``: fields that replace those of its table ``[reduction]``.
+    inboard : str
+        Interface of the link's own joint; the first unless given.
+    outboard : str
+        Interface of the next joint; the second unless given.
+    mesh_pose : MeshPose
+        Where the mesh frame sits.
+    damping : Damping, optional
+        Instead of that of the model.
     """
 
     name: str
@@ -204,8 +325,18 @@ class Link(_Record, frozen=True):
 
 
 class Point(_Record, frozen=True):
-    """A named point whose position is reported: a named node or interface of a link, or the mesh node nearest to a
-    ``position`` in the mesh frame.
+    """A named point whose position is reported and drawn.
+
+    Attributes
+    ----------
+    name : str
+        What reports, payloads and events call it.
+    link : str
+        The link that carries it.
+    node : str
+        A named node or an interface of that link; give this or ``position``.
+    position : (3,) floats, optional
+        In the link's mesh frame [m]; the nearest mesh node is taken.
     """
 
     name: str
@@ -215,7 +346,19 @@ class Point(_Record, frozen=True):
 
 
 class Payload(_Record, frozen=True):
-    """A rigid body on a named point: mass [kg], inertia about its centre, centre from the point (mesh axes) [m]."""
+    """A rigid body on a named point, in mesh axes of its link.
+
+    Attributes
+    ----------
+    point : str
+        A name from ``[[points]]``.
+    mass : float
+        [kg]
+    inertia : (3,) floats or (3, 3) floats
+        About its centre of mass [kg m²]: [Ixx, Iyy, Izz], or a symmetric matrix.
+    offset : (3,) floats
+        Of its centre of mass from the point [m].
+    """
 
     point: str
     mass: float = 0.0
@@ -224,8 +367,24 @@ class Payload(_Record, frozen=True):
 
 
 class Event(_Record, frozen=True):
-    """A time at which a coordinate crosses a value: ``angle`` or ``rate`` of a joint, ``x``, ``y`` or ``z`` of a named
-    point in the world; ``direction`` is ``any``, ``rising`` or ``falling``; with ``stop`` the run ends there.
+    """A time at which a coordinate crosses a value: told after the run.
+
+    Attributes
+    ----------
+    name : str
+        What reports call it.
+    coordinate : str
+        ``angle`` or ``rate`` of a joint; ``x``, ``y`` or ``z`` of a point in the world.
+    joint : str
+        The joint that is watched; give this or ``point``.
+    point : str
+        The named point that is watched.
+    value, value_deg : float, optional
+        What is crossed [rad or m, per second for a rate], or in degrees for revolute joints; give one.
+    direction : str
+        ``any``, ``rising`` or ``falling``.
+    stop : bool
+        The run ends there.
     """
 
     name: str
@@ -239,22 +398,56 @@ class Event(_Record, frozen=True):
 
 
 class Initial(_Record, frozen=True):
-    """``deformation``: links start undeformed (``zero``) or in static equilibrium, joints held (``static``)."""
+    """How links start.
+
+    Attributes
+    ----------
+    deformation : str
+        ``zero``: undeformed; ``static``: in static equilibrium with the joints held.
+    """
 
     deformation: str = "zero"
 
 
 class Loop(_Record, frozen=True):
-    """A joint that closes a loop, between a ``node`` of ``link`` and the ground, or ``to_node`` of ``to_link``; nodes
-    are interfaces or named nodes.
-
-    ``position``: where the node meets the ground, in the world; where it is at the initial joint coordinates unless
-    given. ``axis``: in the world at those coordinates, fixed to both sides from then on; that of the joint which
-    carries the link unless given.
+    """A joint that closes a loop, between a node of a link and the ground, or a node of another link.
 
     Drive, spring, damper, friction and rotor act along the coordinate of a revolute or prismatic one: how far the link
-    has moved about or along the axis. It is ``coordinate`` at the initial joint coordinates; unless given, 0 there, or
-    the distance of ``node`` from where it meets the other side.
+    has moved about or along the axis.
+
+    Attributes
+    ----------
+    name : str
+        What reports and ``--set`` call it.
+    link : str
+        The link that it holds.
+    node : str
+        Interface or named node of that link; it sits on the joint.
+    type : str
+        What it leaves free: ``line`` keeps a point on a straight line, ``planar`` leaves two slides and the turn about
+        their normal, the others are what their names say.
+    to_link, to_node : str
+        The other link and its interface or named node; the ground unless given.
+    position : (3,) floats, optional
+        Where the node meets the ground, in the world [m]; where it is at the initial joint coordinates unless given.
+    axis : (3,) floats, optional
+        Direction in the world at the initial joint coordinates, fixed to both sides from then on; that of the joint
+        which carries the link unless given.
+    coordinate, coordinate_deg : float, optional
+        Its coordinate at the initial joint coordinates [rad or m], or in degrees; unless given 0 if it turns, or the
+        distance along the axis of ``node`` from where it meets the other side if it slides.
+    drive : DriveRecord
+        What moves it; nothing unless given.
+    stiffness : float
+        Of a spring in the joint [N m/rad or N/m].
+    rest, rest_deg : float, optional
+        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
+    damping : float
+        Viscous damping [N m s/rad or N s/m].
+    friction : Friction, optional
+        Coulomb friction; none unless given.
+    motor : Rotor
+        Rotor inertia.
     """
 
     name: str
@@ -277,7 +470,33 @@ class Loop(_Record, frozen=True):
 
 
 class SceneRecord(_Record, frozen=True):
-    """A scene: a serial chain of joints and links, what closes and drives it, and how it is simulated."""
+    """A scene: a serial chain of joints and links, what closes and drives it, and how it is simulated.
+
+    Attributes
+    ----------
+    simulation : Simulation
+        How the motion is computed.
+    joints : list of Joint
+        From the ground outward, ``[[joints]]``.
+    links : list of Link
+        Joint k carries link k, ``[[links]]``.
+    name : str
+        Of the scene; that of the file unless given.
+    gravity : (3,) floats
+        In the world [m/s²].
+    base : Base
+        Where the chain stands.
+    points : list of Point
+        What is reported and drawn, ``[[points]]``.
+    payloads : list of Payload
+        Rigid bodies on points, ``[[payloads]]``.
+    initial : Initial
+        How links start.
+    loops : list of Loop
+        Joints that close the chain, ``[[loops]]``.
+    events : list of Event
+        Crossings that are told after the run, or end it, ``[[events]]``.
+    """
 
     simulation: Simulation
     joints: list[Joint]

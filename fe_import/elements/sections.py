@@ -31,11 +31,11 @@ class Rectangular(msgspec.Struct, tag="rectangular", tag_field="shape", forbid_u
     Attributes
     ----------
     width, height : float
-        Along local y and along local z.
+        Along local y and along local z [m].
     shear_factor : float
-        5/6 unless given.
+        Effective area in shear over the area, both directions; 5/6 unless given.
     torsion_constant : float, optional
-        Instead of Saint-Venant's.
+        Instead of Saint-Venant's [m⁴].
     """
 
     width: float
@@ -45,7 +45,17 @@ class Rectangular(msgspec.Struct, tag="rectangular", tag_field="shape", forbid_u
 
 
 class Circular(msgspec.Struct, tag="circular", tag_field="shape", forbid_unknown_fields=True, frozen=True):
-    """Solid circle; shear factor after Cowper (1966) unless given."""
+    """Solid circle.
+
+    Attributes
+    ----------
+    diameter : float
+        [m]
+    shear_factor : float, optional
+        Effective area in shear over the area; after Cowper (1966) unless given.
+    torsion_constant : float, optional
+        Instead of the polar moment [m⁴].
+    """
 
     diameter: float
     shear_factor: float | None = None
@@ -53,7 +63,19 @@ class Circular(msgspec.Struct, tag="circular", tag_field="shape", forbid_unknown
 
 
 class Tubular(msgspec.Struct, tag="tubular", tag_field="shape", forbid_unknown_fields=True, frozen=True):
-    """Circular tube; shear factor after Cowper (1966) unless given."""
+    """Circular tube.
+
+    Attributes
+    ----------
+    outer_diameter : float
+        [m]
+    thickness : float
+        Of the wall [m].
+    shear_factor : float, optional
+        Effective area in shear over the area; after Cowper (1966) unless given.
+    torsion_constant : float, optional
+        Instead of the polar moment [m⁴].
+    """
 
     outer_diameter: float
     thickness: float
@@ -64,7 +86,19 @@ class Tubular(msgspec.Struct, tag="tubular", tag_field="shape", forbid_unknown_f
 class RectangularTube(
     msgspec.Struct, tag="rectangular-tube", tag_field="shape", forbid_unknown_fields=True, frozen=True
 ):
-    """Thin-walled rectangular tube (Bredt's torsion constant; shear carried by the walls along the force)."""
+    """Thin-walled rectangular tube (Bredt's torsion constant; shear carried by the walls along the force).
+
+    Attributes
+    ----------
+    width, height : float
+        Outer size along local y and along local z [m].
+    thickness : float
+        Of the walls [m].
+    shear_factor_y, shear_factor_z : float, optional
+        Effective area in shear over the area; that of the walls along the force unless given.
+    torsion_constant : float, optional
+        Instead of Bredt's [m⁴].
+    """
 
     width: float
     height: float
@@ -75,7 +109,19 @@ class RectangularTube(
 
 
 class Constants(msgspec.Struct, tag="constants", tag_field="shape", forbid_unknown_fields=True, frozen=True):
-    """Given constants of any section."""
+    """Given constants of any section.
+
+    Attributes
+    ----------
+    area : float
+        [m²]
+    inertia_y, inertia_z : float
+        ∫z²dA, for bending in the local x-z plane, and ∫y²dA, in the x-y plane [m⁴].
+    torsion_constant : float
+        [m⁴]
+    shear_factor_y, shear_factor_z : float
+        Effective area in shear over the area; 5/6 unless given.
+    """
 
     area: float
     inertia_y: float

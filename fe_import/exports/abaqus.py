@@ -20,8 +20,15 @@ from fe_import.exports.superelement import assembled, refuse_cut
 
 
 class AbaqusOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """``positions``: of nodes by number, instead of a deck. ``modal_nodes``: nodes of a substructure that carry its
-    modal coordinates (the retained eigenmodes)."""
+    """What matrices of Abaqus leave open.
+
+    Attributes
+    ----------
+    positions : dict of (3,) floats
+        Of nodes by number [m], instead of a deck.
+    modal_nodes : list of int
+        Nodes of a substructure that carry its modal coordinates (the retained eigenmodes).
+    """
 
     positions: dict[str, Vector] = {}
     modal_nodes: list[int] = []

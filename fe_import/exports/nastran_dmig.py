@@ -31,7 +31,15 @@ _LARGEST_POINT = 10**12  # Nastran's own limit is 10^8
 
 
 class DmigOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Names of the matrices; positions of grid points by number, when no file holds them."""
+    """What punched matrices of Nastran leave open.
+
+    Attributes
+    ----------
+    stiffness, mass : str
+        Names of the matrices.
+    positions : dict of (3,) floats
+        Of grid points by number [m], when no file holds them.
+    """
 
     stiffness: str = "KAAX"
     mass: str = "MAAX"

@@ -35,9 +35,16 @@ _ROUNDING = 1e-9  # relative: both triangles of a symmetric matrix are written f
 
 
 class Op4Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Names of the matrices; ``boundary``: grid points of the first rows, six each, before rows of modal coordinates.
+    """What OUTPUT4 matrices of Nastran leave open.
 
-    ``positions``: of grid points by number, when no file holds them.
+    Attributes
+    ----------
+    stiffness, mass : str
+        Names of the matrices.
+    boundary : list of int
+        Grid points of the first rows, six each, before rows of modal coordinates.
+    positions : dict of (3,) floats
+        Of grid points by number [m], when no file holds them.
     """
 
     stiffness: str = "KAAX"

@@ -20,8 +20,10 @@ class Dynamics(_Analysis, frozen=True, tag="dynamics"):
 
     Attributes
     ----------
-    duration, step : float
-        [s]; the step is a thousandth of the duration, at most 1 ms, unless given.
+    duration : float
+        [s]
+    step : float, optional
+        [s]; a thousandth of the duration, at most 1 ms, unless given.
     group : str
         Where every node moves: ``SE(3)``, equations in its own axes; or ``R3xSO(3)``, positions in the world's axes.
     spectral_radius : float
@@ -71,8 +73,16 @@ class StaticSteps(_AtRest, frozen=True, tag="statics"):
 
 
 class Buckling(_AtRest, frozen=True, tag="buckling"):
-    """The ``count`` lowest load parameters at which the equilibrium at ``load`` becomes unstable, from the rate at
-    which its stiffness changes with the load there.
+    """The lowest load parameters at which the equilibrium becomes unstable.
+
+    They follow from the rate at which its stiffness changes with the load.
+
+    Attributes
+    ----------
+    count : int
+        How many.
+    load : float
+        Load parameter of the equilibrium at which that rate is taken.
     """
 
     count: int = 4
@@ -80,7 +90,15 @@ class Buckling(_AtRest, frozen=True, tag="buckling"):
 
 
 class Frequencies(_AtRest, frozen=True, tag="frequencies"):
-    """The ``count`` lowest natural frequencies about the equilibrium at the load parameter ``load``."""
+    """The lowest natural frequencies about an equilibrium.
+
+    Attributes
+    ----------
+    count : int
+        How many.
+    load : float
+        Load parameter of the equilibrium.
+    """
 
     count: int = 6
     load: float = 1.0

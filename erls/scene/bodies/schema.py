@@ -23,8 +23,24 @@ class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class Body(_Record, frozen=True):
     """A rigid body; its frame is a node of the same name.
 
-    ``position`` and ``rotation_deg`` (about fixed x, then y, then z) place the frame; ``centre_of_mass`` lies in it,
-    and ``inertia`` is about the centre of mass in the axes of the frame. ``velocity`` is that of the frame's origin.
+    Attributes
+    ----------
+    name : str
+        Of the body and of its node.
+    mass : float
+        [kg]
+    inertia : (3,) floats or (3, 3) floats
+        About the centre of mass [kg m²], in the axes of the frame: [Ixx, Iyy, Izz], or a symmetric matrix.
+    centre_of_mass : (3,) floats
+        In the frame [m].
+    position : (3,) floats
+        Of the frame's origin, as built [m].
+    rotation_deg : (3,) floats
+        Of the frame about fixed x, then y, then z, as built [deg].
+    velocity : (3,) floats
+        Of the frame's origin at time 0 [m/s], axes of the world.
+    angular_velocity : (3,) floats
+        At time 0 [rad/s], axes of the world.
     """
 
     name: str
@@ -38,11 +54,29 @@ class Body(_Record, frozen=True):
 
 
 class Beam(_Record, frozen=True):
-    """A beam between two nodes or bodies: straight, or an arc ``through`` a third point.
+    """A beam between two nodes or bodies: straight, or an arc. Its inner nodes are NAME/1, NAME/2 ...
 
-    Its inner nodes are NAME/1, NAME/2 ... ``local_z``, at its start, is the direction of the section's height, z unless
-    given (y for beams along z); an arc carries it along, and ``twist_deg`` turns it about the beam from start to end.
-    ``chords``: straight elements between nodes on the arc.
+    Attributes
+    ----------
+    name : str
+        Of the beam and of its inner nodes.
+    start, end : str
+        Nodes or bodies.
+    section : str
+        A name from ``[sections]``.
+    material : str
+        A name from ``[materials]``.
+    elements : int
+        Elements of equal length.
+    through : (3,) floats, optional
+        An arc runs through this point [m]; straight unless given.
+    chords : bool
+        Straight elements between nodes on the arc.
+    local_z : (3,) floats, optional
+        Direction of the section's height at the start of the beam, carried along by an arc; z, or y for beams along z,
+        unless given.
+    twist_deg : float
+        How far the section turns about the beam from start to end [deg].
     """
 
     name: str
@@ -58,7 +92,17 @@ class Beam(_Record, frozen=True):
 
 
 class PointMass(_Record, frozen=True):
-    """Mass [kg], and inertia about the node in the axes of its frame, added to a node."""
+    """A rigid mass added to a node.
+
+    Attributes
+    ----------
+    node : str
+        A node, a body, or an inner node of a beam.
+    mass : float
+        [kg]
+    inertia : (3,) floats or (3, 3) floats
+        About the node [kg m²], in the axes of its frame: [Ixx, Iyy, Izz], or a symmetric matrix.
+    """
 
     node: str
     mass: float
@@ -66,11 +110,26 @@ class PointMass(_Record, frozen=True):
 
 
 class Connection(_Record, frozen=True):
-    """A joint between a ``node`` and the ground or another node.
+    """A joint between a node and the ground or another node.
 
-    It sits at ``position``, where ``node`` is unless given. ``axis``: of revolute, prismatic and cylindrical joints,
-    and the one of a universal joint that is fixed to ``to``, with ``second_axis`` fixed to ``node``. ``motion``
-    prescribes the coordinate of a revolute or prismatic joint, from 0 on; at rest over the load parameter.
+    Attributes
+    ----------
+    name : str
+        What reports call it.
+    type : str
+        What it leaves free.
+    node : str
+        A node, a body, or an inner node of a beam.
+    to : str
+        Another one.
+    position : (3,) floats, optional
+        Where the joint sits, as built [m]; where ``node`` is unless given.
+    axis : (3,) floats, optional
+        Of revolute, prismatic and cylindrical joints; the one of a universal joint that is fixed to ``to``.
+    second_axis : (3,) floats, optional
+        The axis of a universal joint that is fixed to ``node``.
+    motion : Motion, optional
+        Prescribed coordinate of a revolute or prismatic joint, from 0 on; at rest over the load parameter.
     """
 
     name: str
@@ -84,8 +143,24 @@ class Connection(_Record, frozen=True):
 
 
 class LineSpring(_Record, frozen=True, tag_field="type", tag="line"):
-    """A spring [N/m] and damper [N s/m] along the line from ``to_position`` on the ground or the node ``to`` to
-    ``position`` on ``node``; where the nodes are unless given. ``length`` without force: as built unless given.
+    """A spring and damper along the line between two points.
+
+    Attributes
+    ----------
+    node : str
+        A node, a body, or an inner node of a beam.
+    to : str
+        Another one.
+    position : (3,) floats, optional
+        End on ``node``, as built [m]; where it is unless given.
+    to_position : (3,) floats, optional
+        End on ``to``, as built [m]; where that node is unless given. The ground needs it.
+    stiffness : float
+        [N/m]
+    damping : float
+        [N s/m]
+    length : float, optional
+        Without force [m]; as built unless given.
     """
 
     node: str
@@ -98,8 +173,22 @@ class LineSpring(_Record, frozen=True, tag_field="type", tag="line"):
 
 
 class TurningSpring(_Record, frozen=True, tag_field="type", tag="turning"):
-    """A torsion spring [N m/rad] and damper [N m s/rad] about an ``axis``, between a ``node`` and the ground or ``to``;
-    without moment at ``rest_deg`` from where it is built.
+    """A torsion spring and damper about an axis.
+
+    Attributes
+    ----------
+    node : str
+        A node, a body, or an inner node of a beam.
+    axis : (3,) floats
+        In the world, as built.
+    to : str
+        Another one.
+    stiffness : float
+        [N m/rad]
+    damping : float
+        [N m s/rad]
+    rest_deg : float
+        Angle from where it is built at which there is no moment [deg].
     """
 
     node: str
@@ -114,10 +203,21 @@ Spring = LineSpring | TurningSpring
 
 
 class Load(_Record, frozen=True):
-    """A force [N] and a moment [N m] at a node, in the world's axes, or with ``follower`` in those of the node's frame.
+    """A force and a moment at a node.
 
-    ``factor``: profiles over time, which add up; at rest over the load parameter. Unless given, loads act in full
-    during a motion and grow with the load parameter at rest.
+    Attributes
+    ----------
+    node : str
+        A node, a body, or an inner node of a beam.
+    force : (3,) floats
+        [N], in the world's axes.
+    moment : (3,) floats
+        [N m], in the world's axes.
+    follower : bool
+        Force and moment turn with the node: they are those of the node's frame.
+    factor : list of Load
+        Profiles over time, which add up; at rest over the load parameter. Unless given, loads act in full during a
+        motion and grow with the load parameter at rest.
     """
 
     node: str
@@ -128,9 +228,36 @@ class Load(_Record, frozen=True):
 
 
 class BodySceneRecord(_Record, frozen=True):
-    """A scene: named ``nodes`` that beams run between, bodies, what connects and loads them, and what is to be found.
+    """A scene: named nodes that beams run between, bodies, what connects and loads them, and what is to be found.
 
-    ``report``: nodes whose places are reported beside named nodes and bodies, such as BEAM/4.
+    Attributes
+    ----------
+    simulation : Analysis
+        What is to be found.
+    name : str
+        Of the scene; that of the file unless given.
+    gravity : (3,) floats
+        In the world [m/s²].
+    materials : dict of Material
+        By name, as in link descriptions.
+    sections : dict of Section
+        By name, as in link descriptions.
+    nodes : dict of (3,) floats
+        Where beams end [m]; their axes are those of the world.
+    bodies : list of Body
+        Rigid bodies, ``[[bodies]]``.
+    beams : list of Beam
+        Geometrically exact beams, ``[[beams]]``.
+    masses : list of PointMass
+        Rigid masses on nodes, ``[[masses]]``.
+    connections : list of Connection
+        Joints, ``[[connections]]``.
+    springs : list of Spring
+        Springs and dampers, ``[[springs]]``.
+    loads : list of Load
+        Forces and moments, ``[[loads]]``.
+    report : list of str
+        Nodes whose places are reported beside named nodes and bodies, such as BEAM/4.
     """
 
     simulation: Analysis
