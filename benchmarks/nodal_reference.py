@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
 
 ROOT = Path(__file__).parents[1]

@@ -29,8 +29,9 @@ import tomlkit
 
 import erls
 from erls.scene.build import build_mechanism
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
 from erls.scene.integrators import INTEGRATORS
+from erls.scene.read import load_scene
 from fe_import import load_link
 
 DATA = Path(__file__).resolve().parent.parent / "data"

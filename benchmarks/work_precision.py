@@ -21,7 +21,8 @@ from erls.integrate.base import Options, Solution
 from erls.integrate.registry import integrator_named
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_scene
 
 DATA = Path(__file__).resolve().parent.parent / "data"
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)

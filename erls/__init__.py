@@ -14,7 +14,7 @@ from typing import Any
 __all__ = ["load_run", "load_scene", "save_run", "section_forces", "simulate", "simulate_many", "stress"]
 
 _HOME = {
-    "load_scene": ("erls.scene.chain", "load_scene"),
+    "load_scene": ("erls.scene.read", "load_scene"),
     "simulate": ("erls.simulation.simulate", "simulate"),
     "simulate_many": ("erls.simulation.batch", "simulate_many"),
     "load_run": ("erls.run.file", "load_run"),

@@ -103,7 +103,7 @@ def test_example_scene_and_link_run(tmp_path: Path) -> None:
 
 def test_defaults_are_as_printed() -> None:
     """Fields marked #= in the annotated scene and link hold the default of the schema."""
-    from erls.scene.chain import Simulation
+    from erls.scene.settings import Simulation
     from fe_import.description.link import Frame, Member
 
     simulation = Simulation(duration=1.0)
@@ -132,14 +132,11 @@ def test_drive_examples_are_valid() -> None:
 def test_shipped_files_have_a_header_and_are_valid(path: Path) -> None:
     """Each link and scene says what it shows, and loads."""
     from erls import load_scene
-    from erls.scene.bodies.read import is_body_scene, load_body_scene
     from fe_import import load_link
 
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# ")
-    if is_body_scene(tomllib.loads(text)):
-        load_body_scene(path)
-    elif "[simulation]" in text:
+    if "[simulation]" in text:
         load_scene(path)
     else:
         load_link(path)

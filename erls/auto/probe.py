@@ -26,7 +26,8 @@ from erls.integrate.choice import integrator
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.record import Run
-from erls.scene.chain import Scene, Simulation
+from erls.scene.chain import Scene
+from erls.scene.settings import Simulation
 
 FEWEST, MOST = 120, 20_000  # steps
 PLACES, EFFORTS = 16, 6  # times at which points and drive forces are compared

@@ -14,7 +14,8 @@ from erls.equations.system import metre_scales
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split
-from erls.scene.chain import Scene, Simulation
+from erls.scene.chain import Scene
+from erls.scene.settings import Simulation
 
 _BELOW = 0.5  # of the lowest frequency along the run
 _PEAKS = 64  # times at which drive forces are looked at

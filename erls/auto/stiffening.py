@@ -17,7 +17,8 @@ from erls.equations.registry import TREES, formulate
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import in_order
 from erls.run.watches.spin_stability import UNSTABLE, planned_spin_warnings
-from erls.scene.chain import Scene, Simulation
+from erls.scene.chain import Scene
+from erls.scene.settings import Simulation
 
 STIFFENING = frozenset({"geometric_stiffening", "foreshortening"})
 _SPEEDS = 61

@@ -14,7 +14,8 @@ from erls.errors import Cause, SceneError
 from erls.mechanism.effects import EFFECTS, in_order
 from erls.run.watches.spin_stability import missing_stiffening
 from erls.scene.build import build_mechanism
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_chain
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def survey(path: Path | str, overrides: Iterable[str] = (), tell: Callable[[str]
     SimulationError
         The coarse run with all effects failed.
     """
-    scene = load_scene(path, overrides)
+    scene = load_chain(path, overrides)
     settings = scene.record.simulation
     if settings.formulation not in TREES:
         raise SceneError(

@@ -17,10 +17,10 @@ def simulate_bodies(
     from erls.run.bodies.result_file import write_result
     from erls.run.bodies.solve import solve
     from erls.scene.bodies.analyses import Dynamics
-    from erls.scene.bodies.read import load_body_scene
+    from erls.scene.read import load_scene
 
     _only_nodal(formulation)
-    loaded = load_body_scene(scene, changes)
+    loaded = load_scene(scene, changes)
     analysis = loaded.record.simulation
     times = report_times(at, analysis.duration) if isinstance(analysis, Dynamics) else _no_times(at)
     if output is not None:

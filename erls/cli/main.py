@@ -134,7 +134,7 @@ def simulate(
         Print one JSON object.
     """
     from erls.errors import Cause, SceneError, SimulationError
-    from erls.scene.chain import is_body_scene, load_scene
+    from erls.scene.read import is_body_scene, load_chain
     from fe_import.files.toml import read_toml
 
     if is_body_scene(read_toml(scene, SceneError)):
@@ -148,7 +148,7 @@ def simulate(
     changes = list(set_ or [])
     if formulation is not None:
         changes.append(f'simulation.formulation="{formulation}"')
-    loaded = load_scene(scene, changes)
+    loaded = load_chain(scene, changes)
     times = report_times(at, loaded.record.simulation.duration)
     if output is not None:
         refuse_unwritable(output, scene)

@@ -10,7 +10,7 @@ from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.substructures import Substructured
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split, split
-from erls.scene.chain import Simulation
+from erls.scene.settings import Simulation
 
 
 def _ffr(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:

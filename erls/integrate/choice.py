@@ -15,8 +15,8 @@ from erls.integrate.registry import integrator_named
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split, split
-from erls.scene.chain import Simulation
 from erls.scene.integrators import INTEGRATORS
+from erls.scene.settings import Simulation
 
 
 def of_pieces(integrate: Callable[..., Solution]) -> Callable[..., Solution]:

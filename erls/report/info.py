@@ -14,8 +14,9 @@ from erls.run.bodies.result_file import SCHEMA as RESULT_SCHEMA
 from erls.run.bodies.result_file import read_summary
 from erls.run.file import SCHEMA as RUN_SCHEMA
 from erls.run.file import load_run
-from erls.scene.bodies.read import BodyScene, load_body_scene
-from erls.scene.chain import Scene, is_body_scene, load_scene
+from erls.scene.bodies.schema import BodyScene
+from erls.scene.chain import Scene
+from erls.scene.read import load_scene
 from fe_import.description.link import LinkFile, load_link
 from fe_import.files.hdf5.files import open_for_reading
 from fe_import.files.toml import read_toml
@@ -58,11 +59,9 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
                 remedy="give a file that erls wrote",
             )
         return _modal_info(read_modal_file(path))
-    data = read_toml(path, SceneError)
-    if is_body_scene(data):
-        return _body_scene_info(load_body_scene(path))
-    if "joints" in data or "simulation" in data or "links" in data:
-        return _scene_info(load_scene(path))
+    if not {"joints", "simulation", "links", "bodies", "beams"}.isdisjoint(read_toml(path, SceneError)):
+        scene = load_scene(path)
+        return _body_scene_info(scene) if isinstance(scene, BodyScene) else _scene_info(scene)
     return _link_info(load_link(path))
 
 

@@ -25,9 +25,9 @@ from erls.mechanism.without_effects import without
 from erls.scene.build_joints import angle, joint_forces, reflected_inertia
 from erls.scene.build_loops import build_loops
 from erls.scene.build_substructures import piece_links, piece_models, piece_warnings
-from erls.scene.chain import Joint as JointRecord
-from erls.scene.chain import Link as LinkRecord
 from erls.scene.chain import Scene
+from erls.scene.joints import Joint as JointRecord
+from erls.scene.links import Link as LinkRecord
 from fe_import.description.link import LinkDescription, load_link
 from fe_import.errors import FEImportError, ReportedError
 from fe_import.files.toml import choose

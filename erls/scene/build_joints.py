@@ -6,7 +6,7 @@ import math
 
 from erls.mechanism.joints import JointForces
 from erls.mechanism.place import Place
-from erls.scene.chain import Joint, Loop
+from erls.scene.joints import Joint, Loop
 
 
 def angle(place: Place, name: str, plain: float | None, degrees: float | None) -> float:

@@ -16,8 +16,8 @@ from erls.mechanism.loop_turns import turning_signs
 from erls.mechanism.loops import LOOP_TYPES, Loop, LoopEnd, LoopFreedom
 from erls.mechanism.place import Place
 from erls.scene.build_joints import angle, joint_forces, reflected_inertia
-from erls.scene.chain import Loop as LoopRecord
 from erls.scene.chain import Scene
+from erls.scene.joints import Loop as LoopRecord
 from fe_import.files.toml import choose
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from erls.mechanism.links import Link, truncated
-from erls.scene.chain import Link as LinkRecord
+from erls.scene.links import Link as LinkRecord
 from fe_import.description.link import LinkFile
 from fe_import.errors import Cause, FEImportError
 from fe_import.modal.file import ModalModel

@@ -28,7 +28,8 @@ from erls.run.watches.small_displacements import range_warnings
 from erls.run.watches.spin_stability import missing_stiffening, planned_spin_warnings, spin_warnings
 from erls.run.watches.stored_output import output_step, output_warnings
 from erls.scene.build import Message, build_mechanism
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_chain
 from fe_import.description.link import LinkDescription
 from fe_import.files.toml import choose
 from fe_import.modal.file import ModalModel
@@ -86,7 +87,7 @@ def simulate(
     True
     """
     if not isinstance(scene, Scene):
-        scene = load_scene(scene)
+        scene = load_chain(scene)
     settings = scene.record.simulation
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
     built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))

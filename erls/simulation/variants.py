@@ -11,7 +11,8 @@ from erls.equations.registry import formulate
 from erls.integrate.choice import compile_kernels
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_chain
 from erls.simulation.packed_run import PackedRun, unpacked
 from erls.simulation.simulate import Progress, simulate
 from fe_import.errors import ReportedError
@@ -42,7 +43,7 @@ class Variants:
         """
         try:
             progress(0.0, 0.0)
-            scene = load_scene(self.scene, overrides)
+            scene = load_chain(self.scene, overrides)
             run = simulate(scene, progress=progress, like=self._runs.get(_links(scene)))
         except ReportedError as problem:
             return problem
@@ -51,7 +52,7 @@ class Variants:
 
     def prepare(self, overrides: Sequence[str]) -> None:
         """Read and compile what a variant needs."""
-        scene = load_scene(self.scene, overrides)
+        scene = load_chain(self.scene, overrides)
         formulation = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
         compile_kernels(formulation, scene.record.simulation)
 

@@ -12,8 +12,8 @@ from tomlkit.items import AoT, Comment, Item, Table, Whitespace
 
 from erls.errors import Cause, SceneError
 from erls.files.output import check_writable, replacing
-from erls.scene.chain import load_scene
 from erls.scene.overrides import apply_override
+from erls.scene.read import load_chain
 
 ACCURACY_FIELDS = {"generalized_alpha": ("step",), "lobatto": ("tolerance",), "auto": ("tolerance",)}
 
@@ -66,7 +66,7 @@ def write_copy(path: Path, scene: Path, overrides: Sequence[str], note: str) -> 
     with replacing(path) as temporary:
         text = "".join(f"# {line}\n" for line in lines) + tomlkit.dumps(document)
         temporary.write_text(text, encoding="utf-8")
-        load_scene(temporary)
+        load_chain(temporary)
     return removed
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from erls.equations.registry import FORMULATIONS, TREES
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_chain
 from erls.simulation.simulate import simulate
 from erls.studies.outputs import Outputs, run_outputs
 from erls.studies.pool import run_all
@@ -138,7 +139,7 @@ def compare(
         Bad input, or fewer than two columns.
     """
     path = scene.path if isinstance(scene, Scene) else Path(scene)
-    loaded = load_scene(path, overrides)
+    loaded = load_chain(path, overrides)
     names = list(dict.fromkeys(columns)) or list(TREES)
     for name in names:
         choose(name, COLUMNS, "formulations", SceneError)
@@ -163,7 +164,7 @@ def compare(
 
 def _run(task: tuple[str, tuple[str, ...], bool]) -> Outputs:
     path, overrides, full_model = task
-    scene = load_scene(path, overrides)
+    scene = load_chain(path, overrides)
     if full_model:
         scene = _unreduced(scene)
     run = simulate(scene)

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from erls.errors import Cause, SceneError, SimulationError
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_chain
 from erls.studies.grid import Grid, checked, ladders
 from erls.studies.ladder import CostPoint, Ladder, Norm, climb, failed, overrides_of
 from erls.studies.mode_overrides import available_modes, count_field
@@ -114,7 +115,7 @@ def study_cost(
         The reference failed.
     """
     path = scene.path if isinstance(scene, Scene) else Path(scene)
-    loaded = load_scene(path, overrides)
+    loaded = load_chain(path, overrides)
     _check(tolerance, "tolerance")
     _check(budget, "budget")
     choose(norm, ("max", "rms"), "norm", SceneError)

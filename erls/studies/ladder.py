@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from erls.errors import Cause, SimulationError
-from erls.scene.chain import load_scene
+from erls.scene.read import load_chain
 from erls.simulation.simulate import simulate
 from erls.studies.doubts import foretold_error
 from erls.studies.effect_sets import as_field
@@ -159,7 +159,7 @@ def _measured(task: Ladder, setting: Setting, longest: float, first: bool) -> Co
 
     walls: list[float] = []
     try:
-        scene = load_scene(task.path, (*task.overrides, *overrides_of(setting, task.fields)))
+        scene = load_chain(task.path, (*task.overrides, *overrides_of(setting, task.fields)))
         wanted = 1
         while len(walls) < wanted and (not walls or time.monotonic() < task.until):
             begun = None

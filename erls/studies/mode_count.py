@@ -11,7 +11,8 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_chain
 from erls.simulation.simulate import simulate
 from erls.studies.mode_overrides import available_modes, count_field, default_counts
 from erls.studies.outputs import Outputs, run_outputs
@@ -152,7 +153,7 @@ def study_modes(
         Bad input; also when no link has elastic modes to vary.
     """
     path = scene.path if isinstance(scene, Scene) else Path(scene)
-    loaded = load_scene(path, overrides)
+    loaded = load_chain(path, overrides)
     limits = available_modes(loaded)
     if link:
         choose(link, limits, "link", SceneError)
@@ -190,7 +191,7 @@ def study_modes(
 
 def _run(task: tuple[str, tuple[str, ...]]) -> Outputs:
     path, overrides = task
-    run = simulate(load_scene(path, overrides))
+    run = simulate(load_chain(path, overrides))
     return run_outputs(run, np.linspace(0.0, run.end, _SAMPLES + 1))
 
 

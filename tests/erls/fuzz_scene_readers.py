@@ -19,7 +19,8 @@ from erls.report.mode_page import Printed, read_printed
 from erls.run.file import load_run
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
-from erls.scene.chain import SceneRecord, load_scene
+from erls.scene.chain import SceneRecord
+from erls.scene.read import load_scene
 
 SCENE = b"""gravity = [0.0, 0.0, -9.81]
 [simulation]

@@ -10,7 +10,7 @@ from typing import Any
 from erls.equations.erls.chain import Erls
 from erls.mechanism.chain import Mechanism
 from erls.scene.build import build_mechanism
-from erls.scene.chain import is_body_scene, load_scene
+from erls.scene.read import is_body_scene, load_scene
 
 ROOT = Path(__file__).parents[2]
 SHARED = ROOT.parent / "shared"

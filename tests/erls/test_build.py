@@ -15,7 +15,7 @@ from erls.maths.so3 import skew
 from erls.mechanism.chain import Mechanism, poses
 from erls.mechanism.links import link_mass_properties
 from erls.scene.build import Built, build_mechanism
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 from fe_import.errors import Cause as FECause
 from fe_import.errors import FEImportError
 from fe_import.modal.file import write_modal_file

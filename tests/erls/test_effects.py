@@ -24,7 +24,7 @@ from erls.mechanism.effects import ALL, DEFAULT, EFFECTS, conserves_energy, in_o
 from erls.mechanism.links import Link
 from erls.mechanism.without_effects import present, without
 from erls.scene.build import build_mechanism
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 from fe_import.modal.inertia import InertiaInvariants
 
 LINEAR = frozenset({"centrifugal_load", "coriolis", "inertia_first_order"})

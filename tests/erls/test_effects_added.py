@@ -25,7 +25,8 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import DEFAULT
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_scene
 
 DATA = scenes.ROOT / "data"
 SPIN_UP, FAST, L_SHAPE = (DATA / f for f in ("spin_up/beam.toml", "slider_crank/fast.toml", "l_shape/steel_tall.toml"))

@@ -35,7 +35,8 @@ from erls.mechanism.effects import DEFAULT, EFFECTS, Certificate
 from erls.mechanism.without_effects import with_rigid, without
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_scene
 
 WITHIN = 3.0  # actual error over certified one, from the specification
 

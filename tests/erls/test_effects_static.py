@@ -29,7 +29,7 @@ from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 
 WITHIN = 3.0  # actual error over certified one, from the specification
 L_SHAPE, ROBOT = scenes.ROOT / "data/l_shape/steel_flat.toml", scenes.ROOT / "data/robot/two_link.toml"

@@ -22,7 +22,7 @@ from erls.equations.registry import formulate
 from erls.mechanism.effects import FIRST, SECOND
 from erls.mechanism.without_effects import without
 from erls.scene.build import build_mechanism
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"
 L_SHAPE = scenes.ROOT / "data/l_shape/steel_flat.toml"

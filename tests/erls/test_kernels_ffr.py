@@ -25,7 +25,7 @@ from erls.integrate.base import Options
 from erls.integrate.generalized_alpha import generalized_alpha
 from erls.integrate.lobatto import lobatto
 from erls.scene.build import build_mechanism
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-12

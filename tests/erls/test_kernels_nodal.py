@@ -26,7 +26,7 @@ from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.saddle import dense
 from erls.maths.so3 import Array
 from erls.scene.build import build_mechanism
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))

@@ -15,7 +15,7 @@ from erls.equations.loops.closed_chain import ClosedChain
 from erls.errors import SceneError
 from erls.maths.so3 import Array
 from erls.run.record import Run
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
 from fe_import.errors import ReportedError
 

@@ -17,7 +17,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 from erls.run.file import load_run, write_run
 from erls.run.record import Run
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
 from erls.studies.outputs import run_outputs
 from fe_import.errors import ReportedError

@@ -12,12 +12,11 @@ import pytest
 import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
 
-from erls import load_scene
 from erls.cli.main import main
 from erls.errors import Cause, SceneError, SimulationError
 from erls.run.bodies.result_file import read_summary, write_result
 from erls.run.bodies.solve import solve
-from erls.scene.bodies.read import load_body_scene
+from erls.scene.read import load_chain, load_scene
 from fe_import.errors import ReportedError
 
 CLAMP, BEAM, LOAD = STRIP["connections"][0], STRIP["beams"][0], STRIP["loads"][0]
@@ -104,10 +103,10 @@ def test_no_equilibrium(tmp_path: Path) -> None:
 
 
 def test_chains_and_bodies_are_told_apart(tmp_path: Path) -> None:
-    """`load_scene` says where scenes of bodies go."""
+    """What needs a chain says so."""
     path = body_scene(tmp_path, STRIP)
-    with pytest.raises(SceneError, match=r"erls.run.bodies.solve"):
-        load_scene(path)
+    with pytest.raises(SceneError, match=r"no chain"):
+        load_chain(path)
 
 
 def _json(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> dict[str, Any]:
@@ -160,7 +159,7 @@ def test_result_files_are_checked(tmp_path: Path) -> None:
     with pytest.raises(SceneError) as caught:
         read_summary(tmp_path / "other.h5")
     assert caught.value.cause is Cause.RUN_FILE
-    scenes_file = load_body_scene(body_scene(tmp_path, STRIP))
+    scenes_file = load_scene(body_scene(tmp_path, STRIP))
     assert scenes_file.name == "bodies"
     assert scenes_file.folder == tmp_path
     assert scenes.ROOT.is_dir()

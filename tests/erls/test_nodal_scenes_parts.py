@@ -14,7 +14,7 @@ from body_scenes_data import PENDULUM, STRIP, body_scene
 from erls.run.bodies.result import Motion, Rest
 from erls.run.bodies.solve import solve
 from erls.scene.bodies import analyses, schema
-from erls.scene.bodies.read import load_body_scene
+from erls.scene.read import load_scene
 
 EI_Y, EI_Z = 1e6 * 0.1 * 0.02**3 / 12, 1e6 * 0.02 * 0.1**3 / 12
 GA = 5e5 * 0.1 * 0.02 * 5 / 6
@@ -169,7 +169,7 @@ def test_the_scene_of_the_readme_shows_every_field(tmp_path: Path) -> None:
     (block,) = (b for b in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if 'name = "door on a beam"' in b)
     path = tmp_path / "door.toml"
     path.write_text(block, encoding="utf-8")
-    found = solve(load_body_scene(path, ["simulation.duration=0.02"]))
+    found = solve(load_scene(path, ["simulation.duration=0.02"]))
     assert isinstance(found, Motion)
     assert found.end == 0.02
     records = (schema.BodySceneRecord, schema.Body, schema.Beam, schema.PointMass, schema.Connection, schema.LineSpring,

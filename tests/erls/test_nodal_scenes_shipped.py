@@ -12,20 +12,20 @@ import scenes
 from erls.errors import Cause, SimulationError
 from erls.run.bodies.result import Motion, Rest
 from erls.run.bodies.solve import solve
-from erls.scene.bodies.read import load_body_scene
+from erls.scene.read import load_scene
 
 DATA = scenes.ROOT / "data"
 
 
 @functools.cache
 def _top(speed: str, *changes: str) -> Motion:
-    found = solve(load_body_scene(DATA / "heavy_top" / f"{speed}.toml", [f"simulation.{c}" for c in changes]))
+    found = solve(load_scene(DATA / "heavy_top" / f"{speed}.toml", [f"simulation.{c}" for c in changes]))
     assert isinstance(found, Motion)
     return found
 
 
 def _rest(name: str, *changes: str) -> Rest:
-    found = solve(load_body_scene(DATA / "statics" / f"{name}.toml", changes))
+    found = solve(load_scene(DATA / "statics" / f"{name}.toml", changes))
     assert isinstance(found, Rest)
     return found
 

@@ -19,8 +19,8 @@ from erls.integrate.base import Options, Solution, hermite_knots
 from erls.integrate.driver import Recorder
 from erls.integrate.registry import integrator_named
 from erls.run.watches.stored_output import FEWEST, output_error, output_step
-from erls.scene.chain import Simulation
 from erls.scene.integrators import INTEGRATORS
+from erls.scene.settings import Simulation
 
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"
 FLAT = scenes.ROOT / "data/l_shape/steel_flat.toml"

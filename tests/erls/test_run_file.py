@@ -17,7 +17,7 @@ import erls
 from erls.errors import Cause, SceneError, SimulationError
 from erls.run.file import load_run, write_run
 from erls.run.record import Run
-from erls.scene.chain import load_scene
+from erls.scene.read import load_scene
 from fe_import.errors import ReportedError
 from fe_import.files.hdf5.files import write_strings
 

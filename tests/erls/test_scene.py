@@ -10,7 +10,8 @@ import scenes
 
 from erls.errors import Cause, SceneError
 from erls.mechanism.drives import FreeDrive, TorqueDrive
-from erls.scene.chain import Scene, load_scene
+from erls.scene.chain import Scene
+from erls.scene.read import load_scene
 
 DATA = scenes.shipped()
 

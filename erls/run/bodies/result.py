@@ -18,7 +18,7 @@ from erls.integrate.base import hermite
 from erls.integrate.constrained import ConstrainedSolution
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
-from erls.scene.bodies.read import BodyScene
+from erls.scene.bodies.schema import BodyScene
 from fe_import.files.toml import choose
 
 _MOST_ENERGIES = 2001

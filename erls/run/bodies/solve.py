@@ -12,16 +12,19 @@ from erls.equations.nodal.redundant import refuse_open
 from erls.equations.nodal.scenes.build import Assembly, assemble
 from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
 from erls.equations.nodal.statics import Statics, solve_statics
+from erls.errors import Cause, SceneError
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.run.bodies.result import Motion, Rest, work
 from erls.scene.bodies.analyses import TANGENTS, AtRest, Buckling, Dynamics, Frequencies, StaticSteps
-from erls.scene.bodies.read import BodyScene, load_body_scene
+from erls.scene.bodies.schema import BodyScene
+from erls.scene.read import AnyScene, load_scene
+from erls.scene.records import SceneFile
 
 Progress = Callable[[float, float], None]
 
 
-def solve(scene: BodyScene | Path | str, progress: Progress = lambda done, total: None) -> Motion | Rest:
+def solve(scene: AnyScene | Path | str, progress: Progress = lambda done, total: None) -> Motion | Rest:
     """Find what a scene of bodies asks for.
 
     Parameters
@@ -47,8 +50,10 @@ def solve(scene: BodyScene | Path | str, progress: Progress = lambda done, total
     >>> bool(abs(solve("data/statics/roll_up.toml").position("tip")).max() < 1e-10)  # back at the root
     True
     """
+    if not isinstance(scene, SceneFile):
+        scene = load_scene(scene)
     if not isinstance(scene, BodyScene):
-        scene = load_body_scene(scene)
+        raise SceneError(Cause.BAD_FIELD, "a chain", where=str(scene.path), remedy="use erls.simulate")
     assembly = assemble(scene)
     analysis = scene.record.simulation
     if isinstance(analysis, Dynamics):

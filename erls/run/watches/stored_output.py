@@ -12,7 +12,7 @@ from erls.errors import SimulationError
 from erls.integrate.base import hermite
 from erls.maths.so3 import Array
 from erls.run.record import Run, node_positions
-from erls.scene.chain import Simulation
+from erls.scene.settings import Simulation
 
 IntArray = NDArray[np.int64]
 

@@ -5,17 +5,13 @@ Each analysis is one record, which a scene selects by ``type = "..."`` in its ta
 
 from __future__ import annotations
 
-import msgspec
+from erls.scene.records import Record, Stepping
 
 TANGENTS = ("full", "material", "frozen")  # see `erls.equations.nodal.statics`
 GROUPS = ("SE(3)", "R3xSO(3)")
 
 
-class _Analysis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="type"):
-    """Base of all analyses."""
-
-
-class Dynamics(_Analysis, frozen=True, tag="dynamics"):
+class Dynamics(Stepping, frozen=True, kw_only=True, tag_field="type", tag="dynamics"):
     """The motion from the initial velocities on, by Lie-group generalized-α.
 
     Attributes
@@ -24,6 +20,8 @@ class Dynamics(_Analysis, frozen=True, tag="dynamics"):
         [s]
     step : float, optional
         [s]; a thousandth of the duration, at most 1 ms, unless given.
+    formulation : str
+        ``nodal``: elements with a frame per node are the only ones for bodies and beams of their own.
     group : str
         Where every node moves: ``SE(3)``, equations in its own axes; or ``R3xSO(3)``, positions in the world's axes.
     spectral_radius : float
@@ -36,26 +34,27 @@ class Dynamics(_Analysis, frozen=True, tag="dynamics"):
         What a small residual is, against the inertia and loads of the nodes and the forces of the connections.
     """
 
-    duration: float
-    step: float | None = None
+    formulation: str = "nodal"
     group: str = "SE(3)"
-    spectral_radius: float = 0.8
     iteration_matrix: str = "auto"
     newton_tolerance: float = 1e-11
     residual_tolerance: float = 1e-10
 
 
-class _AtRest(_Analysis, frozen=True):
+class _AtRest(Record, frozen=True, kw_only=True, tag_field="type"):
     """What all analyses at rest share.
 
     Attributes
     ----------
+    formulation : str
+        ``nodal``.
     load_steps : int
         Equal steps of the load parameter.
     tangent : str
         ``full``, ``material`` or ``frozen``, see `erls.equations.nodal.statics`.
     """
 
+    formulation: str = "nodal"
     load_steps: int = 1
     tangent: str = "full"
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import msgspec
-
-from erls.errors import Cause, SceneError
+from erls.errors import SceneError
 from erls.mechanism.joint_conditions import CONDITIONS
-from erls.mechanism.place import LARGEST, LATEST
-from erls.scene.bodies.analyses import GROUPS, TANGENTS, AtRest, Buckling, Dynamics, Frequencies
+from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
-from erls.scene.check import MOST_STEPS, check_names, every_number
+from erls.scene.checks import bad, check_names, check_stepping, check_tables, directed, not_negative
 from erls.scene.integrators import MATRICES
 from fe_import.elements.sections import check_section
 from fe_import.files.toml import choose
 
+FORMULATIONS = ("nodal",)
 AXES = {"revolute": 1, "prismatic": 1, "cylindrical": 1, "universal": 2}
 MOST_ELEMENTS = 100_000
 
@@ -34,12 +30,7 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
     SceneError, FEImportError
         BAD_FIELD, BAD_REFERENCE: naming file, field, value and remedy.
     """
-    for path, value in every_number(msgspec.to_builtins(scene)):
-        if not abs(value) <= LARGEST:
-            remedy = f"give a number between {-LARGEST:g} and {LARGEST:g}"
-            raise _bad(f"{file}: {path}", "not a finite number of plausible size", value, remedy)
-    if not scene.name.isprintable():
-        raise _bad(f"{file}: name", "a name is one line of printable characters", scene.name, "rename it")
+    check_tables(scene, file)
     _check_simulation(scene.simulation, f"{file}: simulation")
     nodes = _check_all_names(scene, file)
     _check_properties(scene, file)
@@ -48,7 +39,7 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
     nodes += [f"{b.name}/{k}" for b in scene.beams for k in range(1, b.elements)]
     for k, mass in enumerate(scene.masses):
         choose(mass.node, nodes, f"{file}: masses[{k}].node", SceneError)
-        _not_negative(f"{file}: masses[{k}].mass", mass.mass)
+        not_negative(f"{file}: masses[{k}].mass", mass.mass)
     for k, connection in enumerate(scene.connections):
         _check_connection(connection, nodes, f"{file}: connections[{k}]")
     for k, spring in enumerate(scene.springs):
@@ -60,36 +51,26 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
     ends = {end for beam in scene.beams for end in (beam.start, beam.end)}
     for name in scene.nodes:
         if name not in ends:
-            raise _bad(f"{file}: nodes.{name}", "no beam ends at this node", None, "remove it, or add the beam")
+            raise bad(f"{file}: nodes.{name}", "no beam ends at this node", None, "remove it, or add the beam")
 
 
-def _check_simulation(s: Any, place: str) -> None:
+def _check_simulation(s: Analysis, place: str) -> None:
+    choose(s.formulation, FORMULATIONS, f"{place}.formulation", SceneError)
     if isinstance(s, Dynamics):
+        check_stepping(s, place)
         choose(s.group, GROUPS, f"{place}.group", SceneError)
         choose(s.iteration_matrix, MATRICES, f"{place}.iteration_matrix", SceneError)
-        for name in ("duration", "step"):
-            value = getattr(s, name)
-            if value is not None and not value > 0:
-                raise _bad(f"{place}.{name}", f"{name} must be positive", value, "give a number above 0")
-        if s.duration > LATEST:
-            raise _bad(f"{place}.duration", "longer than any run", s.duration, f"give at most {LATEST:g} s")
-        if s.duration / MOST_STEPS > (s.step or 1e-3):
-            remedy = f"a run has at most {MOST_STEPS:.0e} steps: shorten it, or give a larger step"
-            raise _bad(f"{place}.step", "too many steps", s.step, remedy)
-        if not 0 <= s.spectral_radius <= 1:
-            raise _bad(f"{place}.spectral_radius", "out of range", s.spectral_radius, "give 0 to 1")
-        _not_negative(f"{place}.newton_tolerance", s.newton_tolerance)
+        not_negative(f"{place}.newton_tolerance", s.newton_tolerance)
         if not 0 <= s.residual_tolerance < 1:
-            raise _bad(f"{place}.residual_tolerance", "not a share", s.residual_tolerance, "give 0 or more, below 1")
+            raise bad(f"{place}.residual_tolerance", "not a share", s.residual_tolerance, "give 0 or more, below 1")
         return
-    assert isinstance(s, AtRest)
     choose(s.tangent, TANGENTS, f"{place}.tangent", SceneError)
     if not 1 <= s.load_steps <= 10_000:
-        raise _bad(f"{place}.load_steps", "no such number of load steps", s.load_steps, "give 1 to 10000")
+        raise bad(f"{place}.load_steps", "no such number of load steps", s.load_steps, "give 1 to 10000")
     if isinstance(s, (Buckling, Frequencies)):
         if s.count < 1:
-            raise _bad(f"{place}.count", "a count must be positive", s.count, "give 1 or more")
-        _not_negative(f"{place}.load", s.load)
+            raise bad(f"{place}.count", "a count must be positive", s.count, "give 1 or more")
+        not_negative(f"{place}.load", s.load)
 
 
 def _check_all_names(scene: BodySceneRecord, file: str) -> list[str]:
@@ -100,7 +81,7 @@ def _check_all_names(scene: BodySceneRecord, file: str) -> list[str]:
     for kind in ("beams", "connections"):
         check_names((f"{file}: {kind}[{k}].name", x.name) for k, x in enumerate(getattr(scene, kind)))
     if not scene.bodies and not scene.beams:
-        raise _bad(f"{file}: bodies", "a scene needs a body or a beam", None, "add [[bodies]] or [[beams]]")
+        raise bad(f"{file}: bodies", "a scene needs a body or a beam", None, "add [[bodies]] or [[beams]]")
     return [name for _, name in named]
 
 
@@ -108,15 +89,15 @@ def _check_properties(scene: BodySceneRecord, file: str) -> None:
     for name, material in scene.materials.items():
         place = f"{file}: materials.{name}"
         if not material.youngs_modulus > 0:
-            raise _bad(f"{place}.youngs_modulus", "must be positive", material.youngs_modulus, "give pascals")
+            raise bad(f"{place}.youngs_modulus", "must be positive", material.youngs_modulus, "give pascals")
         if not -1 < material.poissons_ratio <= 0.5:
             message = "Poisson's ratio out of range"
-            raise _bad(f"{place}.poissons_ratio", message, material.poissons_ratio, "give -1 to 0.5")
-        _not_negative(f"{place}.density", material.density)
+            raise bad(f"{place}.poissons_ratio", message, material.poissons_ratio, "give -1 to 0.5")
+        not_negative(f"{place}.density", material.density)
     for name, section in scene.sections.items():
         check_section(section, f"{file}: sections.{name}")
     for k, body in enumerate(scene.bodies):
-        _not_negative(f"{file}: bodies[{k}].mass", body.mass)
+        not_negative(f"{file}: bodies[{k}].mass", body.mass)
 
 
 def _check_beam(beam: Beam, scene: BodySceneRecord, nodes: list[str], place: str) -> None:
@@ -125,12 +106,12 @@ def _check_beam(beam: Beam, scene: BodySceneRecord, nodes: list[str], place: str
     choose(beam.section, scene.sections, f"{place}.section", SceneError)
     choose(beam.material, scene.materials, f"{place}.material", SceneError)
     if beam.start == beam.end:
-        raise _bad(f"{place}.to", "a beam runs between two nodes", beam.end, "name another node")
+        raise bad(f"{place}.to", "a beam runs between two nodes", beam.end, "name another node")
     if not 1 <= beam.elements <= MOST_ELEMENTS:
         message = "no such number of elements"
-        raise _bad(f"{place}.elements", message, beam.elements, f"give 1 to {MOST_ELEMENTS}")
+        raise bad(f"{place}.elements", message, beam.elements, f"give 1 to {MOST_ELEMENTS}")
     if beam.local_z is not None and not any(beam.local_z):
-        raise _bad(f"{place}.local_z", "a direction is needed", beam.local_z, "give a direction across the beam")
+        raise bad(f"{place}.local_z", "a direction is needed", beam.local_z, "give a direction across the beam")
 
 
 def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
@@ -138,47 +119,36 @@ def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
     choose(joint.node, nodes, f"{place}.node", SceneError)
     choose(joint.to, [GROUND, *nodes], f"{place}.to", SceneError)
     if joint.node == joint.to:
-        raise _bad(f"{place}.to", "a connection needs two nodes", joint.to, "name another node, or the ground")
+        raise bad(f"{place}.to", "a connection needs two nodes", joint.to, "name another node, or the ground")
     wanted = AXES.get(joint.type, 0)
     for k, name in enumerate(("axis", "second_axis")):
         axis = getattr(joint, name)
         if axis is None and k < wanted:
-            raise _bad(f"{place}.{name}", f"a {joint.type} joint needs it", None, "give its direction in the world")
+            raise bad(f"{place}.{name}", f"a {joint.type} joint needs it", None, "give its direction in the world")
         if axis is not None and k >= wanted:
-            raise _bad(f"{place}.{name}", f"a {joint.type} joint has none", axis, "remove it")
-        if axis is not None and not any(axis):
-            raise _bad(f"{place}.{name}", "an axis needs a direction", axis, "give three numbers, not all zero")
+            raise bad(f"{place}.{name}", f"a {joint.type} joint has none", axis, "remove it")
+        directed(f"{place}.{name}", axis)
     if joint.motion is not None and joint.type not in ("revolute", "prismatic"):
         message = "its motion cannot be prescribed"
-        raise _bad(f"{place}.motion", message, joint.type, "let the joint be revolute or prismatic")
+        raise bad(f"{place}.motion", message, joint.type, "let the joint be revolute or prismatic")
 
 
 def _check_spring(spring: Spring, nodes: list[str], place: str) -> None:
     choose(spring.node, nodes, f"{place}.node", SceneError)
     choose(spring.to, [GROUND, *nodes], f"{place}.to", SceneError)
     if spring.node == spring.to:
-        raise _bad(f"{place}.to", "a spring needs two ends", spring.to, "name another node, or the ground")
-    _not_negative(f"{place}.stiffness", spring.stiffness)
-    _not_negative(f"{place}.damping", spring.damping)
+        raise bad(f"{place}.to", "a spring needs two ends", spring.to, "name another node, or the ground")
+    not_negative(f"{place}.stiffness", spring.stiffness)
+    not_negative(f"{place}.damping", spring.damping)
     if isinstance(spring, TurningSpring):
-        if not any(spring.axis):
-            raise _bad(f"{place}.axis", "an axis needs a direction", spring.axis, "give three numbers, not all zero")
+        directed(f"{place}.axis", spring.axis)
         return
-    _not_negative(f"{place}.length", spring.length or 0.0)
+    not_negative(f"{place}.length", spring.length or 0.0)
     if spring.to == GROUND and spring.to_position is None:
-        raise _bad(f"{place}.to_position", "where on the ground", None, "give its position in the world")
+        raise bad(f"{place}.to_position", "where on the ground", None, "give its position in the world")
 
 
 def _check_load(load: Load, nodes: list[str], place: str) -> None:
     choose(load.node, nodes, f"{place}.node", SceneError)
     if not any(load.force) and not any(load.moment):
-        raise _bad(place, "neither a force nor a moment", None, "give one, or remove the load")
-
-
-def _not_negative(where: str, value: float) -> None:
-    if value < 0:
-        raise _bad(where, "must not be negative", value, "give 0 or more")
-
-
-def _bad(where: str, message: str, value: Any, remedy: str) -> SceneError:
-    return SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)
+        raise bad(place, "neither a force nor a moment", None, "give one, or remove the load")

@@ -5,22 +5,21 @@ Positions, directions and velocities are those of the world, as built; angles in
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import msgspec
 
 from erls.mechanism.motions import Motion
 from erls.mechanism.profiles import Load as Profile
 from erls.scene.bodies.analyses import Analysis
-from fe_import.description.link import Inertia, Material, Vector
+from erls.scene.records import Record, SceneFile, SceneTables
+from fe_import.description.link import Inertia, Material, PointMass, Vector
 from fe_import.elements.sections import Section
 
 GROUND = "ground"
 
 
-class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    pass
-
-
-class Body(_Record, frozen=True):
+class Body(Record, frozen=True):
     """A rigid body; its frame is a node of the same name.
 
     Attributes
@@ -53,7 +52,7 @@ class Body(_Record, frozen=True):
     angular_velocity: Vector = (0.0, 0.0, 0.0)
 
 
-class Beam(_Record, frozen=True):
+class Beam(Record, frozen=True):
     """A beam between two nodes or bodies: straight, or an arc. Its inner nodes are NAME/1, NAME/2 ...
 
     Attributes
@@ -91,25 +90,7 @@ class Beam(_Record, frozen=True):
     twist_deg: float = 0.0
 
 
-class PointMass(_Record, frozen=True):
-    """A rigid mass added to a node.
-
-    Attributes
-    ----------
-    node : str
-        A node, a body, or an inner node of a beam.
-    mass : float
-        [kg]
-    inertia : (3,) floats or (3, 3) floats
-        About the node [kg m²], in the axes of its frame: [Ixx, Iyy, Izz], or a symmetric matrix.
-    """
-
-    node: str
-    mass: float
-    inertia: Inertia = (0.0, 0.0, 0.0)
-
-
-class Connection(_Record, frozen=True):
+class Connection(Record, frozen=True):
     """A joint between a node and the ground or another node.
 
     Attributes
@@ -142,7 +123,7 @@ class Connection(_Record, frozen=True):
     motion: Motion | None = None
 
 
-class LineSpring(_Record, frozen=True, tag_field="type", tag="line"):
+class LineSpring(Record, frozen=True, tag_field="type", tag="line"):
     """A spring and damper along the line between two points.
 
     Attributes
@@ -172,7 +153,7 @@ class LineSpring(_Record, frozen=True, tag_field="type", tag="line"):
     length: float | None = None
 
 
-class TurningSpring(_Record, frozen=True, tag_field="type", tag="turning"):
+class TurningSpring(Record, frozen=True, tag_field="type", tag="turning"):
     """A torsion spring and damper about an axis.
 
     Attributes
@@ -202,7 +183,7 @@ class TurningSpring(_Record, frozen=True, tag_field="type", tag="turning"):
 Spring = LineSpring | TurningSpring
 
 
-class Load(_Record, frozen=True):
+class Load(Record, frozen=True):
     """A force and a moment at a node.
 
     Attributes
@@ -227,7 +208,7 @@ class Load(_Record, frozen=True):
     factor: tuple[Profile, ...] = ()
 
 
-class BodySceneRecord(_Record, frozen=True):
+class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
     """A scene: named nodes that beams run between, bodies, what connects and loads them, and what is to be found.
 
     Attributes
@@ -261,8 +242,6 @@ class BodySceneRecord(_Record, frozen=True):
     """
 
     simulation: Analysis
-    name: str = ""
-    gravity: Vector = (0.0, 0.0, -9.81)
     materials: dict[str, Material] = {}
     sections: dict[str, Section] = {}
     nodes: dict[str, Vector] = {}
@@ -273,3 +252,10 @@ class BodySceneRecord(_Record, frozen=True):
     springs: list[Spring] = []
     loads: list[Load] = []
     report: list[str] = []
+
+
+@dataclass(frozen=True)
+class BodyScene(SceneFile):
+    """A checked scene of bodies and its file."""
+
+    record: BodySceneRecord

@@ -27,10 +27,9 @@ from erls.mechanism.place import Place
 from erls.mechanism.profiles import build_loads
 from erls.scene.bodies.analyses import Dynamics
 from erls.scene.bodies.check import AXES
-from erls.scene.bodies.read import BodyScene
 from erls.scene.bodies.schema import GROUND as GROUND_NAME
 from erls.scene.bodies.schema import Beam as BeamRecord
-from erls.scene.bodies.schema import BodySceneRecord, Connection, Load
+from erls.scene.bodies.schema import BodyScene, BodySceneRecord, Connection, Load
 from fe_import.elements.sections import section_constants
 from fe_import.models.model import inertia_matrix
 

@@ -1,0 +1,41 @@
+"""The conditions on the settings of a chain's simulation."""
+
+from __future__ import annotations
+
+from erls.errors import SceneError
+from erls.mechanism.effects import named_effects
+from erls.scene.checks import bad, check_stepping, positive
+from erls.scene.integrators import FIXED_STEP, INTEGRATORS
+from erls.scene.settings import Simulation
+from fe_import.files.toml import choose
+
+GAUGES = ("joint-angle", "minimum-norm")
+BODY_FRAMES = ("tangent", "mean-axis")
+COORDINATES = ("independent", "absolute")
+SMALLEST_RTOL = 3e-14  # rounding
+
+
+def check_settings(s: Simulation, place: str) -> None:
+    """Refuse settings that cannot be meant, or that do not go together."""
+    check_stepping(s, place)
+    choose(s.integrator, INTEGRATORS, f"{place}.integrator", SceneError)
+    choose(s.gauge, GAUGES, f"{place}.gauge", SceneError)
+    choose(s.body_frame, BODY_FRAMES, f"{place}.body_frame", SceneError)
+    choose(s.coordinates, COORDINATES, f"{place}.coordinates", SceneError)
+    if s.coordinates == "absolute":
+        for name, value, right in (("formulation", s.formulation, "ffr"), ("integrator", s.integrator, FIXED_STEP)):
+            if value != right:
+                message = "absolute coordinates do not go with this"
+                raise bad(f"{place}.{name}", message, value, f"use {right}, or coordinates = 'independent'")
+    if s.formulation == "nodal" and s.integrator not in (FIXED_STEP, "auto"):
+        message = "nodal frames need an integrator for constraints"
+        raise bad(f"{place}.integrator", message, s.integrator, f"use {FIXED_STEP}, or auto")
+    if s.elements_per_member is not None and s.elements_per_member < 1:
+        message = "a member needs at least one element"
+        raise bad(f"{place}.elements_per_member", message, s.elements_per_member, "give 1 or more")
+    for name in ("output_step", "bandwidth", "atol", "tolerance", "effects_tolerance", "effects_effort_tolerance"):
+        positive(f"{place}.{name}", getattr(s, name))
+    if not SMALLEST_RTOL <= s.rtol < 1:
+        remedy = f"give {SMALLEST_RTOL:g} (rounding) to 1"
+        raise bad(f"{place}.rtol", "not a relative tolerance", s.rtol, remedy)
+    named_effects(s.effects, f"{place}.effects")

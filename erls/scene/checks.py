@@ -1,0 +1,88 @@
+"""Conditions that scenes of every kind share: names, numbers, directions, settings of motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import msgspec
+
+from erls.errors import Cause, SceneError
+from erls.mechanism.place import LARGEST, LATEST
+from erls.scene.records import SceneTables, Stepping
+
+MOST_STEPS = 100_000_000  # fill any memory; more are a slip
+SHORTEST = 1e-9  # s, a thousand times what separates two breakpoints
+
+
+def bad(where: str, message: str, value: Any, remedy: str) -> SceneError:
+    """A BAD_FIELD error."""
+    return SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)
+
+
+def check_tables(scene: SceneTables, file: str) -> None:
+    """Every number is finite and plausible, and the scene's name a line."""
+    for path, value in _every_number(msgspec.to_builtins(scene)):
+        if not abs(value) <= LARGEST:
+            remedy = f"give a number between {-LARGEST:g} and {LARGEST:g}"
+            raise bad(f"{file}: {path}", "not a finite number of plausible size", value, remedy)
+    if not scene.name.isprintable():
+        raise bad(f"{file}: name", "a name is one line of printable characters", scene.name, "rename it")
+
+
+def _every_number(value: Any, path: str = "") -> Iterable[tuple[str, float]]:
+    """All numbers of nested tables and lists with their places."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _every_number(item, f"{path}.{key}" if path else key)
+    elif isinstance(value, (list, tuple)):
+        for k, item in enumerate(value):
+            yield from _every_number(item, f"{path}[{k}]")
+    elif isinstance(value, (int, float)):
+        yield path, value
+
+
+def check_names(places: Iterable[tuple[str, str]]) -> None:
+    """Names, each behind its place, differ and can stand in tables and, as keys, in files."""
+    seen: set[str] = set()
+    for place, name in places:
+        if not name or name == "." or "/" in name or not name.isprintable():
+            message = "a name is one line of printable characters without '/'"
+            raise bad(place, message, name, "rename it")
+        if name in seen:
+            raise bad(place, "names must differ", name, "rename one")
+        seen.add(name)
+
+
+def check_stepping(s: Stepping, place: str) -> None:
+    """Duration, step and numerical damping of a motion."""
+    for name in ("duration", "step"):
+        positive(f"{place}.{name}", getattr(s, name))
+    if s.duration < SHORTEST:
+        raise bad(f"{place}.duration", "shorter than any run", s.duration, f"give at least {SHORTEST:g} s")
+    if s.duration > LATEST:
+        raise bad(f"{place}.duration", "longer than any run", s.duration, f"give at most {LATEST:g} s")
+    if s.duration / MOST_STEPS > (s.step or 1e-3):
+        name = "duration" if s.step is None else "step"
+        remedy = f"a run has at most {MOST_STEPS:.0e} steps: shorten it, or give a larger step"
+        raise bad(f"{place}.{name}", "too many steps", getattr(s, name), remedy)
+    if not 0 <= s.spectral_radius <= 1:
+        raise bad(f"{place}.spectral_radius", "out of range", s.spectral_radius, "give 0 to 1")
+
+
+def positive(where: str, value: float | None) -> None:
+    """A number above 0, if there is one."""
+    if value is not None and not value > 0:
+        raise bad(where, f"{where.rpartition('.')[2]} must be positive", value, "give a number above 0")
+
+
+def not_negative(where: str, value: float, message: str = "must not be negative") -> None:
+    """A number of 0 or more."""
+    if value < 0:
+        raise bad(where, message, value, "give 0 or more")
+
+
+def directed(where: str, axis: Sequence[float] | None) -> None:
+    """An axis, if there is one, has a direction."""
+    if axis is not None and not any(axis):
+        raise bad(where, "an axis needs a direction", axis, "give three numbers, not all zero")

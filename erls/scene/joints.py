@@ -1,0 +1,200 @@
+"""The tables ``joints`` and ``loops`` of a chain."""
+
+from __future__ import annotations
+
+from erls.mechanism.drives import DriveRecord, FreeDrive
+from erls.scene.records import Record
+from fe_import.description.link import Inertia, Vector
+
+
+class DH(Record, frozen=True):
+    """Denavit-Hartenberg row of a joint: from the frame of the link before to that of its own link.
+
+    Attributes
+    ----------
+    convention : str
+        ``standard``: Rz(θ) Tz(d) Tx(a) Rx(α); or ``modified`` (Craig): Rx(α) Tx(a) Rz(θ) Tz(d). There is no default.
+    a : float
+        Length along x [m].
+    alpha, alpha_deg : float, optional
+        Twist about x [rad], or in degrees; 0 unless given.
+    d : float
+        Offset along z [m]; the coordinate of a prismatic joint adds to it.
+    theta, theta_deg : float, optional
+        Turn about z [rad], or in degrees; 0 unless given. The coordinate of a revolute joint adds to it.
+    """
+
+    convention: str
+    a: float = 0.0
+    alpha: float | None = None
+    alpha_deg: float | None = None
+    d: float = 0.0
+    theta: float | None = None
+    theta_deg: float | None = None
+
+
+class JointInitial(Record, frozen=True):
+    """Joint coordinate and rate at time 0; refused where a motion is prescribed, which fixes its own start.
+
+    Attributes
+    ----------
+    position, position_deg : float, optional
+        Coordinate [rad or m], or in degrees; 0 unless given.
+    rate, rate_deg : float, optional
+        Rate [rad/s or m/s], or in degrees per second; 0 unless given.
+    """
+
+    position: float | None = None
+    position_deg: float | None = None
+    rate: float | None = None
+    rate_deg: float | None = None
+
+
+class Friction(Record, frozen=True):
+    """Coulomb friction, smooth around zero: ``force`` · tanh(rate / ``transition_rate``).
+
+    Attributes
+    ----------
+    force : float
+        Friction at large rates [N m or N].
+    transition_rate : float
+        Rate at which it reaches 76 % of that [rad/s or m/s].
+    """
+
+    force: float
+    transition_rate: float = 0.01
+
+
+class Motor(Record, frozen=True):
+    """The motor of a joint; its rotor acts on the joint, its mass sits on the outboard interface of the link before.
+
+    Attributes
+    ----------
+    rotor_inertia : float
+        Of the rotor about its axis [kg m²]; rotor_inertia · gear_ratio² is reflected to the joint.
+    gear_ratio : float
+        Turns of the rotor per turn of the joint, or rad/m.
+    mass : float
+        Of the motor [kg].
+    inertia : (3,) floats or (3, 3) floats
+        Of the motor about its centre [kg m²], mesh axes of the link before: [Ixx, Iyy, Izz], or a symmetric matrix.
+    """
+
+    rotor_inertia: float = 0.0
+    gear_ratio: float = 1.0
+    mass: float = 0.0
+    inertia: Inertia = (0.0, 0.0, 0.0)
+
+
+class Rotor(Record, frozen=True):
+    """The rotor of a closing joint.
+
+    Attributes
+    ----------
+    rotor_inertia : float
+        Of the rotor about its axis [kg m²]; rotor_inertia · gear_ratio² is reflected to the joint.
+    gear_ratio : float
+        Turns of the rotor per turn of the joint, or rad/m.
+    """
+
+    rotor_inertia: float = 0.0
+    gear_ratio: float = 1.0
+
+
+class Acting(Record, frozen=True, kw_only=True):
+    """What acts along the coordinate of a joint: drive, spring, damper and friction, as `Joint` and `Loop` say."""
+
+    drive: DriveRecord = FreeDrive()
+    stiffness: float = 0.0
+    rest: float | None = None
+    rest_deg: float | None = None
+    damping: float = 0.0
+    friction: Friction | None = None
+
+
+class Joint(Acting, frozen=True):
+    """A joint between the link before it (or the ground) and its own link; it moves about or along its z axis.
+
+    Attributes
+    ----------
+    name : str
+        What reports, events and ``--set`` call it.
+    dh : DH
+        Its Denavit-Hartenberg row.
+    type : str
+        ``revolute`` turns about z, ``prismatic`` slides along z.
+    initial : JointInitial
+        Coordinate and rate at time 0.
+    drive : DriveRecord
+        What moves it; nothing unless given.
+    stiffness : float
+        Of a spring in the joint [N m/rad or N/m].
+    rest, rest_deg : float, optional
+        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
+    damping : float
+        Viscous damping [N m s/rad or N s/m].
+    friction : Friction, optional
+        Coulomb friction; none unless given.
+    motor : Motor
+        Rotor inertia, and the mass of the motor.
+    """
+
+    name: str
+    dh: DH
+    type: str = "revolute"
+    initial: JointInitial = JointInitial()
+    motor: Motor = Motor()
+
+
+class Loop(Acting, frozen=True):
+    """A joint that closes a loop, between a node of a link and the ground, or a node of another link.
+
+    Drive, spring, damper, friction and rotor act along the coordinate of a revolute or prismatic one: how far the link
+    has moved about or along the axis.
+
+    Attributes
+    ----------
+    name : str
+        What reports and ``--set`` call it.
+    link : str
+        The link that it holds.
+    node : str
+        Interface or named node of that link; it sits on the joint.
+    type : str
+        What it leaves free: ``line`` keeps a point on a straight line, ``planar`` leaves two slides and the turn about
+        their normal, the others are what their names say.
+    to_link, to_node : str
+        The other link and its interface or named node; the ground unless given.
+    position : (3,) floats, optional
+        Where the node meets the ground, in the world [m]; where it is at the initial joint coordinates unless given.
+    axis : (3,) floats, optional
+        Direction in the world at the initial joint coordinates, fixed to both sides from then on; that of the joint
+        which carries the link unless given.
+    coordinate, coordinate_deg : float, optional
+        Its coordinate at the initial joint coordinates [rad or m], or in degrees; unless given 0 if it turns, or the
+        distance along the axis of ``node`` from where it meets the other side if it slides.
+    drive : DriveRecord
+        What moves it; nothing unless given.
+    stiffness : float
+        Of a spring in the joint [N m/rad or N/m].
+    rest, rest_deg : float, optional
+        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
+    damping : float
+        Viscous damping [N m s/rad or N s/m].
+    friction : Friction, optional
+        Coulomb friction; none unless given.
+    motor : Rotor
+        Rotor inertia.
+    """
+
+    name: str
+    link: str
+    node: str
+    type: str = "revolute"
+    to_link: str = ""
+    to_node: str = ""
+    position: Vector | None = None
+    axis: Vector | None = None
+    coordinate: float | None = None
+    coordinate_deg: float | None = None
+    motor: Rotor = Rotor()

@@ -1,0 +1,111 @@
+"""Scene files (TOML) and their overrides read into checked scenes: chains, and scenes of bodies and beams."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from erls.errors import Cause, SceneError
+from erls.scene.bodies.check import check_body_scene
+from erls.scene.bodies.schema import BodyScene, BodySceneRecord
+from erls.scene.chain import Scene, SceneRecord
+from erls.scene.check import check_scene
+from erls.scene.integrators import FIXED_STEP
+from erls.scene.overrides import apply_override
+from fe_import.files.toml import convert, read_toml
+
+AnyScene = Scene | BodyScene
+
+
+def load_scene(path: Path | str, overrides: Iterable[str] = ()) -> AnyScene:
+    """Read and check a scene; its tables decide which kind it is.
+
+    Parameters
+    ----------
+    path : Path or str
+    overrides : iterable of str
+        ``KEY=VALUE`` as on the command line: ``simulation.step=1e-4``, ``links.arm.elastic_modes=8``,
+        ``joints.0.drive.type="free"``, ``beams.strip.elements=16``. Members of lists go by name or number.
+
+    Returns
+    -------
+    Scene or BodyScene
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Naming file, field, value and remedy.
+
+    Examples
+    --------
+    >>> from erls import load_scene
+    >>> scene = load_scene("data/l_shape/steel_tall.toml", ["simulation.duration=0.5"])
+    >>> scene.record.simulation.duration
+    0.5
+    >>> load_scene("data/statics/roll_up.toml", ["beams.strip.elements=8"]).record.beams[0].elements
+    8
+    """
+    path = Path(path)
+    data = read_toml(path, SceneError)
+    for text in overrides:
+        apply_override(data, text)
+    return checked(data, path, str(path))
+
+
+def load_chain(path: Path | str, overrides: Iterable[str] = ()) -> Scene:
+    """The same for what works on chains only.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Also for a scene of bodies.
+    """
+    scene = load_scene(path, overrides)
+    if isinstance(scene, BodyScene):
+        message = "a scene of bodies, beams and connections, which is no chain of joints and links"
+        remedy = "use erls simulate, info or view"
+        raise SceneError(Cause.BAD_FIELD, message, where=str(path), remedy=remedy)
+    return scene
+
+
+def checked(data: dict[str, Any], path: Path, where: str) -> AnyScene:
+    """The scene of parsed tables.
+
+    Parameters
+    ----------
+    data : dict
+    path : Path
+        Of the scene file.
+    where : str
+        Where the tables come from, for messages.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Naming file, field, value and remedy.
+    """
+    if is_body_scene(data):
+        bodies = convert(data, BodySceneRecord, where, SceneError)
+        check_body_scene(bodies, where)
+        return BodyScene(path, bodies)
+    chain = _with_integrator(convert(data, SceneRecord, where, SceneError))
+    check_scene(chain, where)
+    return Scene(path, chain)
+
+
+def is_body_scene(data: dict[str, Any]) -> bool:
+    """Whether tables are those of a scene of bodies."""
+    return not {"bodies", "beams"}.isdisjoint(data) and {"joints", "links"}.isdisjoint(data)
+
+
+def _with_integrator(record: SceneRecord) -> SceneRecord:
+    """The record with the name of the integrator."""
+    s = record.simulation
+    if s.integrator:
+        return record
+    fixed = s.step is not None or record.loops or s.formulation == "nodal" or s.coordinates == "absolute"
+    settings = msgspec.structs.replace(s, integrator=FIXED_STEP if fixed else "auto")
+    return msgspec.structs.replace(record, simulation=settings)
