@@ -12,7 +12,7 @@ from typing import Any
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
-from erls.integrate.stepping.generalized_alpha import back_solve, factor
+from erls.maths import dense
 from erls.maths.jit import ENABLED, helper, kernel
 
 # known: formulas of generalized-α, what iterations may leave, then what steps leave behind
@@ -57,13 +57,13 @@ if ENABLED:
 @helper
 def factor_matrix(a: Array, pivots: IntArray) -> int:
     """LU factors of a matrix whose columns are the rows of ``a``; 0, or the number of a pivot that is zero."""
-    return int(factor(a, pivots))
+    return int(dense.factor(a, pivots))
 
 
 @helper
 def solve_matrix(a: Array, pivots: IntArray, b: Array) -> None:
     """Replace ``b`` by the solution."""
-    back_solve(a, pivots, b)
+    dense.solve(a, pivots, b)
 
 
 @helper

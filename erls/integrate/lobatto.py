@@ -102,8 +102,9 @@ class _Run:
         self.mixed = np.zeros(n, dtype=complex)
         self.coefficients = _coefficients()
         self.stages, self.last = np.zeros((4, 3, n)), np.zeros((4, 3, n))
-        self.own = np.zeros((3, self.factoring.size)), np.zeros((2, self.factoring.size), dtype=complex)
-        self.matrices = np.zeros((at.SOLVERS + (0 if self.factoring.size else 4), n, n))
+        size, exchanged = self.factoring.size or n * n, 0 if self.factoring.size else n
+        self.own = np.zeros((3, size)), np.zeros((2, size), dtype=complex), np.zeros((3, exchanged), dtype=np.int64)
+        self.matrices = np.zeros((at.MATRICES, n, n))
         self.vectors = np.zeros((at.RESIDUALS + 6, n))
         self.vectors[at.METRES] = metre_scales(system)
         self.known, self.counts = np.zeros(at.KNOWN), np.zeros(at.COUNTS, dtype=np.int64)

@@ -9,7 +9,7 @@ from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.loops import layout as at
 from erls.equations.loops.closure import CLOSURE
-from erls.equations.loops.dense import backward, cholesky, dot, forward
+from erls.maths.dense import backward, cholesky, dot, forward
 from erls.maths.jit import ENABLED, kernel, part
 
 _CLOSED = 1e-14  # of the size of the mechanism

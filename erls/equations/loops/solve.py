@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.loops import layout as at
-from erls.equations.loops.dense import backward, cholesky, dot, forward
+from erls.maths.dense import backward, cholesky, dot, forward
 from erls.maths.jit import part
 
 SINGULAR = 1e-13  # of a condition's flexibility, once those before it hold: nothing is left of sixteen digits

@@ -12,8 +12,9 @@ from erls.equations.compiled_system import Array, IntArray
 from erls.equations.erls import balance, composite
 from erls.equations.erls import layout as chain
 from erls.equations.quasi_static import layout as at
-from erls.equations.quasi_static.dense import add_combined, combine, project, solve
+from erls.equations.quasi_static.dense import add_combined, combine, project
 from erls.equations.serial import gains as chain_gains
+from erls.maths.dense import backward, cholesky, forward
 from erls.maths.jit import kernel, part
 
 MOST = 6  # evaluations with everything
@@ -201,14 +202,16 @@ def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: 
     matrix, left = scratch[len(scratch) - s * s :], scratch[span(integers, at.SLOW, at.LEFT)]
     masses(reals, integers, scratch, t, y, matrix)
     start = integers[at.MEMORY] + at.FULL * integers[at.SIZE] + at.STATICS * h + at.SLOWS * s
-    spare = scratch[start : start + s * s]  # of the chain's mass matrix
+    factor = scratch[start : start + s * s].reshape(s, s)  # where the chain's mass matrix was
+    factor[:] = matrix.reshape(s, s)
+    status = cholesky(factor, 0.0)
+    if status != 0:
+        return status
     out[:] = 0.0
     for _ in range(CORRECTIONS):
         residual(reals, integers, scratch, t, y, v, out, left)
-        spare[:] = matrix
-        status = solve(spare, s, left)
-        if status != 0:
-            return status
+        forward(factor, left)
+        backward(factor, left)
         for j in range(s):
             out[j] -= left[j]
     return 0

@@ -92,6 +92,7 @@ if ENABLED:
         contract.REALS,
         contract.MATRIX,
         _t.complex128[:, ::1],
+        _t.int64[:, ::1],
         contract.COMPLEX,
         contract.REALS,
         contract.INTEGERS,
@@ -215,6 +216,7 @@ def advance(
     scratch: Array,
     own: Array,
     own_complex: Any,
+    pivots: IntArray,
     mixed: Any,
     known: Array,
     counts: IntArray,
@@ -234,7 +236,7 @@ def advance(
         Number of knots made; -1 - that number when no step is small enough to go on.
     """
     made, m, nodes = 0, stages.shape[0] - 1, coefficients[ROWS, NODES]
-    way = reals, integers, own, own_complex, mixed
+    way = reals, integers, own, own_complex, pivots, mixed
     factored = known[BEFORE] if counts[FACTORED] else 0.0  # the step of the present factors
     while made + m <= len(times) and known[T] < known[END]:
         choose_step(known)
@@ -254,7 +256,7 @@ def advance(
                 transpose(matrices[DAMPING])
                 diagonal = is_diagonal(matrices[STIFFNESS]) and is_diagonal(matrices[DAMPING])
                 counts[DIAGONAL] = 1 if diagonal else 0
-                if own.shape[1] > 0:
+                if pivots.shape[1] == 0:
                     y, v = stages[1, 0], stages[0, 1]
                     status = own_factor(reals, integers, scratch, at, y, v, h, h * h, own[0])
                     for k in range(pairs(m)):
@@ -267,7 +269,7 @@ def advance(
                                 reals, integers, scratch, at, y, v, shift, shift * shift, own_complex[k]
                             )
                 else:
-                    status = factor(h, coefficients, matrices)
+                    status = factor(h, coefficients, matrices, own, own_complex, pivots)
                 counts[FACTORIZATIONS] += 1
                 known[RATE], counts[USUAL], counts[EXCESS] = SLOWEST, counts[MAX_ITERATIONS], 0
                 factored = h

@@ -13,7 +13,7 @@ from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.loops import layout as at
 from erls.equations.loops.closure import CLOSURE
-from erls.equations.loops.dense import eliminate, substitute
+from erls.maths import dense
 from erls.maths.jit import ENABLED, kernel, part
 
 DONE, FAILED, OPEN = 0, 1, 2
@@ -140,14 +140,14 @@ def refresh(
     for i in range(n):
         for j in range(n):
             entry = known[TO_A] * mass[i, j] + known[TO_V] * damping[i, j] + stiffness[i, j]
-            matrix[i, j] = left[i] * entry * right[j]
+            matrix[j, i] = left[i] * entry * right[j]
     for k in range(r):
         for i in range(n):
-            matrix[i, n + k] = left[i] * gradient[k * n + i] * right[n + k]
-            matrix[n + k, i] = left[n + k] * gradient[k * n + i] * right[i]
+            matrix[n + k, i] = left[i] * gradient[k * n + i] * right[n + k]
+            matrix[i, n + k] = left[n + k] * gradient[k * n + i] * right[i]
         for j in range(r):
             matrix[n + k, n + j] = 0.0
-    status = eliminate(matrix, pivots)
+    status = dense.factor(matrix, pivots)
     counts[FACTORIZATIONS] += 1
     counts[FACTORED] = 1 if status == 0 else 0
     known[RATE], counts[USUAL], known[SPENT] = known[SLOWEST], counts[MAX_ITERATIONS], 0.0
@@ -177,7 +177,7 @@ def correct(known: Array, state: Array, unknowns: Array, matrix: Array, pivots: 
         correction[i] = left[i] * (state[FORCE, i] + state[REACTION, i])
     for k in range(n, len(correction)):
         correction[k] = left[k] * unknowns[VIOLATED, k - n]
-    substitute(matrix, pivots, correction)
+    dense.solve(matrix, pivots, correction)
     size = total = 0.0
     for i in range(len(correction)):
         size = max(size, abs(correction[i]))

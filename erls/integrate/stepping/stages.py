@@ -3,9 +3,8 @@
 Arrays: numbers in ``known``, counts in ``counts``; ``stages`` and ``last`` (stages + 1, 3, n) hold y, v, a at the nodes
 of the present and of the last step; ``coefficients``, ``matrices`` and ``vectors`` are named below. ``own_solve`` and
 ``own_solve_complex`` are the system's way of solving (`erls.equations.compiled_system.Factoring`), ``way`` what they
-need: its
-constants, factors in real and in complex numbers, room for n complex numbers. Without such factors, ``matrices`` holds
-dense ones.
+need: its constants, factors in real and in complex numbers, row exchanges of dense ones, room for n complex numbers.
+The factors are dense, row by row, where there is room for row exchanges.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from erls.equations.compiled_system import Array, IntArray
-from erls.integrate.stepping.dense import add_product, factor_complex, factor_real, solve_complex, solve_real
+from erls.maths import dense
 from erls.maths.jit import helper, part
 
 # known: the leg, settings of a run, then what steps leave behind
@@ -33,7 +32,8 @@ SINGULAR, NOT_FINITE, SLOW, INACCURATE = 1, 2, 3, 4  # reasons
 RATES, PLACES, INTO_RE, INTO_IM, BACK_RE, BACK_IM, FORETELL, ROWS = range(8)
 NODES, DIFFERENCE, LAMBDA_RE, LAMBDA_IM = range(4)
 # blocks of matrices (n, n), transposed
-MASS, DAMPING, STIFFNESS, FILTER, SOLVERS = range(5)
+MASS, DAMPING, STIFFNESS = range(3)
+MATRICES = 3
 # rows of vectors (n,); the residuals of the stages are followed by the changes of their accelerations
 METRES, PART_RE, PART_IM, RESIDUALS = range(4)
 
@@ -92,7 +92,7 @@ def foretell(
                 for q in range(n):
                     out[q] += matrix[q, q] * difference[q]
             else:
-                add_product(matrices[kind], difference, out)
+                dense.add_product(matrices[kind], difference, out)
     correct(h, coefficients, stages, matrices, vectors, own_solve, own_solve_complex, way)
 
 
@@ -124,7 +124,6 @@ def pairs(stages: int) -> int:
 def solve(
     k: int,
     real: bool,
-    matrices: Array,
     re: Array,
     im: Array,
     own_solve: Callable[..., None] | None,
@@ -132,23 +131,24 @@ def solve(
     way: Any,
 ) -> None:
     """Replace re + i im by the solution with the matrix of eigenvalue k, or with the filter where k is -1."""
-    reals, integers, own, own_complex, mixed = way
-    # a system that is not compiled has no way of its own: what follows is then left out of the compiled code
+    reals, integers, own, own_complex, pivots, mixed = way
+    n, plain = len(re), pivots.shape[1] > 0
+    if real and plain:
+        dense.solve(own[k + 1].reshape(n, n), pivots[k + 1], re)
+        return
+    # a system that is not compiled has no way of its own: what calls it is then left out of the compiled code
     if own_solve is not None:  # noqa: SIM102
-        if own.shape[1] > 0:
-            if real:
-                own_solve(reals, integers, own[k + 1], re)
-                return
-            for i in range(len(re)):
-                mixed[i] = re[i] + 1j * im[i]
-            own_solve_complex(reals, integers, own_complex[k], mixed)
-            for i in range(len(re)):
-                re[i], im[i] = mixed[i].real, mixed[i].imag
+        if real:
+            own_solve(reals, integers, own[k + 1], re)
             return
-    if real:
-        solve_real(matrices[FILTER if k < 0 else SOLVERS + 2 * k], re)
-    else:
-        solve_complex(matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1], re, im)
+    for i in range(n):
+        mixed[i] = re[i] + 1j * im[i]
+    if plain:
+        dense.solve(own_complex[k].reshape(n, n), pivots[k + 1], mixed)
+    elif own_solve is not None:
+        own_solve_complex(reals, integers, own_complex[k], mixed)
+    for i in range(n):
+        re[i], im[i] = mixed[i].real, mixed[i].imag
 
 
 @helper
@@ -179,7 +179,7 @@ def correct(
             for i in range(n):
                 re[i] += p * out[i]
                 im[i] += q * out[i]
-        solve(k, coefficients[ROWS, LAMBDA_IM, k] == 0.0, matrices, re, im, own_solve, own_solve_complex, way)
+        solve(k, coefficients[ROWS, LAMBDA_IM, k] == 0.0, re, im, own_solve, own_solve_complex, way)
         for j in range(m):
             p, q, change = back_re[j, k], back_im[j, k], changes[j]
             for i in range(n):
@@ -208,24 +208,30 @@ def correct(
 
 
 @helper
-def factor(h: float, coefficients: Array, matrices: Array) -> int:
+def factor(h: float, coefficients: Array, matrices: Array, real: Array, mixed: Any, pivots: IntArray) -> int:
     """Dense factors for steps of ``h``; 0, or 1 + the coordinate at which elimination broke down."""
     n = matrices.shape[1]
-    mass, damping, stiffness, real = matrices[MASS], matrices[DAMPING], matrices[STIFFNESS], matrices[FILTER]
-    for i in range(n):
-        for j in range(n):
-            real[i, j] = mass[i, j] + h * damping[i, j] + h * h * stiffness[i, j]
-    status = factor_real(real)
+    mass, damping, stiffness = matrices[MASS], matrices[DAMPING], matrices[STIFFNESS]
+    status = factor_one(mass, damping, stiffness, h, real[0].reshape(n, n), pivots[0])
     for k in range(pairs(coefficients[RATES].shape[0] - 1)):
         p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
-        pp, qq = p * p - q * q, 2 * p * q
-        re, im = matrices[SOLVERS + 2 * k], matrices[SOLVERS + 2 * k + 1]
-        for i in range(n):
-            for j in range(n):
-                re[i, j] = mass[i, j] + p * damping[i, j] + pp * stiffness[i, j]
-                im[i, j] = q * damping[i, j] + qq * stiffness[i, j]
-        status = max(status, factor_real(re) if q == 0.0 else factor_complex(re, im))
+        if q == 0.0:
+            found = factor_one(mass, damping, stiffness, p, real[k + 1].reshape(n, n), pivots[k + 1])
+        else:
+            found = factor_one(mass, damping, stiffness, p + 1j * q, mixed[k].reshape(n, n), pivots[k + 1])
+        status = max(status, found)
     return status
+
+
+@part
+def factor_one(mass: Array, damping: Array, stiffness: Array, shift: Any, out: Any, pivots: IntArray) -> int:
+    """Factors of M + s C + s² K, real or complex."""
+    square = shift * shift
+    for i in range(len(out)):
+        m, c, k, row = mass[i], damping[i], stiffness[i], out[i]
+        for j in range(len(row)):
+            row[j] = m[j] + shift * c[j] + square * k[j]
+    return int(dense.factor(out, pivots))
 
 
 @helper
@@ -274,8 +280,8 @@ def judge(
             total += weights[j] * stages[j, 2, q]
         difference[q] = h * h * total
         error[q] = 0.0
-    add_product(matrices[MASS], difference, error)
-    solve(-1, True, matrices, error, difference, own_solve, own_solve_complex, way)
+    dense.add_product(matrices[MASS], difference, error)
+    solve(-1, True, error, difference, own_solve, own_solve_complex, way)
     largest = 0.0
     for q in range(n):
         largest = max(largest, metres[q] * abs(error[q]))

@@ -7,7 +7,7 @@ The conventions are those of `erls.equations.nodal.assembly` and `erls.maths.sad
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array
-from erls.equations.nodal.kernels import band
+from erls.maths import band
 from erls.equations.nodal.kernels.actuators import actuator_derivatives
 from erls.equations.nodal.kernels.beam import beam_derivatives
 from erls.equations.nodal.kernels.bodies import body_derivatives, load_derivatives

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from erls.equations.compiled_system import Array
-from erls.equations.nodal.kernels import band
+from erls.maths import band
 from erls.equations.nodal.kernels.actuators import set_coordinates, store_coordinates
 from erls.equations.nodal.kernels.beam import bend
 from erls.equations.nodal.kernels.contract import ADVANCE, Knots, Model, Progress, Settings, State, Work
