@@ -8,9 +8,9 @@ from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.loops import layout as at
 from erls.equations.loops.closure import closure
-from erls.maths.dense import backward, dot, forward
 from erls.equations.loops.solve import let_along, multipliers_of, spread_rows
 from erls.equations.loops.tree import forces, masses, matrices
+from erls.maths.dense import backward, dot, forward
 from erls.maths.jit import kernel
 
 

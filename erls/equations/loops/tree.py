@@ -8,9 +8,9 @@ from erls.equations.erls import balance, composite
 from erls.equations.erls import layout as chain
 from erls.equations.loops import layout as at
 from erls.equations.loops.closure import closure
-from erls.maths.dense import dot
 from erls.equations.serial import gains
 from erls.equations.serial.drives import gains as gains_of
+from erls.maths.dense import dot
 from erls.maths.jit import kernel, part
 
 

@@ -7,7 +7,6 @@ The conventions are those of `erls.equations.nodal.assembly` and `erls.maths.sad
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array
-from erls.maths import band
 from erls.equations.nodal.kernels.actuators import actuator_derivatives
 from erls.equations.nodal.kernels.beam import beam_derivatives
 from erls.equations.nodal.kernels.bodies import body_derivatives, load_derivatives
@@ -28,6 +27,7 @@ from erls.equations.nodal.kernels.vectors import (
     turned,
     unit,
 )
+from erls.maths import band
 from erls.maths.jit import inlined, kernel, part
 
 _ZERO = (0.0, 0.0, 0.0)

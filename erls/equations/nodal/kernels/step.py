@@ -7,12 +7,12 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from erls.equations.compiled_system import Array
-from erls.maths import band
 from erls.equations.nodal.kernels.actuators import set_coordinates, store_coordinates
 from erls.equations.nodal.kernels.beam import bend
 from erls.equations.nodal.kernels.contract import ADVANCE, Knots, Model, Progress, Settings, State, Work
 from erls.equations.nodal.kernels.system import compose, set_twists
 from erls.equations.nodal.kernels.vectors import cross, dot, nine, plus, put, scaled, three, times, vector
+from erls.maths import band
 from erls.maths.jit import inlined, kernel
 
 Forces: TypeAlias = Callable[[Model, Work, State, Array], None]
