@@ -18,6 +18,21 @@ def clear(x: Array) -> None:
         x[i] = 0.0
 
 
+@part
+def copy(x: Array, out: Array) -> None:
+    """``out`` = x, of vectors."""
+    for i in range(len(x)):
+        out[i] = x[i]
+
+
+@part
+def copy_matrix(a: Array, out: Array) -> None:
+    """``out`` = A."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            out[i, j] = a[i, j]
+
+
 @reordered
 def dot(x: Array, y: Array) -> Any:
     """xᵀ y, plain also for complex numbers."""

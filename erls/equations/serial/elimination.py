@@ -21,7 +21,7 @@ import numpy as np
 from erls.equations.serial.records import JOINT, MODES, Serial, read_joint, read_modes
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
 from erls.maths.jit import part
-from erls.maths.products import add_product, add_rows, add_transposed_product, clear, dot
+from erls.maths.products import add_product, add_rows, add_transposed_product, clear, copy, copy_matrix, dot
 from erls.maths.records import Matrix, Vector, reader, table_size
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -161,7 +161,7 @@ def condense(own: Segment, work: Condensed) -> float:
     What it bears stands in ``rows``, ``bound``, ``bound_lead`` and ``articulated`` already.
     """
     n, e, p, extra = work.rows.shape[0], len(work.compliance), len(work.load), own.change.shape[0]
-    work.coupling[:, :] = own.coupling
+    copy_matrix(own.coupling, work.coupling)
     for r in range(extra):
         at, partner = n - 2 * extra + r, n - extra + r
         for j in range(e):
@@ -222,9 +222,9 @@ def eliminate(
     for k in range(serial.links):
         work = read_condensed(factors, integers, condensed + k * CONDENSED)
         own = read_segment(scratch, integers, segments + k * SEGMENT)
-        work.articulated[:, :] = own.inertia
-        work.lead[:, :] = own.lead
-        work.reach[:, :] = own.reach
+        copy_matrix(own.inertia, work.articulated)
+        copy_matrix(own.lead, work.lead)
+        copy_matrix(own.reach, work.reach)
         for i in range(len(work.subspace)):
             work.subspace[i] = own.subspace[i]
         work.bound[:, :] = 0.0
@@ -264,8 +264,8 @@ def _hand_inertia(work: Condensed, before: Condensed) -> None:
     add_product(work.articulated, work.lead, spare)
     add_transposed_product(work.lead, spare, before.articulated)
     for i in range(ports):
-        before.rows[at + i, :] = work.reach[i]
-        before.bound_lead[at + i, :] = spare[i]
+        copy(work.reach[i], before.rows[at + i])
+        copy(spare[i], before.bound_lead[at + i])
         for j in range(ports):
             before.bound[at + i, at + j] = work.articulated[i, j]
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from erls.equations.serial.records import JOINT, MODES, Serial, read_joint, read_modes
 from erls.maths.jit import part
-from erls.maths.products import add_product, add_transposed_product, dot
+from erls.maths.products import add_product, add_transposed_product, copy_matrix, dot
 from erls.maths.records import Matrix, Vector, reader, table_size
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -100,8 +100,8 @@ def fill_mass_matrix(
     out[:, :] = 0.0
     for k in range(serial.links):
         own = read_segment(scratch, integers, segments + k * SEGMENT)
-        own.composite[:, :] = own.inertia
-        own.bearing[:, :] = own.coupling
+        copy_matrix(own.inertia, own.composite)
+        copy_matrix(own.coupling, own.bearing)
     for k in range(serial.links - 1, -1, -1):
         own = read_segment(scratch, integers, segments + k * SEGMENT)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
