@@ -13,6 +13,7 @@ import scenes
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.erls.chain import Erls
 from erls.equations.erls.compiled import compile_chain
+from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import EFFECTS
 
 INERTIAL = [name for name, effect in EFFECTS.items() if effect.in_equations]
@@ -90,6 +91,11 @@ class State:
 
 def equations(folder: Path, name: str) -> Erls:
     """The ERLS equations of a case; files go to ``folder``."""
+    return Erls(mechanism(folder, name))
+
+
+def mechanism(folder: Path, name: str, source: dict[str, str] = scenes.ARM) -> Mechanism:
+    """The mechanism of a case; ``source`` says where the model of its links comes from."""
     joints, off, payload = CASES[name]
     scenes.arm_link(folder)
     data: dict[str, Any] = {
@@ -97,15 +103,15 @@ def equations(folder: Path, name: str) -> Erls:
         "base": {"rotation_deg": [20.0, 30.0, -10.0]},
         "joints": joints,
         "links": [
-            {"name": j["name"], "model": "arm.toml", "mesh_pose": {"frame": "joint", "rotation_deg": [0, 5, 10 * k]}}
+            {"name": j["name"], **source, "mesh_pose": {"frame": "joint", "rotation_deg": [0, 5, 10 * k]}}
             for k, j in enumerate(joints)
         ],
         "points": [{"name": "end", "link": joints[-1]["name"], "node": "tip"}],
     }
     if payload:
         data["payloads"] = [{"point": "end", "mass": 0.2, "offset": [0.02, 0.0, 0.1]}]
-    mechanism = scenes.mechanism(scenes.write_toml(folder / "case.toml", data))
-    return Erls(replace(mechanism, effects=mechanism.effects - off))
+    found = scenes.mechanism(scenes.write_toml(folder / "case.toml", data))
+    return replace(found, effects=found.effects - off)
 
 
 def states(chain: Erls, name: str) -> list[State]:

@@ -27,16 +27,24 @@ CASES = [
 
 def equations(folder: Path, case: str) -> Ffr:
     """The FFR equations of a case; files go to ``folder``."""
+    return Ffr(mechanism(folder, case), body_frame(case))
+
+
+def body_frame(case: str) -> str:
+    """Name of a case's body frame."""
+    return case.partition(": ")[0].split()[0]
+
+
+def mechanism(folder: Path, case: str, source: dict[str, str] = scenes.ARM) -> Mechanism:
+    """The mechanism of a case; ``source`` says where the model of its links comes from."""
     kind, _, name = case.partition(": ")
-    body_frame, *stiffened = kind.split()
-    mechanism = _partly_rigid(folder, name) if name in PARTLY_RIGID else chain_cases.equations(folder, name).mechanism
-    if stiffened:
-        mechanism = replace(mechanism, effects=mechanism.effects | {"geometric_stiffening"})
-    return Ffr(mechanism, body_frame)
+    part = _partly_rigid if name in PARTLY_RIGID else chain_cases.mechanism
+    found = part(folder, name, source)
+    return replace(found, effects=found.effects | {"geometric_stiffening"}) if "stiffened" in kind else found
 
 
-def _partly_rigid(folder: Path, name: str) -> Mechanism:
-    data = scenes.read_toml(scenes.three_links(folder, "mixed", payloads=[{"point": "end", "mass": 0.2}]))
+def _partly_rigid(folder: Path, name: str, source: dict[str, str]) -> Mechanism:
+    data = scenes.read_toml(scenes.three_links(folder, "mixed", source, payloads=[{"point": "end", "mass": 0.2}]))
     data["joints"][1]["drive"] = {**chain_cases.PD, "feed_forward": True}
     data["joints"][2].update(chain_cases.SPRING)
     for k in PARTLY_RIGID[name]:

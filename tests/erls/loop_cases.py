@@ -16,7 +16,7 @@ from erls.equations.loops.closed_chain import ClosedChain
 from erls.integrate.closed_loops import TiedCoordinates
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
-from erls.mechanism.chain import poses
+from erls.mechanism.chain import Mechanism, poses
 
 AXIS = [0.3, -0.5, 0.8]
 MOVED = {"drive": {"type": "motion", "motion": SINE}}
@@ -42,9 +42,14 @@ WELL_CONDITIONED = ("spherical", "line to another link", "two loops")
 
 def chain(folder: Path, name: str) -> ClosedChain:
     """The ERLS equations of a case, closed where it starts; files go to ``folder``."""
+    return ClosedChain(Erls(mechanism(folder, name)))
+
+
+def mechanism(folder: Path, name: str, source: dict[str, str] = scenes.ARM) -> Mechanism:
+    """The mechanism of a case; ``source`` says where the model of its links comes from."""
     kind, loops = CASES[name]
     spatial = "revolute" if kind == "parallel" else kind
-    data = scenes.read_toml(scenes.three_links(folder, spatial, payloads=[{"point": "end", "mass": 0.2}]))
+    data = scenes.read_toml(scenes.three_links(folder, spatial, source, payloads=[{"point": "end", "mass": 0.2}]))
     if kind == "parallel":
         for joint in data["joints"]:
             del joint["dh"]["alpha_deg"]
@@ -68,7 +73,7 @@ def chain(folder: Path, name: str) -> ClosedChain:
         elif loop["type"] in ("prismatic", "cylindrical"):
             loop["axis"] = AXIS
         data["loops"].append({**loop, **({"to_link": to, "to_node": "root"} if to else {"position": here.tolist()})})
-    return ClosedChain(Erls(scenes.mechanism(scenes.write_toml(folder / "closed.toml", data))))
+    return scenes.mechanism(scenes.write_toml(folder / "closed.toml", data))
 
 
 def states(closed: ClosedChain, name: str) -> list[chain_cases.State]:

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import chain_cases
 import numpy as np
+import scenes
 
 from erls.equations.erls.chain import Erls
 from erls.equations.quasi_static.formulation import QuasiStatic, quasi_static
+from erls.mechanism.chain import Mechanism
 
 BANDWIDTHS = {
     "one link": 100.0,
@@ -24,12 +26,15 @@ BANDWIDTHS = {
 
 def equations(folder: Path, name: str, static: bool = True) -> QuasiStatic:
     """A case of `chain_cases` whose modes above a bandwidth follow statically."""
-    mechanism = replace(chain_cases.equations(folder, name).mechanism, bandwidth=BANDWIDTHS[name])
-    if not static:
-        mechanism = replace(mechanism, effects=mechanism.effects - {"static_correction"})
-    found = quasi_static(Erls, mechanism, 1.0)
+    found = quasi_static(Erls, mechanism(folder, name, static), 1.0)
     assert isinstance(found, QuasiStatic)
     return found
+
+
+def mechanism(folder: Path, name: str, static: bool = True, source: dict[str, str] = scenes.ARM) -> Mechanism:
+    """The mechanism of a case; ``source`` says where the model of its links comes from."""
+    found = replace(chain_cases.mechanism(folder, name, source), bandwidth=BANDWIDTHS[name])
+    return found if static else replace(found, effects=found.effects - {"static_correction"})
 
 
 def states(system: QuasiStatic, name: str) -> list[chain_cases.State]:

@@ -94,6 +94,8 @@ def equations(path: Path, gauge: str = "joint-angle") -> Erls:
     return Erls(mechanism(path), gauge)
 
 
+ARM = {"model": "arm.toml"}
+"""The link of `arm_link` as a link of a scene names it."""
 ARM_LINK: dict[str, Any] = {
     "materials": {"m": {"youngs_modulus": 7e10, "poissons_ratio": 0.33, "density": 2700.0}},
     "sections": {"s": {"shape": "rectangular", "width": 0.01, "height": 0.02}},
@@ -111,9 +113,9 @@ def arm_link(folder: Path, **changes: Any) -> Path:
     return write_toml(folder / "arm.toml", merged(ARM_LINK, changes))
 
 
-def three_links(folder: Path, kind: str = "revolute", **changes: Any) -> Path:
+def three_links(folder: Path, kind: str = "revolute", source: dict[str, str] = ARM, **changes: Any) -> Path:
     """A spatial chain of three flexible links: ``revolute``, ``mixed`` (a prismatic joint, both conventions) or
-    ``prescribed`` (the second joint driven).
+    ``prescribed`` (the second joint driven); ``source`` says where the links' model comes from.
     """
     arm_link(folder)
     joints: list[dict[str, Any]] = [
@@ -129,9 +131,9 @@ def three_links(folder: Path, kind: str = "revolute", **changes: Any) -> Path:
         joints[1]["drive"] = {"type": "motion", "motion": motion}
     pose = {"position": [-0.4, 0.02, 0.03], "rotation_deg": [5.0, -10.0, 20.0]}
     links = [
-        {"name": "a", "model": "arm.toml", "mesh_pose": {"frame": "joint"}},
-        {"name": "b", "model": "arm.toml", "mesh_pose": pose},
-        {"name": "c", "model": "arm.toml", "mesh_pose": {"frame": "joint", "rotation_deg": [0.0, 15.0, 0.0]}},
+        {"name": "a", **source, "mesh_pose": {"frame": "joint"}},
+        {"name": "b", **source, "mesh_pose": pose},
+        {"name": "c", **source, "mesh_pose": {"frame": "joint", "rotation_deg": [0.0, 15.0, 0.0]}},
     ]
     data = {
         "simulation": {"duration": 0.2, "step": 1e-3},

@@ -41,16 +41,21 @@ def _bare(mechanism: Mechanism, which: set[int]) -> Mechanism:
 
 def equations(folder: Path, name: str) -> Erls:
     """The ERLS equations of a case; files go to ``folder``."""
+    return Erls(mechanism(folder, name))
+
+
+def mechanism(folder: Path, name: str, source: dict[str, str] = scenes.ARM) -> Mechanism:
+    """The mechanism of a case; ``source`` says where the model of its links comes from."""
     off: set[str] = set()
     if name in chain_cases.CASES:
         off = chain_cases.CASES[name][1]
-        mechanism = chain_cases.equations(folder, name).mechanism
+        found = chain_cases.mechanism(folder, name, source)
     else:
         payload = {"point": "end", "mass": 0.3, "offset": [0.02, 0.0, 0.01], "inertia": [1e-3, 2e-3, 3e-3]}
-        mechanism = scenes.mechanism(scenes.three_links(folder, ARMS.get(name, "mixed"), payloads=[payload]))
-        mechanism = with_rigid(_bare(mechanism, MIXED.get(name, set())), RIGID.get(name, set()))
-    links = tuple(replace(link, stiffness=SOFT * link.stiffness) for link in mechanism.links)
-    return Erls(replace(mechanism, links=links, effects=STIFFENED - off))
+        found = scenes.mechanism(scenes.three_links(folder, ARMS.get(name, "mixed"), source, payloads=[payload]))
+        found = with_rigid(_bare(found, MIXED.get(name, set())), RIGID.get(name, set()))
+    links = tuple(replace(link, stiffness=SOFT * link.stiffness) for link in found.links)
+    return replace(found, links=links, effects=STIFFENED - off)
 
 
 def states(chain: Erls, name: str) -> list[chain_cases.State]:
