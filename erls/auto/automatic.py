@@ -16,6 +16,7 @@ from erls.maths.jit import announcing
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import Certificate, in_order
 from erls.mechanism.without_effects import present
+from erls.run.all_modes import with_all_modes
 from erls.run.record import Run
 from erls.run.watches.spin_stability import UNSTABLE
 from erls.run.watches.static_following import ABOVE
@@ -50,6 +51,8 @@ def automatic(
     SimulationError
         The run failed with all effects, or was interrupted; BEYOND_TOLERANCE: with ``strict``, see `refuse_beyond`.
     """
+    if whole.bandwidth is not None:
+        return _with_bandwidth(scene, whole, integrate, tell, strict)
     begun = time.perf_counter()
     choice = choose_effects(scene, whole)
     spent = time.perf_counter() - begun
@@ -86,6 +89,24 @@ def automatic(
     if strict:
         refuse_beyond(result)
     return result
+
+
+def _with_bandwidth(
+    scene: Scene,
+    whole: Mechanism,
+    integrate: Callable[[Scene, Mechanism], Run],
+    tell: Callable[[str], None],
+    strict: bool,
+) -> Run:
+    """The same, where modes above a bandwidth of the scene follow statically: judged as if all modes moved."""
+    runs: list[Run] = []
+
+    def integrate_slow(scene: Scene, mechanism: Mechanism) -> Run:
+        runs.append(integrate(scene, replace(mechanism, bandwidth=whole.bandwidth)))
+        return with_all_modes(runs[-1])
+
+    found = automatic(scene, replace(whole, bandwidth=None), integrate_slow, tell, strict)
+    return replace(runs[-1], warnings=found.warnings, certificate=found.certificate)
 
 
 class _Physics:

@@ -12,7 +12,7 @@ from erls.auto.sizes import EffectSize, effect_sizes
 from erls.equations.registry import TREES
 from erls.errors import Cause, SceneError
 from erls.mechanism.effects import EFFECTS, in_order
-from erls.run.watches.spin_stability import missing_stiffening
+from erls.run.watches.second_order_data import missing_stiffening
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.read import load_chain

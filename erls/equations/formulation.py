@@ -2,7 +2,7 @@
 
 Rules for adding a formulation:
 
-1. One file (more beside it if it needs them) and one line in the registry of ``erls/integrate/formulate.py``.
+1. One file (more beside it if it needs them) and one line in ``erls/equations/registry.py``.
 2. It imports no other formulation; it shares the mechanism, the modal models, the drives and nothing else.
 3. A `TreeFormulation` is a `erls.integrate.base.SecondOrderSystem` in independent coordinates, prescribed motions
    eliminated, over which `erls.equations.loops.closed_chain` can close loops.

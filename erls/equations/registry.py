@@ -1,8 +1,14 @@
-"""Formulations of the equations of motion, and their registry."""
+"""Formulations of the equations of motion, and the systems that a mechanism makes of them: their registries.
+
+A formulation is one line in `TREES`, or, where its coordinates are not independent, in `FORMULATIONS`. What a mechanism
+holds beyond a tree of links (links in pieces, loops, modes that follow statically) is put around a tree's equations by
+a kind of system: one line in `SYSTEMS`, and one in `erls.integrate.choice.INTEGRATIONS`, which says how it is solved.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from erls.equations.erls.chain import Erls
 from erls.equations.formulation import Formulation, TreeFormulation
@@ -37,18 +43,51 @@ FORMULATIONS: dict[str, Callable[[Mechanism, Simulation], Formulation]] = {
 }
 
 
+class System(NamedTuple):
+    """A kind of system: whether a mechanism, as the settings say, is one, and what makes its equations."""
+
+    applies: Callable[[Mechanism, Simulation], bool]
+    formulate: Callable[[Mechanism, Simulation], Formulation]
+
+
+def _plain(mechanism: Mechanism, settings: Simulation) -> Formulation:
+    return FORMULATIONS[settings.formulation](mechanism, settings)
+
+
+def _pieces(mechanism: Mechanism, settings: Simulation) -> Formulation:
+    parts = split(mechanism)
+    return Substructured(formulate(parts.pieces, settings), parts)
+
+
+def _tied(mechanism: Mechanism, settings: Simulation) -> Formulation:
+    return ClosedChain(TREES[settings.formulation](mechanism, settings))
+
+
+def _quasi_static(mechanism: Mechanism, settings: Simulation) -> Formulation:
+    from erls.equations.quasi_static.formulation import quasi_static
+
+    build = TREES[settings.formulation]
+    return quasi_static(lambda given: build(given, settings), mechanism, settings.duration)
+
+
+SYSTEMS: dict[str, System] = {
+    "nodal": System(lambda mechanism, settings: settings.formulation not in TREES, _plain),
+    "pieces": System(lambda mechanism, settings: is_split(mechanism), _pieces),
+    "loops": System(lambda mechanism, settings: bool(mechanism.loops), _tied),
+    "quasi-static": System(lambda mechanism, settings: mechanism.bandwidth is not None, _quasi_static),
+    "absolute": System(lambda mechanism, settings: settings.coordinates == "absolute", _plain),
+    "tree": System(lambda mechanism, settings: True, _plain),
+}
+"""The first that applies is the one: frames of nodes hold pieces and loops themselves, pieces may be tied by loops."""
+
+
+def system_of(mechanism: Mechanism, settings: Simulation) -> str:
+    """The kind of system that a mechanism is, as the settings say: a key of `SYSTEMS`."""
+    return next(name for name, system in SYSTEMS.items() if system.applies(mechanism, settings))
+
+
 def formulate(mechanism: Mechanism, settings: Simulation) -> Formulation:
     """Equations of motion of a mechanism; of its chain, tied by its loops; of the pieces of links that are split; with
     modes above a bandwidth that follow statically.
     """
-    if settings.formulation in TREES and is_split(mechanism):
-        parts = split(mechanism)
-        return Substructured(formulate(parts.pieces, settings), parts)
-    if mechanism.loops and settings.formulation in TREES:
-        return ClosedChain(TREES[settings.formulation](mechanism, settings))
-    if mechanism.bandwidth is not None and settings.formulation in TREES:
-        from erls.equations.quasi_static.formulation import quasi_static
-
-        build = TREES[settings.formulation]
-        return quasi_static(lambda given: build(given, settings), mechanism, settings.duration)
-    return FORMULATIONS[settings.formulation](mechanism, settings)
+    return SYSTEMS[system_of(mechanism, settings)].formulate(mechanism, settings)

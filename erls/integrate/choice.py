@@ -1,4 +1,4 @@
-"""The integrator that fits a formulation, and what it compiles."""
+"""What integrates a kind of system, and what that compiles: one line for each in `INTEGRATIONS`."""
 
 from __future__ import annotations
 
@@ -6,21 +6,45 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from functools import partial
 from importlib import import_module
+from typing import Any, NamedTuple, TypeAlias
 
 from erls.equations.formulation import Formulation
-from erls.equations.registry import TREES
+from erls.equations.registry import system_of
 from erls.equations.substructures import solved
 from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.registry import integrator_named
+from erls.integrate.thinning import output_step
+from erls.maths.jit import compiling_beside
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.substructures import is_split, split
-from erls.scene.integrators import INTEGRATORS
+from erls.mechanism.substructures import split
+from erls.scene.integrators import FIXED_STEP, INTEGRATORS
 from erls.scene.settings import Simulation
 
+Integrate: TypeAlias = Callable[..., Solution]
+"""An `erls.integrate.base.Integrator` for one kind of system."""
 
-def of_pieces(integrate: Callable[..., Solution]) -> Callable[..., Solution]:
-    """An integrator that solves for the pieces."""
+
+class Integration(NamedTuple):
+    """What integrates a kind of system as the settings say, and what compiles the functions that this will call."""
+
+    integrator: Callable[[Mechanism, Simulation], Integrate]
+    compile: Callable[[Any, Simulation], None]
+
+
+def _nodal(mechanism: Mechanism, settings: Simulation) -> Integrate:
+    from erls.integrate.nodal_chain import nodal_generalized_alpha
+
+    return partial(nodal_generalized_alpha, adaptive=settings.integrator == "auto")
+
+
+def _compile_nodal(system: Any, settings: Simulation) -> None:
+    for name in ("system", "matrix", "step"):
+        import_module(f"erls.equations.nodal.kernels.{name}")
+
+
+def _pieces(mechanism: Mechanism, settings: Simulation) -> Integrate:
+    integrate = integrator(split(mechanism).pieces, settings)
 
     def integrated(
         system: Formulation,
@@ -35,40 +59,74 @@ def of_pieces(integrate: Callable[..., Solution]) -> Callable[..., Solution]:
     return integrated
 
 
-def integrator(mechanism: Mechanism, settings: Simulation) -> Callable[..., Solution]:
-    """The integrator that the settings name, for what `formulate` makes of the same: chains, loops, or frames tied by
-    joints.
-    """
-    if settings.formulation in TREES and is_split(mechanism):
-        return of_pieces(integrator(split(mechanism).pieces, settings))
-    if settings.formulation == "nodal":
-        from erls.integrate.nodal_chain import nodal_generalized_alpha
+def _compile_pieces(system: Any, settings: Simulation) -> None:
+    compile_kernels(solved(system), settings)
 
-        return partial(nodal_generalized_alpha, adaptive=settings.integrator == "auto")
-    if settings.coordinates == "absolute":
-        from erls.integrate.absolute import absolute_generalized_alpha
 
-        return absolute_generalized_alpha
-    if mechanism.loops:
-        from erls.integrate.closed_loops import loop_integrator
+def _tied(mechanism: Mechanism, settings: Simulation) -> Integrate:
+    from erls.integrate.closed_loops import loop_integrator
 
-        return loop_integrator(settings.integrator)
+    return loop_integrator(settings.integrator)
+
+
+def _compile_tied(system: Any, settings: Simulation) -> None:
+    if settings.integrator != FIXED_STEP:
+        _compile_named(system, settings)
+    elif system.compiled is not None:
+        import_module("erls.integrate.stepping.loops")
+
+
+def _absolute(mechanism: Mechanism, settings: Simulation) -> Integrate:
+    from erls.integrate.absolute import absolute_generalized_alpha
+
+    return absolute_generalized_alpha
+
+
+def _named(mechanism: Mechanism, settings: Simulation) -> Integrate:
     return integrator_named(settings.integrator)
+
+
+def _compile_named(system: Any, settings: Simulation) -> None:
+    loop = INTEGRATORS[settings.integrator].kernels
+    if loop is None:
+        if system.compiled is not None:
+            system.compiled.load_acceleration()
+        return
+    both = settings.gauge == "joint-angle"  # the equations are compiled too, for all that is known
+    with compiling_beside(loop) if both else nullcontext():
+        compiled = system.compiled
+    if compiled is not None:
+        import_module(loop)
+
+
+INTEGRATIONS: dict[str, Integration] = {
+    "nodal": Integration(_nodal, _compile_nodal),
+    "pieces": Integration(_pieces, _compile_pieces),
+    "loops": Integration(_tied, _compile_tied),
+    "quasi-static": Integration(_named, _compile_named),
+    "absolute": Integration(_absolute, _compile_named),
+    "tree": Integration(_named, _compile_named),
+}
+"""By kind of system, as in `erls.equations.registry.SYSTEMS`."""
+
+
+def integrator(mechanism: Mechanism, settings: Simulation) -> Integrate:
+    """What integrates that which `erls.equations.registry.formulate` makes of the same."""
+    return INTEGRATIONS[system_of(mechanism, settings)].integrator(mechanism, settings)
 
 
 def compile_kernels(formulation: Formulation, settings: Simulation) -> None:
     """Compile what a run will call, by importing it: before the clock of the run starts."""
-    if settings.formulation == "nodal":
-        for name in ("system", "matrix", "step"):
-            import_module(f"erls.equations.nodal.kernels.{name}")
-    elif (loop := INTEGRATORS[settings.integrator].kernels) is not None:
-        from erls.maths.jit import compiling_beside
+    INTEGRATIONS[system_of(formulation.mechanism, settings)].compile(formulation, settings)
 
-        tied = formulation.mechanism.loops and settings.integrator == "generalized_alpha"
-        one = tied or settings.gauge != "joint-angle"  # module, or none at all
-        with nullcontext() if one else compiling_beside(loop):
-            compiled = getattr(solved(formulation), "compiled", None)
-        if compiled is not None:
-            import_module("erls.integrate.stepping.loops" if tied else loop)
-    elif (compiled := getattr(solved(formulation), "compiled", None)) is not None:
-        compiled.load_acceleration()
+
+def options_of(settings: Simulation) -> Options:
+    """What the settings say to an integrator; steps that follow a tolerance are not given."""
+    return Options(
+        None if INTEGRATORS[settings.integrator].follows_tolerance else settings.step,
+        settings.rtol,
+        settings.atol,
+        settings.spectral_radius,
+        tolerance=settings.tolerance,
+        output_step=output_step(settings),
+    )

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from erls.integrate.base import hermite_knots
 from erls.maths.so3 import Array
+from erls.scene.settings import Simulation
+
+FEWEST = 200
+"""Stretches of a run, at the least, at whose ends states are stored: what looks along a run needs as many."""
 
 _HAIR = 1e-9  # of the distance: a knot this near to an output time stands for it
+
+
+def output_step(settings: Simulation) -> float | None:
+    """Distance of the states that a run stores [s]: that of the scene, or a part of it that makes them enough."""
+    if settings.output_step is None:
+        return None
+    longest = min(settings.output_step, settings.duration)
+    return longest / max(1, math.ceil(FEWEST * longest / settings.duration * (1 - 1e-9)))
 
 
 def thinned(

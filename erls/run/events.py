@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from erls.integrate.base import Solution, StopRun
+from erls.integrate.base import Solution
 from erls.scene.chain import Event
 from erls.scene.check import OF_POINTS
 
@@ -70,32 +70,6 @@ def happenings(run: Run, since: float | None = None) -> tuple[Happening, ...]:
             ):
                 found.append(Happening(event.name, _root(run, height, float(s.t[k]), float(s.t[k + 1])), rising))
     return tuple(sorted(found, key=lambda happening: happening.time))
-
-
-class Stopper:
-    """Finds events as knots pass, and ends a run at the first one that says so; to be called by its observer."""
-
-    def __init__(self, run: Callable[[Solution], Run], names: set[str]) -> None:
-        self._run, self._names = run, names
-        self._since = 0.0
-        self.happened: Happening | None = None
-
-    def look(self, solution: Solution) -> list[float]:
-        """Times of events since the last look; their steps are to be kept, so that the run shows them.
-
-        Raises
-        ------
-        StopRun
-            With these times, where an event stops the run.
-        """
-        times = []
-        for happening in happenings(self._run(solution), self._since):
-            times.append(happening.time)
-            if happening.name in self._names:
-                self.happened = happening
-                raise StopRun(*times)
-        self._since = float(solution.t[-1])
-        return times
 
 
 def cut(solution: Solution, time: float) -> Solution:

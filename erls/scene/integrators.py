@@ -9,12 +9,15 @@ from typing import NamedTuple
 
 
 class Entry(NamedTuple):
-    """An integrator: its module and function, the module of its compiled loop where it has one, and what it is."""
+    """An integrator: its module and function, what it is, the module of its compiled loop where it has one, and whether
+    its steps follow ``tolerance``, whatever ``step`` says.
+    """
 
     module: str
     function: str
     description: str
     kernels: str | None = None
+    follows_tolerance: bool = False
 
 
 _ALPHA, _LOBATTO, _SCIPY = "erls.integrate.generalized_alpha", "erls.integrate.lobatto", "erls.integrate.scipy_ivp"
@@ -32,12 +35,14 @@ INTEGRATORS: dict[str, Entry] = {
         "lobatto",
         "implicit, order 6, adaptive to `tolerance`, no numerical damping: for accuracy at low cost",
         _LOBATTO_LOOP,
+        follows_tolerance=True,
     ),
     "auto": Entry(
         "erls.integrate.automatic",
         "automatic",
         "lobatto for stiff and for compiled systems, dop853 for soft ones; says which",
         _LOBATTO_LOOP,
+        follows_tolerance=True,
     ),
     "rk45": Entry(_SCIPY, "rk45", "explicit, order 5, adaptive: for soft mechanisms and moderate accuracy"),
     "dop853": Entry(_SCIPY, "dop853", "explicit, order 8, adaptive: for soft mechanisms and references"),

@@ -13,7 +13,7 @@ from erls.mechanism.effects import Certificate
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
-from erls.simulation.simulate import models_of
+from erls.simulation.chains import models_of
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,10 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSI
 START = """
 import sys
 import erls.scene.build
-import erls.simulation.simulate
+import erls.run.watches.progress
 from erls.cli.main import Progress, main
 
-erls.simulation.simulate.CHECKPOINT_S = {checkpoint}
+erls.run.watches.progress.CHECKPOINT_S = {checkpoint}
 advance = Progress.advance
 
 def tell(self, done, total):

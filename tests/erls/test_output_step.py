@@ -18,7 +18,8 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.integrate.base import Options, Solution, hermite_knots
 from erls.integrate.driver import Recorder
 from erls.integrate.registry import integrator_named
-from erls.run.watches.stored_output import FEWEST, output_error, output_step
+from erls.integrate.thinning import FEWEST, output_step
+from erls.run.watches.stored_output import output_error
 from erls.scene.integrators import INTEGRATORS
 from erls.scene.settings import Simulation
 

@@ -237,7 +237,7 @@ def test_breakpoints_of_drives_are_knots(tmp_path: Path, integrator: str) -> Non
 
 def test_checkpoints(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A long run saves what it has; the file loads, is marked unfinished, and gives the same answers."""
-    monkeypatch.setattr("erls.simulation.simulate.CHECKPOINT_S", 0.0)
+    monkeypatch.setattr("erls.run.watches.progress.CHECKPOINT_S", 0.0)
     monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 11)
     partial, found = tmp_path / "r.h5.partial", []
 
@@ -258,7 +258,7 @@ def test_the_command_line_removes_its_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Once the run itself is written; also after a failure. One from before stays until then."""
-    monkeypatch.setattr("erls.simulation.simulate.CHECKPOINT_S", 0.0)
+    monkeypatch.setattr("erls.run.watches.progress.CHECKPOINT_S", 0.0)
     monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 11)
     output, partial = tmp_path / "r.h5", tmp_path / "r.h5.partial"
     partial.write_text("from a run that was killed", encoding="utf-8")
@@ -274,7 +274,7 @@ def test_a_checkpoint_that_cannot_be_written_does_not_end_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A full disk may have room again at the end."""
-    monkeypatch.setattr("erls.simulation.simulate.CHECKPOINT_S", 0.0)
+    monkeypatch.setattr("erls.run.watches.progress.CHECKPOINT_S", 0.0)
     messages: list[str] = []
     path = scene(tmp_path)
     run = erls.simulate(path, tell=messages.append, checkpoint=tmp_path / "nix" / "r.partial")

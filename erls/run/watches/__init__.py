@@ -1,1 +1,1 @@
-"""What is looked at during and after a run, so that nobody trusts a result beyond the range of its model."""
+"""What looks at a run before, while and after it is computed: `base` has the contract, `registry` all of them."""

@@ -18,6 +18,7 @@ from erls.integrate.base import hermite
 from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism, poses
 from erls.run.record import Run
+from erls.run.watches.base import NOTHING, Ended, Finding, Watch
 from erls.run.watches.deflection_estimate import DeflectionError, LinkMotion, deflection_error
 
 if TYPE_CHECKING:
@@ -26,6 +27,17 @@ if TYPE_CHECKING:
 _SAMPLES, _SAMPLES_OF_LOOPS = 61, 31  # loads of loops take an acceleration of their own
 _STEP = 1e-5  # s, of central differences, as in `erls.run.link_loads`
 NOTABLE = 2e-3  # of the size of a link: errors above this make a run warn
+
+
+class DeflectionRange(Watch):
+    """Looks at the deflection of links."""
+
+    def after(self, ended: Ended) -> Finding:
+        """Errors of all links together, with a warning of those that matter."""
+        if ended.meaningless:
+            return NOTHING
+        errors = deflection_errors(ended.run)
+        return Finding(deflection_warnings(ended.run, errors), error=sum(found.error for found in errors.values()))
 
 
 def deflection_errors(run: Run) -> dict[str, DeflectionError]:

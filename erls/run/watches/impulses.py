@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 from erls.mechanism.chain import Mechanism
+from erls.run.watches.base import Finding, Plan, Watch
+
+
+class Impulses(Watch):
+    """Looks at prescribed motions."""
+
+    def before(self, plan: Plan) -> Finding:
+        """Those whose rate jumps."""
+        return Finding(impulse_warnings(plan.mechanism, plan.settings.duration))
 
 
 def impulse_warnings(mechanism: Mechanism, duration: float) -> list[str]:

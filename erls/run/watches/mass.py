@@ -13,11 +13,26 @@ from erls.equations.formulation import Formulation
 from erls.equations.substructures import solved
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Solution
+from erls.run.watches.base import Ended, Finding, Plan, Watch
 
 _LOOKS = 60
 _ROUNDING = 1e-12
 _VANISHED = 1e-6  # of what it was at the start: what explicit steps, ever smaller ones, do not pass
 _VANISHING = 1e-3  # of the same: what a run ends at whose next step has met an indefinite matrix
+
+
+class IndefiniteMass(Watch):
+    """Looks at the mass matrix along the run."""
+
+    @staticmethod
+    def concerns(plan: Plan) -> bool:
+        """Modal models with half of the kinetic energy of their deformation."""
+        effects = plan.mechanism.effects
+        return plan.modal and "inertia_first_order" in effects and "inertia_second_order" not in effects
+
+    def after(self, ended: Ended) -> Finding:
+        """SINGULAR_MASS, whatever else the run failed with."""
+        return Finding(failure=indefinite_mass(ended.run.formulation, ended.run.solution))
 
 
 def indefinite_mass(formulation: Formulation, solution: Solution) -> SimulationError | None:
@@ -32,11 +47,10 @@ def indefinite_mass(formulation: Formulation, solution: Solution) -> SimulationE
     Returns
     -------
     SimulationError or None
-        SINGULAR_MASS; None also where all of the kinetic energy is there.
+        SINGULAR_MASS.
     """
-    effects = formulation.mechanism.effects
     system = solved(formulation)
-    if "inertia_first_order" not in effects or "inertia_second_order" in effects or not system.size:
+    if not system.size:
         return None
     if solution.failure is not None and solution.failure.cause == Cause.INTERRUPTED:
         return None

@@ -9,11 +9,28 @@ import numpy as np
 from erls.equations.formulation import Formulation
 from erls.equations.substructures import solved
 from erls.integrate.base import Solution
+from erls.integrate.choice import options_of
 from erls.maths.so3 import Array
 from erls.mechanism.rigid_dynamics import inverse_dynamics
+from erls.run.watches.base import Ended, Finding, Plan, Watch
 
 _LOOKS = 500  # at most
 _WORST = 100  # times the tolerance, in runs of one arm whose motor switches between its limits
+
+
+class MotorLimits(Watch):
+    """Looks at what drives ask of their motors."""
+
+    @staticmethod
+    def concerns(plan: Plan) -> bool:
+        """Motors with a limit, in steps that follow a tolerance."""
+        limited = any(joint.drive.torque_limit < np.inf for joint in plan.mechanism.joints)
+        return limited and options_of(plan.settings).step is None
+
+    def after(self, ended: Ended) -> Finding:
+        """Motors that reached their limit and left it."""
+        run = ended.run
+        return Finding(limit_warnings(run.formulation, run.solution, run.scene.record.simulation.tolerance))
 
 
 def limit_warnings(formulation: Formulation, solution: Solution, tolerance: float) -> list[str]:

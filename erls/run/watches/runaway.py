@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
 
 from erls.equations.formulation import Formulation
@@ -15,70 +12,63 @@ from erls.errors import Cause, SimulationError
 from erls.integrate.base import Solution
 from erls.maths.so3 import Array
 from erls.mechanism.links import Link
+from erls.run.watches.base import NOTHING, Begun, Finding, Knots, Plan, Watch
 from erls.run.watches.spin_stability import spin_warnings
 
 LARGEST = 10.0  # of the size of a link
 _LOOKS = 101
+_EVERY = 16  # calls of the observer, one of which looks at all knots since the last one; `output_step` would lose some
 
 
-class Runaway:
-    """Looks at the knots of a run as they pass; to be called by its observer.
+class Runaway(Watch):
+    """Looks at the knots of a run as they pass."""
 
-    Parameters
-    ----------
-    formulation : Formulation
-        One whose links are linear in their own frame.
-    every : int
-        Of the calls of the observer, one in so many looks, at all knots since the last one.
-    """
+    def __init__(self) -> None:
+        self._calls, self._since = 0, -np.inf
+        self._ended: float | None = None  # time of the first knot beyond the limit
 
-    def __init__(self, formulation: Formulation, every: int = 1) -> None:
-        self._every, self._calls = every, 0
-        self._system = solved(formulation)
+    @staticmethod
+    def concerns(plan: Plan) -> bool:
+        """Links that are linear in their own frames."""
+        return plan.modal
+
+    def begins(self, begun: Begun) -> Finding:
+        """Nothing; it learns the sizes of links and the scales of coordinates."""
+        self._every = 1 if begun.plan.settings.output_step is not None else _EVERY
+        self._system: Formulation = solved(begun.formulation)
         self._links = self._system.mechanism.links
         self._sizes = np.array([np.linalg.norm(np.ptp(link.model.nodes, axis=0)) for link in self._links])
         self._metres = metre_scales(self._system)  # type: ignore[arg-type]
         joints = sum(not joint.drive.prescribed for joint in self._system.mechanism.joints)
         self._elastic = slice(min(joints, len(self._metres)), None)
         self._least = LARGEST * float(self._sizes[self._sizes > 0].min(initial=np.inf))  # a crank may be a point
-        self._since = -np.inf
-        self.ended: float | None = None
-        """Time of the first knot beyond the limit."""
+        return NOTHING
 
-    def pass_by(self, knots: Callable[[], Solution]) -> None:
-        """Look, now and then; see `look`."""
+    def during(self, t: float, knots: Knots) -> Finding:
+        """Where a node of a link is displaced by more than 10 times the link's size: RUNAWAY."""
         self._calls += 1
-        if self._calls % self._every == 0:
-            self.look(knots())
+        return NOTHING if self._calls % self._every else Finding(failure=self._look(knots()))
 
-    def judged(self, solution: Solution) -> Solution:
-        """A run that ended by itself, or failed, with what its last knots have to say as its failure."""
-        try:
-            self.look(solution)
-        except SimulationError as problem:
-            return replace(solution, failure=problem)
-        return solution
+    def ends(self, solution: Solution) -> Finding:
+        """The same of the last knots; what comes after the first one beyond the limit is not worth keeping."""
+        failure = self._look(solution) if self._ended is None else None
+        return Finding(failure=failure, end=self._ended)
 
-    def look(self, solution: Solution) -> None:
-        """Raise where a node of a link is displaced by more than 10 times the link's size.
-
-        Raises
-        ------
-        SimulationError
-            RUNAWAY
-        """
+    def _look(self, solution: Solution) -> SimulationError | None:
+        """RUNAWAY, at the first knot beyond the limit."""
         first = int(np.searchsorted(solution.t, self._since))
         with np.errstate(over="ignore", invalid="ignore"):  # integrators see to what is not finite
             bounds = np.abs(solution.y[first:, self._elastic]) @ self._metres[self._elastic]
         self._since = float(solution.t[-1])
         suspects = first + np.flatnonzero((bounds > self._least) & np.isfinite(bounds))
         if not len(suspects) or self._worst(solution, int(suspects[np.argmax(bounds[suspects - first])])) is None:
-            return
+            return None
         for knot in suspects.tolist():
             found = self._worst(solution, knot)
             if found is not None:
-                self.ended = float(solution.t[knot])
-                raise self._failure(solution, knot, *found)
+                self._ended = float(solution.t[knot])
+                return self._failure(solution, knot, *found)
+        return None
 
     def _worst(self, solution: Solution, knot: int) -> tuple[int, float] | None:
         """Number of the link that is displaced most for its size, and by how much [m]; None within the limit."""

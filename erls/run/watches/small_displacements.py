@@ -7,10 +7,19 @@ import numpy as np
 from erls.equations.serial.state_series import StateSeries
 from erls.mechanism.chain import Mechanism
 from erls.run.record import Run
+from erls.run.watches.base import NOTHING, Ended, Finding, Watch
 
 _LARGE_DEFLECTION = 0.1  # of the link's size; the second-order error of a small-displacement model is then about 1 %
 _LARGE_ROTATION = 0.2  # rad
 _AT_ONCE = 1_000_000  # displacements in memory while states are looked at
+
+
+class SmallDisplacements(Watch):
+    """Looks at the nodes of links."""
+
+    def after(self, ended: Ended) -> Finding:
+        """Links that left the range."""
+        return NOTHING if ended.meaningless else Finding(range_warnings(ended.run, ended.seen))
 
 
 def range_warnings(run: Run, seen: StateSeries) -> list[str]:

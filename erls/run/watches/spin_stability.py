@@ -15,26 +15,38 @@ from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, kinematics
 from erls.mechanism.links import Link, node_shape6
 from erls.mechanism.substructures import is_split, split
+from erls.run.watches.base import NOTHING, Ended, Finding, Plan, Watch
+from erls.run.watches.second_order_data import reason_without
 
 _NOTABLE = 0.2  # share of the stiffness that is lost; the deflection is then wrong by more than a tenth
 _SAMPLES = 401
 UNSTABLE = "the linear model loses stability"  # in warnings of links whose motion is then meaningless
 
 
-def missing_stiffening(mechanism: Mechanism) -> list[str]:
-    """Flexible links without the second-order data that the scene asks for."""
-    if {"geometric_stiffening", "foreshortening"}.isdisjoint(mechanism.effects):
-        return []
-    return [
-        f"link {link.name!r} has no geometric stiffening and foreshortening: {_reason(link)}"
-        for link in mechanism.links
-        if link.elastic_modes and link.second_order is None
-    ]
+class SpinStability(Watch):
+    """Looks at speeds: planned ones before a run, else those of the run."""
 
+    def __init__(self) -> None:
+        self._planned = False
 
-def _reason(link: Link) -> str:
-    found = link.model.provenance.get("second_order", "")
-    return found or "its modal file was made without them; reduce it again"
+    @staticmethod
+    def concerns(plan: Plan) -> bool:
+        """Links that are linear in their own frames."""
+        return plan.modal
+
+    def before(self, plan: Plan) -> Finding:
+        """Speeds that drives prescribe or want."""
+        found = planned_spin_warnings(plan.mechanism, plan.settings.duration)
+        self._planned = bool(found)
+        return Finding(found)
+
+    def after(self, ended: Ended) -> Finding:
+        """Speeds of joints that are free to take any; unless those of the others said enough."""
+        mechanism, seen = ended.run.formulation.mechanism, ended.seen
+        if self._planned or all(joint.drive.reference(0.0) is not None for joint in mechanism.joints):
+            return NOTHING
+        motion = zip(seen.times.tolist(), seen.coordinates, seen.rates, strict=True)
+        return Finding(spin_warnings(mechanism, motion))
 
 
 def planned_spin_warnings(mechanism: Mechanism, duration: float, samples: int = _SAMPLES) -> list[str]:
@@ -117,7 +129,7 @@ def _warning(link: Link, share: float, speed: float, lost: tuple[float, float] |
     remedy = (
         "turn on the effect 'geometric_stiffening'"
         if link.second_order is not None
-        else f"geometric stiffening is {_reason(link)}"
+        else f"geometric stiffening is {reason_without(link)}"
     )
     if lost is None:
         return (

@@ -18,11 +18,28 @@ from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.errors import SimulationError
 from erls.integrate.base import Leg, Solution, hermite, legs
 from erls.maths.so3 import Array
+from erls.run.watches.base import NOTHING, Ended, Finding, Plan, Watch
 
 ABOVE = "modes above the bandwidth"  # in warnings of an error beyond the tolerance
 _SAMPLES, _SAMPLES_UNCOMPILED = 30, 10
 _MOST_LEGS = 30
 _PER_PERIOD = 40  # differences in time, of the period of the slowest static mode
+
+
+class StaticFollowing(Watch):
+    """Looks at what the loads of static modes do."""
+
+    @staticmethod
+    def concerns(plan: Plan) -> bool:
+        """Mechanisms with a bandwidth."""
+        return plan.mechanism.bandwidth is not None
+
+    def after(self, ended: Ended) -> Finding:
+        """An error beyond the tolerance."""
+        if ended.meaningless:
+            return NOTHING
+        run = ended.run
+        return Finding(static_warnings(run.formulation, run.solution, run.scene.record.simulation.effects_tolerance))
 
 
 @dataclass(frozen=True)

@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from erls.equations.serial.state_series import state_series
 from erls.errors import SimulationError
 from erls.integrate.base import hermite
+from erls.integrate.thinning import output_step
 from erls.maths.so3 import Array
 from erls.run.record import Run, node_positions
-from erls.scene.settings import Simulation
+from erls.run.watches.base import NOTHING, Ended, Finding, Plan, Watch
 
 IntArray = NDArray[np.int64]
-
-FEWEST = 200
-"""Stretches of a run, at the least, at whose ends states are stored: what looks along a run needs as many."""
 
 _PLACES = 40
 _ORDER = 64  # halving the distance of knots divides the error of quintic interpolation by as much, once it resolves
 
 
-def output_step(settings: Simulation) -> float | None:
-    """Distance of the states that a run stores [s]: that of the scene, or a part of it that makes them enough."""
-    if settings.output_step is None:
-        return None
-    longest = min(settings.output_step, settings.duration)
-    return longest / max(1, math.ceil(FEWEST * longest / settings.duration * (1 - 1e-9)))
+class StoredOutput(Watch):
+    """Looks at stored states."""
+
+    @staticmethod
+    def concerns(plan: Plan) -> bool:
+        """Runs that do not store every step."""
+        return plan.settings.output_step is not None
+
+    def after(self, ended: Ended) -> Finding:
+        """That motion between them is not resolved."""
+        return NOTHING if ended.meaningless else Finding(output_warnings(ended.run))
 
 
 def output_error(run: Run) -> float:

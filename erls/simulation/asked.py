@@ -1,0 +1,29 @@
+"""What a caller of a simulation asks for beside its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from erls.run.record import Run
+from erls.run.watches.base import Watch
+from erls.run.watches.progress import Checkpoint, Progress
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The arguments of `erls.simulation.simulate.simulate`, which says what they mean."""
+
+    progress: Callable[[float, float], None] | None
+    tell: Callable[[str], None]
+    checkpoint: Path | None
+    strict: bool
+    like: Run | None
+
+    def watches(self) -> list[Watch]:
+        """What looks at each run on the caller's behalf."""
+        found: list[Watch] = [] if self.progress is None else [Progress(self.progress)]
+        if self.checkpoint is not None:
+            found.append(Checkpoint(self.checkpoint))
+        return found

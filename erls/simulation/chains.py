@@ -1,0 +1,68 @@
+"""Runs of chains of joints and links: mechanism, equations of motion, integrator, watches."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+
+from erls.equations.registry import FORMULATIONS, formulate
+from erls.errors import SceneError
+from erls.integrate.base import Solution
+from erls.integrate.choice import compile_kernels, integrator, options_of
+from erls.maths.jit import announcing
+from erls.mechanism.chain import Mechanism
+from erls.run.file import self_contained
+from erls.run.record import Run
+from erls.run.watches.base import Begun, Plan
+from erls.run.watches.watching import Warnings, Watching
+from erls.scene.build import build_mechanism
+from erls.scene.chain import Scene
+from erls.simulation.asked import Asked
+from fe_import.description.link import LinkDescription
+from fe_import.files.toml import choose
+from fe_import.modal.file import ModalModel
+
+
+def run_chain(scene: Scene, asked: Asked) -> Run:
+    """Build the mechanism of a scene and run it, with all effects that it names or those that ``auto`` chooses."""
+    settings = scene.record.simulation
+    choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
+    like, tell = asked.like, asked.tell
+    built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))
+    scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
+    warnings = Warnings(tell)
+    warnings(built.warnings)
+    run = partial(_run, asked=asked, warnings=warnings)
+    if settings.effects == "auto":
+        from erls.auto.automatic import automatic  # here: most runs need none of it
+
+        return automatic(scene, built.mechanism, run, tell, asked.strict)
+    return run(scene, built.mechanism)
+
+
+def models_of(run: Run) -> tuple[list[ModalModel], list[LinkDescription | None], list[list[ModalModel]]]:
+    """Modal models of the links of a run, descriptions, and modal models of their pieces, for `build_mechanism`."""
+    links = run.formulation.mechanism.links
+    pieces = [[piece.model for piece in link.pieces] for link in links]
+    return [link.model for link in links], [link.description for link in links], pieces
+
+
+def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -> Run:
+    """Run a mechanism as the scene says."""
+    settings, plan, told = scene.record.simulation, Plan(scene, mechanism), warnings.beside()
+    watching = Watching(plan, told, asked.watches())
+    watching.before()
+    formulation = formulate(mechanism, settings)
+    with announcing(asked.tell):
+        compile_kernels(formulation, settings)
+    y, v = formulation.initial_state()
+    begun = time.perf_counter()
+
+    def run_of(solution: Solution) -> Run:
+        return Run(scene, formulation, solution, time.perf_counter() - begun, tuple(told.texts))
+
+    watching.begins(Begun(plan, formulation, run_of))
+    integrate = integrator(mechanism, settings)
+    times, options = (0.0, settings.duration), options_of(settings)
+    solution = integrate(formulation, times, y, v, options, watching.observe)
+    return watching.judged(run_of(watching.ended(solution)))
