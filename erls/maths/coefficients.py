@@ -1,4 +1,4 @@
-"""Functions of a squared angle x = θ² that rotations are made of, accurate from θ = 0 on.
+"""Functions of a squared angle x = θ² that rotations are made of, accurate from θ = 0 on; real or complex.
 
 Stumpff functions (K. Stumpff, Himmelsmechanik I, 1959, ch. V):
 
@@ -9,87 +9,112 @@ with c_k = 1/k! − x c_{k+2} and dc_k/dx = (k c_{k+2} − c_{k+1})/2. The inver
     b(x) = (1 − (θ/2) cot(θ/2))/x = 2/(4π² − x) + Σ_k 2 (ζ(2k + 2) − 1) x^k / (2π)^(2k+2),
 
 with its pole at θ = 2π set apart; it solves 2x b' = 1/4 − 3b + x b².
+
+Each function is a series near zero and a closed form beyond, both without branches, so that they serve for arrays too
+(`erls.maths.rotation_maps`); the choice goes by the real part, and a complex step through it is exact.
 """
 
 from __future__ import annotations
 
-from math import factorial, pi
+import math
+from typing import TypeAlias
 
 import numpy as np
 
-from erls.maths.so3 import Array
+from erls.maths.jit import part
 
-_SERIES_BELOW = 4.0  # no term of a Stumpff series exceeds the one before it there, for k ≥ 1
-_TERMS = 12
-_INVERSE_FACTORIALS = np.array([1 / factorial(k) for k in range(2 * _TERMS + 12)])
-_SUFFICIENT = [  # squared angles up to which term 0, 1, ... may be the last one, for each highest function
-    np.array([(1e-17 * factorial(2 * j + 1 + k) / factorial(max(k - 1, 0))) ** (1 / (j + 1)) for j in range(_TERMS)])
-    for k in range(8)
-]
-_POLE = 4 * np.pi**2
-_RATIO_BELOW = 0.5  # of x to the pole
+Three: TypeAlias = tuple[float, float, float]
+Seven: TypeAlias = tuple[float, float, float, float, float, float, float]
 
+FEW, MANY, CLOSED_FROM = 6, 12, 4.0
+"""Terms that are exact to rounding up to `_FEW_BELOW` and up to ``CLOSED_FROM``, where the closed form takes over."""
+_FEW_BELOW = 0.25
+_FACTORIALS = tuple(1.0 / math.factorial(k) for k in range(32))
+_POLE = 4 * math.pi**2
+POLE_HALVED = 0.5 * _POLE
+"""Where the closed form of the inverse coefficient takes over."""
+_FEW_ZETA, MANY_ZETA = 7, 19
 # 2 ζ(s) - 2 of Riemann's function at s = 2, 4, 6, ..., which falls by four from term to term
-_ZETA = 2 * np.array(
-    [pi**2 / 6 - 1, pi**4 / 90 - 1, *((np.arange(2000.0, 1.0, -1.0) ** -s).sum() for s in range(6, 40, 2))]
-)
+_SUMMED = (float((np.arange(2000.0, 1.0, -1.0) ** -s).sum()) for s in range(6, 2 * MANY_ZETA + 2, 2))
+_ZETA = tuple(2.0 * value for value in (math.pi**2 / 6 - 1, math.pi**4 / 90 - 1, *_SUMMED))
 
 
-def stumpff(x: Array, highest: int) -> Array:
-    """(highest + 1, ...) c₀ to c_highest of the squared angles (...)."""
-    found = np.empty((highest + 1, *np.shape(x)))
-    inside = np.minimum(x, _SERIES_BELOW)
-    last = np.zeros((2, *np.shape(x)))  # the two highest, from the smallest term on
-    for j in range(int(np.searchsorted(_SUFFICIENT[highest], np.max(inside, initial=0.0))), -1, -1):
-        first = 2 * j + highest - 1
-        last = _INVERSE_FACTORIALS[first : first + 2].reshape(2, *(1,) * np.ndim(x)) - inside * last
-    found[highest - 1 :] = last
-    for k in range(highest - 2, -1, -1):
-        found[k] = _INVERSE_FACTORIALS[k] - inside * found[k + 2]
-    large = np.asarray(x > _SERIES_BELOW)
-    if large.any():
-        far = np.asarray(x)[large]
-        angle = np.sqrt(far)
-        found[0, large], found[1, large] = np.cos(angle), np.sin(angle) / angle
-        for k in range(highest - 1):
-            found[k + 2, large] = (_INVERSE_FACTORIALS[k] - found[k, large]) / far
-    return found
+@part
+def stumpff(x: float) -> Seven:
+    """c₁ to c₇ of a squared angle."""
+    if x.real > CLOSED_FROM:
+        return stumpff_closed(x)
+    return stumpff_series(x, FEW if x.real <= _FEW_BELOW else MANY)
 
 
-def stumpff_derivative(c: Array, k: int) -> Array:
-    """dc_k/dx from the first k + 3 functions ``c``."""
-    first: Array = (k * c[k + 2] - c[k + 1]) / 2
-    return first
+@part
+def stumpff_series(x: float, terms: int) -> Seven:
+    """c₁ to c₇: the two highest from their series, the others from them."""
+    c6, c7 = 0.0 * x, 0.0 * x
+    for j in range(terms - 1, -1, -1):
+        c6 = _FACTORIALS[2 * j + 6] - x * c6
+        c7 = _FACTORIALS[2 * j + 7] - x * c7
+    c5, c4 = _FACTORIALS[5] - x * c7, _FACTORIALS[4] - x * c6
+    c3, c2 = _FACTORIALS[3] - x * c5, _FACTORIALS[2] - x * c4
+    return 1.0 - x * c3, c2, c3, c4, c5, c6, c7
 
 
-def stumpff_second_derivative(c: Array, k: int) -> Array:
-    """d²c_k/dx² from the first k + 5 functions ``c``."""
-    second: Array = (k * stumpff_derivative(c, k + 2) - stumpff_derivative(c, k + 1)) / 2
-    return second
+@part
+def stumpff_closed(x: float) -> Seven:
+    """c₁ to c₇ from cosine and sine."""
+    angle = np.sqrt(x)
+    c0, c1 = np.cos(angle), np.sin(angle) / angle
+    c2, c3 = (1.0 - c0) / x, (1.0 - c1) / x
+    c4, c5 = (_FACTORIALS[2] - c2) / x, (_FACTORIALS[3] - c3) / x
+    return c1, c2, c3, c4, c5, (_FACTORIALS[4] - c4) / x, (_FACTORIALS[5] - c5) / x
 
 
-def inverse_coefficient(x: Array) -> tuple[Array, Array, Array]:
-    """b(x) and its first and second derivative, each (...); infinite at θ = 2π."""
-    y = np.minimum(np.asarray(x) / _POLE, _RATIO_BELOW)
-    value, slope, bend = np.zeros((3, *np.shape(x)))
-    ratio = float(np.max(y, initial=0.0)) / 4  # of one term to the next
-    last = len(_ZETA) - 1 if ratio > 0.1 else int(-37 / np.log(max(ratio, 1e-17))) + 2
-    for k in range(last, -1, -1):
+@part
+def tangent_coefficients(c: Seven) -> tuple[Three, Three]:
+    """f = −c₂ and g = c₃ of the tangent operator 1 + f ψ̃ + g ψ̃², each with two derivatives by x."""
+    c4_, c3_, c2_ = (4 * c[5] - c[4]) / 2, (3 * c[4] - c[3]) / 2, (2 * c[3] - c[2]) / 2
+    c5_ = (5 * c[6] - c[5]) / 2
+    return (-c[1], -c2_, -(2 * c4_ - c3_) / 2), (c[2], c3_, (3 * c5_ - c4_) / 2)
+
+
+@part
+def inverse_coefficient(x: float) -> Three:
+    """b(x) with two derivatives; infinite at a full turn."""
+    if x.real > POLE_HALVED:
+        return inverse_closed(x)
+    return inverse_series(x, _FEW_ZETA if x.real <= _FEW_BELOW else MANY_ZETA)
+
+
+@part
+def inverse_series(x: float, terms: int) -> Three:
+    """b(x) with two derivatives: the pole, and the series of what is left."""
+    y = x / _POLE
+    value, slope, bend = 0.0 * x, 0.0 * x, 0.0 * x
+    for k in range(terms - 1, -1, -1):
         bend = slope * 2 + y * bend
         slope = value + y * slope
         value = _ZETA[k] + y * value
-    gap = 1 - y
-    found = np.empty((3, *np.shape(x)))
-    found[0] = (value + 2 / gap) / _POLE
-    found[1] = (slope + 2 / gap**2) / _POLE**2
-    found[2] = (bend + 4 / gap**3) / _POLE**3
-    large = np.asarray(x > _RATIO_BELOW * _POLE)
-    if large.any():
-        far = np.asarray(x)[large]
-        half = np.sqrt(far) / 2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            b = (1 - half * np.cos(half) / np.sin(half)) / far
-            first = (0.25 - 3 * b + far * b * b) / (2 * far)
-            second = (b * b - 5 * first + 2 * far * b * first) / (2 * far)
-        found[:, large] = b, first, second
-    return found[0], found[1], found[2]
+    gap = 1.0 / (1.0 - y)
+    above = (slope + 2 * gap**2) / _POLE**2, (bend + 4 * gap**3) / _POLE**3
+    return (value + 2 * gap) / _POLE, above[0], above[1]
+
+
+@part
+def inverse_closed(x: float) -> Three:
+    """b(x) with two derivatives, which follow from its differential equation."""
+    half = np.sqrt(x) / 2
+    b = (1.0 - half * np.cos(half) / np.sin(half)) / x
+    first = (0.25 - 3 * b + x * b * b) / (2 * x)
+    return b, first, (b * b - 5 * first + 2 * x * b * first) / (2 * x)
+
+
+@part
+def angle_of(sine: float, cosine: float) -> float:
+    """Angle of a point (cosine, sine) of any size, from −π to π; with complex numbers, of small imaginary parts.
+
+    The angle of the real parts, and the one from there, whose tangent is zero for real numbers.
+    """
+    s, c = sine.real, cosine.real
+    rest = (sine * c - cosine * s) / (cosine * c + sine * s)
+    angle: float = np.arctan2(s, c) + rest * (1.0 - rest * rest / 3)
+    return angle

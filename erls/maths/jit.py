@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -143,6 +144,21 @@ def inlined(function: F) -> F:
 def generated(function: F) -> F:
     """A `part` whose source is made at import and not kept on disk: it becomes one with its caller."""
     return _njit(function, **_PART, forceinline=True, cache=False) if ENABLED else function
+
+
+@cache
+def plain(function: F) -> F:
+    """The same source as plain Python, with all that it calls: for arrays in place of numbers.
+
+    It must not choose by its numbers, nor keep what it makes in tables.
+    """
+    source: Any = getattr(function, "py_func", function)
+    names = dict(source.__globals__)
+    for name in source.__code__.co_names:
+        if hasattr(names.get(name), "py_func"):
+            names[name] = plain(names[name])
+    twin: Any = FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__)
+    return twin  # type: ignore[no-any-return]
 
 
 def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:

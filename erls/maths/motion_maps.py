@@ -1,26 +1,29 @@
-"""Exponential, logarithm, adjoint and tangent operators of rigid motions SE(3), for any number of them at once.
+"""Operators of rigid motions SE(3) as matrices, for any number of them at once.
 
-A twist ξ = [v; ω] (as in `erls.maths.se3`) has the bracket ad ξ = [[ω̃, ṽ], [0, ω̃]]: ω̃ with a perturbation ṽ above its
-diagonal. Every power series in ad ξ therefore has the derivative of the same series of rotations, along v, there:
-
-    T(ξ) = [[T(ω), DT(ω)·v], [0, T(ω)]],    exp ξ = (exp ω̃, T(ω)ᵀ v)
-
-(V. Sonneville, A. Cardona, O. Brüls, Comput. Methods Appl. Mech. Eng. 268 (2014) 451, app. A). With H = exp ξ moving,
-H⁻¹ Ḣ = ν̃ and ν = T(ξ) ξ̇. As with rotations, T⁻¹ has a pole at |ω| = 2π.
+The formulas are those of `erls.maths.motions`, with arrays in place of numbers. Poses are (..., 4, 4), twists
+ξ = [v; ω] (..., 6). As with rotations, T⁻¹ has a pole at |ω| = 2π.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from erls.maths import rotation_maps as rotations
-from erls.maths.rotation_maps import skews
+from erls.maths import motions, rotations
+from erls.maths import rotation_maps as turns
+from erls.maths.jit import plain
 from erls.maths.so3 import Array
+from erls.maths.vectors import dot
+
+_HALF = (0.5, 0.0, 0.0)
+_UNITS = tuple(np.eye(6))  # a column is what becomes of a unit twist: all six along a last axis
+_E = _UNITS[:3], _UNITS[3:]
 
 
 def poses(rotation: Array, position: Array) -> Array:
     """(..., 4, 4) poses of rotations (..., 3, 3) and positions (..., 3)."""
-    result = np.zeros((*rotation.shape[:-2], 4, 4))
+    result = np.zeros((*rotation.shape[:-2], 4, 4), dtype=np.result_type(rotation, position))
     result[..., :3, :3], result[..., :3, 3], result[..., 3, 3] = rotation, position, 1.0
     return result
 
@@ -28,90 +31,90 @@ def poses(rotation: Array, position: Array) -> Array:
 def inverse(h: Array) -> Array:
     """(..., 4, 4) inverse poses."""
     turn = np.swapaxes(h[..., :3, :3], -1, -2)
-    return poses(turn, -_times(turn, h[..., :3, 3]))
+    return poses(turn, -(turn @ h[..., :3, 3:])[..., 0])
 
 
 def adjoint(h: Array) -> Array:
     """(..., 6, 6) Ad: twists in the moved frame's axes to twists in the fixed ones, hat(Ad ξ) = H hat(ξ) H⁻¹."""
-    turn = h[..., :3, :3]
-    return _dual(turn, skews(h[..., :3, 3]) @ turn)
+    return adjoint_inverse(inverse(h))
 
 
 def adjoint_inverse(h: Array) -> Array:
     """(..., 6, 6) Ad⁻¹: `erls.maths.se3.twist_transform` of many poses."""
-    turn = np.swapaxes(h[..., :3, :3], -1, -2)
-    return _dual(turn, -turn @ skews(h[..., :3, 3]))
+    return _columns(plain(motions.transformed)(*_parts(h), *_E))
 
 
 def bracket(xi: Array) -> Array:
     """(..., 6, 6) ad of twists (..., 6)."""
-    return _dual(skews(xi[..., 3:]), skews(xi[..., :3]))
+    return _columns(plain(motions.bracket)(*_pair(xi), *_E))
 
 
 def cobracket(force: Array) -> Array:
     """(..., 6, 6) matrix of ξ ↦ ad(ξ)ᵀ f, for forces f = [n; m] (..., 6)."""
-    result = np.zeros((*force.shape, 6))
-    n = skews(force[..., :3])
-    result[..., :3, 3:] = result[..., 3:, :3] = n
-    result[..., 3:, 3:] = skews(force[..., 3:])
-    return result
+    return _columns(plain(motions.cobracket)(*_E, *_pair(force)))
 
 
 def exp(xi: Array) -> Array:
     """(..., 4, 4) motions by twists (..., 6)."""
-    shift = np.swapaxes(rotations.tangent(xi[..., 3:]), -1, -2)
-    return poses(rotations.exp(xi[..., 3:]), _times(shift, xi[..., :3]))
+    u, psi = turns.entries(xi[..., :3]), turns.entries(xi[..., 3:])
+    f, g = turns.tangent_coefficients(psi)
+    return poses(turns.exp(xi[..., 3:]), np.stack(plain(rotations.value)(-f[0], g[0], psi, u), axis=-1))
 
 
 def log(h: Array) -> Array:
     """(..., 6) twists of motions (..., 4, 4), turning by at most π; at π as `erls.maths.rotation_maps.log`."""
-    return _with_turn(h, rotations.log(h[..., :3, :3]))
+    return _with_turn(h, turns.log(h[..., :3, :3]))
 
 
 def log_near(h: Array, near: Array) -> Array:
     """(..., 6) the twists of motions (..., 4, 4) whose turn is closest to that of ``near`` (..., 6)."""
-    return _with_turn(h, rotations.log_near(h[..., :3, :3], near[..., 3:]))
+    return _with_turn(h, turns.log_near(h[..., :3, :3], near[..., 3:]))
 
 
-def _with_turn(h: Array, psi: Array) -> Array:
-    back = np.swapaxes(rotations.tangent_inverse(psi), -1, -2)
-    return np.concatenate([_times(back, h[..., :3, 3]), psi], axis=-1)
+def _with_turn(h: Array, turn: Array) -> Array:
+    psi = turns.entries(turn)
+    b = turns.inverse_coefficient(plain(dot)(psi, psi))
+    u = plain(rotations.value)(-0.5, b[0], psi, turns.entries(h[..., :3, 3]))
+    return np.concatenate([np.stack(u, axis=-1), turn], axis=-1)
 
 
 def tangent(xi: Array) -> Array:
     """(..., 6, 6) T."""
-    v, w = xi[..., :3], xi[..., 3:]
-    return _dual(rotations.tangent(w), rotations.tangent_derivative(w, v))
+    u, psi = _pair(xi)
+    return _columns(plain(motions.series)(*turns.tangent_coefficients(psi), u, psi, *_E))
 
 
-def tangent_derivative(xi: Array, change: Array) -> Array:
-    """(..., 6, 6) derivative of T(ξ) when ξ moves along ``change`` (..., 6)."""
-    v, w, dv, dw = xi[..., :3], xi[..., 3:], change[..., :3], change[..., 3:]
-    above = rotations.tangent_second_derivative(w, v, dw) + rotations.tangent_derivative(w, dv)
-    return _dual(rotations.tangent_derivative(w, dw), above)
+def tangent_derivative(xi: Array, along: Array) -> Array:
+    """(..., 6, 6) derivative of T(ξ) when ξ moves along ``along`` (..., 6)."""
+    u, psi = _pair(xi)
+    return _columns(plain(motions.change)(*turns.tangent_coefficients(psi), u, psi, *_pair(along), *_E))
 
 
 def tangent_inverse(xi: Array) -> Array:
     """(..., 6, 6) T⁻¹; infinite at |ω| = 2π."""
-    v, w = xi[..., :3], xi[..., 3:]
-    return _dual(rotations.tangent_inverse(w), rotations.tangent_inverse_derivative(w, v))
+    u, psi = _pair(xi)
+    b = turns.inverse_coefficient(plain(dot)(psi, psi))
+    return _columns(plain(motions.series)(_HALF, b, u, psi, *_E))
 
 
-def tangent_inverse_derivative(xi: Array, change: Array) -> Array:
-    """(..., 6, 6) derivative of T⁻¹(ξ) along ``change`` (..., 6)."""
-    v, w, dv, dw = xi[..., :3], xi[..., 3:], change[..., :3], change[..., 3:]
-    above = rotations.tangent_inverse_second_derivative(w, v, dw) + rotations.tangent_inverse_derivative(w, dv)
-    return _dual(rotations.tangent_inverse_derivative(w, dw), above)
+def tangent_inverse_derivative(xi: Array, along: Array) -> Array:
+    """(..., 6, 6) derivative of T⁻¹(ξ) along ``along`` (..., 6)."""
+    u, psi = _pair(xi)
+    b = turns.inverse_coefficient(plain(dot)(psi, psi))
+    return _columns(plain(motions.change)(_HALF, b, u, psi, *_pair(along), *_E))
 
 
-def _times(matrix: Array, vector: Array) -> Array:
-    product: Array = (matrix @ vector[..., None])[..., 0]
-    return product
+def _pair(xi: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Both vectors of twists (..., 6), with an axis for the columns."""
+    return turns.entries(xi[..., None, :3]), turns.entries(xi[..., None, 3:])
 
 
-def _dual(diagonal: Array, above: Array) -> Array:
-    """(..., 6, 6) [[A, B], [0, A]]."""
-    result = np.zeros((*np.broadcast_shapes(diagonal.shape, above.shape)[:-2], 6, 6))
-    result[..., :3, :3] = result[..., 3:, 3:] = diagonal
-    result[..., :3, 3:] = above
-    return result
+def _parts(h: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Position and rotation of poses, with an axis for the columns."""
+    turn = h[..., :3, :3].reshape(*h.shape[:-2], 1, 9)
+    return turns.entries(h[..., None, :3, 3]), turns.entries(turn)
+
+
+def _columns(pair: Any) -> Array:
+    """(..., 6, 6) of two triples of arrays (..., 6), which hold the entries of its columns."""
+    return np.stack(np.broadcast_arrays(*pair[0], *pair[1]), axis=-2)

@@ -13,9 +13,10 @@ import scipy.linalg as la
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from erls.maths import motion_maps, rotation_maps
-from erls.maths.coefficients import inverse_coefficient, stumpff, stumpff_derivative, stumpff_second_derivative
+from erls.maths import coefficients, motion_maps, rotation_maps, rotations
+from erls.maths import vectors as vectors3
 from erls.maths.groups import R3_SO3, SE3, SO3, Group, product, vectors
+from erls.maths.jit import ENABLED, plain
 from erls.maths.se3 import twist_cross, twist_transform
 from erls.maths.so3 import Array, skew
 
@@ -26,6 +27,7 @@ TURNS = {
     "R^3×SO(3)": [slice(3, 6)],
     "a product": [slice(5, 8), slice(8, 11)],
 }
+H = 1e-30  # of complex steps
 EPS = float(np.finfo(float).eps)
 ANGLES = [0.0, 1e-300, 1e-160, 1e-9, 1e-5, 1e-3, 0.3, 1.0, 1.9, 2.1, 3.0, np.pi - 1e-3, np.pi - 1e-9, np.pi]
 PAST = [np.pi + 1e-9, np.pi + 1e-3, 4.0, 4.4, 4.5, 6.0]
@@ -60,32 +62,49 @@ def _series(k: int, x: float) -> Fraction:
     return sum((Fraction(-x) ** j / factorial(2 * j + k) for j in range(40)), Fraction(0))
 
 
-@pytest.mark.parametrize("x", [0.0, 1e-12, 0.1, 1.0, 3.999, 4.001, np.pi**2, 19.0, 25.0])
-def test_stumpff_functions_against_exact_series(x: float) -> None:
+COEFFICIENTS: dict[str, Callable[[Any], tuple[Any, Any, Any]]] = {
+    "arrays": lambda x: (
+        rotation_maps.stumpff(np.array(x)),
+        rotation_maps.inverse_coefficient(np.array(x)),
+        plain(coefficients.tangent_coefficients)(rotation_maps.stumpff(np.array(x))),
+    ),
+    "numbers": lambda x: (
+        plain(coefficients.stumpff)(x),
+        plain(coefficients.inverse_coefficient)(x),
+        plain(coefficients.tangent_coefficients)(plain(coefficients.stumpff)(x)),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", COEFFICIENTS)
+@pytest.mark.parametrize("x", [0.0, 1e-12, 0.1, 0.2499, 0.2501, 1.0, 3.999, 4.001, np.pi**2, 19.0, 25.0])
+def test_stumpff_functions_against_exact_series(x: float, kind: str) -> None:
     """A few roundings of 1/k! up to the switch at 4; past it, k of them upward from the cosine over x."""
-    found = stumpff(np.array(x), 7)
-    for k in range(8):
+    found, _, (f, g) = COEFFICIENTS[kind](x)
+    for k in range(1, 8):
         limit = 8 if x < 4 else 8 * (1 + k)
-        assert abs(found[k] - float(_series(k, x))) <= limit * EPS / factorial(k), k
-    for k in (2, 3):
-        slope = (k * _series(k + 2, x) - _series(k + 1, x)) / 2
-        bend = (
+        assert abs(found[k - 1] - float(_series(k, x))) <= limit * EPS / factorial(k), k
+    for k, sign, (value, slope, bend) in ((2, -1, f), (3, 1, g)):
+        first = (k * _series(k + 2, x) - _series(k + 1, x)) / 2
+        second = (
             k * ((k + 2) * _series(k + 4, x) - _series(k + 3, x)) - ((k + 1) * _series(k + 3, x) - _series(k + 2, x))
         ) / 4
-        assert stumpff_derivative(found, k) == pytest.approx(float(slope), rel=50 * EPS)
-        assert stumpff_second_derivative(found, k) == pytest.approx(float(bend), rel=200 * EPS)
+        assert value == sign * found[k - 1]
+        assert slope == pytest.approx(sign * float(first), rel=50 * EPS)
+        assert bend == pytest.approx(sign * float(second), rel=200 * EPS)
 
 
+@pytest.mark.parametrize("kind", COEFFICIENTS)
 @pytest.mark.parametrize("x", [1e-3, 0.1, 1.0, np.pi**2, 19.7, 19.8, 30.0, 39.0])
-def test_coefficient_of_inverse_tangents_against_exact_series(x: float) -> None:
+def test_coefficient_of_inverse_tangents_against_exact_series(x: float, kind: str) -> None:
     """b = (1 − c₁/(2 c₂))/x in rational arithmetic, and its differential equation for the derivatives."""
     b = (1 - _series(1, x) / (2 * _series(2, x))) / Fraction(x)
     first = (Fraction(1, 4) - 3 * b + Fraction(x) * b * b) / (2 * Fraction(x))
     second = (b * b - 5 * first + 2 * Fraction(x) * b * first) / (2 * Fraction(x))
     near = 39.478 / abs(39.478 - x)  # conditioning next to the pole
-    for found, exact in zip(inverse_coefficient(np.array(x)), (b, first, second), strict=True):
+    for found, exact in zip(COEFFICIENTS[kind](x)[1], (b, first, second), strict=True):
         assert float(found) == pytest.approx(float(exact), rel=100 * EPS * near)
-    zero = [float(v) for v in inverse_coefficient(np.array(0.0))]
+    zero = [float(v) for v in COEFFICIENTS[kind](0.0)[1]]
     assert zero == pytest.approx([1 / 12, 1 / 720, 1 / 15120], rel=4 * EPS)
 
 
@@ -163,6 +182,55 @@ def test_derivatives_of_tangents(name: str, seed: int, angle: float) -> None:
     expected = (8 * near - far) / (12 * e)
     size = max(1.0, np.abs(expected).max())
     np.testing.assert_allclose(derivative(x, d), expected, atol=1e-8 * size)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 1.9, 2.1, 3.0, np.pi - 1e-6, 4.4, 4.5, 6.0])
+def test_complex_steps(angle: float) -> None:
+    """Through the exponential and the logarithm of rotations and motions: T and T⁻¹, to rounding."""
+    x, d = _increment("SE(3)", angle, 1), np.random.default_rng(2).standard_normal(6)
+    moved = motion_maps.exp(x + 1j * H * d)
+    h, change = moved.real, moved.imag / H
+    rate = motion_maps.inverse(h) @ change
+    twist = motion_maps.tangent(x) @ d
+    np.testing.assert_allclose(rate[:3, :3], skew(twist[3:]), atol=1e-14)
+    np.testing.assert_allclose(rate[:3, 3], twist[:3], atol=1e-14)
+    back = motion_maps.log_near(moved, x)
+    np.testing.assert_allclose(back.real, x, atol=1e-13)
+    inverse = motion_maps.tangent_inverse(x)
+    np.testing.assert_allclose(back.imag / H, d, atol=1e-13 * (1 + la.norm(inverse) ** 2))
+    for operator, derivative in (
+        (motion_maps.tangent, motion_maps.tangent_derivative),
+        (motion_maps.tangent_inverse, motion_maps.tangent_inverse_derivative),
+    ):
+        expected = derivative(x, d)
+        found = operator(x + 1j * H * d).imag / H
+        np.testing.assert_allclose(found, expected, atol=1e-13 * max(1.0, np.abs(expected).max()))
+
+
+@pytest.mark.parametrize("scalar", [1.0, 1.0 + 0j])
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 1.9, 2.1, np.pi, 4.4])
+def test_one_number_at_a_time_equals_many(angle: float, scalar: complex) -> None:
+    """The functions with their branches, compiled for real and complex numbers, against the arrays."""
+    psi = _increment("SO(3)", angle, 5)
+    near = 3 * psi
+
+    def turned(psi: Any, near: Any) -> Any:
+        square = dot(psi, psi)
+        c = stumpff(square)
+        r = exponential(psi, c[0], c[1])
+        return r, logarithm_near(r, near), inverse_coefficient(square)[0]
+
+    dot, exponential, logarithm_near = vectors3.dot, rotations.exponential, rotations.logarithm_near
+    stumpff, inverse_coefficient = coefficients.stumpff, coefficients.inverse_coefficient
+    function = plain(turned)
+    if ENABLED:
+        import numba
+
+        function = numba.njit(turned)
+    r, log, b = function(tuple((scalar * psi).tolist()), tuple((scalar * near).tolist()))
+    np.testing.assert_allclose(np.reshape(r, (3, 3)), rotation_maps.exp(psi), atol=1e-15)
+    np.testing.assert_allclose(log, rotation_maps.log_near(rotation_maps.exp(psi), near), atol=4e-15)
+    assert b == pytest.approx(float(rotation_maps.inverse_coefficient(psi @ psi)[0]), rel=1e-14)
 
 
 def test_singularity_of_the_tangent_at_a_full_turn() -> None:

@@ -7,8 +7,9 @@ import math
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.kernels.contract import Knots, Model, Work
 from erls.equations.nodal.kernels.joints import frame_in_world, relative
-from erls.equations.nodal.kernels.motions import bracket, pair_minus, transformed, transposed
-from erls.equations.nodal.kernels.vectors import (
+from erls.maths.jit import inlined, part
+from erls.maths.motions import bracket, pair_minus, transformed, transposed
+from erls.maths.vectors import (
     Rotation,
     Twist,
     Vector,
@@ -23,7 +24,6 @@ from erls.equations.nodal.kernels.vectors import (
     unit,
     vector,
 )
-from erls.maths.jit import inlined, part
 
 _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 

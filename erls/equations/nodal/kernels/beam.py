@@ -6,7 +6,9 @@ import math
 
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.kernels.contract import Model, Work
-from erls.equations.nodal.kernels.motions import (
+from erls.maths.coefficients import Three, inverse_coefficient, stumpff, tangent_coefficients
+from erls.maths.jit import inlined, part
+from erls.maths.motions import (
     bracket,
     change,
     change_transposed,
@@ -19,16 +21,8 @@ from erls.equations.nodal.kernels.motions import (
     transformed,
     transposed,
 )
-from erls.equations.nodal.kernels.rotations import (
-    Three,
-    exponential,
-    inverse_coefficient,
-    logarithm_near,
-    stumpff,
-    tangent_coefficients,
-    value,
-)
-from erls.equations.nodal.kernels.vectors import (
+from erls.maths.rotations import exponential, logarithm_near, value
+from erls.maths.vectors import (
     Rotation,
     Twist,
     Vector,
@@ -47,7 +41,6 @@ from erls.equations.nodal.kernels.vectors import (
     unit,
     vector,
 )
-from erls.maths.jit import inlined, part
 
 _POINTS = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))  # of Gauss's rule on a length of one
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)

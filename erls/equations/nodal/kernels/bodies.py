@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.kernels.contract import Model, Work
-from erls.equations.nodal.kernels.motions import cobracket, pair_minus, pair_plus
-from erls.equations.nodal.kernels.vectors import (
+from erls.maths.jit import inlined, part
+from erls.maths.motions import cobracket, pair_minus, pair_plus
+from erls.maths.vectors import (
     Twist,
     Vector,
     add,
@@ -21,7 +22,6 @@ from erls.equations.nodal.kernels.vectors import (
     unit,
     vector,
 )
-from erls.maths.jit import inlined, part
 
 _ZERO = (0.0, 0.0, 0.0)
 

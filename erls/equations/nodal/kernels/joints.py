@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.kernels.contract import Model, Work
-from erls.equations.nodal.kernels.motions import cobracket, pair_minus, transformed, transposed
-from erls.equations.nodal.kernels.rotations import exponential, stumpff
-from erls.equations.nodal.kernels.vectors import (
+from erls.maths.coefficients import stumpff
+from erls.maths.jit import inlined, part
+from erls.maths.motions import cobracket, pair_minus, transformed, transposed
+from erls.maths.rotations import exponential
+from erls.maths.vectors import (
     Rotation,
     Twist,
     Vector,
@@ -25,7 +27,6 @@ from erls.equations.nodal.kernels.vectors import (
     unit,
     vector,
 )
-from erls.maths.jit import inlined, part
 
 _ZERO = (0.0, 0.0, 0.0)
 

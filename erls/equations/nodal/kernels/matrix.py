@@ -12,9 +12,12 @@ from erls.equations.nodal.kernels.beam import beam_derivatives
 from erls.equations.nodal.kernels.bodies import body_derivatives, load_derivatives
 from erls.equations.nodal.kernels.contract import FACTOR, Model, Work
 from erls.equations.nodal.kernels.joints import joint_derivatives
-from erls.equations.nodal.kernels.motions import series
-from erls.equations.nodal.kernels.rotations import stumpff, tangent_coefficients, value
-from erls.equations.nodal.kernels.vectors import (
+from erls.maths import band
+from erls.maths.coefficients import stumpff, tangent_coefficients
+from erls.maths.jit import inlined, kernel, part
+from erls.maths.motions import series
+from erls.maths.rotations import value
+from erls.maths.vectors import (
     Vector,
     cross,
     dot,
@@ -27,8 +30,6 @@ from erls.equations.nodal.kernels.vectors import (
     turned,
     unit,
 )
-from erls.maths import band
-from erls.maths.jit import inlined, kernel, part
 
 _ZERO = (0.0, 0.0, 0.0)
 GROUND = -1

@@ -11,9 +11,9 @@ from erls.equations.nodal.kernels.actuators import set_coordinates, store_coordi
 from erls.equations.nodal.kernels.beam import bend
 from erls.equations.nodal.kernels.contract import ADVANCE, Knots, Model, Progress, Settings, State, Work
 from erls.equations.nodal.kernels.system import compose, set_twists
-from erls.equations.nodal.kernels.vectors import cross, dot, nine, plus, put, scaled, three, times, vector
 from erls.maths import band
 from erls.maths.jit import inlined, kernel
+from erls.maths.vectors import cross, dot, nine, plus, put, scaled, three, times, vector
 
 Forces: TypeAlias = Callable[[Model, Work, State, Array], None]
 Factor: TypeAlias = Callable[[Model, Work, Array, float, float, float], int]

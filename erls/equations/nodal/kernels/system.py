@@ -12,8 +12,10 @@ from erls.equations.nodal.kernels.beam import beam_forces
 from erls.equations.nodal.kernels.bodies import body_forces, load_forces
 from erls.equations.nodal.kernels.contract import FORCES, Model, State, Work
 from erls.equations.nodal.kernels.joints import joint_forces
-from erls.equations.nodal.kernels.rotations import exponential, stumpff, value
-from erls.equations.nodal.kernels.vectors import (
+from erls.maths.coefficients import stumpff
+from erls.maths.jit import inlined, kernel
+from erls.maths.rotations import exponential, value
+from erls.maths.vectors import (
     cross,
     dot,
     minus,
@@ -26,7 +28,6 @@ from erls.equations.nodal.kernels.vectors import (
     turned,
     vector,
 )
-from erls.maths.jit import inlined, kernel
 
 
 @inlined

@@ -1,11 +1,14 @@
-"""Vectors as three numbers and rotation matrices as nine, rows first."""
+"""Vectors as three numbers and rotation matrices as nine, rows first: without memory of their own in compiled code.
+
+The numbers may be real or complex, or arrays of either where the functions run plain (`erls.maths.jit.plain`).
+"""
 
 from __future__ import annotations
 
 from typing import TypeAlias
 
-from erls.equations.compiled_system import Array
 from erls.maths.jit import part
+from erls.maths.so3 import Array
 
 Vector: TypeAlias = tuple[float, float, float]
 Twist: TypeAlias = tuple[Vector, Vector]

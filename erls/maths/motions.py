@@ -1,14 +1,21 @@
-"""Operators of one rigid motion, applied to twists and wrenches: the formulas of `erls.maths.motion_maps`.
+"""Rigid motions SE(3): adjoint, brackets, power series in ad ξ with derivatives, applied to twists and wrenches.
 
-A power series in ad ξ, ξ = [u; ψ], is [[A, B], [0, A]] with the same series A of rotations and its derivative B along
-u. Coefficients f, g of A come from `erls.equations.nodal.kernels.rotations`.
+A twist ξ = [u; ψ] has the bracket ad ξ = [[ψ̃, ũ], [0, ψ̃]]: ψ̃ with a perturbation ũ above its diagonal. Every power
+series in ad ξ is therefore [[A, B], [0, A]] with the same series A of rotations and its derivative B along u:
+
+    T(ξ) = [[T(ψ), DT(ψ)·u], [0, T(ψ)]],    exp ξ = (exp ψ̃, T(ψ)ᵀ u)
+
+(V. Sonneville, A. Cardona, O. Brüls, Comput. Methods Appl. Mech. Eng. 268 (2014) 451, app. A). With H = exp ξ moving,
+H⁻¹ Ḣ = ν̃ and ν = T(ξ) ξ̇. Coefficients f, g of A are those of `erls.maths.rotations`. A motion is a position p and a
+rotation R. One matrix for each of many motions: `erls.maths.motion_maps`.
 """
 
 from __future__ import annotations
 
-from erls.equations.nodal.kernels.rotations import Three, first, second, value
-from erls.equations.nodal.kernels.vectors import Rotation, Twist, Vector, cross, minus, plus, scaled, times, turned
+from erls.maths.coefficients import Three
 from erls.maths.jit import part
+from erls.maths.rotations import first, second, value
+from erls.maths.vectors import Rotation, Twist, Vector, cross, minus, plus, scaled, times, turned
 
 
 @part
