@@ -31,11 +31,12 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from fe_import.description.link import LinkFile, Recovery, load_link
-from fe_import.modal.file import ModalModel
+from fe_import.description.link import LinkFile, load_link
+from fe_import.description.records import Recovery
+from fe_import.modal.model import ModalModel
+from fe_import.modal.recovery_maps import von_mises
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
-from fe_import.recovery.maps import von_mises
 from fe_import.recovery.recover import chosen_sites, mode_acceleration
 from fe_import.reduce import reduce_model
 

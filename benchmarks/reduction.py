@@ -34,10 +34,10 @@ import fe_import.solver
 import fe_import.solver.sparse
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import FEImportError
 from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace
-from fe_import.mesh.solid_mesh import SolidMesh
 from fe_import.modal.file import write_modal_file
 from fe_import.model import FEModel
 from fe_import.reduction import fixed_interface

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fe_import.description.link import LinkFile, load_link
 from fe_import.description.reduction import Reduction
-from fe_import.modal.file import ModalModel
+from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_model

@@ -7,15 +7,12 @@ Degrees of freedom ("dofs") are numbered over *all* nodal components first (``ma
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from fe_import.second_order.beams import BeamLines
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -75,6 +72,50 @@ class StressSource(Protocol):
 
     def converted(self, length: float, stress: float) -> StressSource:
         """The same in SI, from units of ``length`` metres and ``stress`` pascals."""
+
+
+@dataclass(frozen=True)
+class BeamLines:
+    """Elements of a frame as lines with mass, for its second-order kinematics.
+
+    Attributes
+    ----------
+    nodes : (e, 2) int array
+    axes : (e, 3, 3) array
+        Rows are the local axes in the mesh frame.
+    lengths : (e,) array
+        [m]
+    shear : (e, 2) array
+        Φ_y and Φ_z of `fe_import.elements.frame.shear_flexibility`.
+    mass : (e,) array
+        Per length [kg/m].
+    rotary : (e, 3) array
+        Rotary inertia per length about the local axes [kg m].
+    lumped : bool
+        Half of each element at either of its nodes.
+    """
+
+    nodes: IntArray
+    axes: Array
+    lengths: Array
+    shear: Array
+    mass: Array
+    rotary: Array
+    lumped: bool
+
+    @property
+    def is_tree(self) -> bool:
+        """Whether there is one way from each node to each other (the lines are connected)."""
+        return len(self.nodes) < len(np.unique(self.nodes))
+
+    def converted(self, length: float, mass: float) -> BeamLines:
+        """In SI, from units of ``length`` metres and ``mass`` kilograms."""
+        return replace(
+            self,
+            lengths=self.lengths * length,
+            mass=self.mass * (mass / length),
+            rotary=self.rotary * (mass * length),
+        )
 
 
 @dataclass(frozen=True)

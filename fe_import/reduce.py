@@ -19,9 +19,9 @@ from fe_import.files.toml import choose
 from fe_import.health.plausibility import plausible_link, plausible_materials
 from fe_import.health.report import check_basis, check_model, check_reduction, mode_residuals
 from fe_import.health.static_flexibility import check_static
-from fe_import.modal.file import SCHEMA_VERSION, ModalModel, read_modal_file, write_modal_file
+from fe_import.modal.file import SCHEMA_VERSION, read_modal_file, write_modal_file
 from fe_import.modal.inertia import inertia_invariants, mass_properties
-from fe_import.modal.model import HealthCheck
+from fe_import.modal.model import HealthCheck, ModalModel
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.model import build_model, unit_factors
 from fe_import.recovery.recover import recovery_maps

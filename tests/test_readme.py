@@ -104,7 +104,7 @@ def test_example_scene_and_link_run(tmp_path: Path) -> None:
 def test_defaults_are_as_printed() -> None:
     """Fields marked #= in the annotated scene and link hold the default of the schema."""
     from erls.scene.settings import Simulation
-    from fe_import.description.link import Frame, Member
+    from fe_import.description.records import Frame, Member
 
     simulation = Simulation(duration=1.0)
     assert (simulation.formulation, simulation.gauge) == ("erls", "joint-angle")

@@ -12,9 +12,9 @@ import scipy.linalg as la
 from erls.maths.se3 import pose, twist_transform
 from erls.maths.so3 import Array, skew
 from erls.mechanism.second_order import LinkSecondOrder, link_second_order
-from fe_import.description.link import LinkDescription
-from fe_import.modal.file import FixedInterfaceModes, ModalModel
+from fe_import.description.records import LinkDescription
 from fe_import.modal.inertia import InertiaInvariants, MassProperties, mass_properties
+from fe_import.modal.model import FixedInterfaceModes, ModalModel
 from fe_import.model import InterfaceNode
 
 

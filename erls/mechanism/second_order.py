@@ -11,9 +11,9 @@ import numpy as np
 from erls.maths.so3 import Array, cross_all, skew
 from fe_import.modal.inertia import mass_properties
 from fe_import.modal.model import ModalModel
+from fe_import.modal.second_order import SecondOrder, pair_numbers
 from fe_import.model import IntArray
 from fe_import.second_order.composition import composed, composed_rotation, twice_turned
-from fe_import.second_order.data import SecondOrder, pair_numbers
 from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_masses, of_modes, of_moments
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class LinkSecondOrder:
     Attributes
     ----------
     momentum, spin : (6, m, m), (3, 3, m, m) arrays
-        See `fe_import.second_order.data.SecondOrder`.
+        See `fe_import.modal.second_order.SecondOrder`.
     modal : (n, m, m) array
         K, likewise, of the n elastic modes.
     model : ModalModel

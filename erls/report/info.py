@@ -21,7 +21,8 @@ from fe_import.description.link import LinkFile, load_link
 from fe_import.files.hdf5.files import open_for_reading
 from fe_import.files.toml import read_toml
 from fe_import.modal.file import SCHEMA as MODAL_SCHEMA
-from fe_import.modal.file import ModalModel, read_modal_file
+from fe_import.modal.file import read_modal_file
+from fe_import.modal.model import ModalModel
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 

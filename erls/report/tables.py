@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from erls.run.record import Run
-from fe_import.modal.file import HealthCheck, ModalModel
 from fe_import.modal.inertia import MassProperties
+from fe_import.modal.model import HealthCheck, ModalModel
 
 _SHOWN_MODES = 40
 

@@ -25,12 +25,13 @@ from erls.run.record import Run
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene, SceneRecord
 from erls.scene.check import check_scene
-from fe_import.description.link import LinkDescription
+from fe_import.description.records import LinkDescription
 from fe_import.errors import ReportedError
 from fe_import.files.hdf5.files import open_for_reading, write_array, write_atomically, write_attribute, write_strings
 from fe_import.files.hdf5.values import Reader
 from fe_import.files.toml import choose, convert
-from fe_import.modal.file import ModalModel, read_modal_group, write_modal_group
+from fe_import.modal.file import read_modal_group, write_modal_group
+from fe_import.modal.model import ModalModel
 from fe_import.models.substructures import MOST_PIECES
 
 SCHEMA = "erls run"

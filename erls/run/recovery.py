@@ -2,7 +2,7 @@
 
 They need a modal file with recovery maps (table ``[recovery]`` of the link description). What the modes of the scene
 carry is corrected by the static answer of all others to the loads of the run (mode acceleration): see
-`fe_import.recovery.maps`.
+`fe_import.modal.recovery_maps`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from erls.run.link_loads import link_loads
 from erls.run.record import Run
 from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
-from fe_import.recovery.maps import UNITS, RecoveryMaps, spin_products
+from fe_import.modal.recovery_maps import UNITS, RecoveryMaps, spin_products
 from fe_import.recovery.recover import mode_acceleration, required_maps
 
 

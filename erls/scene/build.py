@@ -28,10 +28,12 @@ from erls.scene.build_substructures import piece_links, piece_models, piece_warn
 from erls.scene.chain import Scene
 from erls.scene.joints import Joint as JointRecord
 from erls.scene.links import Link as LinkRecord
-from fe_import.description.link import LinkDescription, load_link
+from fe_import.description.link import load_link
+from fe_import.description.records import LinkDescription
 from fe_import.errors import FEImportError, ReportedError
 from fe_import.files.toml import choose
-from fe_import.modal.file import ModalModel, read_modal_file
+from fe_import.modal.file import read_modal_file
+from fe_import.modal.model import ModalModel
 from fe_import.model import InterfaceNode
 from fe_import.models.model import inertia_matrix
 from fe_import.reduce import reduce_cached

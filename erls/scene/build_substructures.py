@@ -12,7 +12,7 @@ from erls.mechanism.links import Link, truncated
 from erls.scene.links import Link as LinkRecord
 from fe_import.description.link import LinkFile
 from fe_import.errors import Cause, FEImportError
-from fe_import.modal.file import ModalModel
+from fe_import.modal.model import ModalModel
 from fe_import.models.substructures import split_link
 from fe_import.reduce import reduce_cached
 from fe_import.reduction.modes import damping_ratios

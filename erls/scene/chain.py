@@ -8,7 +8,7 @@ from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
 from erls.scene.records import Record, SceneFile, SceneTables
 from erls.scene.settings import Simulation
-from fe_import.description.link import Inertia, Vector
+from fe_import.description.records import Inertia, Vector
 
 
 class Base(Record, frozen=True):

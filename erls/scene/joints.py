@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from erls.mechanism.drives import DriveRecord, FreeDrive
 from erls.scene.records import Record
-from fe_import.description.link import Inertia, Vector
+from fe_import.description.records import Inertia, Vector
 
 
 class DH(Record, frozen=True):

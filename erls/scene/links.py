@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from erls.scene.records import Record
-from fe_import.description.link import Damping, Inertia, Vector
+from fe_import.description.records import Damping, Inertia, Vector
 
 
 class RigidBody(Record, frozen=True):

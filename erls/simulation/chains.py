@@ -18,9 +18,9 @@ from erls.run.watches.watching import Warnings, Watching
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.simulation.asked import Asked
-from fe_import.description.link import LinkDescription
+from fe_import.description.records import LinkDescription
 from fe_import.files.toml import choose
-from fe_import.modal.file import ModalModel
+from fe_import.modal.model import ModalModel
 
 
 def run_chain(scene: Scene, asked: Asked) -> Run:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from fe_import.description.records import Damping, LinkDescription
 from fe_import.description.reduction import check_reduction_options
 from fe_import.elements.sections import check_section
 from fe_import.errors import Cause, FEImportError, ReportedError
 from fe_import.files.toml import choose
-
-if TYPE_CHECKING:
-    from fe_import.description.link import Damping, LinkDescription
 
 COUPLINGS = ("rigid", "averaged")
 WEIGHTS = ("area", "uniform")

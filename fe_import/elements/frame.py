@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.elements.sections import SectionConstants
-from fe_import.model import Array, IntArray
+from fe_import.model import Array, BeamLines, IntArray
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the sixth-degree products of the shape functions
 _POINTS, _WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
@@ -197,3 +197,24 @@ def assemble_frame(
     assembled = {name: assemble(blocks) for name, blocks in parts.items()}
     stiffness = sum(assembled.values(), start=sp.csc_array((size, size)))
     return assemble(masses), stiffness.tocsc(), assembled
+
+
+def beam_lines(elements: Sequence[FrameElement], shear: bool, mass: str, rotary_inertia: bool) -> BeamLines:
+    """Lines of frame elements; see `assemble_frame` for the options."""
+    polar = np.array([[e.section.inertia_y + e.section.inertia_z, e.section.inertia_y, e.section.inertia_z]
+                      for e in elements])  # fmt: skip
+    density = np.array([e.density for e in elements])
+    rotary = polar * density[:, None]
+    if not rotary_inertia:
+        rotary[:, 1:] = 0.0
+        if mass == "lumped":
+            rotary[:, 0] = 0.0
+    return BeamLines(
+        nodes=np.array([e.nodes for e in elements], dtype=np.int64),
+        axes=np.stack([e.axes for e in elements]),
+        lengths=np.array([e.length for e in elements]),
+        shear=np.array([shear_flexibility(e, shear) for e in elements]),
+        mass=density * np.array([e.section.area for e in elements]),
+        rotary=rotary,
+        lumped=mass == "lumped",
+    )

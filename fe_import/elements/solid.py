@@ -10,8 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.elements.solid_assembly import NodePattern, chunks, element_masses, element_stiffnesses
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh.solid_mesh import SolidMesh
 from fe_import.model import IntArray
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.mesh.solid_mesh import SolidMesh
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.model import Array, IntArray
 
 _CHUNK_VALUES = 3_000_000  # entries of element matrices held at a time

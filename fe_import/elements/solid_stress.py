@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_import.elements.solid_elements import SolidElement
-from fe_import.mesh.solid_mesh import SolidMesh
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.model import Array, IntArray
 
 _CHUNK_VALUES = 4_000_000  # stress values held at a time

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
-from fe_import.mesh.solid_mesh import FACE_TRIANGLES
+from fe_import.elements.solid_mesh import FACE_TRIANGLES
 from fe_import.model import IntArray
 
 _SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_import.description.link import Material
+from fe_import.description.records import Material
 from fe_import.errors import Cause, FEImportError
 from fe_import.modal.model import HealthCheck
 from fe_import.model import Array

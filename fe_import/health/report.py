@@ -17,11 +17,11 @@ from fe_import.health.rotation_terms import rotation_departure
 from fe_import.modal.inertia import InertiaInvariants, mass_properties
 from fe_import.modal.model import NO_LIMIT, HealthCheck
 from fe_import.model import Array, FEModel
+from fe_import.models.measures import GROUNDING, asymmetry, grounding, negative_diagonal
 from fe_import.reduction import Basis
 from fe_import.solver.sparse import modes_below
 
 _ROUNDING = 1e-9  # symmetry, mass properties: sums of many terms of one sign in double precision
-GROUNDING = 1e-7  # exported matrices carry 6 to 14 digits; a real ground spring is far above
 _RIGID = 1e-5  # rounding times the condition of a slender link's stiffness; a loose or grounded part gives 1
 _RIGID_PRINTED = 1e-4  # the same with the 14 digits of exported text, which leave 1.2e-5 on the L of 100 hexahedra
 _EIGEN = 1e-6
@@ -31,31 +31,6 @@ _CAUSES = {
     "grounding": Cause.GROUNDED,
     "rigid-body": Cause.NOT_DEFINITE,
 }
-
-
-def _norm(matrix: sp.csc_array) -> float:
-    return float(np.sqrt(matrix.multiply(matrix).sum()))
-
-
-def asymmetry(matrix: sp.csc_array) -> float:
-    """‖A - Aᵀ‖ / ‖A‖."""
-    total = _norm(matrix)
-    return _norm((matrix - matrix.T).tocsc()) / total if total else 0.0
-
-
-def grounding(model: FEModel) -> float:
-    """Largest force that a rigid-body motion causes, relative to the forces of its terms |K| |r|."""
-    rigid = model.rigid_body_modes()
-    force = np.abs(model.stiffness @ rigid).max(axis=0)
-    terms = (abs(model.stiffness) @ np.abs(rigid)).max(axis=0)
-    return float((force / np.where(terms > 0, terms, 1)).max())
-
-
-def negative_diagonal(matrix: sp.csc_array) -> float:
-    """Most negative diagonal entry, per the largest."""
-    diagonal = matrix.diagonal()
-    largest = np.abs(diagonal).max(initial=0.0)
-    return float(max(0.0, -diagonal.min()) / largest) if largest else 0.0
 
 
 def check_model(model: FEModel, where: str) -> tuple[HealthCheck, ...]:

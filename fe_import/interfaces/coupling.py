@@ -4,7 +4,7 @@
 are a solid's with rows 3 * node + component, the (n, 6) dof map and the number of rows of the matrices.
 
 Rules for adding a coupling: one file with a function that makes dofs of a `Dependence` follow, a branch in
-`couple_interfaces`, and its name in `fe_import.description.link` and `fe_import.modal.check`. Interface dofs stay
+`couple_interfaces`, and its name in `fe_import.description.check` and `fe_import.modal.check`. Interface dofs stay
 independent; rigid-body motion passes exactly.
 """
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
 from fe_import.errors import Cause, FEImportError
 from fe_import.interfaces.weights import area_weights
-from fe_import.mesh.solid_mesh import SolidMesh, surface_triangles
 from fe_import.model import Array, IntArray
 
 NARROW = 1e-4  # width of a face over its length; files of 6 digits leave 1e-6 on a line

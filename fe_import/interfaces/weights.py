@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import skfem
 
+from fe_import.elements.solid_mesh import SolidMesh, boundary_faces
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh.solid_mesh import SolidMesh, boundary_faces
 from fe_import.model import Array, IntArray
 
 _SHAPES: dict[int, Any] = {  # nodes of a face -> element whose shape functions it has

@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from fe_import.elements.solid_mesh import SolidMesh, element_faces
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh.solid_mesh import SolidMesh, element_faces
 from fe_import.model import Array, IntArray
 
 COINCIDENT = 1e-9  # of the mesh's size

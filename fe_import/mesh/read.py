@@ -1,6 +1,6 @@
 """Mesh files: everything that meshio reads -> a checked mesh of one solid element type with its named sets.
 
-meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX are read by `fe_import.abaqus.mesh`.
+meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX by `fe_import.mesh.abaqus_files`.
 """
 
 from __future__ import annotations
@@ -14,14 +14,12 @@ from typing import Any
 import numpy as np
 
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.checks import check_mesh, scaled_jacobians
 from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
-from fe_import.mesh.solid_mesh import SolidMesh, surface_triangles
 from fe_import.model import IntArray
-
-__all__ = ["SolidMesh", "read_mesh", "surface_triangles"]
 
 _BY_MESHIO_NAME = {element.meshio_name: name for name, element in SOLID_ELEMENTS.items()}
 
@@ -81,7 +79,7 @@ def _read(path: Path) -> RawMesh:
         )
     with unpacked(path) as plain:
         if plain.suffix.lower() == ".inp":
-            from fe_import.abaqus.mesh import read_abaqus
+            from fe_import.mesh.abaqus_files import read_abaqus
 
             return read_abaqus(plain, str(path))
         from fe_import.mesh.meshio_files import read_with_meshio  # meshio is heavy

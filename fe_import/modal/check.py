@@ -9,8 +9,8 @@ import numpy as np
 
 from fe_import.modal.identities import Check, check_matrices, check_orthonormal, check_rigid_motion
 from fe_import.modal.model import ModalModel
-from fe_import.recovery.file import check_recovery
-from fe_import.second_order.file import check_second_order
+from fe_import.modal.recovery_file import check_recovery
+from fe_import.modal.second_order_file import check_second_order
 
 FORMS = ("orthonormal", "physical")
 COUPLINGS = ("node", "rigid", "averaged")

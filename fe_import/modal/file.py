@@ -23,21 +23,9 @@ from fe_import.files.hdf5.files import (
 from fe_import.modal.check import validate
 from fe_import.modal.inertia import InertiaInvariants, MassProperties
 from fe_import.modal.model import FixedInterfaceModes, HealthCheck, ModalModel
+from fe_import.modal.recovery_file import read_recovery, write_recovery
+from fe_import.modal.second_order_file import read_second_order, write_second_order
 from fe_import.model import IntArray, InterfaceNode
-from fe_import.recovery.file import read_recovery, write_recovery
-from fe_import.second_order.file import read_second_order, write_second_order
-
-__all__ = [
-    "SCHEMA_VERSION",
-    "FixedInterfaceModes",
-    "HealthCheck",
-    "ModalModel",
-    "read_modal_file",
-    "read_modal_group",
-    "validate",
-    "write_modal_file",
-    "write_modal_group",
-]
 
 SCHEMA = "erls modal model"
 SCHEMA_VERSION = 3

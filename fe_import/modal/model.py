@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_import.modal.inertia import InertiaInvariants, MassProperties, mass_properties
+from fe_import.modal.recovery_maps import RecoveryMaps
+from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, IntArray, InterfaceNode
-from fe_import.recovery.maps import RecoveryMaps
-from fe_import.second_order.data import SecondOrder
 
 NO_LIMIT = float(np.finfo(np.float64).max)  # a figure that is reported, not judged; finite, as all in a file
 

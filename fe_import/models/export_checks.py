@@ -9,8 +9,8 @@ import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports import Export
-from fe_import.health.report import asymmetry
 from fe_import.models.export_rigid import listed
+from fe_import.models.measures import asymmetry
 
 _ASYMMETRY = 1e-9
 _LARGEST = 1e60  # of mass and stiffness in any unit; squares stay finite

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.health.report import GROUNDING, grounding
 from fe_import.model import Array, FEModel, IntArray
+from fe_import.models.measures import GROUNDING, grounding
 
 _LOCAL = 0.3  # share of the nodes at which a link is held, beyond which the matrix is another one
 _NOTICED = 1e-3  # of the largest force

@@ -9,14 +9,13 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from fe_import.description.link import Frame, Interface, LinkDescription, Material, Member
-from fe_import.elements.frame import FrameElement, assemble_frame, local_axes
+from fe_import.description.records import Frame, Interface, LinkDescription, Material, Member
+from fe_import.elements.frame import FrameElement, assemble_frame, beam_lines, local_axes
 from fe_import.elements.section_forces import frame_sections
 from fe_import.elements.sections import section_constants
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
 from fe_import.model import Array, FEModel, IntArray, InterfaceNode
-from fe_import.second_order.beams import beam_lines
 
 MOST_ELEMENTS = 100_000  # per member; a larger number is a slip
 

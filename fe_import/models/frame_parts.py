@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from fe_import.description.link import Frame, LinkDescription
+from fe_import.description.records import Frame, LinkDescription
 from fe_import.elements.frame import FrameElement
 from fe_import.elements.sections import SectionConstants
 from fe_import.model import Array

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.description.link import LinkFile, Matrices
+from fe_import.description.link import LinkFile
+from fe_import.description.records import Matrices
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports import EXPORTS, Export, ExportFormat
 from fe_import.files.toml import choose, convert

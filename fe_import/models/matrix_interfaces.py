@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fe_import.description.link import Interface, LinkDescription, Matrices
+from fe_import.description.records import Interface, LinkDescription, Matrices
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports import Export
 from fe_import.files.toml import choose

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.description.link import Inertia, LinkDescription, LinkFile, PointMass
+from fe_import.description.link import LinkFile
+from fe_import.description.records import Inertia, LinkDescription, PointMass
 from fe_import.errors import Cause, FEImportError, ReportedError
 from fe_import.files.toml import choose
 from fe_import.model import Array, FEModel, IntArray

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from fe_import.description.link import LinkDescription, LinkFile, Solid
+from fe_import.description.link import LinkFile
+from fe_import.description.records import LinkDescription, Solid
 from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
 from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.mesh.read import read_mesh
-from fe_import.mesh.solid_mesh import SolidMesh, surface_triangles
 from fe_import.model import FEModel
 
 

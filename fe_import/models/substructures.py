@@ -16,7 +16,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from fe_import.description.link import Interface, LinkDescription, LinkFile, Member, Recovery
+from fe_import.description.link import LinkFile
+from fe_import.description.records import Interface, LinkDescription, Member, Recovery
 from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, IntArray

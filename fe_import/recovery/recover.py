@@ -1,16 +1,16 @@
-"""Recovery maps of a reduction, and mode acceleration with them (see `fe_import.recovery.maps`)."""
+"""Recovery maps of a reduction, and mode acceleration with them (see `fe_import.modal.recovery_maps`)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fe_import.description.link import Recovery
+from fe_import.description.records import Recovery
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
 from fe_import.modal.inertia import turned
 from fe_import.modal.model import ModalModel
+from fe_import.modal.recovery_maps import SPIN_PAIRS, RecoveryMaps
 from fe_import.model import Array, FEModel, IntArray, StressSource
-from fe_import.recovery.maps import SPIN_PAIRS, RecoveryMaps
 from fe_import.reduction.base import expanded
 from fe_import.reduction.free_body import free_body
 
@@ -103,7 +103,7 @@ def inertia_relief(model: FEModel, loads: Array) -> Array:
 
 
 def _centrifugal_loads(model: FEModel) -> Array:
-    """(d, 6) loads per unit `fe_import.recovery.maps.spin_products`: minus A_a M R_b, as in the inertia invariants."""
+    """(d, 6) loads per unit spin product (see `SPIN_PAIRS`): minus A_a M R_b, as in the inertia invariants."""
     momentum = model.mass @ model.rigid_body_modes()[:, 3:]
     along = [turned(momentum, model.dof_map, a) for a in range(3)]
     columns = [-along[a][:, b] if a == b else -along[a][:, b] - along[b][:, a] for a, b in SPIN_PAIRS]

@@ -22,7 +22,7 @@ import numpy as np
 
 from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
-from fe_import.modal.file import FixedInterfaceModes
+from fe_import.modal.model import FixedInterfaceModes
 from fe_import.model import Array, FEModel, IntArray
 
 

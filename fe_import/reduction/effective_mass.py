@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.modal.file import FixedInterfaceModes
+from fe_import.modal.model import FixedInterfaceModes
 from fe_import.model import Array
 from fe_import.reduction.fixed_interface import Partition
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as la
 
-from fe_import.description.link import Damping
+from fe_import.description.records import Damping
 from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, FEModel

@@ -1,14 +1,13 @@
-"""The members of a frame as lines with mass, and the fields of their first-order strains."""
+"""The fields of first-order strains along the elements of a frame."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from fe_import.elements.frame import FrameElement, bending_shapes, shear_flexibility
-from fe_import.model import Array, IntArray
+from fe_import.elements.frame import bending_shapes
+from fe_import.model import Array, BeamLines
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 POINTS, WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
@@ -17,71 +16,6 @@ POINTS, WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
 _POWERS = np.arange(5)
 _FIT = np.linalg.inv(POINTS[:, None] ** _POWERS)
 INTEGRALS = (np.append(POINTS, 1.0)[:, None] ** (_POWERS + 1) / (_POWERS + 1)) @ _FIT
-
-
-@dataclass(frozen=True)
-class BeamLines:
-    """Elements of a frame.
-
-    Attributes
-    ----------
-    nodes : (e, 2) int array
-    axes : (e, 3, 3) array
-        Rows are the local axes in the mesh frame.
-    lengths : (e,) array
-        [m]
-    shear : (e, 2) array
-        Φ_y and Φ_z of `fe_import.elements.frame.shear_flexibility`.
-    mass : (e,) array
-        Per length [kg/m].
-    rotary : (e, 3) array
-        Rotary inertia per length about the local axes [kg m].
-    lumped : bool
-        Half of each element at either of its nodes.
-    """
-
-    nodes: IntArray
-    axes: Array
-    lengths: Array
-    shear: Array
-    mass: Array
-    rotary: Array
-    lumped: bool
-
-    @property
-    def is_tree(self) -> bool:
-        """Whether there is one way from each node to each other (the lines are connected)."""
-        return len(self.nodes) < len(np.unique(self.nodes))
-
-    def converted(self, length: float, mass: float) -> BeamLines:
-        """In SI, from units of ``length`` metres and ``mass`` kilograms."""
-        return replace(
-            self,
-            lengths=self.lengths * length,
-            mass=self.mass * (mass / length),
-            rotary=self.rotary * (mass * length),
-        )
-
-
-def beam_lines(elements: Sequence[FrameElement], shear: bool, mass: str, rotary_inertia: bool) -> BeamLines:
-    """Lines of frame elements; see `fe_import.elements.frame.assemble_frame` for the options."""
-    polar = np.array([[e.section.inertia_y + e.section.inertia_z, e.section.inertia_y, e.section.inertia_z]
-                      for e in elements])  # fmt: skip
-    density = np.array([e.density for e in elements])
-    rotary = polar * density[:, None]
-    if not rotary_inertia:
-        rotary[:, 1:] = 0.0
-        if mass == "lumped":
-            rotary[:, 0] = 0.0
-    return BeamLines(
-        nodes=np.array([e.nodes for e in elements], dtype=np.int64),
-        axes=np.stack([e.axes for e in elements]),
-        lengths=np.array([e.length for e in elements]),
-        shear=np.array([shear_flexibility(e, shear) for e in elements]),
-        mass=density * np.array([e.section.area for e in elements]),
-        rotary=rotary,
-        lumped=mass == "lumped",
-    )
 
 
 @dataclass(frozen=True)

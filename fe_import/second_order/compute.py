@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, FEModel, IntArray
-from fe_import.second_order.data import SecondOrder
 from fe_import.second_order.frame import frame_second_order
 
 MOST_MODES = 64  # elastic; the field has as many columns as pairs of them

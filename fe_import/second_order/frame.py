@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.model import Array, FEModel, IntArray
-from fe_import.second_order.beams import INTEGRALS, POINTS, WEIGHTS, BeamLines, LineFields, line_fields
+from fe_import.modal.second_order import SecondOrder
+from fe_import.model import Array, BeamLines, FEModel, IntArray
+from fe_import.second_order.beams import INTEGRALS, POINTS, WEIGHTS, LineFields, line_fields
 from fe_import.second_order.composition import composed, composed_rotation, paired, twice_turned
-from fe_import.second_order.data import SecondOrder
 from fe_import.second_order.moments import of_inertia, of_masses, of_modes
 
 Pair = tuple[Array, Array]  # Ψ of a displacement and of a rotation vector, (3, n, n) each

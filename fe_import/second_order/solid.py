@@ -18,10 +18,10 @@ import numpy as np
 
 from fe_import.elements.solid_assembly import chunks
 from fe_import.elements.solid_stress import SolidStress
+from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import expanded
 from fe_import.second_order.composition import composed_rotation, twice_turned
-from fe_import.second_order.data import SecondOrder
 from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_modes, of_moments
 from fe_import.solver.sparse import factorize
 

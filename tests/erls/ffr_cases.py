@@ -9,8 +9,8 @@ from pathlib import Path
 import chain_cases
 import numpy as np
 import scenes
-
 from erls.equations.ffr.compiled import compile_frames
+
 from erls.equations.ffr.equations import Ffr
 from erls.mechanism.chain import Mechanism
 

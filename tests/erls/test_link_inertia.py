@@ -13,7 +13,7 @@ from erls.equations.erls.paper.link_inertia import LinkInertia, moment_about
 from erls.maths.so3 import skew
 from erls.mechanism.links import payload_invariants, rigid_model
 from fe_import.description.link import load_link
-from fe_import.modal.file import ModalModel
+from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_model

@@ -16,8 +16,8 @@ from solid_meshes import box
 
 from fe_import.description.link import LinkFile, load_link
 from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh.solid_mesh import SolidMesh
 from fe_import.reduce import reduce_link
 
 Files = dict[str, bytes]

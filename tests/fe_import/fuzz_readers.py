@@ -22,11 +22,14 @@ from modal_models import synthetic_model
 from solid_meshes import box
 from superelements import Reduced, condensed, deck, frame_model, matrix_input, punch, substructure
 
-from fe_import.description.link import LinkDescription, load_link
+from fe_import.description.link import load_link
+from fe_import.description.records import LinkDescription
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.health.report import check_model
 from fe_import.mesh.read import read_mesh
-from fe_import.mesh.solid_mesh import SolidMesh
-from fe_import.modal.file import ModalModel, read_modal_file, validate, write_modal_file, write_modal_group
+from fe_import.modal.check import validate
+from fe_import.modal.file import read_modal_file, write_modal_file, write_modal_group
+from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
 

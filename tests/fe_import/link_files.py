@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from solid_meshes import box
 
 from fe_import.description.link import LinkFile, load_link
-from fe_import.modal.file import ModalModel
+from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import scipy.sparse.linalg as spla
 from link_files import SOLID, Array, boundary, frame_link, interface_shapes, solid_link, straight_link
 
 from fe_import.description.link import LinkFile
-from fe_import.modal.file import ModalModel
+from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 
 HUB, HAND = {"name": "hub", "node": "root"}, {"name": "hand", "node": "tip"}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.modal.file import FixedInterfaceModes, HealthCheck, ModalModel
 from fe_import.modal.inertia import inertia_invariants, mass_properties
+from fe_import.modal.model import FixedInterfaceModes, HealthCheck, ModalModel
 from fe_import.model import FEModel, InterfaceNode
 
 

@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
-from fe_import.mesh.solid_mesh import SolidMesh
+from fe_import.elements.solid_mesh import SolidMesh
 
 
 def box(

@@ -13,6 +13,7 @@ from link_files import clamped_flexibility, frame_link, solid_link, write_box
 from solid_meshes import box, quarter_ring
 
 from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
 from fe_import.interfaces import averaged as coupling_averaged
@@ -20,7 +21,6 @@ from fe_import.interfaces.coupling import Coupling, couple_interfaces
 from fe_import.interfaces.dependence import arm
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.interfaces.weights import area_weights, nodal_areas
-from fe_import.mesh.solid_mesh import SolidMesh
 from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 from fe_import.reduce import reduce_link

@@ -32,11 +32,11 @@ from solid_meshes import box
 
 from fe_import.description.link import load_link
 from fe_import.elements.solid import assemble_solid
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause
 from fe_import.exports.calculix import read_calculix
 from fe_import.exports.inp_elements import picture
 from fe_import.exports.inp_mesh import read_inp
-from fe_import.mesh.solid_mesh import SolidMesh
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 from fe_import.solver.sparse import lowest_modes

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import pytest
 from link_files import FRAME, SOLID, frame_link, merged, write_box, write_toml
 
-from fe_import.description.link import LinkDescription, load_link
+from fe_import.description.link import load_link
+from fe_import.description.records import LinkDescription
 from fe_import.errors import Cause, FEImportError, ReportedError, shortened
 from fe_import.files.toml import choose, convert, read_toml
 from fe_import.reduce import reduce_link

@@ -12,7 +12,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from link_files import FRAME, dense, frame_link, solid_link, straight_link
 
-from fe_import.description.link import LinkFile, Reduction
+from fe_import.description.link import LinkFile
+from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
 from fe_import.health.report import check_basis, check_model, mode_residuals
 from fe_import.health.rigid_motion import rigid_motion_as_eigenmodes, rigid_motion_by_stiffness

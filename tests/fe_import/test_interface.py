@@ -11,10 +11,11 @@ import scipy.linalg
 from solid_meshes import box, quarter_ring
 
 from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.interfaces.coupling import Coupling, couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
-from fe_import.mesh.read import SolidMesh, read_mesh
+from fe_import.mesh.read import read_mesh
 from fe_import.model import FEModel
 
 L_MESH = Path(__file__).parents[2] / "data" / "l_shape" / "meshes" / "l_hex20.msh"

@@ -24,7 +24,8 @@ from link_files import (
     write_toml,
 )
 
-from fe_import.description.link import Reduction, load_link
+from fe_import.description.link import load_link
+from fe_import.description.reduction import Reduction
 from fe_import.errors import FEImportError
 from fe_import.modal.inertia import MassProperties, mass_properties
 from fe_import.model import FEModel

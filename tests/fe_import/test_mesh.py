@@ -11,9 +11,10 @@ import pytest
 from solid_meshes import box, quarter_ring
 
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
 from fe_import.errors import Cause, FEImportError
 from fe_import.interfaces.faces import interface_face
-from fe_import.mesh.read import SolidMesh, read_mesh, surface_triangles
+from fe_import.mesh.read import read_mesh
 
 L_MESH = Path(__file__).parents[2] / "data" / "l_shape" / "meshes" / "l_hex20.msh"
 TYPES = sorted(SOLID_ELEMENTS)

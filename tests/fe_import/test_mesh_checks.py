@@ -9,9 +9,9 @@ import pytest
 from solid_meshes import box
 
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.checks import check_mesh, scaled_jacobians
-from fe_import.mesh.solid_mesh import SolidMesh
 
 TYPES = sorted(SOLID_ELEMENTS)
 

@@ -12,9 +12,9 @@ from link_files import solid_link
 from solid_meshes import box
 
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.read import read_mesh
-from fe_import.mesh.solid_mesh import SolidMesh
 from fe_import.models.model import build_model
 
 TYPES = sorted(SOLID_ELEMENTS)

@@ -16,14 +16,9 @@ from modal_models import same, synthetic_model
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.hdf5.files import open_for_reading, write_atomically
-from fe_import.modal.file import (
-    ModalModel,
-    read_modal_file,
-    read_modal_group,
-    validate,
-    write_modal_file,
-    write_modal_group,
-)
+from fe_import.modal.check import validate
+from fe_import.modal.file import read_modal_file, read_modal_group, write_modal_file, write_modal_group
+from fe_import.modal.model import ModalModel
 
 MODEL = synthetic_model()
 

@@ -20,7 +20,7 @@ import fe_import.reduction.selection
 from fe_import.description.link import load_link
 from fe_import.description.reduction import COMPONENTS, SELECTIONS, Ranking
 from fe_import.errors import Cause, FEImportError
-from fe_import.modal.file import ModalModel
+from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model

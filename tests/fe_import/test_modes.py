@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from link_files import Array, dense, frame_link, free_frequencies, merged, solid_link, straight_link
 
 import fe_import.solver.sparse
-from fe_import.description.link import Damping, Rayleigh
+from fe_import.description.records import Damping, Rayleigh
 from fe_import.errors import Cause, FEImportError
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model

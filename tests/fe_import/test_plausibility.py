@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from link_files import frame_link, solid_link, write_box
 
-from fe_import.description.link import Material, load_link
+from fe_import.description.link import load_link
+from fe_import.description.records import Material
 from fe_import.errors import Cause, FEImportError
 from fe_import.health.plausibility import plausible_link, plausible_materials
 from fe_import.mesh.read import read_mesh

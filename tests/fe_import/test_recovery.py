@@ -24,13 +24,15 @@ from link_files import (
 from modal_models import same
 from solid_meshes import box
 
-from fe_import.description.link import LinkFile, Recovery
+from fe_import.description.link import LinkFile
+from fe_import.description.records import Recovery
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
-from fe_import.modal.file import ModalModel, read_modal_file, write_modal_file
+from fe_import.modal.file import read_modal_file, write_modal_file
+from fe_import.modal.model import ModalModel
+from fe_import.modal.recovery_maps import RecoveryMaps, spin_products, von_mises
 from fe_import.models.model import build_model
-from fe_import.recovery.maps import RecoveryMaps, spin_products, von_mises
 from fe_import.recovery.recover import inertia_relief, mode_acceleration, recovery_maps, required_maps
 from fe_import.reduce import reduce_link, reduction_summary
 

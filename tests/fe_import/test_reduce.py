@@ -13,7 +13,8 @@ import fe_import
 import fe_import.reduce
 from fe_import.description.link import LinkFile, load_link
 from fe_import.errors import FEImportError
-from fe_import.modal.file import ModalModel, read_modal_file, write_modal_file
+from fe_import.modal.file import read_modal_file, write_modal_file
+from fe_import.modal.model import ModalModel
 from fe_import.reduce import cache_key, reduce_cached, reduce_link, reduction_summary
 
 KINDS = pytest.mark.parametrize("make", [frame_link, solid_link])

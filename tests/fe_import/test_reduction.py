@@ -27,7 +27,8 @@ from link_files import (
 
 from fe_import.description.link import LinkFile, load_link
 from fe_import.errors import Cause, FEImportError
-from fe_import.modal.file import ModalModel, read_modal_file, write_modal_file
+from fe_import.modal.file import read_modal_file, write_modal_file
+from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model

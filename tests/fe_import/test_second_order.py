@@ -16,14 +16,16 @@ from scipy.spatial.transform import Rotation
 from fe_import.description.link import LinkFile
 from fe_import.elements.solid_stress import SolidStress
 from fe_import.errors import Cause, FEImportError
-from fe_import.modal.file import ModalModel, read_modal_file, validate, write_modal_file
+from fe_import.modal.check import validate
+from fe_import.modal.file import read_modal_file, write_modal_file
+from fe_import.modal.model import ModalModel
+from fe_import.modal.second_order import SecondOrder, pair_numbers
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 from fe_import.second_order.beams import POINTS, line_fields
 from fe_import.second_order.composition import twice_turned
 from fe_import.second_order.compute import MOST_DOFS_OF_SOLIDS, MOST_MODES, MOST_MODES_OF_SOLIDS, second_order
-from fe_import.second_order.data import SecondOrder, pair_numbers
 from fe_import.second_order.frame import frame_second_order
 from fe_import.second_order.moments import of_inertia, of_masses
 from fe_import.second_order.solid import solid_second_order

@@ -16,9 +16,9 @@ from solid_meshes import box, quarter_ring
 
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.checks import check_mesh
-from fe_import.mesh.solid_mesh import SolidMesh
 from fe_import.modal.inertia import mass_properties
 
 STEEL = SolidMaterial(2.1e11, 0.3, 7850.0)

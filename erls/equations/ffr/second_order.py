@@ -1,7 +1,7 @@
 """Standard data of a body with its second-order displacement ½ ηᵀ Ψ η: geometric stiffening.
 
 Beside the blocks of T = ½ νᵀ M ν + νᵀ C η̇ + ½ η̇ᵀ M_e η̇ the second-order displacement has, with the tensors of
-`fe_import.second_order.data` in the elastic coordinates,
+`fe_import.modal.second_order` in the elastic coordinates,
 
     C₂(η) = [S_ab η; ηᵀ P],   H(η) = [0, -S̃; 0, ½ ηᵀ W η],   S = ½ ηᵀ S_ab η
 

@@ -19,7 +19,7 @@ from erls.maths import motion_maps as motions
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.mechanism.links import Link, link_mass_properties
-from fe_import.description.link import Frame
+from fe_import.description.records import Frame
 from fe_import.elements.frame import FrameElement
 from fe_import.models.frame import FrameMesh
 from fe_import.models.frame_parts import FrameParts, frame_parts

@@ -1,6 +1,6 @@
 """Inertia of the elastic modes that changes with the deformation, through their displacements ½ qᵀ Ψ q.
 
-With K of `fe_import.second_order.data` the kinetic energy of a link holds q̇_c K_cab q_a q̇_b, the velocity of second
+With K of `fe_import.modal.second_order` the kinetic energy of a link holds q̇_c K_cab q_a q̇_b, the velocity of second
 order times that of the elastic modes. What second-order momenta h = C q̇ contribute already, as those of a rigid-body
 motion (`erls.equations.erls.paper.second_order_inertia`), is taken off: k = K(q) q̇ - Φᵀm ρ M₀⁻¹ h. Then
 

@@ -19,9 +19,9 @@ from erls.maths.so3 import Array
 from erls.mechanism.links import Link, node_shape6
 from erls.mechanism.second_order import LinkSecondOrder, link_second_order
 from fe_import.modal.model import ModalModel
+from fe_import.modal.second_order import SecondOrder
 from fe_import.model import IntArray
 from fe_import.second_order.composition import composed
-from fe_import.second_order.data import SecondOrder
 from fe_import.second_order.moments import of_masses
 
 _VALUES = 2_000_000  # entries of the fields of nodes: 16 MB

@@ -4,7 +4,7 @@ Two things are left out. Points do not come nearer when the link bends: the seco
 (foreshortening, ½∫w'²dx of a beam). And loads do no work on it, so that compression does not soften nor tension
 stiffen: with G the stiffness that interface loads F, inertia and weight make of it,
 
-    G = -Σ F·Ψ + (a - g)·S + α·P - ω_c ω_d W_cd        (S, P, W: `fe_import.second_order.data.SecondOrder`),
+    G = -Σ F·Ψ + (a - g)·S + α·P - ω_c ω_d W_cd        (S, P, W: `fe_import.modal.second_order.SecondOrder`),
 
 r = qᵀGq / qᵀΩ²q is the load relative to the one that would buckle the link in the shape that it has. A deflection δ is
 then wrong by δ |r|, and vibrations run out of step by ½ ω ∫r dt, which moves them by 2 δ at most. With σ for ω times

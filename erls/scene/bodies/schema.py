@@ -13,7 +13,7 @@ from erls.mechanism.motions import Motion
 from erls.mechanism.profiles import Load as Profile
 from erls.scene.bodies.analyses import Analysis
 from erls.scene.records import Record, SceneFile, SceneTables
-from fe_import.description.link import Inertia, Material, PointMass, Vector
+from fe_import.description.records import Inertia, Material, PointMass, Vector
 from fe_import.elements.sections import Section
 
 GROUND = "ground"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import enum
 import os
-import secrets
 import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,7 +21,7 @@ from fe_import.files.hdf5.audit import Limits, audit
 from fe_import.files.hdf5.seal import ATTRIBUTE, seal_of
 from fe_import.files.hdf5.sink import Sink
 from fe_import.files.hdf5.values import REMEDY, Reader, translated, write_array, write_attribute, write_strings
-from fe_import.files.output import refusal
+from fe_import.files.output import replacing
 
 __all__ = [
     "Reader",
@@ -104,32 +103,10 @@ def write_atomically(
     error, cause
         Raised when the file cannot be written (missing folder, no permission, disk full).
     """
-    where = str(path)
-    try:
-        target = Path(os.path.realpath(path))  # through a link to a file, not over it
-        problem = refusal(target)
-    except (OSError, ValueError) as failure:
-        problem = (str(failure), "choose another path")
-    if problem:
-        raise error(cause, f"cannot be written: {problem[0]}", where=where, remedy=problem[1])
-    temporary = target.with_name(f".{os.getpid()}-{secrets.token_hex(8)}.h5.tmp")
-    try:
-        try:
-            with Sink(temporary) as sink:
-                _fill(sink, write)
-            os.replace(temporary, target)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
-        with contextlib.suppress(OSError):  # not every system syncs folders
-            _sync_folder(target.parent)
-    except OSError as problem:
-        raise error(
-            cause,
-            f"cannot be written: {problem}",
-            where=where,
-            remedy="free disk space, or choose another path",
-        ) from problem
+    with replacing(path, error, cause) as temporary, Sink(temporary) as sink:
+        _fill(sink, write)
+    with contextlib.suppress(OSError):  # not every system syncs folders
+        _sync_folder(Path(os.path.realpath(path)).parent)
 
 
 def _fill(sink: Sink, write: Callable[[h5py.Group], None]) -> None:

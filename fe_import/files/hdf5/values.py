@@ -1,6 +1,6 @@
 """Values inside an HDF5 file: a typed reader that names what is wrong and where, and the writers.
 
-The reader expects a file that passed `fe_import.hdf5_audit.audit`.
+The reader expects a file that passed `fe_import.files.hdf5.audit.audit`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Of the velocity of that displacement the kinetic energy needs, to second order in q, what it has in common with
 rigid-body motions: the momenta, with ν = [v; ω] the twist of the link's frame and the tensors of
-`fe_import.second_order.data`,
+`fe_import.modal.second_order`,
 
     h = C q̇ + H ν,   C = [S_ab q; qᵀ P],   H = [0, -S̃; 0, ½ qᵀ W q],   S = ½ qᵀ S_ab q.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fe_import.files.hdf5.files import Reader, write_array, write_attribute
 from fe_import.modal.identities import EXACT, Check
-from fe_import.recovery.maps import COMPONENTS, UNITS, RecoveryMaps
+from fe_import.modal.recovery_maps import COMPONENTS, UNITS, RecoveryMaps
 
 if TYPE_CHECKING:
     from fe_import.modal.model import ModalModel

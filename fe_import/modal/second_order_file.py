@@ -9,7 +9,7 @@ import numpy as np
 
 from fe_import.files.hdf5.files import Reader, write_array
 from fe_import.modal.identities import EXACT, Check
-from fe_import.second_order.data import SecondOrder
+from fe_import.modal.second_order import SecondOrder
 
 if TYPE_CHECKING:
     from fe_import.modal.model import ModalModel

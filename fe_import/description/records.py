@@ -1,0 +1,315 @@
+"""Link descriptions (TOML): the schema and its defaults.
+
+Every record below is one table of the file; unknown keys are errors with a suggestion.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from fe_import.description.reduction import Reduction
+from fe_import.elements.sections import Section
+
+Vector = tuple[float, float, float]
+Inertia = tuple[float | Vector, float | Vector, float | Vector]  # [Ixx, Iyy, Izz] or a 3x3 matrix
+
+
+class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    pass
+
+
+class Units(_Record, frozen=True):
+    """Units of the description and its mesh; converted to SI at the border.
+
+    Attributes
+    ----------
+    length : str
+        ``m``, ``cm``, ``mm``, ``in`` or ``ft``.
+    mass : str
+        ``kg``, ``g``, ``t``, ``lb``, or with pounds of force ``slug`` (feet) or ``lbf*s2/in`` (inches).
+    time : str
+        ``s`` or ``ms``.
+    """
+
+    length: str = "m"
+    mass: str = "kg"
+    time: str = "s"
+
+
+class Material(_Record, frozen=True):
+    """Isotropic linear elastic material, in the stated units.
+
+    Attributes
+    ----------
+    youngs_modulus : float
+        E [Pa].
+    poissons_ratio : float
+        ν, between -1 and 0.5.
+    density : float
+        ρ [kg/m³].
+    """
+
+    youngs_modulus: float
+    poissons_ratio: float
+    density: float
+
+
+class Member(_Record, frozen=True):
+    """A straight member between two named nodes; its inner nodes are named ``FROM-TO/1`` ... in order.
+
+    Attributes
+    ----------
+    start, end : str
+        Nodes of ``[frame.nodes]``.
+    material : str
+        A name from ``[materials]``.
+    section : str
+        A name from ``[sections]``.
+    elements : int
+        Elements of equal length.
+    local_z : (3,) floats, optional
+        Direction of the section's height; z, or y for members along z, unless given.
+    """
+
+    start: str = msgspec.field(name="from")
+    end: str = msgspec.field(name="to")
+    material: str = ""
+    section: str = ""
+    elements: int = 1
+    local_z: Vector | None = None
+
+
+class Frame(_Record, frozen=True):
+    """A link made of beams.
+
+    Attributes
+    ----------
+    nodes : dict of (3,) floats
+        Positions of named nodes [m], mesh frame.
+    members : list of Member
+        Beams between them, ``[[frame.members]]``.
+    theory : str
+        ``timoshenko``, or ``euler-bernoulli``: no shear deformation.
+    mass : str
+        ``consistent`` with the interpolation of the elements, or ``lumped`` at the nodes.
+    rotary_inertia : bool
+        Cross sections resist turning.
+    torsion : str
+        Torsion constant of a section: ``saint-venant``, or ``polar``, Iy + Iz, as some programs take it.
+    """
+
+    nodes: dict[str, Vector]
+    members: list[Member]
+    theory: str = "timoshenko"
+    mass: str = "consistent"
+    rotary_inertia: bool = True
+    torsion: str = "saint-venant"
+
+
+class Region(_Record, frozen=True):
+    """The elements of a named set of the mesh, and their material.
+
+    Attributes
+    ----------
+    set : str
+        Element set of the mesh.
+    material : str
+        A name from ``[materials]``.
+    """
+
+    set: str
+    material: str
+
+
+class Solid(_Record, frozen=True):
+    """A link meshed with solid elements.
+
+    Attributes
+    ----------
+    mesh : str
+        Any file that meshio reads, also packed as ``.gz``; the path starts at the description.
+    material : str
+        A name from ``[materials]``, for the whole mesh.
+    regions : list of Region
+        Instead of ``material``: one for each set of elements, ``[[solid.regions]]``.
+    nodes : dict of (3,) floats
+        Names for the mesh nodes nearest to these positions [m]; scenes may refer to them.
+    """
+
+    mesh: str
+    material: str = ""
+    regions: list[Region] = []
+    nodes: dict[str, Vector] = {}
+
+
+class Matrices(_Record, frozen=True):
+    """A link whose mass and stiffness matrices a finite-element program exported.
+
+    Attributes
+    ----------
+    format : str
+        The reader of the files.
+    files : dict of str
+        Files by their role: ``stiffness``, ``mass``, ``dofs``, ``mesh``, ``nodes``, ``sets``; which of them, the format
+        says.
+    options : dict
+        What the format wants to know besides, see below.
+    nodes : dict of int or (3,) floats
+        Names of nodes that interfaces, masses and scenes may refer to, by number in that program or by position [m]
+        (nearest node).
+    """
+
+    format: str
+    files: dict[str, str]
+    options: dict[str, Any] = {}
+    nodes: dict[str, int | Vector] = {}
+
+
+class PointMass(_Record, frozen=True):
+    """A rigid mass added to a node.
+
+    Attributes
+    ----------
+    node : str
+        A named node, or an interface.
+    mass : float
+        [kg]
+    inertia : (3,) floats or (3, 3) floats
+        About the node [kg m²]: [Ixx, Iyy, Izz], or a symmetric matrix, mesh axes.
+    """
+
+    node: str
+    mass: float = 0.0
+    inertia: Inertia = (0.0, 0.0, 0.0)
+
+
+class Interface(_Record, frozen=True):
+    """A node where a joint sits: a node of a frame, or one that moves with a face.
+
+    Attributes
+    ----------
+    name : str
+        What scenes call it.
+    node : str
+        A named node; give this or ``face``.
+    face : str
+        A node or face set of the mesh.
+    coupling : str
+        How a face goes with the interface node: it follows, ``rigid`` (RBE2), or the node moves as the face does on
+        average, ``averaged`` (RBE3).
+    weights : str
+        Of ``averaged``: each node's share of the ``area`` (the default on a mesh), or ``uniform``.
+    position : (3,) floats, optional
+        Of the interface node of a face [m], mesh frame; the centre of the face unless given.
+    """
+
+    name: str
+    node: str = ""
+    face: str = ""
+    coupling: str = "rigid"
+    weights: str = ""
+    position: Vector | None = None
+
+
+class Recovery(_Record, frozen=True):
+    """Where stress (solids) or section forces (frames) can be found from the modal coordinates later.
+
+    Attributes
+    ----------
+    nodes : list of str
+        Named nodes.
+    sets : list of str
+        Node or element sets of the mesh, or members of a frame (``FROM-TO``).
+    all : bool
+        Everywhere.
+    """
+
+    nodes: list[str] = []
+    sets: list[str] = []
+    all: bool = False
+
+
+class Rayleigh(_Record, frozen=True):
+    """Damping matrix ``alpha`` M + ``beta`` K; a mode of the angular frequency ω has the ratio α/2ω + βω/2.
+
+    Attributes
+    ----------
+    alpha : float
+        Share of the mass matrix [1/s].
+    beta : float
+        Share of the stiffness matrix [s].
+    """
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+
+class Damping(_Record, frozen=True):
+    """Modal damping, stated in one way; none unless given.
+
+    Attributes
+    ----------
+    ratio : float, optional
+        Damping ratio of all elastic modes; 1 is critical.
+    ratios : list of float, optional
+        Ratios from the lowest elastic mode on; 0 for modes beyond the list.
+    rayleigh : Rayleigh, optional
+        Ratios from shares of mass and stiffness.
+    """
+
+    ratio: float | None = None
+    ratios: list[float] | None = None
+    rayleigh: Rayleigh | None = None
+
+
+class LinkDescription(_Record, frozen=True):
+    """A link: exactly one of ``frame``, ``solid`` and ``matrices``, its interfaces and its reduction.
+
+    Attributes
+    ----------
+    interfaces : list of Interface
+        Where joints sit, at least one: ``[[interfaces]]``; the first is the inboard one unless a scene says otherwise.
+    name : str
+        Of the link; that of the file unless given.
+    units : Units
+        Of the numbers in the description, of its mesh and of exported matrices.
+    materials : dict of Material
+        By name, ``[materials.NAME]``.
+    sections : dict of Section
+        Cross sections of beams by name, ``[sections.NAME]``.
+    frame : Frame, optional
+        The link is made of beams.
+    solid : Solid, optional
+        The link is meshed with solid elements.
+    matrices : Matrices, optional
+        The link comes as exported matrices.
+    masses : list of PointMass
+        Rigid masses on nodes, ``[[masses]]``.
+    reduction : Reduction
+        How the model is reduced.
+    damping : Damping
+        Of the elastic modes.
+    recovery : Recovery, optional
+        Where stress or section forces are wanted; without it the modal file holds nothing for them.
+    """
+
+    interfaces: list[Interface]
+    name: str = ""
+    units: Units = Units()
+    materials: dict[str, Material] = {}
+    sections: dict[str, Section] = {}
+    frame: Frame | None = None
+    solid: Solid | None = None
+    matrices: Matrices | None = None
+    masses: list[PointMass] = []
+    reduction: Reduction = Reduction()
+    damping: Damping = Damping()
+    recovery: Recovery | None = None
+
+    def files(self) -> list[str]:
+        """The files that it names, as they stand there."""
+        if self.solid is not None:
+            return [self.solid.mesh]
+        return [] if self.matrices is None else [name for _, name in sorted(self.matrices.files.items())]

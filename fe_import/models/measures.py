@@ -1,0 +1,35 @@
+"""How far the matrices of a model are from those of a free link: symmetry, definiteness, resistance to rigid motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_import.model import FEModel
+
+GROUNDING = 1e-7  # exported matrices carry 6 to 14 digits; a real ground spring is far above
+
+
+def _norm(matrix: sp.csc_array) -> float:
+    return float(np.sqrt(matrix.multiply(matrix).sum()))
+
+
+def asymmetry(matrix: sp.csc_array) -> float:
+    """‖A - Aᵀ‖ / ‖A‖."""
+    total = _norm(matrix)
+    return _norm((matrix - matrix.T).tocsc()) / total if total else 0.0
+
+
+def grounding(model: FEModel) -> float:
+    """Largest force that a rigid-body motion causes, relative to the forces of its terms |K| |r|."""
+    rigid = model.rigid_body_modes()
+    force = np.abs(model.stiffness @ rigid).max(axis=0)
+    terms = (abs(model.stiffness) @ np.abs(rigid)).max(axis=0)
+    return float((force / np.where(terms > 0, terms, 1)).max())
+
+
+def negative_diagonal(matrix: sp.csc_array) -> float:
+    """Most negative diagonal entry, per the largest."""
+    diagonal = matrix.diagonal()
+    largest = np.abs(diagonal).max(initial=0.0)
+    return float(max(0.0, -diagonal.min()) / largest) if largest else 0.0
