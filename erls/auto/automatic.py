@@ -135,7 +135,7 @@ class _Physics:
             return True
         if problem.cause != Cause.RUNAWAY or not self._may_add:
             return False
-        self._add(addition(self.scene, self.whole, f"without them the run fails ({problem.message})"))
+        self._add(addition(self.whole, f"without them the run fails ({problem.message})"))
         return True
 
     def stiffens(self, run: Run, strict: bool) -> bool:
@@ -146,7 +146,7 @@ class _Physics:
         lost = unstable(run.warnings)
         if not lost and not (strict and error > tolerance):
             return False
-        self._add(addition(self.scene, self.whole, lost or off_by(error, tolerance)))
+        self._add(addition(self.whole, lost or off_by(error, tolerance)))
         return True
 
     def warnings(self, run: Run) -> list[str]:

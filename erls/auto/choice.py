@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 
 from erls.auto.certify import FEWEST
 from erls.auto.coordinates import same_start
-from erls.auto.cost import cost_of
 from erls.auto.cuts import Cut, possible_cuts
+from erls.auto.operations import operations
 from erls.auto.probe import coarse_run, deformation, difference, look_steps, needed, resolved, too_coarse
 from erls.auto.purse import Purse
 from erls.auto.resolution import Vibrations
@@ -181,8 +181,7 @@ class _Looks:
             return
         less = cut.applied(mechanism)
         if self.purse is not None:
-            cost = cost_of(formulate(less, self.scene.record.simulation))
-            price = self.purse.look(cost, self.count) + self.purse.comparison
+            price = self.purse.look(operations(less), self.count) + self.purse.comparison
             after = self.purse.saved(Choice((*self.taken, cut)).applied(mechanism))
             gain = after - self.purse.won - (0.0 if self.taken else self.purse.certificate)
             if not self.purse.affords(price) or gain < price:

@@ -26,7 +26,7 @@ from erls.mechanism.chain import Mechanism
 KNOTS = 512  # of s(t), all legs together
 _FEWEST, _MOST = 8, 4096  # in a leg; all together
 _STRAIGHT = 3e-4  # of the largest deflection: how far s(t) may be from a straight line between knots
-_CONFIGURATIONS = 5
+CONFIGURATIONS = 5
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def forced_vibrations(system: Any, duration: float, y: Array, v: Array) -> Force
     if loads is None:
         return None
     knots = np.concatenate([t for t, _ in loads])
-    at = knots[np.linspace(0, len(knots) - 1, _CONFIGURATIONS).astype(int)]
+    at = knots[np.linspace(0, len(knots) - 1, CONFIGURATIONS).astype(int)]
     rest = np.zeros(system.size)
     stiffness = system.stiffness_and_damping(0.0, rest, rest)[0]
     values, shapes, amplitudes = [], [], []

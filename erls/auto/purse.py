@@ -1,24 +1,25 @@
-"""Whether deciding what to leave out pays: estimated times, by counting (`erls.auto.cost`)."""
+"""Whether deciding what to leave out pays: operations against operations (`erls.auto.operations`)."""
 
 from __future__ import annotations
 
 from erls.auto import certify, probe
-from erls.auto.cost import (
+from erls.auto.operations import (
+    CALL,
     CALM,
+    EFFORT,
     FIXED,
     FOLLOWING,
     ITERATIONS,
     PREPARE,
+    REACTION,
     STATE,
-    Cost,
-    cost_of,
-    count_steps,
-    effort_cost,
-    forced_cost,
+    Operations,
+    operations,
 )
+from erls.auto.outputs import driven_joints, reacting
+from erls.auto.pilot import count_steps
 from erls.auto.static import may_follow
 from erls.equations.formulation import Formulation
-from erls.equations.registry import formulate
 from erls.mechanism.chain import Mechanism
 from erls.scene.chain import Scene
 
@@ -27,14 +28,15 @@ _FOLLOWED = 4  # iterations of a step of the certificate
 
 
 class Purse:
-    """Estimated times [s]: of the run, of what was spent on looks, and what they won."""
+    """Operations: of the run, of what was spent on looks, and what they won."""
 
     def __init__(self, scene: Scene, formulation: Formulation) -> None:
         self.settings, self.mechanism = scene.record.simulation, formulation.mechanism
-        self.cost = cost_of(formulation)
+        self.cost = operations(self.mechanism)
         self.steps = count_steps(scene, self.mechanism)
         self.forced = may_follow(self.mechanism, self.settings)
-        self.effort = effort_cost(formulation)
+        freed = reacting(formulation) is not None
+        self.effort = (EFFORT if freed else REACTION) if driven_joints(self.mechanism) else 0
         self.spent = self.won = 0.0
         self.followed = certify.FEWEST
         self.set_calm(self.forced)
@@ -48,8 +50,8 @@ class Purse:
     def may_pay(self) -> bool:
         """Whether the shortest decision costs less than the run."""
         if self.forced:
-            vain = self.amplitudes > _IN_VAIN * (self.run + FIXED)
-            return not vain and self.certificate + self.amplitudes < self.run - FOLLOWING * self.cost.links
+            vain = self.amplitudes > _IN_VAIN * (self.run + CALL * FIXED)
+            return not vain and self.certificate + self.amplitudes < self.run - self.cost.calls(FOLLOWING)
         shortest = self.look(self.cost, probe.FEWEST) + self.comparison
         return self.affords(shortest) and self.certificate + shortest < self.run
 
@@ -61,23 +63,23 @@ class Purse:
     @property
     def certificate(self) -> float:
         """Of what was left out."""
-        places = 2 * (certify.PLACES * STATE + certify.EFFORTS * self.effort + PREPARE)
+        looks = 2 * (certify.PLACES * STATE + certify.EFFORTS * self.effort + PREPARE)
         step = _FOLLOWED * self.cost.iteration + self.cost.evaluation
-        return self.followed * step + places * self.cost.links + self.amplitudes
+        return self.followed * step + self.cost.calls(looks) + self.amplitudes
 
     @property
     def amplitudes(self) -> float:
         """Of what prescribed motions set off."""
-        return forced_cost(self.cost) if self.forced else 0.0
+        return self.cost.forced if self.forced else 0.0
 
-    def look(self, cost: Cost, count: int) -> float:
+    def look(self, cost: Operations, count: int) -> float:
         """One coarse run."""
-        return count * cost.coarse_step + PREPARE * cost.links
+        return count * cost.coarse_step + cost.calls(PREPARE)
 
     @property
     def comparison(self) -> float:
         """Of two coarse runs."""
-        return 2 * (probe.PLACES * STATE + probe.EFFORTS * self.effort) * self.cost.links
+        return self.cost.calls(2 * (probe.PLACES * STATE + probe.EFFORTS * self.effort))
 
     def affords(self, price: float) -> bool:
         """Whether looks may cost so much more, when this one finds nothing to leave out."""
@@ -86,6 +88,5 @@ class Purse:
     def saved(self, less: Mechanism) -> float:
         """By the mechanism without what was chosen."""
         if less.bandwidth is not None:
-            return self.run - FOLLOWING * self.cost.links
-        cost = cost_of(formulate(less, self.settings))
-        return self.run - self.steps * cost.step(self.iterations)
+            return self.run - self.cost.calls(FOLLOWING)
+        return self.run - self.steps * operations(less).step(self.iterations)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TypeVar
@@ -11,6 +10,7 @@ import numpy as np
 
 from erls.auto.coordinates import kept_places
 from erls.auto.cuts import flexible_links, partners
+from erls.auto.operations import Operations, operations
 from erls.auto.probe import Difference, coarse_run, difference, look_steps, needed, resolved
 from erls.auto.quick import quick
 from erls.equations.formulation import Formulation
@@ -27,7 +27,6 @@ from erls.scene.chain import Scene
 T = TypeVar("T")
 FAILS, UNSTABLE = "fails", "unstable"
 _FORCES = 20  # knots at which forces are compared
-_REPEATS, _CALLS = 9, 20
 
 
 @dataclass(frozen=True)
@@ -46,8 +45,8 @@ class EffectSize:
     effort_error : float or None
         Largest difference of drive forces without it, relative to their peak; None where no drive reacts.
     share : float or None
-        Part of the time of an evaluation of the equations of motion that leaving it out saves, with the effects that
-        share its products.
+        Part of the operations of an evaluation of the equations of motion that leaving it out saves, with the effects
+        that share its products.
     link : str
         Of ``flexibility``: the one link that it is about; empty for all of them.
     outcome : str
@@ -103,13 +102,12 @@ def effect_sizes(scene: Scene, mechanism: Mechanism, names: Iterable[str]) -> tu
 
 def _size(
     scene: Scene, whole: Run, less: Mechanism, faster: Mechanism, count: int
-) -> tuple[Difference, float, float | None]:
-    """Difference, largest force, and share of the time of an evaluation."""
+) -> tuple[Difference, float, float]:
+    """Difference, largest force, and share of the operations of an evaluation."""
     settings = scene.record.simulation
     apart = _or_fails(lambda: difference(whole, coarse_run(scene, less, count)), Difference(np.inf, None))
     force = _or_fails(lambda: _force(whole, formulate(less, settings)), np.inf)
-    share = _or_fails(lambda: _share(whole, formulate(faster, settings)), None)
-    return apart, force, share
+    return apart, force, _share(operations(whole.formulation.mechanism), operations(faster))
 
 
 def _or_fails(value: Callable[[], T], otherwise: T) -> T:
@@ -153,21 +151,6 @@ def _force(whole: Run, less: Formulation) -> float:
     return float(np.sqrt(max(mass, 0.0) * largest))
 
 
-def _share(whole: Run, less: Formulation) -> float:
-    """Part of the time of an evaluation that is saved: least of several measurements of either, taken in turn."""
-    system, other = quick(solved(whole.formulation)), quick(solved(less))
-    if not other.size:
-        return 1.0  # nothing is left to integrate
-    if not (hasattr(system, "residual") and hasattr(other, "residual")):
-        return 0.0
-    kept = kept_places(whole.formulation.mechanism, less.mechanism, system.size)
-    s = whole.solution
-    t, states = float(s.t[0]), [[x[-1, at].copy() for x in (s.y, s.v, s.a)] for at in (np.arange(system.size), kept)]
-    best = [np.inf, np.inf]
-    for _ in range(_REPEATS):
-        for k, (one, state) in enumerate(zip((system, other), states, strict=True)):
-            begun = time.perf_counter()
-            for _ in range(_CALLS):
-                one.residual(t, *state)
-            best[k] = min(best[k], time.perf_counter() - begun)
-    return max(0.0, 1 - best[1] / best[0])
+def _share(whole: Operations, less: Operations) -> float:
+    """Part of the operations of an evaluation that is saved; all of them where nothing is left to integrate."""
+    return 1 - less.evaluation / whole.evaluation if less.size else 1.0

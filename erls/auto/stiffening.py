@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from erls.auto.cost import cost_of, stiffened_cost
-from erls.equations.registry import TREES, formulate
+from erls.auto.operations import operations, stiffened_operations
+from erls.equations.registry import TREES
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import in_order
 from erls.run.watches.spin_stability import UNSTABLE, planned_spin_warnings
@@ -51,12 +51,10 @@ def can_stiffen(mechanism: Mechanism, settings: Simulation) -> bool:
     return any(link.elastic_modes and link.second_order is not None for link in mechanism.links)
 
 
-def addition(scene: Scene, mechanism: Mechanism, why: str) -> Addition:
+def addition(mechanism: Mechanism, why: str) -> Addition:
     """Both effects, with the reason and what they make of a step."""
-    settings = scene.record.simulation
     added = Addition(STIFFENING - mechanism.effects)
-    formulation = formulate(mechanism, settings)
-    before, after = cost_of(formulation).iteration, stiffened_cost(formulation).iteration
+    before, after = operations(mechanism).iteration, stiffened_operations(mechanism).iteration
     ratio = after / before if before else 1.0
     names = ", ".join(in_order(added.names))
     return replace(added, note=f"effects: added: {names}: {why}; a step takes about {ratio:.2g} times as long")
@@ -75,7 +73,7 @@ def stiffening(scene: Scene, mechanism: Mechanism) -> Addition:
     if not can_stiffen(mechanism, settings):
         return Addition()
     lost = unstable(planned_spin_warnings(mechanism, settings.duration, _SPEEDS))
-    return addition(scene, mechanism, lost) if lost else Addition()
+    return addition(mechanism, lost) if lost else Addition()
 
 
 def off_by(error: float, tolerance: float) -> str:

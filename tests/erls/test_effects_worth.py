@@ -13,10 +13,13 @@ from small_systems import Modes
 
 import erls
 from erls.auto import choice as choice_module
+from erls.auto import operations as operations_module
+from erls.auto import purse as purse_module
 from erls.auto.choice import Choice, choose_effects
-from erls.auto.cost import CALM, ITERATIONS, cost_of, count_steps
 from erls.auto.cuts import possible_cuts
+from erls.auto.operations import CALM, ITERATIONS, operations
 from erls.auto.outputs import Outputs, busiest, watched_nodes
+from erls.auto.pilot import count_steps
 from erls.auto.resolution import Vibrations, resolution, vibrations
 from erls.equations.registry import formulate
 from erls.mechanism.effects import FIRST, SECOND
@@ -67,6 +70,16 @@ def test_long_slow_runs_leave_out_inertia_with_the_deformation() -> None:
     assert sum(cut.error for cut in choices[0].cuts) < 3e-5
 
 
+@pytest.mark.parametrize("times", [1 / 3, 1.0, 3.0])
+def test_decisions_bear_another_weight_of_calls(times: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A factor of three on what a call from Python weighs: short runs keep all, long led ones follow statically."""
+    for module in (operations_module, purse_module):
+        monkeypatch.setattr(module, "CALL", times * operations_module.CALL)
+    for path in (ROBOT, L_SHAPE):
+        assert not _choice(path).cuts
+    assert [cut.bandwidth > 0 for cut in _choice(ROBOT, "simulation.duration=60.0", *SLOW).cuts] == [True]
+
+
 def test_long_shaken_runs_keep_all() -> None:
     """Links that start undeformed vibrate by millimetres, undamped: a look would have to follow that for 60 s."""
     choice = _choice(ROBOT, "simulation.duration=60.0", *SLOW[:2])
@@ -85,15 +98,14 @@ def test_costs_fall_with_what_goes_and_rise_with_time(path: Path) -> None:
     """Every cut saves; steps are those of the scene."""
     scene = load_scene(path, ["simulation.duration=3.0", "simulation.step=1e-3"])
     whole = build_mechanism(scene).mechanism
-    settings = scene.record.simulation
     assert count_steps(scene, whole) == 3000
-    full = cost_of(formulate(whole, settings))
-    costs = [cost_of(formulate(cut.applied(whole), settings)).step(CALM) for cut in possible_cuts(whole, "erls")]
+    full = operations(whole)
+    costs = [operations(cut.applied(whole)).step(CALM) for cut in possible_cuts(whole, "erls")]
     assert all(cost < full.step(CALM) for cost in costs)
     assert costs[0] == min(costs)  # no flexibility at all
     assert full.step(CALM) < full.step(ITERATIONS)
-    second = cost_of(formulate(without(whole, SECOND), settings))
-    bare = cost_of(formulate(without(whole, FIRST | SECOND), settings))
+    second = operations(without(whole, SECOND))
+    bare = operations(without(whole, FIRST | SECOND))
     assert bare.evaluation < second.evaluation < full.evaluation
 
 
