@@ -64,9 +64,9 @@ class Member(_Record, frozen=True):
     start, end : str
         Nodes of ``[frame.nodes]``.
     material : str
-        A name from ``[materials]``.
+        A name from ``[materials]``; needed.
     section : str
-        A name from ``[sections]``.
+        A name from ``[sections]``; needed.
     elements : int
         Elements of equal length.
     local_z : (3,) floats, optional
@@ -173,11 +173,11 @@ class PointMass(_Record, frozen=True):
     Attributes
     ----------
     node : str
-        A named node, or an interface.
+        A named node or an interface; in a scene of bodies also a body, or an inner node of a beam.
     mass : float
         [kg]
     inertia : (3,) floats or (3, 3) floats
-        About the node [kg m²]: [Ixx, Iyy, Izz], or a symmetric matrix, mesh axes.
+        About the node [kg m²]: [Ixx, Iyy, Izz], or a symmetric matrix; mesh axes, or those of the node's frame.
     """
 
     node: str

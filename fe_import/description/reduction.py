@@ -82,6 +82,7 @@ class Reduction(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         Share of the mass that fixed-interface modes can carry at all, to be reached in every rigid-body direction in
         which there is some; 0.9 unless given.
     ranking : Ranking, optional
+        Of ``selection = "ranking"``: what the modes are ranked for.
     """
 
     method: str = "craig-bampton"

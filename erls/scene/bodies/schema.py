@@ -62,9 +62,9 @@ class Beam(Record, frozen=True):
     start, end : str
         Nodes or bodies.
     section : str
-        A name from ``[sections]``.
+        A name from ``[sections]``; needed.
     material : str
-        A name from ``[materials]``.
+        A name from ``[materials]``; needed.
     elements : int
         Elements of equal length.
     through : (3,) floats, optional
