@@ -14,17 +14,16 @@ import msgspec
 import pytest
 from pages import DOCS, PAGES, ROOT, blocks, run, shell_lines
 
-from erls.report.documentation import PAGES as FILES
-from erls.report.documentation import documentation, written
+from erls.report.documentation import tables, written
+from erls.report.fields import PAGES as FILES
+from erls.report.fields import documentation
 
 REGENERATE = "python -m erls.report.documentation docs"
 RECORDS = dict(FILES.values())
 
 
 @pytest.mark.parametrize("page", [page for page in DOCS if shell_lines(page) or blocks(page, "python")])
-def test_commands_and_python_examples_run_in_order(
-    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_commands_and_python_examples_run_in_order(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Word for word, in a folder that looks like a checkout; commands of one page first, then its Python."""
     shutil.copytree(ROOT / "data", tmp_path / "data")
     shutil.copytree(ROOT / "docs", tmp_path / "docs")
@@ -121,6 +120,12 @@ def test_defaults_are_as_printed() -> None:
 def test_tables_are_those_of_the_program(page: str) -> None:
     """What stands there is what is made from the records and registries."""
     assert PAGES[page] == written(PAGES[page]), f"run: {REGENERATE}"
+
+
+def test_every_table_stands_on_a_page() -> None:
+    """Between its marks."""
+    marks = re.findall(r"<!-- table: (.+?) -->", "".join(PAGES.values()))
+    assert sorted(marks) == sorted(tables())
 
 
 def _records(kind: Any) -> Iterator[type[msgspec.Struct]]:
