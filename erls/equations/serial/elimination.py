@@ -18,7 +18,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from erls.equations.serial.records import JOINT, MODES, Serial, read_joint, read_modes
+from erls.equations.serial.joints import gains
+from erls.equations.serial.records import (
+    JOINT,
+    JOINT_STATE,
+    MODES,
+    Serial,
+    read_joint,
+    read_joint_state,
+    read_modes,
+)
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
 from erls.maths.jit import part
 from erls.maths.products import add_product, add_rows, add_transposed_product, clear, copy, copy_matrix, dot
@@ -207,6 +216,32 @@ def condense(own: Segment, work: Condensed) -> float:
                 total -= work.crossing[m, i] * work.bound_lead[m, j]
             work.articulated[i, j] += total
     return sign
+
+
+@part
+def set_compliance(
+    serial: Serial, condensed: int, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array,
+    alpha: Any, beta: Any, factors: Any,
+) -> int:  # fmt: skip
+    """D⁻¹ of all links, and what α C + β K adds along their joints, after `feed_forward` where a drive needs that.
+
+    0, or 1 + the number of a coordinate whose motion nothing resists.
+    """
+    for k in range(serial.links):
+        work = read_condensed(factors, integers, condensed + k * CONDENSED)
+        modes = read_modes(reals, integers, serial.modes + k * MODES)
+        joint = read_joint(reals, integers, serial.joints + k * JOINT)
+        for i in range(len(work.compliance)):
+            whole = 1.0 + alpha * modes.decoupled_damping[i] + beta * modes.decoupled_stiffness[i]
+            if not whole.real > 0.0:
+                return int(modes.first + i + 1)
+            work.compliance[i] = 1.0 / whole
+        work.along[1] = 0.0
+        if joint.place >= 0 and joint.acts:
+            feed = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).feed[0]
+            stiffness, damping = gains(joint, reals, integers, t, y[joint.place], v[joint.place], feed)
+            work.along[1] = alpha * damping + beta * stiffness
+    return 0
 
 
 @part

@@ -98,11 +98,14 @@ class JointState(NamedTuple):
         Of the frame behind the joint in that before it, see `erls.maths.spatial`.
     feed : (1,) array
         Force that feeds forward.
+    forces : (2,) array
+        After a residual: what the joint must give for the motion beside drive, spring, damper and friction; and these.
     """
 
     coordinate: Vector
     pose: Vector
     feed: Vector
+    forces: Vector
 
 
 class Modes(NamedTuple):

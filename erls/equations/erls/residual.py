@@ -1,0 +1,187 @@
+"""Forces out of balance on the independent coordinates: outward for the motion, inward for the forces.
+
+A virtual displacement is δν_k = J_k δθ, δq = (D δq_d + G δθ, δq_d) (ERLS-CMS paper, eq. 69-75); instead of forming J, D
+and G, forces on ν and on u go from link to parent with the transposes of what carries motions outward.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from erls.equations import compiled_system as contract
+from erls.equations.erls.frames import move_frames
+from erls.equations.erls.link_forces import link_forces, weigh_displaced
+from erls.equations.erls.records import (
+    BEND,
+    BEND_STATE,
+    LINK,
+    LINK_STATE,
+    Bend,
+    BendState,
+    Chain,
+    LinkState,
+    read_bend,
+    read_bend_state,
+    read_chain,
+    read_link,
+    read_link_state,
+)
+from erls.equations.erls.second_order import bend_frames, correct_twist, feel_curvature, set_arm
+from erls.equations.serial.feed_forward import feed_forward
+from erls.equations.serial.joints import effort
+from erls.equations.serial.records import (
+    JOINT,
+    JOINT_STATE,
+    MODES,
+    Serial,
+    read_joint,
+    read_joint_state,
+    read_modes,
+    read_serial,
+)
+from erls.maths.jit import inlined, kernel, part
+from erls.maths.products import add_rows, clear
+from erls.maths.so3 import Array
+from erls.maths.spatial import add_cross, add_force_cross, add_motion_cross, dot6, transform_force_back
+from fe_import.model import IntArray
+
+
+@part
+def _forces_of_links(
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, accelerated: bool
+) -> None:
+    """``wrench``, ``force`` and ``modal`` of every link alone."""
+    for k in range(serial.links):
+        link = read_link(reals, integers, chain.links + k * LINK)
+        state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
+        twist, rate, curved = state.twist, state.twist_rate, False
+        if chain.bends >= 0:
+            curved = read_bend(reals, integers, chain.bends + k * BEND).curved != 0
+            if curved:
+                bend = read_bend(reals, integers, chain.bends + k * BEND)
+                bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
+                correct_twist(bend, state, bent)
+                twist, rate = bent.full, bent.full_rate
+        link_forces(chain, link, state, twist, rate, accelerated)
+        if curved:
+            bend = read_bend(reals, integers, chain.bends + k * BEND)
+            bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
+            feel_curvature(bend, link, state, bent)
+        if chain.weight:
+            weigh_displaced(link, state)
+        if link.parent >= 0:  # on the ground the frame moves along the joint, which does not feel this
+            add_force_cross(state.twist, state.momentum, state.wrench)
+        for i in range(6):
+            state.force[i] = state.modal[i]
+        if chain.bends >= 0:
+            push = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).push
+            for i in range(6):
+                push[i] = state.modal[i]
+
+
+@inlined
+def _turn_arm_back(bend: Bend, state: LinkState, bent: BendState, coordinate: Any) -> None:
+    """What ``push`` does to the turn of a link, by the arm from its inboard interface to its joint."""
+    back = bent.share[:3]
+    set_arm(bend.slide, bend.arm, coordinate, state.u[3:], bent.d, bent.b)
+    clear(back)
+    add_cross(bent.push, state.u[3:], 1.0, back)
+    add_cross(bent.b, bent.push, 0.5, state.force[3:])
+    add_cross(bent.d, back, 0.5, state.force[3:])
+
+
+@inlined
+def _push_along(bend: Bend, state: LinkState, bent: BendState, slides: int, screw: Array) -> Any:
+    """Force of ``push`` along a joint, which turns second-order displacements along."""
+    path, turned = bent.share, bent.share_rate[:3]
+    clear(path)
+    add_motion_cross(bent.carried, screw, 1.0, path)
+    if bend.armed and slides:
+        clear(turned)
+        add_cross(state.u[3:], bend.slide, 1.0, turned)
+        add_cross(state.u[3:], turned, 0.5, path)
+    return dot6(path, bent.push)
+
+
+@part
+def _hand_back(
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int
+) -> None:
+    """Forces of a link and of all that it bears, on its parent."""
+    link = read_link(reals, integers, chain.links + k * LINK)
+    state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
+    before = read_link_state(scratch, integers, chain.states + link.parent * LINK_STATE)
+    pose, point = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose, state.point
+    transform_force_back(pose, state.wrench, point)
+    for i in range(6):
+        before.wrench[i] += point[i]
+    transform_force_back(pose, state.force, point)
+    for i in range(6):
+        before.force[i] += point[i]
+    add_rows(link.out, point, 1.0, before.modal[6:])
+    if chain.bends >= 0:
+        bend = read_bend(reals, integers, chain.bends + k * BEND)
+        bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
+        bent_before = read_bend_state(scratch, integers, chain.bend_states + link.parent * BEND_STATE)
+        transform_force_back(pose, bent.push, point)
+        for i in range(6):
+            bent_before.push[i] += point[i]
+        if bend.bows:
+            m = bent.bow.shape[1]
+            forces, turns = bent.spare[:m], m - (len(before.q) - 6)
+            clear(forces)
+            for r in range(6):
+                row, weight = bent.bow[r], point[r]
+                for i in range(m):
+                    forces[i] += weight * row[i]
+            for i in range(turns):
+                before.force[3 + i] += forces[i]
+            for i in range(turns, m):
+                before.modal[6 + i - turns] += forces[i]
+
+
+@kernel(contract.RESIDUAL, counted=False)
+def residual(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
+) -> None:
+    """M a - f, see `erls.equations.compiled_system`; an empty ``a`` stands for zeros, with which nothing is multiplied
+    then.
+    """
+    serial = read_serial(reals, integers, integers[0])
+    chain = read_chain(reals, integers, serial.own)
+    if serial.feeds:
+        feed_forward(serial, reals, integers, scratch, t)
+    move_frames(serial, chain, reals, integers, scratch, t, y, v, a)
+    if chain.bends >= 0:
+        bend_frames(serial, chain, reals, integers, scratch, True)
+    _forces_of_links(serial, chain, reals, integers, scratch, len(a) > 0)
+    for k in range(serial.links - 1, -1, -1):
+        joint = read_joint(reals, integers, serial.joints + k * JOINT)
+        motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
+        modes = read_modes(reals, integers, serial.modes + k * MODES)
+        parent = read_link(reals, integers, chain.links + k * LINK).parent
+        state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
+        for i in range(len(modes.stiffness)):
+            at = modes.first + i
+            out[at] = state.modal[6 + i] + modes.stiffness[i] * y[at] + modes.damping[i] * v[at]
+        total = dot6(joint.screw, state.wrench) + joint.rotor * motion.coordinate[2]
+        if parent >= 0:  # the joint turns the displacement along: u̇ holds -ad(S θ̇) u
+            clear(state.point)
+            add_motion_cross(state.u, joint.screw, 1.0, state.point)
+            if chain.bends >= 0:
+                bend = read_bend(reals, integers, chain.bends + k * BEND)
+                bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
+                if bend.armed:
+                    _turn_arm_back(bend, state, bent, motion.coordinate[0])
+                total += _push_along(bend, state, bent, joint.slides, joint.screw)
+            total += dot6(state.point, state.force)
+        motion.forces[1] = 0.0
+        if joint.acts:
+            motion.forces[1] = effort(
+                joint, reals, integers, t, motion.coordinate[0], motion.coordinate[1], motion.feed[0]
+            )
+        motion.forces[0] = total - motion.forces[1]
+        if joint.place >= 0:
+            out[joint.place] = motion.forces[0]
+        if parent >= 0:
+            _hand_back(serial, chain, reals, integers, scratch, k)

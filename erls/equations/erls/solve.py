@@ -1,0 +1,86 @@
+"""Accelerations, and (M + α C + β K) x = b, link by link; see `erls.equations.compiled_system`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from erls.equations import compiled_system as contract
+from erls.equations.erls.records import read_chain
+from erls.equations.erls.residual import residual
+from erls.equations.erls.segments import set_segments
+from erls.equations.serial.elimination import eliminate, set_compliance, substitute
+from erls.equations.serial.feed_forward import feed_forward
+from erls.equations.serial.records import read_serial
+from erls.maths.jit import kernel, part
+from erls.maths.so3 import Array
+from fe_import.model import IntArray
+
+
+@part
+def _factor(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, alpha: Any, beta: Any,
+    factors: Any, definite: bool,
+) -> int:  # fmt: skip
+    serial = read_serial(reals, integers, integers[0])
+    chain = read_chain(reals, integers, serial.own)
+    if serial.feeds:
+        feed_forward(serial, reals, integers, scratch, t)
+    status = set_compliance(
+        serial, chain.condensed, reals, integers, scratch, t, y, v, alpha, beta, factors
+    )
+    if status != 0:
+        return int(status)
+    set_segments(serial, chain, reals, integers, scratch, t, y, True)
+    return int(
+        eliminate(serial, chain.segments, chain.condensed, reals, integers, scratch, factors, definite)
+    )
+
+
+@part
+def _solve(reals: Array, integers: IntArray, factors: Any, b: Any) -> None:
+    serial = read_serial(reals, integers, integers[0])
+    substitute(serial, read_chain(reals, integers, serial.own).condensed, reals, integers, factors, b)
+
+
+@kernel(contract.FACTOR, counted=False)
+def factor(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, alpha: float, beta: float,
+    factors: Array,
+) -> int:  # fmt: skip
+    """With real numbers."""
+    return int(_factor(reals, integers, scratch, t, y, v, alpha, beta, factors, False))
+
+
+@kernel(contract.SOLVE, counted=False)
+def solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
+    """With real numbers."""
+    _solve(reals, integers, factors, b)
+
+
+@kernel(contract.FACTOR_COMPLEX, counted=False)
+def factor_complex(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, alpha: complex, beta: complex,
+    factors: Any,
+) -> int:  # fmt: skip
+    """With complex numbers."""
+    return int(_factor(reals, integers, scratch, t, y, v, alpha, beta, factors, False))
+
+
+@kernel(contract.SOLVE_COMPLEX, counted=False)
+def solve_complex(reals: Array, integers: IntArray, factors: Any, b: Any) -> None:
+    """With complex numbers."""
+    _solve(reals, integers, factors, b)
+
+
+@kernel(contract.ACCELERATION, counted=False)
+def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> int:
+    """M⁻¹ f."""
+    residual(reals, integers, scratch, t, y, v, y[0:0], out)
+    serial = read_serial(reals, integers, integers[0])
+    factors = scratch[read_chain(reals, integers, serial.own).factors :]
+    status = _factor(reals, integers, scratch, t, y, v, 0.0, 0.0, factors, True)
+    if status == 0:
+        for i in range(len(out)):
+            out[i] = -out[i]
+        _solve(reals, integers, factors, out)
+    return int(status)

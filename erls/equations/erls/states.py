@@ -1,0 +1,51 @@
+"""Poses of links and their coordinates at many times; see `erls.equations.compiled_system`."""
+
+from __future__ import annotations
+
+from erls.equations import compiled_system as contract
+from erls.equations.erls.frames import move_frames
+from erls.equations.erls.records import LINK, LINK_STATE, read_chain, read_link, read_link_state
+from erls.equations.erls.second_order import bend_frames
+from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
+from erls.maths.jit import kernel, part
+from erls.maths.so3 import Array
+from fe_import.model import IntArray
+
+
+@part
+def _compose(before: Array, pose: Array, out: Array) -> None:
+    """A pose (12,) behind another."""
+    for i in range(3):
+        for j in range(3):
+            out[3 * i + j] = (
+                before[3 * i] * pose[j] + before[3 * i + 1] * pose[3 + j] + before[3 * i + 2] * pose[6 + j]
+            )
+        out[9 + i] = (
+            before[9 + i] + before[3 * i] * pose[9] + before[3 * i + 1] * pose[10] + before[3 * i + 2] * pose[11]
+        )
+
+
+@kernel(contract.STATES, counted=False)
+def states(reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array) -> None:
+    """Rows of ``out``: pose (12,) of every link, (u, q_d) and its rate of every link, θ and θ̇ of every joint."""
+    serial = read_serial(reals, integers, integers[0])
+    chain = read_chain(reals, integers, serial.own)
+    for row in range(len(t)):
+        move_frames(serial, chain, reals, integers, scratch, t[row], y[row], v[row], y[row, 0:0])
+        if chain.bends >= 0:
+            bend_frames(serial, chain, reals, integers, scratch, True)
+        at, found = 12 * serial.links, out[row]
+        for k in range(serial.links):
+            parent = read_link(reals, integers, chain.links + k * LINK).parent
+            state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
+            motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
+            pose = found[12 * k : 12 * k + 12]
+            if parent < 0:
+                for i in range(12):
+                    pose[i] = motion.pose[i]
+            else:
+                _compose(found[12 * parent : 12 * parent + 12], motion.pose, pose)
+            for values in (state.q, state.q_rate, motion.coordinate[:2]):
+                for i in range(len(values)):
+                    found[at + i] = values[i]
+                at += len(values)
