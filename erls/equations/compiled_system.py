@@ -108,6 +108,11 @@ class CompiledSystem:
         return self.load_acceleration()
 
 
+def function_in(module: str, name: str) -> Callable[[], Callable[..., Any]]:
+    """What loads a function from a module of kernels, which is compiled then."""
+    return lambda: getattr(import_module(module), name)
+
+
 def acceleration_in(module: str) -> Callable[[], Callable[..., int]]:
     """What loads ``acceleration`` from a module of kernels."""
     return lambda: getattr(import_module(module), "acceleration")  # noqa: B009

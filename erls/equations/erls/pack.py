@@ -1,0 +1,291 @@
+"""A chain in the joint-angle gauge as records, from a mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from erls.equations.compiled_system import CompiledSystem, Factoring, function_in
+from erls.equations.erls import records as own
+from erls.equations.erls import residual as balance
+from erls.equations.erls import segments as moved
+from erls.equations.erls.paper.second_order_compatibility import frame_second_order
+from erls.equations.erls.paper.second_order_inertia import compliance
+from erls.equations.serial import elimination, pack, segments, stiffness
+from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
+from erls.equations.serial.records import Serial
+from erls.maths.records import Memory
+from erls.maths.se3 import inverse, twist_transform
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.joints import Joint
+from erls.mechanism.links import Link
+
+_PARALLEL = 1e-13  # sine of the angle between axes that count as one
+DENSE = 40  # coordinates up to which dense factors cost less than elimination link by link
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of axes
+
+
+def rotation_axes(joints: Sequence[Joint]) -> list[Array]:
+    """(A, 3) for each link: the one axis about which it can turn, in its own frame, or all three; none for a link that
+    only slides.
+    """
+    result: list[Array] = []
+    axes = np.zeros((0, 3))
+    for joint in joints:
+        if joint.type.revolute:
+            along = joint.before[:3, 2]
+            if len(axes) == 1 and np.linalg.norm(np.cross(axes[0], along)) > _PARALLEL:
+                axes = np.eye(3)
+            elif len(axes) < 3:
+                axes = joint.screw[None, 3:]
+        elif len(axes) == 1:
+            axes = axes @ joint.before[:3, :3] @ joint.after[:3, :3]
+        result.append(axes)
+    return result
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """What the equations hold of a link and of the interface of its parent.
+
+    Attributes
+    ----------
+    modes : (m, n) array
+        [ρ Ψ]: its modal coordinates per (u, q_d).
+    out : (6, e of the parent) array
+        What the parent's interface moves, as a motion of the parent's frame.
+    """
+
+    modes: Array
+    out: Array
+
+
+def combined_modes(link: Link, joint: Joint) -> Array:
+    """(m, m) the modes [ρ Ψ] of a link over its own, with Ψ leaving its inboard interface where it is."""
+    interface = link.interface_shape(link.inboard, inverse(joint.after))
+    stay = -np.linalg.solve(interface[:, :6], interface[:, 6:])
+    return np.hstack([link.invariants.rigid, np.vstack([stay, np.eye(link.elastic_modes)])])
+
+
+def shapes(mechanism: Mechanism) -> list[Shapes]:
+    """Of all links."""
+    result: list[Shapes] = []
+    for k, (link, joint) in enumerate(zip(mechanism.links, mechanism.joints, strict=True)):
+        out = np.zeros((6, 0))
+        if k:
+            before = mechanism.links[k - 1]
+            moved_frame = before.interface_shape(before.outboard, joint.before)  # type: ignore[arg-type]
+            out = twist_transform(inverse(joint.before)) @ moved_frame @ result[k - 1].modes[:, 6:]
+        result.append(Shapes(combined_modes(link, joint), out))
+    return result
+
+
+def _link(link: Link, modes: Array, axes: Array, out: Array, vectors: Array, before: Array, parent: int) -> own.Link:
+    """Constants of a link; ``vectors`` and ``before`` are decoupled coordinates of it and of its parent."""
+    mass = modes.T @ link.invariants.m @ modes
+    x = modes.T @ np.einsum("ca,aij->cij", axes, link.invariants.X) @ modes
+    z = np.einsum("ca,db,abij->cdij", axes, axes, link.invariants.Z)
+    pairs = [(i, j) for i, j in _PAIRS if max(i, j) < len(axes)]
+    n = modes.shape[1]
+    return own.Link(
+        parent=parent,
+        axes=axes,
+        mass=(mass + mass.T) / 2,
+        x=x.transpose(0, 2, 1),
+        z=np.array([modes.T @ ((z[i, j] + z[j, i]) / 2) @ modes for i, j in pairs]).reshape(len(pairs), n, n),
+        out=out.T,
+        rigid_decoupled=mass[:6, 6:] @ vectors,
+        out_decoupled=(out @ before).T,
+    )
+
+
+def _columns(matrices: Array) -> Array:
+    """(columns, matrices * rows) of (matrices, rows, columns)."""
+    count, rows, columns = matrices.shape
+    return np.ascontiguousarray(matrices.transpose(2, 0, 1)).reshape(columns, count * rows)
+
+
+def _momenta(link: Link, modes: Array, axes: Array, turning: slice) -> tuple[Array, Array]:
+    """`Bend.rows` and `Bend.odd`, before they are laid out."""
+    m = modes[:, turning].shape[1]
+    if link.second_order is None:
+        return np.zeros((6 + 3 * len(axes), m, m)), np.zeros((3, m, m))
+    momenta = (modes.T @ link.second_order.momentum @ modes)[:, turning, turning]
+    spin = np.einsum("nd,cdab->ncab", axes, link.second_order.spin).reshape(3 * len(axes), len(modes), len(modes))
+    spin = (modes.T @ spin @ modes)[:, turning, turning]
+    return np.concatenate([momenta.transpose(0, 2, 1), spin]), (momenta - momenta.transpose(0, 2, 1))[3:]
+
+
+def _bow(before: Link, joint: Joint, modes: Array, turning: slice) -> Array:
+    """(6, m, m) second-order displacement of the parent's interface, as motions of the parent's frame."""
+    m = modes[:, turning].shape[1]
+    found = None if before.outboard is None else frame_second_order(before, before.outboard, joint.before)
+    if found is None:
+        return np.zeros((6, m, m))
+    whole = np.einsum("ij,jab->iab", twist_transform(inverse(joint.before)), modes.T @ found @ modes)
+    return np.asarray(whole[:, turning, turning])
+
+
+def _turning(parent: int) -> slice:
+    """Coordinates of (u, q_d) that second-order displacements know."""
+    return slice(6 if parent < 0 else 3, None)
+
+
+def _bend(mechanism: Mechanism, k: int, found: list[Shapes], axes: Array) -> own.Bend:
+    link, joint, ground = mechanism.links[k], mechanism.joints[k], k == 0
+    rows, odd = _momenta(link, found[k].modes, axes, _turning(k - 1))
+    bow = np.zeros((6, 0, 0))
+    if not ground:
+        bow = _bow(mechanism.links[k - 1], joint, found[k - 1].modes, _turning(k - 2))
+    slide, arm = np.zeros(3), np.zeros(3)
+    if not ground and not joint.type.revolute:
+        slide = joint.screw[:3]
+    if not ground and link.second_order is not None:
+        arm = inverse(joint.after)[:3, 3] - link.inboard.position
+    return own.Bend(
+        curved=int(link.second_order is not None),
+        bows=int(bow.any()),
+        armed=int(slide.any() or arm.any()),
+        turns=0 if ground else 3,
+        axes=axes,
+        rows=_columns(rows),
+        odd=_columns(odd),
+        compliance=compliance(link.invariants.rigid_mass_matrix),
+        bow=_columns(bow),
+        slide=slide,
+        arm=arm,
+    )
+
+
+def stiffened(mechanism: Mechanism) -> bool:
+    """Whether second-order displacements enter the equations."""
+    return "geometric_stiffening" in mechanism.effects and any(
+        link.second_order is not None and link.elastic_modes for link in mechanism.links
+    )
+
+
+def pack_chain(mechanism: Mechanism, dense: int = DENSE) -> CompiledSystem:
+    """The compiled form of a chain in the joint-angle gauge.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    dense : int
+        Coordinates up to which iteration matrices get dense factors. Beyond, they are solved link by link, with the
+        damping that couples elastic coordinates of a link left out of them where that hardly slows iterations down.
+    """
+    links, count = mechanism.links, len(mechanism.links)
+    free = [k for k, joint in enumerate(mechanism.joints) if not joint.drive.prescribed]
+    modes = [link.elastic_modes for link in links]
+    firsts = len(free) + np.concatenate([[0], np.cumsum(modes)]).astype(int)
+    found, axes = shapes(mechanism), rotation_axes(mechanism.joints)
+    bends = stiffened(mechanism)
+    curved = [bends and link.second_order is not None for link in links]
+    integers: list[int] = [0]
+    constants, scratch, condensed = Memory(integers), Memory(integers), Memory(integers)
+
+    masses = [shape.modes.T @ link.invariants.m @ shape.modes for shape, link in zip(found, links, strict=True)]
+    decoupled = [
+        decoupled_modes(mass[6:, 6:], link.stiffness, link.damping) for mass, link in zip(masses, links, strict=True)
+    ]
+    joints = [
+        pack.joint_record(
+            constants,
+            joint,
+            free.index(k) if k in free else -1,
+            pack.step_parts(joint.before, joint.type.revolute, joint.after),
+            joint.screw,
+        )
+        for k, joint in enumerate(mechanism.joints)
+    ]
+    inertial = [np.eye(3) if curved[k] else axes[k] for k in range(count)]
+    vectors = [np.zeros((0, 0)), *(each.vectors for each in decoupled)]
+    sizes = [6 + (3 if bends else 0) + len(each) for each in axes]
+    kept = [e + (3 if k else 0) for k, e in enumerate(modes)]
+    rooms = [
+        segments.segment(
+            k - 1,
+            sizes[k],
+            modes[k],
+            sizes[k - 1] if k else 0,
+            modes[k - 1] if k else 0,
+            (9 if bends else 6) if k and modes[k - 1] else 0,
+            6 if curved[k] and modes[k] else 0,
+        )
+        for k in range(count)
+    ]
+    ports = [rooms[k + 1].ports if k + 1 < count else 0 for k in range(count)]
+    chain = own.Chain(
+        links=pack.put_all(
+            constants,
+            [
+                _link(links[k], found[k].modes, inertial[k], found[k].out, vectors[k + 1], vectors[k], k - 1)
+                for k in range(count)
+            ],
+        ),
+        states=pack.put_all(scratch, [own.link_state(modes[k], len(inertial[k])) for k in range(count)]),
+        bends=pack.put_all(constants, [_bend(mechanism, k, found, axes[k]) for k in range(count)]) if bends else -1,
+        bend_states=pack.put_all(
+            scratch,
+            [own.bend_state(kept[k], kept[k - 1] if k else 0, len(axes[k])) for k in range(count)],
+        )
+        if bends
+        else -1,
+        segments=pack.put_all(scratch, rooms),
+        changes=pack.put_all(scratch, [moved.change(sizes[k], modes[k]) for k in range(count)]) if bends else -1,
+        condensed=pack.put_all(
+            condensed,
+            [
+                elimination.condensed(rooms[k], ports[k] + 2 * rooms[k].change.shape[0], 0)
+                for k in range(count)
+            ],
+        ),
+        factors=0,
+        first_order=int("inertia_first_order" in mechanism.effects),
+        second_order=int("inertia_second_order" in mechanism.effects),
+        coriolis=int("coriolis" in mechanism.effects),
+        centrifugal=int("centrifugal_load" in mechanism.effects),
+        softening=int("spin_softening" in mechanism.effects),
+        weight=int(bool(np.any(mechanism.gravity))),
+    )
+    rigid, rigid_state = pack.rigid_links(mechanism, constants, scratch)
+    serial = Serial(
+        links=count,
+        joints=pack.put_all(constants, joints),
+        joint_states=pack.joint_states(scratch, count),
+        modes=pack.put_all(
+            constants,
+            [
+                pack.modes_record(int(firsts[k]), masses[k][6:, 6:], links[k], decoupled[k])
+                for k in range(count)
+            ],
+        ),
+        feeds=int(rigid >= 0),
+        rigid_links=rigid,
+        rigid_states=rigid_state,
+        own=0,
+        gravity=mechanism.gravity,
+    )
+    chain = chain._replace(factors=len(scratch.numbers))
+    serial = serial._replace(own=constants.put(chain))
+    integers[0] = constants.put(serial)
+    size, room = len(free) + sum(modes), len(condensed.numbers)
+    factoring = None
+    if size > dense and max((each.mixing for each in decoupled), default=0.0) < MIXING:
+        from erls.equations.erls import solve  # here: it is compiled on its own
+
+        factoring = Factoring(room, solve.factor, solve.solve, solve.factor_complex, solve.solve_complex)
+    return CompiledSystem(
+        size=size,
+        reals=constants.numbers,
+        integers=np.array(integers, dtype=np.int64),
+        scratch=np.concatenate([scratch.numbers, np.zeros(room)]),
+        residual=balance.residual,
+        mass_matrix=moved.mass_matrix,
+        stiffness_and_damping=stiffness.stiffness_and_damping,
+        load_acceleration=function_in("erls.equations.erls.solve", "acceleration"),
+        factoring=factoring,
+    )

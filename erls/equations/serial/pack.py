@@ -1,0 +1,99 @@
+"""The records that all formulations share, from a mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from erls.equations.serial.decoupled_modes import DecoupledModes
+from erls.equations.serial.records import Joint, JointState, Modes, RigidLink, RigidState
+from erls.equations.serial.time_curves import put_curve
+from erls.maths.records import Memory
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.joints import Joint as MechanismJoint
+from erls.mechanism.links import Link
+
+
+def step_parts(before: Array, revolute: bool, after: Array) -> Array:
+    """(3, 12) constant, cosine and sine part of the pose before · joint · after; constant and rising at a slide."""
+
+    def part(middle: Array, shift: Array) -> Array:
+        rotation = before[:3, :3] @ middle
+        place = rotation @ after[:3, 3] + before[:3, :3] @ shift
+        return np.concatenate([(rotation @ after[:3, :3]).ravel(), place])
+
+    axis, none = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    if revolute:
+        parts = [part(np.outer(axis, axis), none), part(-turn @ turn, none), part(turn, none)]
+    else:
+        parts = [part(np.eye(3), none), part(np.zeros((3, 3)), axis), np.zeros(12)]
+    parts[0][9:] += before[:3, 3]
+    return np.stack(parts)
+
+
+def joint_acts(joint: MechanismJoint) -> bool:
+    """Whether drive, spring, damper, friction or rotor act in a joint."""
+    return bool(joint.forces.active or joint.rotor_inertia or joint.drive.kind not in ("free", "motion"))
+
+
+def joint_record(memory: Memory, joint: MechanismJoint, place: int, step: Array, screw: Array) -> Joint:
+    """A joint whose coordinate stands at ``place``; its curves are put into memory."""
+    forces, drive = joint.forces, joint.drive
+    gain, rate_gain = drive.gains
+    return Joint(
+        place=place,
+        slides=int(not joint.type.revolute),
+        motion=put_curve(memory, drive.motion),
+        load=put_curve(memory, drive.load),
+        feeds=int(drive.feed_forward),
+        acts=int(joint_acts(joint)),
+        stiffness=forces.stiffness,
+        rest=forces.rest,
+        damping=forces.damping,
+        friction=forces.friction,
+        transition=forces.transition_rate,
+        rotor=joint.rotor_inertia,
+        gain=gain,
+        rate_gain=rate_gain,
+        limit=drive.torque_limit,
+        held=joint.position,
+        step=step,
+        screw=screw,
+    )
+
+
+def modes_record(first: int, mass: Array, link: Link, decoupled: DecoupledModes) -> Modes:
+    """Elastic coordinates of a link that begin at ``first``; ``mass`` (e, e)."""
+    return Modes(
+        first, mass, link.stiffness, link.damping, decoupled.vectors, decoupled.stiffness, decoupled.damping
+    )
+
+
+def put_all(memory: Memory, records: Sequence[Joint | JointState | Modes | RigidLink | RigidState]) -> int:
+    """Records one after the other; the place of the first."""
+    return [memory.put(record) for record in records][0]
+
+
+def joint_states(scratch: Memory, count: int) -> int:
+    """Memory for the motion of joints."""
+    return put_all(scratch, [JointState(np.zeros(3), np.zeros(12), np.zeros(1), np.zeros(2)) for _ in range(count)])
+
+
+def rigid_links(mechanism: Mechanism, constants: Memory, scratch: Memory) -> tuple[int, int]:
+    """Places of the rigid links and their states, for feed-forward; -1 where no drive asks for it."""
+    if not any(joint.drive.feed_forward for joint in mechanism.joints):
+        return -1, -1
+    links = [
+        RigidLink(
+            k - 1,
+            step_parts(joint.before, joint.type.revolute, joint.after),
+            joint.screw,
+            link.invariants.rigid_mass_matrix,
+        )
+        for k, (joint, link) in enumerate(zip(mechanism.joints, mechanism.links, strict=True))
+    ]
+    states = [RigidState(np.zeros(12), *(np.zeros(6) for _ in range(4))) for _ in links]
+    return put_all(constants, links), put_all(scratch, states)
