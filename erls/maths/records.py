@@ -23,6 +23,7 @@ import numpy as np
 
 from erls.maths.jit import generated
 from erls.maths.so3 import Array
+from erls.maths.views import matrix_at, stack_at, vector_at
 from fe_import.model import IntArray
 
 Vector = Annotated[Array, 1]
@@ -73,11 +74,11 @@ def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
         if axes == 0:
             parts.append(f"{flat}[{start}]")
         else:
-            piece = f"{flat}[{start} : {start} + {' * '.join(dims)}]"
-            parts.append(piece if axes == 1 else f"{piece}.reshape(({', '.join(dims)}))")
+            parts.append(f"view{axes}({flat}, {', '.join([start, *dims])})")
         place += 1 + axes
     source = f"def read(numbers, integers, at):\n    return {record.__name__}({', '.join(parts)})\n"
-    names: dict[str, Any] = {record.__name__: record, "__name__": __name__}
+    views = {"view1": vector_at, "view2": matrix_at, "view3": stack_at}
+    names: dict[str, Any] = {record.__name__: record, "__name__": __name__, **views}
     exec(compile(source, f"<reader of {record.__qualname__}>", "exec"), names)
     return generated(names["read"])
 

@@ -67,7 +67,7 @@ def move_frames(
     serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array,
     a: Array,
 ) -> None:  # fmt: skip
-    """Twists and displacement rates of all link frames, at the accelerations ``a``, or at zero ones where it is empty."""
+    """Twists and displacement rates of all link frames, at accelerations ``a``, or at zero ones where it is empty."""
     place_frames(serial, chain, reals, integers, scratch, t, y, v, a)
     for k in range(serial.links):
         screw = read_joint(reals, integers, serial.joints + k * JOINT).screw

@@ -13,8 +13,8 @@ mass matrix. Five parts may be left out (`erls.mechanism.effects`), with s₀ = 
 - ``inertia_second_order``: all of Z in the frame's wrench;
 - ``spin_softening``: -Σ_ab ω_a ω_b Z_ab q on the modes.
 
-With one axis of rotation the wrench holds the moment about that axis only: no joint feels the others. Where the link has
-second-order displacements, ν + M₀⁻¹ (C q̇ + H ν) takes the place of ν (`erls.equations.erls.second_order`).
+With one axis of rotation the wrench holds the moment about that axis only: no joint feels the others. Where the link
+has second-order displacements, ν + M₀⁻¹ (C q̇ + H ν) takes the place of ν (`erls.equations.erls.second_order`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def pair_of(axes: int, a: int, b: int) -> int:
 
 @inlined
 def deform(chain: Chain, link: Link, state: LinkState) -> None:
-    """X q about the axes of a link, Z q and qᵀ Z q of their pairs, as far as the inertia of a link at rest needs them."""
+    """X q about the axes of a link, Z q and qᵀ Z q of their pairs, as far as the inertia of a link needs them."""
     axes, skip = len(link.axes), 6 if link.parent < 0 else 0  # u = 0 on the ground
     if chain.first_order:
         for a in range(axes):

@@ -9,8 +9,6 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, function_in
 from erls.equations.erls import records as own
-from erls.equations.erls import residual as balance
-from erls.equations.erls import segments as moved
 from erls.equations.erls.paper.second_order_compatibility import frame_second_order
 from erls.equations.erls.paper.second_order_inertia import compliance
 from erls.equations.serial import elimination, pack, segments, stiffness
@@ -217,7 +215,6 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE) -> CompiledSystem:
         )
         for k in range(count)
     ]
-    ports = [rooms[k + 1].ports if k + 1 < count else 0 for k in range(count)]
     chain = own.Chain(
         links=pack.put_all(
             constants,
@@ -235,14 +232,8 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE) -> CompiledSystem:
         if bends
         else -1,
         segments=pack.put_all(scratch, rooms),
-        changes=pack.put_all(scratch, [moved.change(sizes[k], modes[k]) for k in range(count)]) if bends else -1,
-        condensed=pack.put_all(
-            condensed,
-            [
-                elimination.condensed(rooms[k], ports[k] + 2 * rooms[k].change.shape[0], 0)
-                for k in range(count)
-            ],
-        ),
+        changes=pack.put_all(scratch, [own.change(sizes[k], modes[k]) for k in range(count)]) if bends else -1,
+        condensed=pack.put_all(condensed, elimination.condensed(rooms)),
         factors=0,
         first_order=int("inertia_first_order" in mechanism.effects),
         second_order=int("inertia_second_order" in mechanism.effects),
@@ -273,19 +264,25 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE) -> CompiledSystem:
     serial = serial._replace(own=constants.put(chain))
     integers[0] = constants.put(serial)
     size, room = len(free) + sum(modes), len(condensed.numbers)
+    own_name = "erls.equations.erls"
+    balance, inertia, solving = (
+        (f"{own_name}.stiffened_chain", f"{own_name}.stiffened_chain", f"{own_name}.stiffened_solve")
+        if bends
+        else (f"{own_name}.residual", f"{own_name}.segments", f"{own_name}.solve")
+    )
     factoring = None
     if size > dense and max((each.mixing for each in decoupled), default=0.0) < MIXING:
-        from erls.equations.erls import solve  # here: it is compiled on its own
-
-        factoring = Factoring(room, solve.factor, solve.solve, solve.factor_complex, solve.solve_complex)
+        factor, factor_complex = (function_in(solving, name)() for name in ("factor", "factor_complex"))
+        solve, solve_complex = (function_in(f"{own_name}.solve", name)() for name in ("solve", "solve_complex"))
+        factoring = Factoring(room, factor, solve, factor_complex, solve_complex)
     return CompiledSystem(
         size=size,
         reals=constants.numbers,
         integers=np.array(integers, dtype=np.int64),
         scratch=np.concatenate([scratch.numbers, np.zeros(room)]),
-        residual=balance.residual,
-        mass_matrix=moved.mass_matrix,
+        residual=function_in(balance, "residual")(),
+        mass_matrix=function_in(inertia, "mass_matrix")(),
         stiffness_and_damping=stiffness.stiffness_and_damping,
-        load_acceleration=function_in("erls.equations.erls.solve", "acceleration"),
+        load_acceleration=function_in(solving, "acceleration"),
         factoring=factoring,
     )

@@ -266,7 +266,35 @@ def bend_state(kept: int, kept_before: int, axes: int) -> BendState:
     )  # fmt: skip
 
 
+class Change(NamedTuple):
+    """Working memory of a link with second-order inertia.
+
+    Attributes
+    ----------
+    inertia, product : (9, 9), (9, p) arrays
+        Inertia over (W, Ω), and times ``map``.
+    map : (9, p) array
+        (W, Ω) per unit of μ.
+    coupling, whole : (9, e) arrays
+        Of (W, Ω) with q̇_d at given (W, Ω), and with the part of these that q̇_d makes.
+    """
+
+    inertia: Matrix
+    map: Matrix
+    product: Matrix
+    coupling: Matrix
+    whole: Matrix
+
+
+def change(size: int, modes: int) -> Change:
+    """Memory for a link with p = ``size``."""
+    return Change(
+        np.zeros((9, 9)), np.zeros((9, size)), np.zeros((9, size)), np.zeros((9, modes)), np.zeros((9, modes))
+    )
+
+
 read_chain, read_link, read_link_state = reader(Chain), reader(Link), reader(LinkState)
 read_bend, read_bend_state = reader(Bend), reader(BendState)
 LINK, LINK_STATE = table_size(Link), table_size(LinkState)
 BEND, BEND_STATE = table_size(Bend), table_size(BendState)
+read_change, CHANGE = reader(Change), table_size(Change)

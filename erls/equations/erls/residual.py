@@ -48,32 +48,32 @@ from fe_import.model import IntArray
 
 @part
 def _forces_of_links(
-    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, accelerated: bool
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, accelerated: bool, bends: Any
 ) -> None:
     """``wrench``, ``force`` and ``modal`` of every link alone."""
     for k in range(serial.links):
         link = read_link(reals, integers, chain.links + k * LINK)
         state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
-        twist, rate, curved = state.twist, state.twist_rate, False
-        if chain.bends >= 0:
-            curved = read_bend(reals, integers, chain.bends + k * BEND).curved != 0
-            if curved:
-                bend = read_bend(reals, integers, chain.bends + k * BEND)
-                bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
+        twist, rate = state.twist, state.twist_rate
+        if bends is not None:
+            bend = read_bend(reals, integers, chain.bends + k * BEND)
+            bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
+            if bend.curved:
                 correct_twist(bend, state, bent)
                 twist, rate = bent.full, bent.full_rate
         link_forces(chain, link, state, twist, rate, accelerated)
-        if curved:
+        if bends is not None:
             bend = read_bend(reals, integers, chain.bends + k * BEND)
             bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
-            feel_curvature(bend, link, state, bent)
+            if bend.curved:
+                feel_curvature(bend, link, state, bent)
         if chain.weight:
             weigh_displaced(link, state)
         if link.parent >= 0:  # on the ground the frame moves along the joint, which does not feel this
             add_force_cross(state.twist, state.momentum, state.wrench)
         for i in range(6):
             state.force[i] = state.modal[i]
-        if chain.bends >= 0:
+        if bends is not None:
             push = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).push
             for i in range(6):
                 push[i] = state.modal[i]
@@ -105,7 +105,7 @@ def _push_along(bend: Bend, state: LinkState, bent: BendState, slides: int, scre
 
 @part
 def _hand_back(
-    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int, bends: Any
 ) -> None:
     """Forces of a link and of all that it bears, on its parent."""
     link = read_link(reals, integers, chain.links + k * LINK)
@@ -119,7 +119,7 @@ def _hand_back(
     for i in range(6):
         before.force[i] += point[i]
     add_rows(link.out, point, 1.0, before.modal[6:])
-    if chain.bends >= 0:
+    if bends is not None:
         bend = read_bend(reals, integers, chain.bends + k * BEND)
         bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
         bent_before = read_bend_state(scratch, integers, chain.bend_states + link.parent * BEND_STATE)
@@ -140,21 +140,19 @@ def _hand_back(
                 before.modal[6 + i - turns] += forces[i]
 
 
-@kernel(contract.RESIDUAL, counted=False)
-def residual(
-    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
+@part
+def balance(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array, bends: Any
 ) -> None:
-    """M a - f, see `erls.equations.compiled_system`; an empty ``a`` stands for zeros, with which nothing is multiplied
-    then.
-    """
+    """M a - f; ``bends`` is None where links have no second-order displacements, which leaves them out of the code."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     if serial.feeds:
         feed_forward(serial, reals, integers, scratch, t)
     move_frames(serial, chain, reals, integers, scratch, t, y, v, a)
-    if chain.bends >= 0:
+    if bends is not None:
         bend_frames(serial, chain, reals, integers, scratch, True)
-    _forces_of_links(serial, chain, reals, integers, scratch, len(a) > 0)
+    _forces_of_links(serial, chain, reals, integers, scratch, len(a) > 0, bends)
     for k in range(serial.links - 1, -1, -1):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
@@ -168,7 +166,7 @@ def residual(
         if parent >= 0:  # the joint turns the displacement along: u̇ holds -ad(S θ̇) u
             clear(state.point)
             add_motion_cross(state.u, joint.screw, 1.0, state.point)
-            if chain.bends >= 0:
+            if bends is not None:
                 bend = read_bend(reals, integers, chain.bends + k * BEND)
                 bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
                 if bend.armed:
@@ -184,4 +182,14 @@ def residual(
         if joint.place >= 0:
             out[joint.place] = motion.forces[0]
         if parent >= 0:
-            _hand_back(serial, chain, reals, integers, scratch, k)
+            _hand_back(serial, chain, reals, integers, scratch, k, bends)
+
+
+@kernel(contract.RESIDUAL, counted=False)
+def residual(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
+) -> None:
+    """M a - f, see `erls.equations.compiled_system`; an empty ``a`` stands for zeros, with which nothing is multiplied
+    then.
+    """
+    balance(reals, integers, scratch, t, y, v, a, out, None)

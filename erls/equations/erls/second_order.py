@@ -159,7 +159,7 @@ def _turn_arm(bend: Bend, state: LinkState, bent: BendState, coordinate: Array, 
 
 @inlined
 def curve_inertia(bend: Bend, state: LinkState, bent: BendState) -> None:
-    """The second-order tensors of a link times its coordinates: ``rows``, S and ½ qᵀ W q. ``x`` becomes those with e."""
+    """The second-order tensors of a link times its coordinates x, now with e: ``rows``, S and ½ qᵀ W q."""
     _set_coordinates(bend.turns, state.q, bent.x)
     bent.rows[:, :] = 0.0
     add_stack(bend.rows, bent.x, bent.rows)

@@ -6,9 +6,7 @@ The motion of a link is μ = (w, ω), w = ν + u̇ six numbers, ω about the axe
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
+from typing import Any
 
 from erls.equations import compiled_system as contract
 from erls.equations.erls.frames import place_frames
@@ -16,16 +14,19 @@ from erls.equations.erls.link_forces import deform, pair_of
 from erls.equations.erls.records import (
     BEND,
     BEND_STATE,
+    CHANGE,
     LINK,
     LINK_STATE,
     Bend,
     BendState,
     Chain,
+    Change,
     Link,
     LinkState,
     read_bend,
     read_bend_state,
     read_chain,
+    read_change,
     read_link,
     read_link_state,
 )
@@ -42,42 +43,10 @@ from erls.equations.serial.records import (
 )
 from erls.equations.serial.segments import SEGMENT, Segment, fill_mass_matrix, read_segment
 from erls.maths.jit import inlined, kernel, part
-from erls.maths.products import add_product, add_transposed_product, clear
-from erls.maths.records import Matrix, reader, table_size
+from erls.maths.products import add_product, add_transposed_product, clear, copy_matrix
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_motion_cross, dot3, transform_motion
 from fe_import.model import IntArray
-
-
-class Change(NamedTuple):
-    """Working memory of a link with second-order inertia.
-
-    Attributes
-    ----------
-    inertia, product : (9, 9), (9, p) arrays
-        Inertia over (W, Ω), and times ``map``.
-    map : (9, p) array
-        (W, Ω) per unit of μ.
-    coupling, whole : (9, e) arrays
-        Of (W, Ω) with q̇_d at given (W, Ω), and with the part of these that q̇_d makes.
-    """
-
-    inertia: Matrix
-    map: Matrix
-    product: Matrix
-    coupling: Matrix
-    whole: Matrix
-
-
-def change(size: int, modes: int) -> Change:
-    """Memory for a link with p = ``size``."""
-    return Change(
-        np.zeros((9, 9)), np.zeros((9, size)), np.zeros((9, size)), np.zeros((9, modes)), np.zeros((9, modes))
-    )
-
-
-read_change = reader(Change)
-CHANGE = table_size(Change)
 
 
 @part
@@ -131,7 +100,8 @@ def _couple(
             if turns:
                 _turn_row(state.turned[a, 6:], decoupled, coupling[first + a])
             else:
-                coupling[first + a, :] = state.turned[a, 6:]
+                for j in range(e):
+                    coupling[first + a, j] = state.turned[a, 6 + j]
 
 
 @inlined
@@ -162,7 +132,7 @@ def _curved_inertia(
         work.map[6 + i, 3 + i] -= 1.0
         for a in range(len(spins)):
             work.map[6 + i, last + a] += spins[a, i]
-    work.whole[:, :] = work.coupling
+    copy_matrix(work.coupling, work.whole)
     for r in range(6):
         for j in range(e):
             made = bent.pulls[r, bend.turns + j]
@@ -227,7 +197,7 @@ def _turned_back(pose: Array, x: Array, out: Array) -> None:
 
 @inlined
 def _lead(
-    pose: Array, axes: Array, axes_before: Array, out: Array, state: LinkState, own: Segment, curved: bool
+    pose: Array, axes: Array, axes_before: Array, out: Array, state: LinkState, own: Segment, bends: Any
 ) -> None:
     """L and N as far as they are of first order."""
     p, before, x = len(own.pull), own.lead.shape[1], state.point
@@ -239,7 +209,7 @@ def _lead(
         transform_motion(pose, x, x)
         for i in range(6):
             own.lead[i, j] = x[i]
-    if curved:
+    if bends is not None:
         for i in range(3):
             for j in range(3):
                 own.lead[6 + i, 6 + j] = pose[3 * j + i]
@@ -251,7 +221,7 @@ def _lead(
         transform_motion(pose, out[j], x)
         for i in range(6):
             own.reach[i, j] = x[i]
-        if curved:
+        if bends is not None:
             for i in range(3):
                 own.reach[6 + i, j] = x[3 + i]
 
@@ -331,11 +301,12 @@ def _turn_along(bend: Bend, state: LinkState, bent: BendState, slides: int, scre
 
 @part
 def set_segments(
-    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, turns: bool
-) -> None:
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, turns: bool,
+    bends: Any,
+) -> None:  # fmt: skip
     """Segments of all links, over their elastic coordinates, or over decoupled ones where ``turns``."""
     place_frames(serial, chain, reals, integers, scratch, t, y, y, y[0:0])
-    if chain.bends >= 0:
+    if bends is not None:
         bend_frames(serial, chain, reals, integers, scratch, False)
     for k in range(serial.links):
         link = read_link(reals, integers, chain.links + k * LINK)
@@ -346,7 +317,7 @@ def set_segments(
         decoupled = read_modes(reals, integers, serial.modes + k * MODES).decoupled
         deform(chain, link, state)
         axes = link.axes
-        if chain.bends >= 0:
+        if bends is not None:
             bend = read_bend(reals, integers, chain.bends + k * BEND)
             bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
             axes = bend.axes
@@ -360,11 +331,11 @@ def set_segments(
         _subspace(joint.screw, axes, link.parent >= 0, state, own)
         if link.parent >= 0:
             axes_before = read_link(reals, integers, chain.links + link.parent * LINK).axes
-            if chain.bends >= 0:
+            if bends is not None:
                 axes_before = read_bend(reals, integers, chain.bends + link.parent * BEND).axes
             out = link.out_decoupled if turns else link.out
-            _lead(motion.pose, axes, axes_before, out, state, own, chain.bends >= 0)
-            if chain.bends >= 0:
+            _lead(motion.pose, axes, axes_before, out, state, own, bends)
+            if bends is not None:
                 bend = read_bend(reals, integers, chain.bends + k * BEND)
                 bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
                 before = read_modes(reals, integers, serial.modes + link.parent * MODES).decoupled
@@ -375,10 +346,16 @@ def set_segments(
                     _arm(bend, state, bent, motion.coordinate, own)
 
 
+@part
+def fill(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array, bends: Any) -> None:
+    """M; ``bends`` as in `erls.equations.erls.residual`."""
+    serial = read_serial(reals, integers, integers[0])
+    chain = read_chain(reals, integers, serial.own)
+    set_segments(serial, chain, reals, integers, scratch, t, y, False, bends)
+    fill_mass_matrix(serial, chain.segments, reals, integers, scratch, out)
+
+
 @kernel(contract.MASS_MATRIX, counted=False)
 def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
     """M; see `erls.equations.compiled_system`."""
-    serial = read_serial(reals, integers, integers[0])
-    chain = read_chain(reals, integers, serial.own)
-    set_segments(serial, chain, reals, integers, scratch, t, y, False)
-    fill_mass_matrix(serial, chain.segments, reals, integers, scratch, out)
+    fill(reals, integers, scratch, t, y, out, None)

@@ -6,7 +6,7 @@ from typing import Any
 
 from erls.equations import compiled_system as contract
 from erls.equations.erls.records import read_chain
-from erls.equations.erls.residual import residual
+from erls.equations.erls.residual import balance
 from erls.equations.erls.segments import set_segments
 from erls.equations.serial.elimination import eliminate, set_compliance, substitute
 from erls.equations.serial.feed_forward import feed_forward
@@ -17,9 +17,9 @@ from fe_import.model import IntArray
 
 
 @part
-def _factor(
+def factor_links(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, alpha: Any, beta: Any,
-    factors: Any, definite: bool,
+    factors: Any, definite: bool, bends: Any,
 ) -> int:  # fmt: skip
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
@@ -30,14 +30,14 @@ def _factor(
     )
     if status != 0:
         return int(status)
-    set_segments(serial, chain, reals, integers, scratch, t, y, True)
+    set_segments(serial, chain, reals, integers, scratch, t, y, True, bends)
     return int(
         eliminate(serial, chain.segments, chain.condensed, reals, integers, scratch, factors, definite)
     )
 
 
 @part
-def _solve(reals: Array, integers: IntArray, factors: Any, b: Any) -> None:
+def solve_links(reals: Array, integers: IntArray, factors: Any, b: Any) -> None:
     serial = read_serial(reals, integers, integers[0])
     substitute(serial, read_chain(reals, integers, serial.own).condensed, reals, integers, factors, b)
 
@@ -48,13 +48,13 @@ def factor(
     factors: Array,
 ) -> int:  # fmt: skip
     """With real numbers."""
-    return int(_factor(reals, integers, scratch, t, y, v, alpha, beta, factors, False))
+    return int(factor_links(reals, integers, scratch, t, y, v, alpha, beta, factors, False, None))
 
 
 @kernel(contract.SOLVE, counted=False)
 def solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
     """With real numbers."""
-    _solve(reals, integers, factors, b)
+    solve_links(reals, integers, factors, b)
 
 
 @kernel(contract.FACTOR_COMPLEX, counted=False)
@@ -63,24 +63,32 @@ def factor_complex(
     factors: Any,
 ) -> int:  # fmt: skip
     """With complex numbers."""
-    return int(_factor(reals, integers, scratch, t, y, v, alpha, beta, factors, False))
+    return int(factor_links(reals, integers, scratch, t, y, v, alpha, beta, factors, False, None))
 
 
 @kernel(contract.SOLVE_COMPLEX, counted=False)
 def solve_complex(reals: Array, integers: IntArray, factors: Any, b: Any) -> None:
     """With complex numbers."""
-    _solve(reals, integers, factors, b)
+    solve_links(reals, integers, factors, b)
+
+
+@part
+def accelerate(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
+) -> int:
+    """M⁻¹ f."""
+    balance(reals, integers, scratch, t, y, v, y[0:0], out, bends)
+    serial = read_serial(reals, integers, integers[0])
+    factors = scratch[read_chain(reals, integers, serial.own).factors :]
+    status = factor_links(reals, integers, scratch, t, y, v, 0.0, 0.0, factors, True, bends)
+    if status == 0:
+        for i in range(len(out)):
+            out[i] = -out[i]
+        solve_links(reals, integers, factors, out)
+    return int(status)
 
 
 @kernel(contract.ACCELERATION, counted=False)
 def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> int:
     """M⁻¹ f."""
-    residual(reals, integers, scratch, t, y, v, y[0:0], out)
-    serial = read_serial(reals, integers, integers[0])
-    factors = scratch[read_chain(reals, integers, serial.own).factors :]
-    status = _factor(reals, integers, scratch, t, y, v, 0.0, 0.0, factors, True)
-    if status == 0:
-        for i in range(len(out)):
-            out[i] = -out[i]
-        _solve(reals, integers, factors, out)
-    return int(status)
+    return int(accelerate(reals, integers, scratch, t, y, v, out, None))

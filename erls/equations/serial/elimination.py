@@ -1,15 +1,15 @@
 """(M + α C + β K) x = b solved link by link, from the tips inward and back; its cost grows with the number of links.
 
-With the segments of `erls.equations.serial.segments` in decoupled coordinates D = 1 + α C_d + β K_d is diagonal. A link
-and all that it bears act on its parent with the force H̃ μ + f, μ their motion without the joint's own. Elastic
-coordinates x of a link feel what it bears through few ports z = P x: the reach N of the links on it, and E, F of
-inertia that changes. With h the forces at ports and g the motion of the link,
+With the segments of `erls.equations.serial.segments` in decoupled coordinates W = 1 + α C_d + β K_d is diagonal, and a
+full matrix only where the inertia of the modes changes. A link and all that it bears act on its parent with the force
+F = H̃ m + h, m their motion without the joint's own. With g the motion of the parent, N and L stacked over all links
+on it,
 
-    D x + Bᵀ g + Pᵀ (Q z + Q_g g + h) = b,   so   (1 + G Q) z = P D⁻¹ b - G h - (G_B + G Q_g) g,   G = P D⁻¹ Pᵀ,
+    x = W⁻¹ (b - Bᵀ g - Nᵀ F),   m = L g + N x,   so   (1 + G H̃) m = A g + N W⁻¹ b - G h,
 
-and the link without its elastic coordinates has the inertia I - B D⁻¹ Bᵀ + ... on g. Then its joint goes
-(R. Featherstone, Rigid Body Dynamics Algorithms, ch. 7: articulated bodies). What C has beside its diagonal in
-decoupled coordinates is left out. Numbers α, β may be complex.
+G = N W⁻¹ Nᵀ and A = L - N W⁻¹ Bᵀ: m = Φ g + ..., and without its elastic coordinates the parent has the inertia
+I - B W⁻¹ Bᵀ + Aᵀ H̃ Φ on g. Then its joint goes (R. Featherstone, Rigid Body Dynamics Algorithms, ch. 7: articulated
+bodies). What C has beside its diagonal in decoupled coordinates is left out. Numbers α, β may be complex.
 """
 
 from __future__ import annotations
@@ -30,93 +30,120 @@ from erls.equations.serial.records import (
 )
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
 from erls.maths.jit import part
-from erls.maths.products import add_product, add_rows, add_transposed_product, clear, copy, copy_matrix, dot
+from erls.maths.products import add_rows, clear, copy_matrix, dot
 from erls.maths.records import Matrix, Vector, reader, table_size
 from erls.maths.so3 import Array
+from erls.maths.symmetric import factor_symmetric, solve_symmetric
 from fe_import.model import IntArray
 
 _SINGULAR = 1e-14  # inertia along a joint against what it was before the elimination of the rest
 
 
 class Condensed(NamedTuple):
-    """A link in elimination: p numbers of motion, e elastic coordinates, n ports.
+    """A link in elimination: p numbers of motion, e elastic coordinates, n numbers of motion of the links on it.
 
     Attributes
     ----------
+    parent, first : int
+        Of the segment; where the motion of the link stands among those on its parent.
     compliance : (e,) array
-        D⁻¹.
-    rows : (n, e) array
-        P.
-    bound, bound_lead : (n, n), (n, p) arrays
-        Q and Q_g.
+        Inverse of the diagonal 1 + α C_d + β K_d.
+    whole, diagonal : (e, e), (e,) arrays
+        Factors of W where it is no diagonal; otherwise (0, 0).
+    rows, rows_solved : (n, e) arrays
+        N and N W⁻¹.
+    coupling_solved : (p, e) array
+        B W⁻¹.
+    bound : (n, n) array
+        H̃ of the links on it.
     yielding : (n, n) array
         G.
     solver : (n, 2 n) array
-        Right half: (1 + G Q)⁻¹.
-    output : (n, p) array
-        z per unit of g.
-    crossing : (n, p) array
-        P D⁻¹ Bᵀ.
-    through : (p, n) array
-        What z puts on g: Q_gᵀ - (P D⁻¹ Bᵀ)ᵀ Q.
+        Right half: (1 + G H̃)⁻¹.
+    lead, follow : (n, p) arrays
+        A and Φ.
     articulated : (p, p) array
-        Inertia on g; without its joint H̃.
-    coupling : (p, e) array
-        B.
-    lead, reach, subspace : arrays
-        L, N and S of the segment.
-    push : (p,) array
-        Articulated inertia times S.
+        Inertia on g; at last without its joint, H̃.
+    subspace, push : (p,) arrays
+        S of the segment, and articulated inertia times S.
     along : (2,) array
         Inertia along the joint, and what stiffness and damping add to it.
-    forces, free, given, load, motion : (e,), (n,), (n,), (p,), (p,) arrays
-        Working memory of right sides.
-    handed : (n,) array
-        h.
+    forces : (e,) array
+        Forces on decoupled coordinates, then these themselves.
+    handed, moved, given : (n,) arrays
+        h; m; spare.
+    load, motion : (p,) arrays
+        Force of the link on its parent at m = 0; g.
     """
 
+    parent: int
+    first: int
     compliance: Vector
+    whole: Matrix
+    diagonal: Vector
     rows: Matrix
+    rows_solved: Matrix
+    coupling_solved: Matrix
     bound: Matrix
-    bound_lead: Matrix
     yielding: Matrix
     solver: Matrix
-    output: Matrix
-    crossing: Matrix
-    through: Matrix
-    articulated: Matrix
-    coupling: Matrix
     lead: Matrix
-    reach: Matrix
+    follow: Matrix
+    articulated: Matrix
     subspace: Vector
     push: Vector
     along: Vector
     forces: Vector
-    free: Vector
+    handed: Vector
+    moved: Vector
     given: Vector
     load: Vector
     motion: Vector
-    handed: Vector
-    parent: int
-    ports: int
-    first_port: int
-    spare: Matrix
 
 
-def condensed(own: Segment, ports: int, first_port: int) -> Condensed:
-    """Memory for a link with so many ports, whose own ones on its parent begin there."""
+def condensed(own: list[Segment]) -> list[Condensed]:
+    """Memory for all links."""
+    on = [0] * len(own)  # numbers of motion of the links on each
+    firsts: list[int] = []
+    for link in own:
+        firsts.append(on[link.parent] if link.parent >= 0 else 0)
+        if link.parent >= 0:
+            on[link.parent] += len(link.pull)
+    return [_condensed(link, n, first) for link, n, first in zip(own, on, firsts, strict=True)]
+
+
+def _condensed(own: Segment, n: int, first: int) -> Condensed:
     p, e = own.coupling.shape
-    before = own.lead.shape[1]
+    full = e if len(own.change) else 0
 
     def room(*shape: int) -> Array:
         return np.zeros(shape)
 
     return Condensed(
-        room(e), room(ports, e), room(ports, ports), room(ports, p), room(ports, ports), room(ports, 2 * ports),
-        room(ports, p), room(ports, p), room(p, ports), room(p, p), room(p, e), room(p, before),
-        room(p, own.reach.shape[1]), room(p), room(p), room(2), room(e), room(ports), room(ports), room(p), room(p),
-        room(ports), own.parent, own.ports, first_port, room(p, max(before, p)),
-    )  # fmt: skip
+        parent=own.parent,
+        first=first,
+        compliance=room(e),
+        whole=room(full, full),
+        diagonal=room(full),
+        rows=room(n, e),
+        rows_solved=room(n, e),
+        coupling_solved=room(p, e),
+        bound=room(n, n),
+        yielding=room(n, n),
+        solver=room(n, 2 * n),
+        lead=room(n, p),
+        follow=room(n, p),
+        articulated=room(p, p),
+        subspace=room(p),
+        push=room(p),
+        along=room(2),
+        forces=room(e),
+        handed=room(n),
+        moved=room(n),
+        given=room(n),
+        load=room(p),
+        motion=room(p),
+    )
 
 
 read_condensed = reader(Condensed)
@@ -164,57 +191,78 @@ def _quadratic(matrix: Array, x: Array) -> Any:
 
 
 @part
+def _solve_modes(work: Condensed, x: Array) -> None:
+    """Replace forces (e,) on decoupled coordinates by W⁻¹ times them."""
+    if work.whole.shape[0] > 0:
+        solve_symmetric(work.whole, x)
+    else:
+        for m in range(len(x)):
+            x[m] *= work.compliance[m]
+
+
+@part
+def _set_whole(own: Segment, work: Condensed, definite: bool) -> int:
+    """Factors of W where the inertia of the modes changes; 0, or 1 + the number of a mode that nothing resists."""
+    e = work.whole.shape[0]
+    work.whole[:, :] = 0.0
+    for m in range(e):
+        work.whole[m, m] = 1.0 / work.compliance[m]
+    for r in range(own.change.shape[0]):
+        for i in range(e):
+            left, right = own.change[r, i] / 2, own.partner[r, i] / 2
+            for j in range(i, e):
+                work.whole[i, j] += left * own.partner[r, j] + right * own.change[r, j]
+    return int(factor_symmetric(work.whole, work.diagonal, definite))
+
+
+@part
 def condense(own: Segment, work: Condensed) -> float:
     """Take the elastic coordinates of a link out of its ``articulated`` inertia; the sign of `invert`.
 
-    What it bears stands in ``rows``, ``bound``, ``bound_lead`` and ``articulated`` already.
+    L, N and H̃ of the links on it stand in ``lead``, ``rows`` and ``bound`` already, W in ``compliance`` or ``whole``.
     """
-    n, e, p, extra = work.rows.shape[0], len(work.compliance), len(work.load), own.change.shape[0]
-    copy_matrix(own.coupling, work.coupling)
-    for r in range(extra):
-        at, partner = n - 2 * extra + r, n - extra + r
-        for j in range(e):
-            work.rows[at, j], work.rows[partner, j] = own.change[r, j], own.partner[r, j]
-        work.bound[at, partner] = work.bound[partner, at] = 0.5
+    n, p = work.rows.shape[0], len(work.load)
+    copy_matrix(own.coupling, work.coupling_solved)
     for i in range(p):
+        _solve_modes(work, work.coupling_solved[i])
         for j in range(p):
-            total = 0.0
-            for m in range(e):
-                total += work.coupling[i, m] * work.compliance[m] * work.coupling[j, m]
-            work.articulated[i, j] -= total
+            work.articulated[i, j] = own.inertia[i, j] - dot(work.coupling_solved[i], own.coupling[j])
     if n == 0:
         return 1.0
+    copy_matrix(work.rows, work.rows_solved)
     for i in range(n):
-        for m in range(e):
-            work.forces[m] = work.rows[i, m] * work.compliance[m]
+        _solve_modes(work, work.rows_solved[i])
         for j in range(i + 1):
-            work.yielding[i, j] = work.yielding[j, i] = dot(work.forces, work.rows[j])
+            work.yielding[i, j] = work.yielding[j, i] = dot(work.rows_solved[i], work.rows[j])
         for j in range(p):
-            work.crossing[i, j] = dot(work.forces, work.coupling[j])
+            work.lead[i, j] -= dot(work.rows_solved[i], own.coupling[j])
+    work.solver[:, :] = 0.0
     for i in range(n):
-        for j in range(n):
-            work.solver[i, j] = 1.0 if i == j else 0.0
-    left, right = work.solver[:, :n], work.solver[:, n:]
-    add_product(work.yielding, work.bound, left)
+        row = work.solver[i]
+        row[i] = 1.0
+        for m in range(n):
+            weight, other = work.yielding[i, m], work.bound[m]
+            for j in range(n):
+                row[j] += weight * other[j]
     sign = invert(work.solver)
-    for i in range(p):
+    work.follow[:, :] = 0.0
+    for i in range(n):
+        row = work.follow[i]
+        for m in range(n):
+            weight, other = work.solver[i, n + m], work.lead[m]
+            for j in range(p):
+                row[j] += weight * other[j]
+    for m in range(n):  # Aᵀ H̃ Φ, row after row of H̃ Φ
+        row = work.motion
+        clear(row)
         for j in range(n):
-            work.through[i, j] = work.bound_lead[j, i]
-            for m in range(n):
-                work.through[i, j] -= work.crossing[m, i] * work.bound[m, j]
-    for j in range(p):
-        for i in range(n):
-            work.given[i] = -work.crossing[i, j]
-            for m in range(n):
-                work.given[i] -= work.yielding[i, m] * work.bound_lead[m, j]
-        for i in range(n):
-            work.output[i, j] = dot(right[i], work.given)
-    for i in range(p):
-        for j in range(p):
-            total = dot(work.through[i], work.output[:, j])
-            for m in range(n):
-                total -= work.crossing[m, i] * work.bound_lead[m, j]
-            work.articulated[i, j] += total
+            weight, other = work.bound[m, j], work.follow[j]
+            for i in range(p):
+                row[i] += weight * other[i]
+        for i in range(p):
+            weight, result = work.lead[m, i], work.articulated[i]
+            for j in range(p):
+                result[j] += weight * row[j]
     return sign
 
 
@@ -257,20 +305,24 @@ def eliminate(
     for k in range(serial.links):
         work = read_condensed(factors, integers, condensed + k * CONDENSED)
         own = read_segment(scratch, integers, segments + k * SEGMENT)
-        copy_matrix(own.inertia, work.articulated)
-        copy_matrix(own.lead, work.lead)
-        copy_matrix(own.reach, work.reach)
         for i in range(len(work.subspace)):
             work.subspace[i] = own.subspace[i]
         work.bound[:, :] = 0.0
-        work.bound_lead[:, :] = 0.0
+        if work.parent >= 0:
+            before = read_condensed(factors, integers, condensed + work.parent * CONDENSED)
+            copy_matrix(own.lead, before.lead[work.first :])
+            copy_matrix(own.reach, before.rows[work.first :])
     for k in range(serial.links - 1, -1, -1):
         own = read_segment(scratch, integers, segments + k * SEGMENT)
         work = read_condensed(factors, integers, condensed + k * CONDENSED)
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         resisting = 0.0  # before elimination
         if joint.place >= 0:
-            resisting = abs(_quadratic(work.articulated, work.subspace))
+            resisting = abs(_quadratic(own.inertia, own.subspace)) + _borne(own, work)
+        if work.whole.shape[0] > 0:
+            status = _set_whole(own, work, definite)
+            if status != 0:
+                return int(read_modes(reals, integers, serial.modes + k * MODES).first + status)
         sign = condense(own, work)
         if definite and sign < 0.0:
             return int(read_modes(reals, integers, serial.modes + k * MODES).first + 1)
@@ -287,31 +339,24 @@ def eliminate(
                 for j in range(len(work.push)):
                     work.articulated[i, j] -= work.push[i] * (work.push[j] / along)
         if work.parent >= 0:
-            _hand_inertia(work, read_condensed(factors, integers, condensed + work.parent * CONDENSED))
+            bound = read_condensed(factors, integers, condensed + work.parent * CONDENSED).bound
+            for i in range(len(work.load)):
+                for j in range(len(work.load)):
+                    bound[work.first + i, work.first + j] = work.articulated[i, j]
     return 0
 
 
 @part
-def _hand_inertia(work: Condensed, before: Condensed) -> None:
-    """What a link without its joint is to its parent: ports, and inertia."""
-    ports, at, spare = work.ports, work.first_port, work.spare[:, : work.lead.shape[1]]
-    spare[:, :] = 0.0
-    add_product(work.articulated, work.lead, spare)
-    add_transposed_product(work.lead, spare, before.articulated)
-    for i in range(ports):
-        copy(work.reach[i], before.rows[at + i])
-        copy(spare[i], before.bound_lead[at + i])
-        for j in range(ports):
-            before.bound[at + i, at + j] = work.articulated[i, j]
+def _borne(own: Segment, work: Condensed) -> Any:
+    """Inertia along a joint of what its link bears, were nothing elastic; before `condense`."""
+    for i in range(len(work.given)):
+        work.given[i] = dot(work.lead[i], own.subspace)
+    return abs(_quadratic(work.bound, work.given))
 
 
 @part
-def substitute(
-    serial: Serial, condensed: int, reals: Array, integers: IntArray, factors: Array, b: Array
-) -> None:
+def substitute(serial: Serial, condensed: int, reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
     """Replace ``b`` by the solution, after `eliminate`."""
-    for k in range(serial.links):
-        clear(read_condensed(factors, integers, condensed + k * CONDENSED).load)
     for k in range(serial.links - 1, -1, -1):
         work = read_condensed(factors, integers, condensed + k * CONDENSED)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
@@ -322,21 +367,18 @@ def substitute(
             for i in range(len(work.load)):
                 work.load[i] += work.push[i] * (b[place] / work.along[0])
         if work.parent >= 0:
-            before = read_condensed(factors, integers, condensed + work.parent * CONDENSED)
+            handed = read_condensed(factors, integers, condensed + work.parent * CONDENSED).handed
             for i in range(len(work.load)):
-                for j in range(len(before.load)):
-                    before.load[j] += work.lead[i, j] * work.load[i]
-            for i in range(work.ports):
-                before.handed[work.first_port + i] = work.load[i]
+                handed[work.first + i] = work.load[i]
     for k in range(serial.links):
         work = read_condensed(factors, integers, condensed + k * CONDENSED)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
         place = read_joint(reals, integers, serial.joints + k * JOINT).place
         clear(work.motion)
         if work.parent >= 0:
-            before = read_condensed(factors, integers, condensed + work.parent * CONDENSED)
-            add_rows(work.lead, before.motion, 1.0, work.motion)
-            add_rows(work.reach, before.forces, 1.0, work.motion)
+            moved = read_condensed(factors, integers, condensed + work.parent * CONDENSED).moved
+            for i in range(len(work.motion)):
+                work.motion[i] = moved[work.first + i]
         if place >= 0:
             b[place] = (b[place] - dot(work.push, work.motion)) / work.along[0]
             for i in range(len(work.motion)):
@@ -346,54 +388,42 @@ def substitute(
 
 @part
 def _collect(work: Condensed, decoupled: Array, b: Array) -> None:
-    """Add to ``load`` what forces on elastic coordinates and at ports put on the link; ``free`` gets z at g = 0.
+    """``load`` by the forces on elastic coordinates and by ``handed``; ``forces`` on decoupled ones, W⁻¹ times them.
 
-    ``forces`` holds those on the decoupled coordinates.
+    ``moved`` is what they make of m at g = 0.
     """
-    n, e, p = len(work.free), len(b), len(work.load)
-    for i in range(e):
-        work.forces[i] = 0.0
+    n, e = len(work.moved), len(b)
+    clear(work.forces)
     for i in range(e):  # Vᵀ b
         row, weight = decoupled[i], b[i]
         for j in range(e):
             work.forces[j] += weight * row[j]
-    for i in range(p):
-        total = 0.0
-        for m in range(e):
-            total += work.coupling[i, m] * work.compliance[m] * work.forces[m]
-        for m in range(n):
-            total -= work.crossing[m, i] * work.handed[m]
-        work.load[i] += total
+    clear(work.load)
+    add_rows(work.coupling_solved, work.forces, 1.0, work.load)
+    clear(work.given)
+    add_rows(work.rows_solved, work.forces, 1.0, work.given)
+    add_rows(work.yielding, work.handed, -1.0, work.given)
     for i in range(n):
-        total = 0.0
-        for m in range(e):
-            total += work.rows[i, m] * work.compliance[m] * work.forces[m]
-        for m in range(n):
-            total -= work.yielding[i, m] * work.handed[m]
-        work.given[i] = total
-    for i in range(n):
-        work.free[i] = dot(work.solver[i, n:], work.given)
-    add_rows(work.through, work.free, 1.0, work.load)
+        work.moved[i] = dot(work.solver[i, n:], work.given)
+    for i in range(n):  # Aᵀ (H̃ m + h)
+        weight, row = work.handed[i] + dot(work.bound[i], work.moved), work.lead[i]
+        for j in range(len(row)):
+            work.load[j] += weight * row[j]
+    _solve_modes(work, work.forces)
 
 
 @part
 def _answer(work: Condensed, decoupled: Array, b: Array) -> None:
     """Elastic coordinates of a link whose ``motion`` is known, decoupled into ``forces``, and its own into ``b``."""
-    n, e = len(work.free), len(b)
-    add_rows(work.output, work.motion, 1.0, work.free)
-    for i in range(n):
-        work.given[i] = work.handed[i]
-    add_rows(work.bound, work.free, 1.0, work.given)
-    add_rows(work.bound_lead, work.motion, 1.0, work.given)
+    n, e = len(work.moved), len(b)
+    add_rows(work.follow, work.motion, 1.0, work.moved)
     for i in range(len(work.motion)):
-        row, weight = work.coupling[i], work.motion[i]
+        row, weight = work.coupling_solved[i], work.motion[i]
         for m in range(e):
             work.forces[m] -= weight * row[m]
     for i in range(n):
-        row, weight = work.rows[i], work.given[i]
+        row, weight = work.rows_solved[i], work.handed[i] + dot(work.bound[i], work.moved)
         for m in range(e):
             work.forces[m] -= weight * row[m]
-    for m in range(e):
-        work.forces[m] *= work.compliance[m]
     clear(b)
     add_rows(decoupled, work.forces, 1.0, b)

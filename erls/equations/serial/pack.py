@@ -74,7 +74,8 @@ def modes_record(first: int, mass: Array, link: Link, decoupled: DecoupledModes)
 
 def put_all(memory: Memory, records: Sequence[Joint | JointState | Modes | RigidLink | RigidState]) -> int:
     """Records one after the other; the place of the first."""
-    return [memory.put(record) for record in records][0]
+    first, *_ = [memory.put(record) for record in records]
+    return first
 
 
 def joint_states(scratch: Memory, count: int) -> int:
