@@ -11,11 +11,11 @@ import ffr_cases
 import numpy as np
 import pytest
 import scenes
+from erls.equations.ffr.compiled import compile_frames
 
 from erls.equations.erls import compiled as erls_compiled
 from erls.equations.erls.chain import Erls
 from erls.equations.erls.compiled import compile_chain
-from erls.equations.ffr.compiled import compile_frames
 from erls.equations.ffr.equations import Ffr
 from erls.equations.serial.decoupled_modes import decoupled_modes
 from erls.integrate.base import Options
