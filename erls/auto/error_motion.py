@@ -199,7 +199,7 @@ def _functions(system: SecondOrderSystem, lesser: SecondOrderSystem) -> tuple[Co
     """Functions of both as the loop calls them, and whether they are compiled."""
     from erls.equations.uncompiled import uncompiled
 
-    ours, other = getattr(system, "compiled", None), getattr(lesser, "compiled", None)
+    ours, other = system.compiled, lesser.compiled
     if ours is not None and (other is not None or not lesser.size):
         return ours, other or ours, True
     return uncompiled(quick(system)), uncompiled(quick(lesser)), False

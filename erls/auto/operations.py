@@ -105,7 +105,7 @@ def operations(mechanism: Mechanism) -> Operations:
     if mechanism.bandwidth is not None and "static_correction" in mechanism.effects:
         evaluation *= 2
     solution = sum(_CARRIED + 4 * e**2 + 4 * (6 + r) * e for e, r in _sizes(links, axes))
-    factors = sum(2 * (6 + r) ** 3 + (6 + r) ** 2 * e + 2 * r * e**2 for e, r in _sizes(links, axes))
+    factors: float = sum(2 * (6 + r) ** 3 + (6 + r) ** 2 * e + 2 * r * e**2 for e, r in _sizes(links, axes))
     conditions = 6 * len(mechanism.loops)
     if conditions:
         evaluation += 2 * conditions * size

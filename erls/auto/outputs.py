@@ -15,8 +15,10 @@ from erls.integrate.base import Solution
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.drives import Drive
+from erls.mechanism.substructures import is_split
 from erls.run.record import Run, node_positions
 from erls.scene.chain import Scene
+from erls.scene.settings import Simulation
 
 Watched = tuple[tuple[int, int], ...]
 
@@ -46,8 +48,10 @@ class Outputs:
         self.formulation, self.watched = formulation, watched
         self.driven = driven_joints(formulation.mechanism)
         self._static = formulation if isinstance(formulation, QuasiStatic) else None
-        freed = reacting(formulation if self._static is None else self._static.inner) if self.driven else None
-        self._reacting = None if freed is None else quick(formulate(freed, scene.record.simulation))
+        whole = formulation if self._static is None else self._static.inner
+        settings = scene.record.simulation
+        freed = reacting(whole.mechanism, settings) if self.driven else None
+        self._reacting = None if freed is None else quick(formulate(freed, settings))
 
     def positions(self, state: State) -> Array:
         """(points, 3) in the world [m]."""
@@ -72,12 +76,12 @@ class Outputs:
         return np.asarray(self._reacting.residual(t, *state))[self.driven]
 
 
-def reacting(formulation: Formulation) -> Mechanism | None:
+def reacting(mechanism: Mechanism, settings: Simulation) -> Mechanism | None:
     """The same chain with nothing that prescribes its motion: forces out of balance on its joints are those of their
-    drives. None where there is no compiled form, or a drive that knows its own force.
+    drives. None where other coordinates are joint angles only as long as they are prescribed, where loops or pieces
+    share out the forces, or for a drive that knows its own force.
     """
-    mechanism = formulation.mechanism
-    if getattr(formulation, "compiled", None) is None or mechanism.loops:
+    if settings.gauge != "joint-angle" or mechanism.loops or is_split(mechanism):
         return None
     if not all(mechanism.joints[k].drive.prescribed for k in driven_joints(mechanism)):
         return None

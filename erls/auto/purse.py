@@ -35,7 +35,7 @@ class Purse:
         self.cost = operations(self.mechanism)
         self.steps = count_steps(scene, self.mechanism)
         self.forced = may_follow(self.mechanism, self.settings)
-        freed = reacting(formulation) is not None
+        freed = reacting(self.mechanism, self.settings) is not None
         self.effort = (EFFORT if freed else REACTION) if driven_joints(self.mechanism) else 0
         self.spent = self.won = 0.0
         self.followed = certify.FEWEST

@@ -10,7 +10,9 @@ from erls.maths.so3 import Array
 
 
 class Quick:
-    """Compiled functions with the signatures of `erls.integrate.base.SecondOrderSystem`."""
+    """Compiled functions with the signatures of `erls.equations.system.SecondOrderSystem`."""
+
+    compiled: None = None  # for those who would call them as they are
 
     def __init__(self, system: Any) -> None:
         self.size: int = system.size
@@ -46,4 +48,4 @@ class Quick:
 
 def quick(system: Any) -> Any:
     """The system itself, or its compiled form."""
-    return system if getattr(system, "compiled", None) is None else Quick(system)
+    return system if system.compiled is None else Quick(system)

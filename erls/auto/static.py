@@ -59,12 +59,12 @@ def static_cut(scene: Scene, formulation: Formulation, forced: Forced) -> Cut | 
 
 def vibrating_efforts(scene: Scene, formulation: Formulation, forced: Forced) -> float | None:
     """What vibrations add to drive forces, relative to their peak: from the accelerations of modes, ω² times their
-    amplitudes, all added up. None where there is no compiled form to tell.
+    amplitudes, all added up. None where joints cannot be freed to tell.
     """
     driven = driven_joints(formulation.mechanism)
     if not driven:
         return 0.0
-    mechanism = reacting(formulation)
+    mechanism = reacting(formulation.mechanism, scene.record.simulation)
     if mechanism is None:
         return None
     freed, joints = quick(formulate(mechanism, scene.record.simulation)), len(mechanism.joints)

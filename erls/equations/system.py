@@ -6,11 +6,14 @@ the same loops through `erls.equations.uncompiled`.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from erls.maths.so3 import Array
+
+if TYPE_CHECKING:
+    from erls.equations.compiled_system import CompiledSystem
 
 
 class MovingSystem(Protocol):
@@ -39,6 +42,11 @@ class SecondOrderSystem(Protocol):
     @property
     def breakpoints(self) -> tuple[float, ...]:
         """Times at which forces or prescribed accelerations jump, in rising order."""
+
+    @property
+    def compiled(self) -> CompiledSystem | None:
+        """The same equations in compiled form; None where there is none."""
+        return None
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
         """(n,) generalized forces M(y, t) a - f(t, y, v)."""

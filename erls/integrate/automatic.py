@@ -44,7 +44,7 @@ def automatic(
 
 def choose(system: SecondOrderSystem, times: tuple[float, float], y: Array, v: Array) -> tuple[str, str]:
     """Name of the method for a system from a state on, and the reason in words."""
-    if getattr(system, "compiled", None) is not None:
+    if system.compiled is not None:
         return "lobatto", "the equations are compiled"
     try:
         frequency, limit = explicit_step_limit(system, times[0], np.asarray(y), np.asarray(v), "dop853")

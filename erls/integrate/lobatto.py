@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 import time
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -38,9 +38,6 @@ from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, Observer, Options, Solution
 from erls.integrate.driver import Recorder, integrate_legs, not_finite
 from erls.maths.so3 import Array
-
-if TYPE_CHECKING:
-    from erls.equations.compiled_system import CompiledSystem
 
 NODES = (0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0)
 WEIGHT = 0.08  # κ
@@ -91,7 +88,7 @@ class _Run:
         from erls.integrate.stepping.absent import FACTORING
 
         self.at, self.recorder, n = at, recorder, system.size
-        compiled: CompiledSystem | None = getattr(system, "compiled", None)
+        compiled = system.compiled
         self.system = compiled or uncompiled(system)
         self.step = loop.advance if compiled else getattr(loop.advance, "py_func", loop.advance)
         self.chunk, self.largest_chunk = (8, 4096) if compiled else (1, 1)  # steps

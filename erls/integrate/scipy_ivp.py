@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,9 +30,6 @@ from erls.errors import Cause, SimulationError
 from erls.integrate.base import Integrator, Leg, Observer, Options, Solution, hermite
 from erls.integrate.driver import Recorder, integrate_legs, not_finite
 from erls.maths.so3 import Array
-
-if TYPE_CHECKING:
-    from erls.equations.compiled_system import CompiledSystem
 
 VELOCITY_PER_METRE = 10.0  # 1/s, of the absolute tolerance
 _WORST = np.array([0.5, 0.5 + 0.05**0.5])  # where quintic Hermite interpolation errs most in y and in v
@@ -140,7 +137,7 @@ def scipy_method(name: str) -> Integrator:
 
 def _acceleration_of(system: SecondOrderSystem) -> Callable[[float, Array, Array], Array]:
     """The accelerations of a system, from its compiled form where there is one."""
-    compiled: CompiledSystem | None = getattr(system, "compiled", None)
+    compiled = system.compiled
     if compiled is None:
         return system.acceleration
     constants = (compiled.reals, compiled.integers, compiled.scratch)

@@ -92,7 +92,7 @@ class ClosedChain:
         """
         from erls.equations.erls.chain import Erls  # here: a run imports the formulation it needs
 
-        chain = getattr(self.bare, "compiled", None) if self.size else None
+        chain = self.bare.compiled if self.size else None
         if chain is None or not isinstance(self.bare, Erls) or self.bare.stiffened:
             return None
         from erls.equations.loops.compiled import compile_loops  # here: it imports the compiler

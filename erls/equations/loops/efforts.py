@@ -155,6 +155,11 @@ class ActuatedTree:
         """Breakpoints of the drives of the chain."""
         return self.bare.breakpoints
 
+    @property
+    def compiled(self) -> None:
+        """None: that of the chain knows nothing of these forces."""
+        return None
+
     def _acting(self, t: float, y: Array, v: Array) -> list[Effort]:
         found = self.efforts.at(t, y, self.efforts.rows.closure(t, y, v))
         return [replace(effort, row=effort.row[self.free]) for effort in found]

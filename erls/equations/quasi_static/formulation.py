@@ -135,7 +135,7 @@ class QuasiStatic:
     @cached_property
     def compiled(self) -> CompiledSystem | None:
         """The same equations in compiled form; None where those of all modes have none of a chain, or all follow."""
-        inner: CompiledSystem | None = getattr(self.inner, "compiled", None)
+        inner = self.inner.compiled
         if inner is None or not self.size:
             return None
         from erls.equations.quasi_static.compiled import compile_quasi_static  # here: it imports the compiler
@@ -322,7 +322,7 @@ class QuasiStatic:
 
 def _residual(equations: TreeFormulation, t: float, y: Array, v: Array, a: Array) -> Array:
     """(n,) M a - f, from the compiled form where there is one."""
-    compiled: CompiledSystem | None = getattr(equations, "compiled", None)
+    compiled = equations.compiled
     if compiled is None:
         return equations.residual(t, y, v, a)
     out = np.empty(len(y))
@@ -332,7 +332,7 @@ def _residual(equations: TreeFormulation, t: float, y: Array, v: Array, a: Array
 
 def _mass_matrix(equations: TreeFormulation, t: float, y: Array) -> Array:
     """(n, n) M, from the compiled form where there is one."""
-    compiled: CompiledSystem | None = getattr(equations, "compiled", None)
+    compiled = equations.compiled
     if compiled is None:
         return equations.mass_matrix(t, y)
     out = np.empty((len(y), len(y)))

@@ -38,7 +38,7 @@ def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray
     zero = np.zeros(size)
     scales = equations.length_scales
 
-    compiled = getattr(equations, "compiled", None)
+    compiled = equations.compiled
 
     def out_of_balance(trial: Array) -> Array:
         """Held angles first, then forces on the elastic coordinates."""

@@ -143,7 +143,7 @@ def static_warnings(formulation: Formulation, solution: Solution, tolerance: flo
 
 def _samples(formulation: QuasiStatic, walk: list[Leg], knots: Array) -> tuple[Array, Array]:
     """Times away from jumps, those of the knots next to even ones, and the steps of differences around them."""
-    count = _SAMPLES_UNCOMPILED if getattr(formulation.inner, "compiled", None) is None else _SAMPLES
+    count = _SAMPLES_UNCOMPILED if formulation.inner.compiled is None else _SAMPLES
     finest = formulation.period / _PER_PERIOD
     middle, step = [], []
     for leg in walk:
