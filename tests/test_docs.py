@@ -78,17 +78,6 @@ def test_annotated_link_and_scene_run(tmp_path: Path) -> None:
     }
 
 
-def test_annotated_scene_of_bodies_runs(tmp_path: Path) -> None:
-    """So is the scene of bodies."""
-    from erls.run.bodies.solve import solve
-
-    path = tmp_path / "scene.toml"
-    path.write_text(_example("docs/bodies.md", "[[connections]]"), encoding="utf-8")
-    result = solve(path)
-    assert result.failure is None
-    assert "arm/4" in result.samples([0.1])[0]["points"]  # type: ignore[union-attr]
-
-
 def test_drive_examples_are_valid() -> None:
     """The drives decode and build, every profile among them."""
     from erls.errors import SceneError

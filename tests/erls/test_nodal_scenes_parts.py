@@ -163,9 +163,9 @@ def test_two_nodes_in_one_place_are_hinged(tmp_path: Path) -> None:
     assert share == pytest.approx(stiffness[0] / stiffness.sum(), rel=1e-6)
 
 
-def test_the_scene_of_the_readme_shows_every_field(tmp_path: Path) -> None:
+def test_the_scene_of_the_documentation_shows_every_field(tmp_path: Path) -> None:
     """It runs as printed, for a while; with the fields that it shows as comments none of the schema is missing."""
-    text = (scenes.ROOT / "README.md").read_text(encoding="utf-8")
+    text = (scenes.ROOT / "docs" / "bodies.md").read_text(encoding="utf-8")
     (block,) = (b for b in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if 'name = "door on a beam"' in b)
     path = tmp_path / "door.toml"
     path.write_text(block, encoding="utf-8")
