@@ -119,6 +119,25 @@ class BeamLines:
 
 
 @dataclass(frozen=True)
+class ThermalLoad:
+    """A uniform change of temperature, and what it does per kelvin.
+
+    Attributes
+    ----------
+    change : float
+        From the temperature of the stated shape without stress [K].
+    force : (d,) array
+        Nodal forces and moments that expand the free link, ∫ Bᵀ E A α dx; in balance [N/K, N m/K].
+    restrained : (s, 6) array
+        Components of ``FEModel.stress`` at its sites while the link is held in its shape, N = -E A α.
+    """
+
+    change: float
+    force: Array
+    restrained: Array
+
+
+@dataclass(frozen=True)
 class FEModel:
     """Mass and stiffness matrices of a free link with what is needed to interpret their rows.
 
@@ -157,6 +176,8 @@ class FEModel:
         Elements of a frame, for its second-order kinematics.
     added_mass : (d, d) sparse CSC or None
         What ``mass`` holds of point masses.
+    thermal : ThermalLoad or None
+        Where a temperature change is given.
     """
 
     name: str
@@ -177,6 +198,7 @@ class FEModel:
     notes: dict[str, str] = field(default_factory=dict)
     beams: BeamLines | None = None
     added_mass: sp.csc_array | None = None
+    thermal: ThermalLoad | None = None
 
     @property
     def interface_dofs(self) -> IntArray:

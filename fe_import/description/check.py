@@ -14,6 +14,7 @@ from fe_import.files.toml import choose
 
 COUPLINGS = ("rigid", "averaged")
 WEIGHTS = ("area", "uniform")
+MOST_KELVIN = 4000.0  # no material is solid beyond
 
 
 def _fail(where: str, message: str, value: Any = None, remedy: str = "", limit: Any = None) -> FEImportError:
@@ -51,6 +52,9 @@ def check_link(link: LinkDescription, file: str) -> None:
             value = getattr(m, field)
             if not (math.isfinite(value) and value > 0):
                 raise _fail(f"{place}.{field}", f"{field} must be positive", value, "give a value above 0")
+        if m.thermal_expansion is not None and not math.isfinite(m.thermal_expansion):
+            message, remedy = "thermal_expansion must be finite", "give it per kelvin, as 12e-6"
+            raise _fail(f"{place}.thermal_expansion", message, m.thermal_expansion, remedy)
         if not -1 < m.poissons_ratio < 0.5:
             raise _fail(
                 f"{place}.poissons_ratio", "Poisson's ratio out of range", m.poissons_ratio, "between -1 and 0.5"
@@ -96,7 +100,29 @@ def check_link(link: LinkDescription, file: str) -> None:
     for k, p in enumerate(link.masses):
         if not (math.isfinite(p.mass) and p.mass >= 0):
             raise _fail(f"{file}: masses[{k}].mass", "a mass cannot be negative", p.mass, "give 0 or more")
+    if link.temperature_change is not None:
+        _check_temperature(link, link.temperature_change, file)
     check_damping(link.damping, f"{file}: damping")
+
+
+def _check_temperature(link: LinkDescription, change: float, file: str) -> None:
+    """Only beams expand, by coefficients that are given."""
+    place = f"{file}: temperature_change"
+    if link.frame is None:
+        message = "only links made of beams expand with temperature"
+        raise _fail(place, message, change, "remove it, or give the link as 'frame'")
+    if not abs(change) <= MOST_KELVIN:  # not a number fails too
+        message, remedy = "no solid is that hot", "give the change of temperature in kelvin"
+        raise _fail(place, message, change, remedy, MOST_KELVIN)
+    if link.reduction.form == "physical":
+        message = "the physical form carries no thermal expansion"
+        raise _fail(place, message, change, "remove it, or use form = 'orthonormal'")
+    for member in link.frame.members:
+        material = link.materials.get(member.material)
+        if material is not None and material.thermal_expansion is None:
+            message = "a link with a temperature change needs the expansion of its materials"
+            where = f"{file}: materials.{member.material}.thermal_expansion"
+            raise _fail(where, message, remedy="give it per kelvin, as 12e-6; 0 for what does not expand")
 
 
 def check_damping(d: Damping, where: str, error: type[ReportedError] = FEImportError) -> None:

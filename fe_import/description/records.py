@@ -49,11 +49,14 @@ class Material(_Record, frozen=True):
         ν, between -1 and 0.5.
     density : float
         ρ [kg/m³].
+    thermal_expansion : float, optional
+        Coefficient of linear thermal expansion α [1/K]; needed where the link has a ``temperature_change``.
     """
 
     youngs_modulus: float
     poissons_ratio: float
     density: float
+    thermal_expansion: float | None = None
 
 
 class Member(_Record, frozen=True):
@@ -293,6 +296,9 @@ class LinkDescription(_Record, frozen=True):
         Of the elastic modes.
     recovery : Recovery, optional
         Where stress or section forces are wanted; without it the modal file holds nothing for them.
+    temperature_change : float, optional
+        Of the whole link, made of beams, from the temperature at which it has its stated shape without stress [K].
+        0 prepares the modal file for one.
     """
 
     interfaces: list[Interface]
@@ -307,6 +313,7 @@ class LinkDescription(_Record, frozen=True):
     reduction: Reduction = Reduction()
     damping: Damping = Damping()
     recovery: Recovery | None = None
+    temperature_change: float | None = None
 
     def files(self) -> list[str]:
         """The files that it names, as they stand there."""

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.elements.sections import SectionConstants
-from fe_import.model import Array, BeamLines, IntArray
+from fe_import.model import Array, BeamLines, IntArray, ThermalLoad
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the sixth-degree products of the shape functions
 _POINTS, _WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
@@ -37,6 +37,8 @@ class FrameElement:
         [Pa]
     density : float
         [kg/m³]
+    thermal_expansion : float
+        [1/K]
     """
 
     nodes: tuple[int, int]
@@ -46,6 +48,7 @@ class FrameElement:
     youngs_modulus: float
     shear_modulus: float
     density: float
+    thermal_expansion: float = 0.0
 
 
 def local_axes(start: Array, end: Array, local_z: Array) -> Array:
@@ -218,3 +221,25 @@ def beam_lines(elements: Sequence[FrameElement], shear: bool, mass: str, rotary_
         rotary=rotary,
         lumped=mass == "lumped",
     )
+
+
+def thermal_load(node_count: int, elements: Sequence[FrameElement], change: float) -> ThermalLoad:
+    """What a uniform temperature change does to frame elements: ε = u' - α ΔT, so N = E A (u' - α ΔT), no bending.
+
+    Parameters
+    ----------
+    node_count : int
+    elements : sequence of FrameElement
+        Their ends, in order, are the sites of `fe_import.elements.section_forces.FrameSections`.
+    change : float
+        [K]
+    """
+    axial = np.array([e.youngs_modulus * e.section.area * e.thermal_expansion for e in elements])
+    along = np.stack([e.axes[0] for e in elements]) * axial[:, None]
+    nodes = np.array([e.nodes for e in elements])
+    force = np.zeros((node_count, 6))
+    np.add.at(force[:, :3], nodes[:, 0], -along)
+    np.add.at(force[:, :3], nodes[:, 1], along)
+    restrained = np.zeros((2 * len(elements), 6))
+    restrained[:, 0] = -np.repeat(axial, 2)
+    return ThermalLoad(change, force.ravel(), restrained)

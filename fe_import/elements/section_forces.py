@@ -53,10 +53,10 @@ class FrameSections:
 
     def evaluate(self, fields: Array, dof_map: IntArray, sites: IntArray) -> Array:
         """(p, 6, m) N, V_y, V_z [N], T, M_y, M_z [N m] of displacement fields (d, m)."""
-        element, second = sites // 2, sites % 2 == 1
+        element, second, count = sites // 2, sites % 2 == 1, fields.shape[1]
         ends = self.site_nodes.reshape(-1, 2)[element]
-        moved = fields[dof_map[ends]].reshape(len(sites), 4, 3, fields.shape[1])  # u₁, φ₁, u₂, φ₂
-        local = np.einsum("pij,pkjm->pkim", self.axes[element], moved).reshape(len(sites), 12, -1)
+        moved = fields[dof_map[ends]].reshape(len(sites), 4, 3, count)  # u₁, φ₁, u₂, φ₂
+        local = np.einsum("pij,pkjm->pkim", self.axes[element], moved).reshape(len(sites), 12, count)
         rows = np.where(second[:, None, None], self.stiffness[element, 6:], -self.stiffness[element, :6])
         return np.asarray(rows @ local)
 

@@ -92,6 +92,11 @@ _SOUND = Range(
     below="MPa or GPa read as Pa, or g read as kg? E and density must be in the same units",
     above="t, or g/cm³, read as kg? E and density must be in the same units",
 )
+_EXPANSION = Range(
+    *("thermal expansion", "1/K", 1e-9, 1e-3, 0.0, 1e-2),
+    below="",
+    above="µm/(m K) read as 1/K? give 12e-6 for 12 of them",
+)
 _FREQUENCY = Range(
     *("first elastic frequency", "Hz", 1e-3, 1e7, 1e-9, 1e12),
     below="stiffness in N/mm read as N/m, or mass in g read as kg? check units",
@@ -174,4 +179,10 @@ def plausible_materials(
                 _SOUND.check(math.sqrt(modulus / density), place),
             )
         )
-    return tuple(max(kind, key=lambda check: check.value) for kind in zip(*found, strict=True))
+    expansions = [
+        _EXPANSION.check(abs(m.thermal_expansion), f"{where}: materials.{name}.thermal_expansion")
+        for name, m in materials.items()
+        if m.thermal_expansion
+    ]
+    kinds = [*zip(*found, strict=True), *([expansions] if expansions else [])]
+    return tuple(max(kind, key=lambda check: check.value) for kind in kinds)

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fe_import.description.records import Frame, Interface, LinkDescription, Material, Member
-from fe_import.elements.frame import FrameElement, assemble_frame, beam_lines, local_axes
+from fe_import.elements.frame import FrameElement, assemble_frame, beam_lines, local_axes, thermal_load
 from fe_import.elements.section_forces import frame_sections
 from fe_import.elements.sections import section_constants
 from fe_import.errors import Cause, FEImportError
@@ -116,6 +116,9 @@ def frame_model(link: LinkDescription, frame: Frame, where: str) -> FEModel:
         source=where,
         stress=frame_sections(mesh.elements, members, shear),
         beams=beam_lines(mesh.elements, shear, frame.mass, frame.rotary_inertia),
+        thermal=None
+        if link.temperature_change is None
+        else thermal_load(len(mesh.nodes), mesh.elements, link.temperature_change),
     )
 
 
@@ -226,6 +229,7 @@ def _element(
         youngs_modulus=material.youngs_modulus,
         shear_modulus=material.youngs_modulus / (2 * (1 + material.poissons_ratio)),
         density=material.density,
+        thermal_expansion=material.thermal_expansion or 0.0,
     )
 
 

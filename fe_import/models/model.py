@@ -148,6 +148,7 @@ def to_si(model: FEModel, link: LinkDescription, where: str) -> FEModel:
     length, mass, time = unit_factors(link, where)
     if length == mass == time == 1:
         return model
+    force = mass * length / time**2
     scale = np.ones(model.mass.shape[0])
     turning = model.dof_map[:, 3:]
     scale[turning[turning >= 0]] = length
@@ -172,4 +173,11 @@ def to_si(model: FEModel, link: LinkDescription, where: str) -> FEModel:
         stress=None if model.stress is None else model.stress.converted(length, mass / (length * time**2)),
         beams=None if model.beams is None else model.beams.converted(length, mass),
         added_mass=None if model.added_mass is None else convert(model.added_mass, mass),
+        thermal=None
+        if model.thermal is None
+        else replace(
+            model.thermal,
+            force=model.thermal.force * scale * force,
+            restrained=model.thermal.restrained * np.repeat([1.0, length], 3) * force,
+        ),
     )
