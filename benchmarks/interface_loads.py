@@ -149,7 +149,7 @@ def modal_history(modal: ModalModel, beta: float, times: Array, corrected: bool)
     clamp = np.linalg.solve(held[:, :6].T, rigid @ a.T - (loaded[:, :6].T @ FORCE)[:, None]).T
     if not corrected:
         return History(clamp, np.tensordot(y @ shapes.T, maps.modes, (1, 2)))
-    modes, per_load, _ = mode_acceleration(modal)
+    modes, per_load, _, _ = mode_acceleration(modal)
     loads = np.hstack([clamp, np.tile(FORCE, (len(times), 1))])
     return History(clamp, np.tensordot(y @ shapes.T, modes, (1, 2)) + np.tensordot(loads, per_load, (1, 2)))
 

@@ -19,14 +19,16 @@ from fe_import.files.toml import choose
 from fe_import.health.plausibility import plausible_link, plausible_materials
 from fe_import.health.report import check_basis, check_model, check_reduction, mode_residuals
 from fe_import.health.static_flexibility import check_static
+from fe_import.health.thermal_expansion import check_expansion
 from fe_import.modal.file import SCHEMA_VERSION, read_modal_file, write_modal_file
 from fe_import.modal.inertia import inertia_invariants, mass_properties
 from fe_import.modal.model import HealthCheck, ModalModel
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.model import build_model, unit_factors
-from fe_import.recovery.recover import recovery_maps
+from fe_import.recovery.recover import recovery_maps, thermal_expansion
 from fe_import.reduction import REDUCTIONS, Basis
 from fe_import.reduction.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
+from fe_import.reduction.thermal import with_thermal_shape
 from fe_import.second_order.compute import second_order
 from fe_import.solver import chosen_solver
 from fe_import.solver.watch import telling
@@ -73,7 +75,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     units = unit_factors(link.description, where)
     checks = plausible_materials(link.description.materials, *units, where) + check_model(model, where)
     _unit_checks(model, np.zeros(0), where)  # a slipped unit is named before the work is done
-    basis = REDUCTIONS[options.method](model, options, where)
+    basis = with_thermal_shape(model, REDUCTIONS[options.method](model, options, where))
     mass, stiffness = reduced_matrices(model, basis)
     interfaces, inboard = basis.vectors[model.interface_dofs], _inboard(model, options.inboard)
     modes = orthonormal_modes(mass, stiffness, basis, options, interfaces, where, inboard)
@@ -84,6 +86,8 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     reference = modes.flexibility if basis.flexibility is None else basis.flexibility
     promised = options.static_correction or basis.flexibility is not None
     checks += check_static(reference, shapes[model.interface_dofs], modes.omega, promised)
+    thermal = thermal_expansion(model, shapes, wanted, where)
+    checks += check_expansion(model, None if thermal is None else thermal.force, modes.omega)
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, where)
     checks += _unit_checks(model, modes.omega, where)
     residuals = mode_residuals(model, shapes, modes.omega)
@@ -124,6 +128,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
         provenance={**provenance(link, model, basis.selection), "second_order": statement},
         second_order=field,
         recovery=None if wanted is None else recovery_maps(model, shapes, wanted, where),
+        thermal=thermal,
     )
 
 

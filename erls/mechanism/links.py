@@ -112,6 +112,7 @@ def truncated(model: ModalModel, elastic_modes: int) -> ModalModel:
         residuals=model.residuals[keep],
         recovery=None if model.recovery is None else model.recovery.truncated(keep),
         second_order=None if model.second_order is None else model.second_order.truncated(keep),
+        thermal=None if model.thermal is None else model.thermal.truncated(keep),
     )
 
 

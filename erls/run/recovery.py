@@ -24,7 +24,7 @@ from erls.run.record import Run
 from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
 from fe_import.modal.recovery_maps import UNITS, RecoveryMaps, spin_products
-from fe_import.recovery.recover import mode_acceleration, required_maps
+from fe_import.recovery.recover import mode_acceleration, mode_displacement, required_maps
 
 
 def recovery_places(run: Run, link: str) -> RecoveryMaps:
@@ -126,12 +126,13 @@ def _recovered(run: Run, link: str, t: ArrayLike, quantity: str, static_correcti
     times = np.asarray(t, dtype=float)
     if static_correction:
         found = link_loads(run, number, times.ravel())
-        modes, loads, spin = mode_acceleration(record.model)
+        modes, loads, spin, warm = mode_acceleration(record.model)
         values = np.tensordot(found.modal, modes, (1, 2)) + np.tensordot(found.interfaces, loads, (1, 2))
         values += np.tensordot(spin_products(found.omega), spin, (1, 2))
     else:
-        values = np.tensordot(run.modal_coordinates(link, times.ravel()), maps.modes, (1, 2))
-    return np.asarray(values.reshape(*times.shape, len(maps.nodes), 6))
+        modes, warm = mode_displacement(record.model)
+        values = np.tensordot(run.modal_coordinates(link, times.ravel()), modes, (1, 2))
+    return np.asarray((values + warm).reshape(*times.shape, len(maps.nodes), 6))
 
 
 def _of_pieces(run: Run, link: Link, t: ArrayLike, quantity: str, static_correction: bool) -> Array:

@@ -11,6 +11,7 @@ from fe_import.modal.identities import Check, check_matrices, check_orthonormal,
 from fe_import.modal.model import ModalModel
 from fe_import.modal.recovery_file import check_recovery
 from fe_import.modal.second_order_file import check_second_order
+from fe_import.modal.thermal_file import check_thermal
 
 FORMS = ("orthonormal", "physical")
 COUPLINGS = ("node", "rigid", "averaged")
@@ -47,6 +48,8 @@ def validate(model: ModalModel, where: str, root: str = "") -> None:
             check_recovery(model, model.recovery, check)
         if model.second_order is not None:
             check_second_order(model, model.second_order, check)
+        if model.thermal is not None:
+            check_thermal(model, model.thermal, check)
 
 
 def _check_shapes(model: ModalModel, check: Check) -> None:

@@ -25,10 +25,11 @@ from fe_import.modal.inertia import InertiaInvariants, MassProperties
 from fe_import.modal.model import FixedInterfaceModes, HealthCheck, ModalModel
 from fe_import.modal.recovery_file import read_recovery, write_recovery
 from fe_import.modal.second_order_file import read_second_order, write_second_order
+from fe_import.modal.thermal_file import read_thermal, write_thermal
 from fe_import.model import IntArray, InterfaceNode
 
 SCHEMA = "erls modal model"
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 UNITS = "SI"
 
 
@@ -105,6 +106,8 @@ def write_modal_group(group: h5py.Group, model: ModalModel) -> None:
         write_recovery(group.create_group("recovery"), model.recovery)
     if model.second_order is not None:
         write_second_order(group.create_group("second_order"), model.second_order)
+    if model.thermal is not None:
+        write_thermal(group.create_group("thermal"), model.thermal)
     provenance = group.create_group("provenance")
     for key, text in sorted(model.provenance.items()):
         write_attribute(provenance, key, text)
@@ -183,6 +186,7 @@ def read_modal_group(group: h5py.Group, where: str) -> ModalModel:
         second_order=read_second_order(file.subgroup("second_order"), len(interface_nodes), n, m)
         if "second_order" in inside
         else None,
+        thermal=read_thermal(file.subgroup("thermal"), m) if "thermal" in inside else None,
     )
     validate(model, where, (group.name or "").rstrip("/"))
     return model

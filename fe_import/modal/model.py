@@ -9,6 +9,7 @@ import numpy as np
 from fe_import.modal.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.modal.recovery_maps import RecoveryMaps
 from fe_import.modal.second_order import SecondOrder
+from fe_import.modal.thermal import ThermalExpansion
 from fe_import.model import Array, IntArray, InterfaceNode
 
 NO_LIMIT = float(np.finfo(np.float64).max)  # a figure that is reported, not judged; finite, as all in a file
@@ -90,6 +91,8 @@ class ModalModel:
         Stress or section forces, when the link description asks for them.
     second_order : SecondOrder or None
         Second-order kinematics; the provenance says why there are none.
+    thermal : ThermalExpansion or None
+        Where the link description gives a temperature change.
     """
 
     name: str
@@ -114,6 +117,7 @@ class ModalModel:
     provenance: dict[str, str] = field(default_factory=dict)
     recovery: RecoveryMaps | None = None
     second_order: SecondOrder | None = None
+    thermal: ThermalExpansion | None = None
 
     @property
     def modes(self) -> int:

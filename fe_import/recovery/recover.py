@@ -10,9 +10,9 @@ from fe_import.files.toml import choose
 from fe_import.modal.inertia import turned
 from fe_import.modal.model import ModalModel
 from fe_import.modal.recovery_maps import SPIN_PAIRS, RecoveryMaps
+from fe_import.modal.thermal import ThermalExpansion
 from fe_import.model import Array, FEModel, IntArray, StressSource
-from fe_import.reduction.base import expanded
-from fe_import.reduction.free_body import free_body
+from fe_import.reduction.free_body import inertia_relief
 
 
 def recovery_maps(model: FEModel, shapes: Array, wanted: Recovery, where: str) -> RecoveryMaps:
@@ -84,24 +84,6 @@ def chosen_sites(model: FEModel, source: StressSource, wanted: Recovery, where: 
     return np.flatnonzero(asked)
 
 
-def inertia_relief(model: FEModel, loads: Array) -> Array:
-    """Elastic displacement of the free link under constant loads, in the frame that the rigid-body modes follow.
-
-    Parameters
-    ----------
-    model : FEModel
-    loads : (d, k) array
-        On all nodal components; what is out of balance accelerates the link as a rigid body.
-
-    Returns
-    -------
-    (d, k) array
-        Pᵀ K⁺ P of the loads, P = 1 - M R Rᵀ; no mode of the link is left out.
-    """
-    forces = loads if model.coupling is None else np.asarray(model.coupling.T @ loads)
-    return expanded(model, free_body(model, model.source).static(forces))
-
-
 def _centrifugal_loads(model: FEModel) -> Array:
     """(d, 6) loads per unit spin product (see `SPIN_PAIRS`): minus A_a M R_b, as in the inertia invariants."""
     momentum = model.mass @ model.rigid_body_modes()[:, 3:]
@@ -110,8 +92,38 @@ def _centrifugal_loads(model: FEModel) -> Array:
     return np.stack(columns, axis=1)
 
 
-def mode_acceleration(model: ModalModel) -> tuple[Array, Array, Array]:
-    """Maps of mode acceleration: (p, 6, m) of modal coordinates, (p, 6, 6 i) of loads, (p, 6, 6) of spin products.
+def thermal_expansion(model: FEModel, shapes: Array, wanted: Recovery | None, where: str) -> ThermalExpansion | None:
+    """Generalized force and section forces of expansion; None without a temperature change.
+
+    Parameters
+    ----------
+    model, shapes, wanted, where
+        See `recovery_maps`; without ``wanted`` there are no places.
+    """
+    load, source = model.thermal, model.stress
+    if load is None or source is None:
+        return None
+    force = shapes.T @ load.force
+    force[:6] = 0.0  # in balance but for rounding
+    sites = np.zeros(0, dtype=np.int64) if wanted is None else chosen_sites(model, source, wanted, where)
+    strained = source.evaluate(inertia_relief(model, load.force[:, None]), model.dof_map, sites)[:, :, 0]
+    restrained = load.restrained[sites]
+    return ThermalExpansion(load.change, force, restrained, strained + restrained)
+
+
+def mode_displacement(model: ModalModel) -> tuple[Array, Array]:
+    """Map (p, 6, m) of modal coordinates by mode displacement, and what temperature adds, (p, 6).
+
+    Parameters and errors are those of `mode_acceleration`.
+    """
+    maps, thermal = required_maps(model, model.name), model.thermal
+    warm = np.zeros(maps.modes.shape[:2]) if thermal is None else thermal.change * thermal.restrained
+    return maps.modes, warm
+
+
+def mode_acceleration(model: ModalModel) -> tuple[Array, Array, Array, Array]:
+    """Maps of mode acceleration: (p, 6, m) of modal coordinates, (p, 6, 6 i) of loads, (p, 6, 6) of spin products; and
+    what temperature adds, (p, 6).
 
     Parameters
     ----------
@@ -131,7 +143,10 @@ def mode_acceleration(model: ModalModel) -> tuple[Array, Array, Array]:
     pull = [model.invariants.X[a].T @ rho for a in range(3)]  # modal loads of ω_a ω_b
     spin = [pull[a][:, b] if a == b else pull[a][:, b] + pull[b][:, a] for a, b in SPIN_PAIRS]
     loads = maps.loads - maps.inertia @ interfaces.T
-    return maps.inertia * squared, loads, maps.spin - maps.inertia @ np.stack(spin, axis=1)
+    warm, thermal = np.zeros(maps.modes.shape[:2]), model.thermal
+    if thermal is not None:
+        warm = thermal.change * (thermal.relaxed - maps.inertia @ thermal.force)
+    return maps.inertia * squared, loads, maps.spin - maps.inertia @ np.stack(spin, axis=1), warm
 
 
 def required_maps(model: ModalModel, where: str) -> RecoveryMaps:

@@ -9,7 +9,8 @@ Rules for adding a method:
 4. Options that mean nothing to the method are refused (`refuse_fields`), not ignored.
 5. With ``options.static_correction`` the vectors span the static response to unit interface loads and to the inertia
    of rigid-body accelerations, or the option is refused.
-6. Nothing is orthonormalized or truncated here: that is common to all methods (`fe_import.reduction.modes`).
+6. Temperature is not the method's business: `fe_import.reduction.thermal` adds the expanded shape to any basis.
+7. Nothing is orthonormalized or truncated here: that is common to all methods (`fe_import.reduction.modes`).
 """
 
 from __future__ import annotations
@@ -45,6 +46,8 @@ class Basis:
     flexibility : (6 n_interfaces, 6 n_interfaces) array or None
         Static flexibility of the full model between its interfaces, inertia-relieved, from a method whose basis
         lacks it.
+    thermal : (k,) array or None
+        Generalized force of thermal expansion per kelvin.
     """
 
     vectors: Array
@@ -53,6 +56,7 @@ class Basis:
     fixed_interface: FixedInterfaceModes
     selection: dict[str, Any] = field(default_factory=dict)
     flexibility: Array | None = None
+    thermal: Array | None = None
 
 
 ReductionMethod = Callable[[FEModel, Reduction, str], Basis]

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.model import Array, FEModel, IntArray
-from fe_import.reduction.base import interface_places
+from fe_import.reduction.base import expanded, interface_places
 from fe_import.reduction.rigid_modes import rigid_modes
 from fe_import.solver.sparse import Factorization, factorize, lowest_modes, modes_below
 
@@ -174,3 +174,20 @@ def free_body(model: FEModel, where: str) -> FreeBody:
     rigid, motions = rigid_modes(mass, model.rigid_body_modes()[model.independent], where)
     return FreeBody(mass, stiffness, rigid, motions, interface_places(model), model.dof_positions())
 
+
+def inertia_relief(model: FEModel, loads: Array) -> Array:
+    """Elastic displacement of the free link under constant loads, in the frame that the rigid-body modes follow.
+
+    Parameters
+    ----------
+    model : FEModel
+    loads : (d, k) array
+        On all nodal components; what is out of balance accelerates the link as a rigid body.
+
+    Returns
+    -------
+    (d, k) array
+        Pᵀ K⁺ P of the loads, P = 1 - M R Rᵀ; no mode of the link is left out.
+    """
+    forces = loads if model.coupling is None else np.asarray(model.coupling.T @ loads)
+    return expanded(model, free_body(model, model.source).static(forces))

@@ -38,6 +38,18 @@ def reduced_matrices(model: FEModel, basis: Basis) -> tuple[Array, Array]:
     return (mass + mass.T) / 2, (stiffness + stiffness.T) / 2
 
 
+def column_scale(mass: Array, stiffness: Array) -> Array:
+    """(k,) factors that bring the columns of a basis to like size.
+
+    Without, rounding in the large ones drowns the lowest modes of a slender link.
+    """
+    inertia, resistance = np.diag(mass), np.diag(stiffness).clip(min=0)
+    massive = inertia > MASSLESS * inertia.max()
+    squared = resistance[massive] / inertia[massive]  # of the frequencies of the columns alone; 0 for rigid motions
+    typical = np.median(squared[squared > 0]) if squared.any() else 1.0
+    return np.asarray(1 / np.sqrt(inertia + resistance / typical))
+
+
 def orthonormal_modes(
     mass: Array,
     stiffness: Array,
@@ -68,19 +80,16 @@ def orthonormal_modes(
     FEImportError
         The rigid-body mass matrix is singular, or more elastic modes are asked for than there are.
     """
-    # columns of like size: without, rounding in the large ones drowns the lowest modes of a slender link
-    inertia, resistance = np.diag(mass), np.diag(stiffness).clip(min=0)
-    massive = inertia > MASSLESS * inertia.max()
-    squared = resistance[massive] / inertia[massive]  # of the frequencies of the columns alone; 0 for rigid motions
-    typical = np.median(squared[squared > 0]) if squared.any() else 1.0
-    scale = 1 / np.sqrt(inertia + resistance / typical)
+    scale = column_scale(mass, stiffness)
     mass, stiffness = mass * np.outer(scale, scale), stiffness * np.outer(scale, scale)
     interfaces = np.zeros((0, len(scale))) if interfaces is None else interfaces * scale
     rigid, rigid_coordinates = rigid_modes(mass, basis.rigid / scale[:, None], where)
 
     complement = whole = la.qr(mass @ rigid)[0][:, 6:]
-    scaled = _Scaled(mass, stiffness, rigid, interfaces)
-    if options.elastic_modes is not None and (options.static_correction or options.truncation == "clamped"):
+    thermal = np.zeros((0, len(scale))) if basis.thermal is None else (basis.thermal * scale)[None]
+    kept_loads = np.vstack([interfaces[: len(interfaces) * options.static_correction], thermal])
+    scaled = _Scaled(mass, stiffness, rigid, interfaces, kept_loads)
+    if options.elastic_modes is not None and (len(kept_loads) or options.truncation == "clamped"):
         complement = _kept_span(scaled, complement, inboard, options, where)
     omega, elastic = dense_modes(
         complement.T @ stiffness @ complement, complement.T @ mass @ complement, None, "free link"
@@ -127,12 +136,16 @@ def mode_shapes(model: FEModel, basis: Basis, modes: OrthonormalModes) -> tuple[
 
 @dataclass(frozen=True)
 class _Scaled:
-    """Mass and stiffness (k, k), rigid-body modes (k, 6) and interface displacements (b, k) of scaled columns."""
+    """Mass and stiffness (k, k), rigid-body modes (k, 6) and interface displacements (b, k) of scaled columns.
+
+    ``kept_loads`` (l, k): generalized loads that the modes kept answer exactly, at the interfaces or of temperature.
+    """
 
     mass: Array
     stiffness: Array
     rigid: Array
     interfaces: Array
+    kept_loads: Array
 
 
 def _flexibility(link: _Scaled, complement: Array) -> Array:
@@ -149,17 +162,20 @@ def _kept_span(link: _Scaled, complement: Array, inboard: int, options: Reductio
         lowest = complement.T @ _clamped_modes(link, slice(6 * inboard, 6 * inboard + 6), count)
     else:
         lowest = dense_modes(k, m, count, "free link")[1]
-    if not options.static_correction:
+    if not len(link.kept_loads):
         return np.asarray(complement @ la.qr(lowest, mode="economic")[0])
-    static = static_span(k, link.interfaces @ complement, link.interfaces @ link.rigid)
+    static = static_span(k, link.kept_loads @ complement, link.kept_loads @ link.rigid)
     if static.shape[1] > count:
+        what, remedy = "thermal expansion", "or remove temperature_change"
+        if options.static_correction:
+            what, remedy = "static correction", "six per interface, or remove static_correction"
         raise FEImportError(
             Cause.MODE_COUNT,
-            "static correction takes more elastic modes",
+            f"{what} takes more elastic modes",
             where=f"{where}: reduction.elastic_modes",
             value=count,
             limit=static.shape[1],
-            remedy="ask for at least as many, six per interface, or remove static_correction",
+            remedy=f"ask for at least as many, {remedy}",
         )
     return np.asarray(complement @ completed(static, lowest, k, count))
 

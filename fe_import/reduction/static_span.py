@@ -17,16 +17,16 @@ _NEW = 1e-8  # share of a field (energy norm) that those before do not hold; rou
 
 
 def static_span(stiffness: Array, interfaces: Array, rigid: Array) -> Array:
-    """Static fields of all interface loads, orthonormal in the energy norm.
+    """Static fields of loads at the interfaces, or of others, orthonormal in the energy norm.
 
     Parameters
     ----------
     stiffness : (n, n) array
         Positive definite, over coordinates of the complement of the rigid-body motions.
     interfaces : (b, n) array
-        Interface displacements and rotations per unit coordinate.
+        Interface displacements and rotations per unit coordinate: what unit loads there do to the coordinates.
     rigid : (b, 6) array
-        Interface displacements and rotations of the rigid-body motions.
+        Interface displacements and rotations of the rigid-body motions; zero for loads in balance.
 
     Returns
     -------
