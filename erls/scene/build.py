@@ -276,6 +276,14 @@ def _link(link: LinkRecord, model: ModalModel, k: int, count: int, file: str) ->
                 remedy="add an interface to the link description",
             )
         outboard = _interface(model, link.outboard or others[0], f"{place}.outboard")
+    if model.thermal is not None and model.thermal.change and model.elastic_modes:  # until every formulation has it
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "the equations of motion do not hold thermal expansion yet",
+            where=place,
+            value=f"{model.thermal.change:g} K",
+            remedy="remove temperature_change from the link description",
+        )
     omega = 2 * np.pi * model.frequencies_hz
     ratios = model.damping_ratios
     if link.damping is not None:
