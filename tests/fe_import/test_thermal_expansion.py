@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -265,6 +267,36 @@ def test_in_a_modal_file(tmp_path: Path) -> None:
     assert not thermal.force[:6].any()
     some = np.array([*range(6), 8, 7])
     np.testing.assert_array_equal(thermal.truncated(some).force, thermal.force[some])
+
+
+@pytest.mark.parametrize(
+    ("item", "change"),
+    [
+        ("change", {"change": np.inf}),
+        ("force", {"force": np.zeros(5)}),
+        ("force", {"force": np.full(24, 1.0)}),
+        ("force", {"force": np.full(24, np.nan)}),
+        ("restrained", {"restrained": np.zeros((3, 6))}),
+        ("relaxed", {"relaxed": np.zeros((12, 6), dtype=np.int64)}),
+    ],
+)
+def test_a_faulty_one_is_not_written(tmp_path: Path, item: str, change: dict[str, Any]) -> None:
+    modal = reduce_link(warm_link(tmp_path, reduction={"elastic_modes": 18}))
+    with pytest.raises(FEImportError) as caught:
+        write_modal_file(tmp_path / "a.modal.h5", replace(modal, thermal=replace(thermal_of(modal), **change)))
+    assert caught.value.cause is Cause.MODAL_FILE
+    assert caught.value.where.endswith(f"/thermal/{item}")
+    assert not (tmp_path / "a.modal.h5").exists()
+
+
+def test_a_faulty_one_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.modal.h5"
+    write_modal_file(path, reduce_link(warm_link(tmp_path)))
+    with h5py.File(path, "r+") as file:
+        del file["thermal/force"]
+    with pytest.raises(FEImportError, match="missing") as caught:
+        read_modal_file(path)
+    assert caught.value.where.endswith("/thermal/force")
 
 
 def test_pieces_of_a_link_expand_together(tmp_path: Path) -> None:
