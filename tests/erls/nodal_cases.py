@@ -26,14 +26,18 @@ TIME, TO_A, TO_V, PERIOD = 0.7, 30.0, 4.0, 0.1
 WEIGHT = np.array([0.3, -0.5, -9.0])
 
 
+def section(rng: np.random.Generator, massless: bool = False) -> BeamSection:
+    """With full matrices."""
+    first, second = rng.standard_normal((2, 6, 6))
+    inertia = np.zeros((6, 6)) if massless else np.eye(6) + second @ second.T
+    return BeamSection(np.eye(6) + first @ first.T, inertia)
+
+
 def system(group: str) -> NodalSystem:
     """Three curved, twisted beams with full section matrices, two bodies, loads, four joints, two of them driven."""
     rng = np.random.default_rng(3)
     poses = motions.exp(0.6 * rng.standard_normal((5, 6)))
-    sections = []
-    for _ in range(3):
-        first, second = rng.standard_normal((2, 6, 6))
-        sections.append(BeamSection(np.eye(6) + first @ first.T, np.eye(6) + second @ second.T))
+    sections = [section(rng) for _ in range(3)]
     ends = motions.exp(0.4 * rng.standard_normal((3, 2, 6)))
     beams = [Beam((k, k + 1), poses[k : k + 2] @ ends[k], sections[k]) for k in range(3)]
     bodies = [RigidBody(k, 2.0 + k, np.diag([1.0, 1.2, 1.3]), rng.standard_normal(3)) for k in (1, 4)]
