@@ -22,9 +22,9 @@ os.environ.setdefault("ERLS_KERNELS", os.environ["ERLS_CACHE"])
 
 KERNELS = (
     (
-        "equations.nodal.kernels.matrix",
-        "equations.nodal.kernels.system",
-        "equations.nodal.kernels.step",
+        "equations.nodal.matrix",
+        "equations.nodal.sums",
+        "equations.nodal.step",
         "equations.ffr.compiled_functions",
         "equations.ffr.solve",
         "equations.ffr.factoring",

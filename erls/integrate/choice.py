@@ -39,8 +39,8 @@ def _nodal(mechanism: Mechanism, settings: Simulation) -> Integrate:
 
 
 def _compile_nodal(system: Any, settings: Simulation) -> None:
-    for name in ("system", "matrix", "step"):
-        import_module(f"erls.equations.nodal.kernels.{name}")
+    for name in ("matrix", "step"):
+        import_module(f"erls.equations.nodal.{name}")
 
 
 def _pieces(mechanism: Mechanism, settings: Simulation) -> Integrate:

@@ -85,8 +85,7 @@ class CompiledSteps:
         options: ConstrainedOptions,
         recorder: ConstrainedRecorder,
     ) -> None:
-        from erls.equations.nodal.kernels import contract, matrix, step
-        from erls.equations.nodal.kernels import system as sums
+        from erls.equations.nodal import contract, matrix, step, sums
 
         self._kernel, self._functions = step, (sums.forces, matrix.iteration_matrix)
         self._contract = contract

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import platformdirs
@@ -159,6 +159,13 @@ def plain(function: F) -> F:
             names[name] = plain(names[name])
     twin: Any = FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__)
     return twin  # type: ignore[no-any-return]
+
+
+@cache
+def any_scalar(function: F) -> F:
+    """A kernel for other numbers than those of its signature: compiled on demand for what it is given, complex ones."""
+    source: Any = getattr(function, "py_func", function)
+    return cast(F, _njit(source, _nrt=False)) if ENABLED else function
 
 
 def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:

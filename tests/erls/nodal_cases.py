@@ -10,7 +10,7 @@ import numpy as np
 from erls.equations.constrained_system import ConstrainedState
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.beam import Beam, Beams
-from erls.equations.nodal.compiled import CompiledSystem
+from erls.equations.nodal.compiled import CompiledSteps
 from erls.equations.nodal.joints import GROUND, Joint
 from erls.equations.nodal.loads import NodalLoad, NodalLoads
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
@@ -68,17 +68,16 @@ def evaluate(known: NodalSystem) -> dict[str, Array]:
     """By kernels at `state`: forces (n,), reactions (n,), violations (m,), and the factored iteration matrix with
     its scales, in the order of the unknowns.
     """
-    from erls.equations.nodal.kernels import matrix
-    from erls.equations.nodal.kernels import system as sums
+    from erls.equations.nodal import matrix, sums
 
-    compiled = CompiledSystem(known)
+    compiled = CompiledSteps(known)
     work = compiled.work()
     increment, v, a, multipliers = state(known)
     start = compiled.state(ConstrainedState(known.start, v, a, multipliers), a)
     moved = known.compose(known.start, increment).poses
     work.poses[:, :3], work.poses[:, 3:] = moved[:, :3, 3], moved[:, :3, :3].reshape(-1, 9)
     work.increment[:], work.v[:], work.a[:], work.multipliers[:] = increment, v, a, multipliers
-    sample = compiled.samples(np.array([TIME]))[0]
+    sample = known.samples(np.array([TIME]))[0]
     sums.forces(compiled.model, work, start, sample)
     found = {"force": work.force.copy(), "reaction": work.reaction.copy(), "violation": work.violation.copy()}
     broken = matrix.iteration_matrix(compiled.model, work, sample, TO_A, TO_V, PERIOD)

@@ -17,9 +17,7 @@ from test_nodal_dynamics import _l_shape
 from test_nodal_scene import _rigid_chain
 
 from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.compiled import has_kernels
 from erls.equations.nodal.equations import Nodal
-from erls.equations.nodal.loads import NodalLoads
 from erls.errors import Cause
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
@@ -40,16 +38,14 @@ def _same(found: Array, expected: Array, limit: float) -> None:
 
 
 @pytest.mark.parametrize("group", nodal_cases.GROUPS)
-def test_kernels_equal_numpy(group: str) -> None:
-    """Forces, reactions, violations; solutions with the factored iteration matrix (condition 5e7)."""
+def test_the_band_solves_with_the_matrices(group: str) -> None:
+    """Solutions with the factored band against those with mass, damping, stiffness and tangent (condition 5e7)."""
     system = nodal_cases.system(group)
     increment, v, a, multipliers = nodal_cases.state(system)
     found = nodal_cases.evaluate(system)
     q, t = system.compose(system.start, increment), nodal_cases.TIME
     rows = dense(system.constraint_matrix(t, q))
-    _same(found["force"], system.residual(t, q, v, a), LIKE_NUMPY)
     _same(found["reaction"], rows.T @ multipliers, LIKE_NUMPY)
-    _same(found["violation"], system.constraint(t, q), LIKE_NUMPY)
     stiffness, damping = (dense(x) for x in system.stiffness_and_damping(t, q, v, a, multipliers))
     tangent = dense(system.tangent(increment))
     block = nodal_cases.TO_A * dense(system.mass_matrix(t, q)) + nodal_cases.TO_V * damping + stiffness @ tangent
@@ -112,19 +108,30 @@ class _Heavier(NodalSystem):
         return 2 * super().residual(t, q, v, a)
 
 
-class _OtherLoads(NodalLoads):
-    """An element without kernel."""
-
-
-def test_systems_without_kernels_go_the_other_way() -> None:
+def test_changed_systems_go_the_other_way() -> None:
+    """By steps that call the methods of the system."""
     good = _l_shape(1)
-    assert has_kernels(good)
-    assert not has_kernels(_Heavier(good.start.poses, good.elements, good.rows.joints))
-    other = NodalSystem(good.start.poses, [*good.elements, _OtherLoads([])], good.rows.joints)
-    assert other.compiled() is None
+    assert good.compiled is not None
+    assert _Heavier(good.start.poses, good.elements, good.rows.joints).compiled is None
+
+    class Alike(NodalSystem):
+        def residual(self, t: float, q: Any, v: Array, a: Array) -> Array:
+            return super().residual(t, q, v, a)
+
+    other = Alike(good.start.poses, good.elements, good.rows.joints)
     found = lie_generalized_alpha(other, (0, 5e-3), other.start, np.zeros(other.size), ConstrainedOptions(step=1e-3))
     alike = lie_generalized_alpha(good, (0, 5e-3), good.start, np.zeros(good.size), ConstrainedOptions(step=1e-3))
     _same(found.y, alike.y, 1e-13)
+
+
+def test_an_element_without_functions_is_refused() -> None:
+    """A kind that the arrays have no place for."""
+
+    class Strange:
+        nodes, breakpoints = np.zeros((1, 1), dtype=np.int64), ()
+
+    with pytest.raises(TypeError, match="Strange"):
+        NodalSystem(np.eye(4)[None], [Strange()])
 
 
 def _swing(elements: int, matrix: str) -> tuple[ConstrainedSolution, float]:
@@ -152,7 +159,7 @@ def test_one_matrix_for_two_seconds() -> None:
 
 def test_the_band_is_as_wide_for_any_number_of_elements() -> None:
     """So that cost is linear: two neighbouring nodes, or a node and its joint."""
-    assert [_l_shape(n).compiled().width for n in (2, 16, 64)] == [11, 11, 11]
+    assert [_l_shape(n).width for n in (2, 16, 64)] == [11, 11, 11]
 
 
 @pytest.mark.parametrize("compiled", [False, True])

@@ -10,8 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from small_systems import DoublePendulum
 
-from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.joints import GROUND, Joint, Motion
+from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.errors import Cause
 from erls.integrate.base import Solution

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.joints import CONDITIONS, GROUND, Joint
+from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.equations.nodal.scatter import DENSE_UP_TO
 from erls.errors import Cause, SceneError, SimulationError

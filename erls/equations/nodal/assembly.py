@@ -1,39 +1,43 @@
-"""Nodes, elements and joints as constrained equations of motion, on SE(3) or on R³×SO(3).
-
-Elements speak in twists and wrenches of the node axes, as on SE(3). On R³×SO(3) a node's velocity is [u; ω] with u in
-the world's axes; with ν = E [u; ω], E = diag(Rᵀ, 1), forces become Eᵀ f and accelerations E a + Ė v.
-"""
+"""Nodes, elements and joints as constrained equations of motion, on SE(3) or on R³×SO(3)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from erls.equations.nodal import blocks, sums
+from erls.equations.nodal.compiled import CompiledSteps
+from erls.equations.nodal.contract import Model, State, Work
 from erls.equations.nodal.elements import Elements
-from erls.equations.nodal.joints import Joint, JointRows, Relative
-from erls.equations.nodal.scatter import IntArray, Scatter, dofs
+from erls.equations.nodal.joints import Joint, JointRows
+from erls.equations.nodal.model import Kinds, band_order, build_model, room
+from erls.equations.nodal.nodes import Nodes, poses_of, rows_of
+from erls.equations.nodal.scatter import Scatter, dofs
+from erls.equations.system import metre_scales
 from erls.maths.groups import SE3, Group
-from erls.maths.rotation_maps import skews
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array
 
-_ONE_AND_HALF = 1.5 * np.eye(3)
-
-
-@dataclass(frozen=True)
-class Nodes:
-    """A configuration: poses (k, 4, 4) of the nodes, and what each kind of elements remembers."""
-
-    poses: Array
-    memory: tuple[Any, ...]
+_STEPPED = (
+    "compose",
+    "tangent",
+    "residual",
+    "mass_matrix",
+    "stiffness_and_damping",
+    "constraint",
+    "constraint_matrix",
+    "length_scales",
+)  # methods of a system that compiled steps stand for
 
 
 class NodalSystem:
     """A mechanism of nodal elements; a `erls.integrate.constrained.ConstrainedSystem`.
+
+    All values come from the functions of `erls.equations.nodal.sums` and `erls.equations.nodal.blocks`, on the arrays
+    of `erls.equations.nodal.contract`.
 
     Parameters
     ----------
@@ -51,23 +55,27 @@ class NodalSystem:
         self.count, self.elements, self.group = len(poses), tuple(elements), group
         self.local = group is SE3
         self.rows = JointRows(joints)
-        self.start = Nodes(poses, tuple(e.remember(poses[e.nodes], None) for e in self.elements))
+        self.kinds = Kinds(elements)
+        pairs = self.kinds.pairs
         n, m = self.size, self.constraints
-        places = [dofs(e.nodes) for e in elements]
-        joint_places = dofs(self.rows.nodes)
-        self._places = places
-        self._mass = Scatter(places, places, (n, n))
-        stiff = [*places, joint_places]
-        self._stiffness = Scatter(stiff, stiff, (n, n))
+        places, joint_places = dofs(pairs), dofs(self.rows.nodes)
+        every = np.concatenate([places, joint_places])
+        self._mass = Scatter([places], [places], (n, n))
+        self._stiffness = Scatter([every], [every], (n, n))
         numbers = np.arange(m)[:, None]
         self._constraint = Scatter([numbers], [joint_places[self.rows.joint_of_row]], (m, n))
         nodes = 6 * np.arange(self.count)[:, None] + np.arange(6)
         self._nodes = Scatter([nodes], [nodes], (n, n))
-        self._last: tuple[float, Nodes, Relative | None] = (
-            0.0,
-            self.start,
-            None,
-        )  # configurations never change in place
+        coordinates = np.concatenate([np.zeros(0), *(a.start for a in self.kinds.actuators)])
+        windings = sum(len(s.nodes) for s in self.kinds.windings)
+        built = Nodes(poses, self.kinds.beams.built, coordinates, np.zeros((windings, 3)))
+        self.start = built  # `length_scales` asks for it
+        order, self.width = band_order(self.count, pairs, self.rows)
+        self.model: Model = build_model(self.kinds, self.rows, self.local, metre_scales(self), order)
+        self._work: Work = room(self.model, 0)
+        self._sampled: tuple[float, Array] = (np.nan, np.zeros(0))
+        self._tied: tuple[float, Nodes | None, tuple[Array, ...]] = (np.nan, None, ())
+        self.start = self.at(poses, built)
 
     @property
     def size(self) -> int:
@@ -92,11 +100,10 @@ class NodalSystem:
             for node, frame in ((joint.inner, joint.inner_frame), (joint.outer, joint.outer_frame)):
                 if node >= 0:
                     reach[node] = max(reach[node], float(np.linalg.norm(frame[:3, 3])))
-        for element in self.elements:
-            for nodes in element.nodes:
-                places = self.start.poses[nodes, :3, 3]
-                far = np.linalg.norm(places[:, None] - places, axis=2).max(axis=1)
-                reach[nodes] = np.maximum(reach[nodes], far)
+        for first, second in self.kinds.pairs:
+            if first >= 0 and second >= 0:
+                far = float(np.linalg.norm(self.start.poses[first, :3, 3] - self.start.poses[second, :3, 3]))
+                reach[[first, second]] = np.maximum(reach[[first, second]], far)
         least = float(reach.max(initial=0.0)) or 1.0
         scales = np.ones((self.count, 6))
         scales[:, 3:] = np.where(reach > 0, reach, least)[:, None]
@@ -110,16 +117,16 @@ class NodalSystem:
 
     def at(self, poses: Array, near: Nodes | None = None) -> Nodes:
         """Configuration at poses (k, 4, 4), with elements wound up as they are nearby (as built unless given)."""
-        before = (near or self.start).memory
-        found = (e.remember(poses[e.nodes], m) for e, m in zip(self.elements, before, strict=True))
-        return Nodes(poses, tuple(found))
+        self._work.poses[:] = rows_of(poses)
+        sums.remember(self.model, self._work, self._knot(near or self.start))
+        return Nodes(poses, self._work.bent.copy(), self._work.turned.copy(), self._work.wound.copy())
 
     def compose(self, q: Nodes, increment: Array) -> Nodes:
         """Poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
-        moved: Array = self.group.move(q.poses, increment.reshape(-1, 6))
-        turn = moved[:, :3, :3]
-        moved[:, :3, :3] = turn @ (_ONE_AND_HALF - 0.5 * np.swapaxes(turn, 1, 2) @ turn)
-        return self.at(moved, q)
+        work = self._work
+        work.increment[:] = increment
+        sums.move(self.model, work, self._knot(q))
+        return Nodes(poses_of(work.poses), work.bent.copy(), work.turned.copy(), work.wound.copy())
 
     def tangent(self, increment: Array) -> Matrix:
         """(n, n) a block for each node."""
@@ -127,176 +134,141 @@ class NodalSystem:
 
     def residual(self, t: float, q: Nodes, v: Array, a: Array) -> Array:
         """(n,) inertia and internal forces less loads."""
-        twist, twist_rate = self._twists(q, v, a)
-        return self._turned(q, self._forces(t, q, twist, twist_rate))
+        return self._evaluated(t, q, v, a, None).force.copy()
 
     def mass_matrix(self, t: float, q: Nodes) -> Matrix:
         """(n, n)"""
-        mass = self._mass.matrix([e.mass(q.poses[e.nodes], m) for e, m in self._each(q)])
-        if self.local:
-            return mass
-        turn = self._turning(q)
-        return turn.T @ mass @ turn
+        rest = np.zeros(self.size)
+        work = self._evaluated(t, q, rest, rest, None)
+        blocks.blocks(self.model, work, self._sample(t), 0)
+        return self._mass.matrix([self._weighted(work, 0, (1.0, 0.0, 0.0))[: len(self.kinds.pairs)]])
 
     def stiffness_and_damping(
         self, t: float, q: Nodes, v: Array, a: Array, multipliers: Array, material: bool = False
     ) -> tuple[Matrix, Matrix]:
-        """(n, n) twice; ``material`` as in `erls.equations.nodal.elements.Elements`."""
-        twist, rate = self._twists(q, v, a)
-        found = []
-        for element, memory in self._each(q):
-            motion = _of_elements(twist, element.nodes), _of_elements(rate, element.nodes)
-            found.append(element.derivatives(t, q.poses[element.nodes], memory, *motion, material=material))
-        relative = self._relative(t, q)
-        stiffness = self._stiffness.matrix([*(k for k, _ in found), self.rows.stiffness(relative, multipliers)])
-        damping = self._mass.matrix([c for _, c in found])
-        if self.local:
-            return stiffness, damping
-        force = self._forces(t, q, twist, rate).reshape(-1, 6)
-        reaction = relative.gradient * multipliers[:, None]
-        for side in (0, 1):
-            nodes = self.rows.nodes[self.rows.joint_of_row, side]
-            np.add.at(force, nodes[nodes >= 0], reaction[nodes >= 0, 6 * side : 6 * side + 6])
-        return self._in_world_axes(q, (twist, rate, force), stiffness, damping)
+        """(n, n) twice; ``material`` as in `erls.equations.nodal.blocks.blocks`."""
+        work = self._evaluated(t, q, v, a, multipliers)
+        blocks.blocks(self.model, work, self._sample(t), int(material))
+        stiffness = self._stiffness.matrix([self._weighted(work, 2, (0.0, 0.0, 1.0))])
+        if not self.local:
+            turning = np.zeros((self.count, 6, 6))
+            turning[:, :3, 3:] = work.turning
+            stiffness = stiffness + self._nodes.matrix([turning])
+        damping = self._mass.matrix([self._weighted(work, 1, (0.0, 1.0, 0.0))[: len(self.kinds.pairs)]])
+        return stiffness, damping
 
     def constraint(self, t: float, q: Nodes) -> Array:
         """(m,) Φ."""
-        return self.rows.violation(self._relative(t, q))
+        return self._conditions(t, q)[0].copy()
 
     def constraint_matrix(self, t: float, q: Nodes) -> Matrix:
         """(m, n) B."""
-        rows = self._constraint.matrix([self._relative(t, q).gradient[:, None, :]])
+        rows = self._constraint.matrix([self._conditions(t, q)[1][:, None, :]])
         return rows if self.local else rows @ self._turning(q)
 
     def constraint_rate(self, t: float, q: Nodes) -> Array:
         """(m,) Φ_t."""
-        return self.rows.rate(self._relative(t, q))
+        return self._conditions(t, q)[2].copy()
 
     def constraint_bias(self, t: float, q: Nodes, v: Array) -> Array:
         """(m,) Φ̈ − B a."""
-        twist, rate = self._twists(q, v, np.zeros_like(v))
-        ends = np.concatenate([self._at_joint_ends(twist, side) for side in (0, 1)], axis=1)
-        relative = self._relative(t, q)
-        bias = self.rows.bias(relative, ends)
-        if self.local:
-            return bias
-        swing = np.concatenate([self._at_joint_ends(rate, side) for side in (0, 1)], axis=1)
-        gradient = relative.gradient
-        result: Array = bias + (gradient * swing[self.rows.joint_of_row]).sum(axis=1)
-        return result
+        work = self._state(q, v, v)
+        sums.conditions(self.model, work, self._sample(t))
+        return work.bias.copy()
 
     def stored(self, t: float, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """(12 k,) position and rotation matrix of each node, with first and second derivatives."""
-        twist, rate = self._twists(q, v, a)
-        turn, spin = q.poses[:, :3, :3], skews(twist[:, 3:])
-        slide = rate[:, :3] + (spin @ twist[:, :3, None])[:, :, 0]
-        first = np.concatenate([(turn @ twist[:, :3, None]), turn @ spin], axis=2)
-        second = np.concatenate([turn @ slide[:, :, None], turn @ (spin @ spin + skews(rate[:, 3:]))], axis=2)
-        knot = np.concatenate([q.poses[:, :3, 3:], turn], axis=2)
-        return _flat(knot), _flat(first), _flat(second)
+        """(12 k + a,) position and rotation matrix of each node, then joint coordinates of actuators, with first and
+        second derivatives.
+        """
+        out = np.zeros((3, 12 * self.count + len(self.model.actuators)))
+        sums.knot(self.model, self._state(q, v, a), out)
+        return out[0], out[1], out[2]
+
+    def energies(self, q: Nodes, v: Array) -> Array:
+        """(5,) kinetic, elastic of beams, gravity, springs, springs in joints [J]."""
+        out = np.zeros(5)
+        sums.energies(self.model, self._state(q, v, np.zeros(self.size)), out)
+        return out
 
     def energy(self, t: float, q: Nodes, v: Array) -> tuple[float, float]:
         """Kinetic and potential energy [J]."""
-        twist, _ = self._twists(q, v, np.zeros_like(v))
-        pairs = [e.energy(t, q.poses[e.nodes], m, _of_elements(twist, e.nodes)) for e, m in self._each(q)]
-        return sum(k for k, _ in pairs), sum(p for _, p in pairs)
+        kinetic, *potential = self.energies(q, v).tolist()
+        return kinetic, sum(potential)
 
-    def compiled(self) -> Any:
-        """The system as arrays (`erls.equations.nodal.compiled.CompiledSystem`), None where it has no kernels."""
-        from erls.equations.nodal.compiled import CompiledSystem, has_kernels
+    def in_joints(self, t: float, q: Nodes, v: Array, a: Array) -> Array:
+        """(a, 10) coordinate, rate, acceleration, effort of each actuator, and its wrench on the outer node there."""
+        out = np.zeros((len(self.model.actuators), 10))
+        sums.in_joints(self.model, self._state(q, v, a), self._sample(t), out)
+        return out
 
-        return CompiledSystem(self) if has_kernels(self) else None
-
-    def _each(self, q: Nodes) -> Iterator[tuple[Elements, Any]]:
-        return zip(self.elements, q.memory, strict=True)
-
-    def _twists(self, q: Nodes, v: Array, a: Array) -> tuple[Array, Array]:
-        """(k, 6) twists of all nodes in their own axes, and their rates."""
-        v, a = v.reshape(-1, 6), a.reshape(-1, 6)
-        if self.local:
-            return v, a
-        back = np.swapaxes(q.poses[:, :3, :3], 1, 2)
-        twist, rate = v.copy(), a.copy()
-        twist[:, :3] = (back @ v[:, :3, None])[:, :, 0]
-        rate[:, :3] = (back @ a[:, :3, None])[:, :, 0] - _crossed(v[:, 3:], twist[:, :3])
-        return twist, rate
-
-    def _forces(self, t: float, q: Nodes, twist: Array, rate: Array) -> Array:
-        """(n,) wrenches in node axes."""
-        result = np.zeros(self.size)
-        for (element, memory), place in zip(self._each(q), self._places, strict=True):
-            nodes = element.nodes
-            motion = _of_elements(twist, nodes), _of_elements(rate, nodes)
-            found = element.forces(t, q.poses[nodes], memory, *motion)
-            result += np.bincount(place.ravel(), found.ravel(), self.size)
+    def samples(self, times: Array) -> Array:
+        """(times, ...) what depends on time alone; see `erls.equations.nodal.contract`."""
+        joints, loads = self.rows.joints, self.kinds.loads.loads
+        result = np.zeros((len(times), 3 * len(joints) + len(loads) + 3 * len(self.model.actuators)))
+        for k, tie in enumerate(joints):
+            if tie.motion is not None:
+                result[:, 3 * k : 3 * k + 3] = [tie.motion(t) for t in times.tolist()]
+        for k, load in enumerate(loads, 3 * len(joints)):
+            result[:, k] = [load.factor(t) for t in times.tolist()]
+        first = 3 * len(joints) + len(loads)
+        for group in self.kinds.actuators:
+            after = first + 3 * len(group.joints)
+            result[:, first:after] = [group.wanted(t).ravel() for t in times.tolist()]
+            first = after
         return result
 
-    def _turned(self, q: Nodes, force: Array) -> Array:
-        """Eᵀ f."""
+    @property
+    def compiled(self) -> Any:
+        """Memory for compiled steps; None where a method was changed that they stand for."""
+        if any(getattr(type(self), name) is not getattr(NodalSystem, name) for name in _STEPPED):
+            return None
+        return CompiledSteps(self)
+
+    def _sample(self, t: float) -> Array:
+        if self._sampled[0] != t:
+            self._sampled = t, self.samples(np.array([t], dtype=float))[0]
+        return self._sampled[1]
+
+    def _knot(self, q: Nodes) -> State:
+        """A configuration as arrays; at rest."""
+        rest, none = np.zeros(self.size), np.zeros(self.constraints)
+        return State(rows_of(q.poses), q.bent, q.turned, q.wound, rest, rest, rest, none)
+
+    def _state(self, q: Nodes, v: Array, a: Array) -> Work:
+        """The configuration and the motion in memory."""
+        work = self._work
+        work.poses[:], work.bent[:], work.turned[:], work.wound[:] = rows_of(q.poses), q.bent, q.turned, q.wound
+        work.v[:], work.a[:], work.increment[:] = v, a, 0.0
+        return work
+
+    def _evaluated(self, t: float, q: Nodes, v: Array, a: Array, multipliers: Array | None) -> Work:
+        """With all forces."""
+        work = self._state(q, v, a)
+        work.multipliers[:] = 0.0 if multipliers is None else multipliers
+        sums.forces(self.model, work, self._knot(q), self._sample(t))
+        return work
+
+    def _weighted(self, work: Work, kind: int, weights: tuple[float, float, float]) -> Array:
+        """(E, 12, 12) mass, damping or stiffness in the coordinates of the system."""
         if self.local:
-            return force
-        blocks = force.reshape(-1, 6).copy()
-        blocks[:, :3] = (q.poses[:, :3, :3] @ blocks[:, :3, None])[:, :, 0]
-        return blocks.ravel()
+            return work.blocks[:, kind]
+        blocks.weighted(self.model, work, *weights)
+        return work.whole
+
+    def _conditions(self, t: float, q: Nodes) -> tuple[Array, ...]:
+        """Φ, gradients (m, 12) and Φ_t."""
+        known_t, known_q, known = self._tied
+        if known_t == t and known_q is q:
+            return known
+        work = self._state(q, np.zeros(self.size), np.zeros(self.size))
+        sums.conditions(self.model, work, self._sample(t))
+        found = work.violation.copy(), work.gradient.copy(), work.drift.copy()
+        self._tied = t, q, found
+        return found
 
     def _turning(self, q: Nodes) -> Matrix:
         """(n, n) E."""
-        blocks = np.zeros((self.count, 6, 6))
-        blocks[:, :3, :3] = np.swapaxes(q.poses[:, :3, :3], 1, 2)
-        blocks[:, 3:, 3:] = np.eye(3)
-        return self._nodes.matrix([blocks])
-
-    def _in_world_axes(
-        self,
-        q: Nodes,
-        known: tuple[Array, Array, Array],
-        stiffness: Matrix,
-        damping: Matrix,
-    ) -> tuple[Matrix, Matrix]:
-        """Derivatives on R³×SO(3) from those on SE(3): chain rule over E(q) v, E(q) a + Ė v and Eᵀ f."""
-        twist, rate, force = known
-        mass = self._mass.matrix([e.mass(q.poses[e.nodes], m) for e, m in self._each(q)])
-        turn = self._turning(q)
-        spin, slide = skews(twist[:, 3:]), skews(twist[:, :3])
-        swing, by_velocity, by_turn, of_force = np.zeros((4, self.count, 6, 6))
-        swing[:, :3, 3:] = slide  # of E v by a turn
-        by_velocity[:, :3, :3] = -spin @ np.swapaxes(q.poses[:, :3, :3], 1, 2)  # of Ė v
-        by_velocity[:, :3, 3:] = slide
-        fixed = rate[:, :3] + _crossed(twist[:, 3:], twist[:, :3])  # E a
-        by_turn[:, :3, 3:] = skews(fixed) - spin @ slide  # of E a + Ė v
-        of_force[:, :3, 3:] = -q.poses[:, :3, :3] @ skews(force[:, :3])
-        swing, by_velocity, by_turn, of_force = (
-            self._nodes.matrix([b]) for b in (swing, by_velocity, by_turn, of_force)
-        )
-        whole = turn.T @ (stiffness @ turn + damping @ swing + mass @ by_turn) + of_force
-        return whole, turn.T @ (damping @ turn + mass @ by_velocity)
-
-    def _relative(self, t: float, q: Nodes) -> Relative:
-        known_t, known_q, known = self._last
-        if known is not None and known_t == t and known_q is q:
-            return known
-        with_ground = np.concatenate([q.poses, np.eye(4)[None]])  # the ground is the last node, −1
-        found = self.rows.relative(t, with_ground[self.rows.nodes[:, 0]], with_ground[self.rows.nodes[:, 1]])
-        self._last = t, q, found
-        return found
-
-    def _at_joint_ends(self, per_node: Array, side: int) -> Array:
-        with_ground = np.concatenate([per_node, np.zeros((1, 6))])
-        result: Array = with_ground[self.rows.nodes[:, side]]
-        return result
-
-
-def _of_elements(per_node: Array, nodes: IntArray) -> Array:
-    """(e, 6k) twists of the nodes (e, k) of elements."""
-    return per_node[nodes].reshape(len(nodes), 6 * nodes.shape[1])
-
-
-def _crossed(a: Array, b: Array) -> Array:
-    """(k, 3) a × b."""
-    result: Array = (skews(a) @ b[:, :, None])[:, :, 0]
-    return result
-
-
-def _flat(columns: Array) -> Array:
-    """(12 k,) position, then the rotation's rows, of matrices (k, 3, 4) [position | rotation]."""
-    return np.concatenate([columns[:, :, 0], columns[:, :, 1:].reshape(-1, 9)], axis=1).ravel()
+        turns = np.zeros((self.count, 6, 6))
+        turns[:, :3, :3] = np.swapaxes(q.poses[:, :3, :3], 1, 2)
+        turns[:, 3:, 3:] = np.eye(3)
+        return self._nodes.matrix([turns])

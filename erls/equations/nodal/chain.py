@@ -8,11 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from erls.equations.nodal.actuators import Actuator, Actuators, Turned
-from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.nodal.actuators import Actuator, Actuators
+from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.beam import Beams
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import GROUND, Joint, Motion
+from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.maths import motion_maps as motions
@@ -54,19 +55,8 @@ class ChainSystem(NodalSystem):
 
     def joint_motion(self, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """(joints,) coordinates, rates and accelerations."""
-        found = []
-        v, a = v.reshape(-1, 6), a.reshape(-1, 6)
-        for group, turned in zip(self.actuators, q.memory[-len(self.actuators) :], strict=True):
-            ends = (x[group.nodes].reshape(len(group.nodes), -1) for x in (v, a))
-            found.append((turned.angles, *group.motion(q.poses[group.nodes], turned, *ends)))
-        first, second, third = (np.concatenate(x) for x in zip(*found, strict=True))
-        return first, second, third
-
-    def stored(self, t: float, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """(12 k + joints,) frames, then joint coordinates, with first and second derivatives."""
-        frames, joints = super().stored(t, q, v, a), self.joint_motion(q, v, a)
-        first, second, third = (np.concatenate(pair) for pair in zip(frames, joints, strict=True))
-        return first, second, third
+        found = self.in_joints(0.0, q, v, a)
+        return found[:, 0], found[:, 1], found[:, 2]
 
     def from_stored(self, y: Array, v: Array) -> tuple[Nodes, Array]:
         """Configuration and velocity from what `stored` gives, interpolated or not; rotations made orthogonal."""
@@ -78,10 +68,7 @@ class ChainSystem(NodalSystem):
         twist = np.empty((self.count, 6))
         twist[:, :3] = (back @ rate[:, :3, None])[:, :, 0]
         twist[:, 3:] = (spin - np.swapaxes(spin, 1, 2))[:, [2, 0, 1], [1, 2, 0]] / 2
-        ends = np.cumsum([0, *(len(g.joints) for g in self.actuators)]) + 12 * self.count
-        built = self.start.memory[-len(self.actuators) :]
-        angles = [Turned(y[a:b], m.rows) for (a, b), m in zip(pairwise(ends), built, strict=True)]
-        near = replace(self.start, memory=(*self.start.memory[: -len(angles)], *angles))
+        near = replace(self.start, turned=y[12 * self.count :].copy())
         return self.at(motions.poses(turn, place[:, :3]), near), twist.ravel()
 
 
@@ -139,7 +126,7 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts]) -> Chain:
     if bodies:
         passive.append(RigidBodies(bodies, mechanism.gravity))
     seats = _seats(mechanism, links, ends)
-    system = ChainSystem(poses, passive, _actuators(mechanism, seats), _joints(mechanism, seats))
+    system = ChainSystem(poses, passive, [_actuators(mechanism, seats)], _joints(mechanism, seats))
     firsts = np.cumsum([0, *(len(part.beams) for part in links)])[:-1].tolist()
     return Chain(system, elastic, nodes, tuple(firsts), seats)
 
@@ -171,14 +158,14 @@ def _joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
     return result
 
 
-def _actuators(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Actuators]:
-    """That of the first joint, which stands on the ground, then the others."""
+def _actuators(mechanism: Mechanism, seats: Sequence[Seat]) -> Actuators:
+    """Of all joints."""
     lead = _FeedForward(mechanism)
     found = []
     for k, (joint, seat) in enumerate(zip(mechanism.joints, seats, strict=True)):
         nodes = (seat.outer,) if seat.inner == GROUND else (seat.inner, seat.outer)
         found.append(Actuator(joint, nodes, seat.inner_frame, seat.outer_frame, lead.of(k)))
-    return [Actuators(group) for group in (found[:1], found[1:]) if group]
+    return Actuators(found)
 
 
 class _FeedForward:

@@ -13,10 +13,10 @@ import numpy as np
 
 from erls.equations.consistency import consistent_acceleration
 from erls.equations.formulation import Energy, Reaction, State
-from erls.equations.nodal.assembly import Nodes
 from erls.equations.nodal.chain import Chain, build_chain
 from erls.equations.nodal.joints import GROUND
 from erls.equations.nodal.link_state import LinkView
+from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import link_parts
 from erls.equations.nodal.statics import solve_statics
 from erls.errors import Cause, SceneError, SimulationError
@@ -112,8 +112,7 @@ class Nodal:
     def state(self, t: float, y: Array, v: Array) -> State:
         """Positions of all nodes; link frames at the inboard nodes, modal coordinates as near as modes come."""
         q, velocity = self.configuration(y, v)
-        bent = q.memory[0] if self.chain.beams is not None else None
-        found = [view.at(q.poses, self.chain.beams, bent) for view in self.views]
+        found = [view.at(q.poses, self.chain.beams, q.bent) for view in self.views]
         _, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
         angles = y[self._frames : self._kept]
         return State(
@@ -123,14 +122,8 @@ class Nodal:
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""
         q, velocity = self.configuration(y, v)
-        kinetic, potential = self.system.energy(t, q, velocity)
-        elastic = 0.0 if self.chain.beams is None else self.chain.beams.elastic_energy(q.memory[0])
-        angles = y[self._frames : self._kept]
-        springs = 0.5 * sum(
-            j.forces.stiffness * (angle - j.forces.rest) ** 2
-            for j, angle in zip(self.mechanism.joints, angles.tolist(), strict=True)
-        )
-        return Energy(kinetic, elastic, potential - elastic - springs, springs)
+        kinetic, elastic, gravity, _, springs = self.system.energies(q, velocity).tolist()
+        return Energy(kinetic, elastic, gravity, springs)
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """(n,) ÿ of frames and joint coordinates; 0 for the rest."""
@@ -143,33 +136,20 @@ class Nodal:
         """Joint reactions from the multipliers and what acts along the joints."""
         q, velocity = self.configuration(y, v)
         a, multipliers = self._found(y)
-        along = self._along(t, q, velocity, a)
+        along = self.system.in_joints(t, q, velocity, a)
         rows = self.system.constraint_matrix(t, q)
         result = []
         for k, (joint, seat) in enumerate(zip(self.mechanism.joints, self.chain.seats, strict=True)):
             place = slice(6 * seat.outer, 6 * seat.outer + 6)
             own = np.flatnonzero(self.system.rows.joint_of_row == k)
             wrench = -np.asarray(rows[own][:, place].T @ multipliers[own]).ravel()
-            effort, push = along[k]
+            effort, push = float(along[k, 3]), along[k, 4:]
             if joint.drive.prescribed:
                 axis = motions.adjoint(seat.outer_frame) @ joint.type.screw
                 effort = float(axis @ wrench)
             wrench = wrench + push
             turn = q.poses[seat.outer, :3, :3]
             result.append(Reaction(turn @ wrench[:3], turn @ wrench[3:], effort))
-        return result
-
-    def _along(self, t: float, q: Nodes, v: Array, a: Array) -> list[tuple[float, Array]]:
-        """Of each joint: force of drive, spring, damper and friction; wrench on the outer node, rotor included."""
-        groups = self.system.actuators
-        result = []
-        twist, rate = v.reshape(-1, 6), a.reshape(-1, 6)
-        for group, turned in zip(groups, q.memory[-len(groups) :], strict=True):
-            poses = q.poses[group.nodes]
-            ends = [x[group.nodes].reshape(len(group.nodes), -1) for x in (twist, rate)]
-            rates, _ = group.motion(poses, turned, *ends)
-            pushes = -group.forces(t, poses, turned, *ends)[:, -6:]
-            result += list(zip(group.efforts(t, turned.angles, rates).tolist(), pushes, strict=True))
         return result
 
     def describe(self) -> dict[str, Any]:

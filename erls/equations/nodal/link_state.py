@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.equations.nodal.beam import Beams, Bent
+from erls.equations.nodal.beam import Beams
 from erls.equations.nodal.parts import LinkParts, node_at
 from erls.maths import rotation_maps as rotations
 from erls.maths.se3 import pose
@@ -49,13 +49,13 @@ class LinkView:
         shapes = np.concatenate([model.translation_shapes, reach * model.rotation_shapes]).reshape(-1, model.modes)
         self._nearest = np.linalg.pinv(shapes)
 
-    def at(self, poses: Array, beams: Beams | None, bent: Bent | None) -> LinkState:
-        """At poses (k, 4, 4) of all nodes."""
+    def at(self, poses: Array, beams: Beams | None, bent: Array) -> LinkState:
+        """At poses (k, 4, 4) of all nodes, with the twists d (e, 6) of the beams."""
         frame = poses[self._inboard] @ self._back
         model = self._model
-        if self._axes is None or beams is None or bent is None:
+        if self._axes is None or beams is None:
             return LinkState(frame, model.nodes @ frame[:3, :3].T + frame[:3, 3], np.zeros(model.modes))
-        sections = beams.sections_at(poses[beams.nodes], bent, self._elements, self._fractions)
+        sections = beams.sections_at(poses, bent, self._elements, self._fractions)
         nodes = sections[:, :3, 3]
         moved = (nodes - frame[:3, 3]) @ frame[:3, :3] - model.nodes
         turned = frame[:3, :3].T @ sections[:, :3, :3] @ np.swapaxes(self._axes, 1, 2)

@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from erls.equations.consistency import redundant_constraints
-from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.joints import Joint
+from erls.equations.nodal.nodes import Nodes
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SimulationError
 from erls.maths.saddle import Scales, dense

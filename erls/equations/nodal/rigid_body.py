@@ -1,8 +1,4 @@
-"""Rigid bodies: inertia and gravity at one node each.
-
-In the node's axes, with the constant inertia M (6, 6) and the momentum M ν (O. Brüls, M. Arnold, A. Cardona, ASME
-DETC2011-48132, eq. 20): M ν̇ − ad(ν)ᵀ M ν = M [Rᵀ g; 0].
-"""
+"""Rigid bodies: inertia and gravity at one node each; forces are in `erls.equations.nodal.body_forces`."""
 
 from __future__ import annotations
 
@@ -13,8 +9,6 @@ import numpy as np
 
 from erls.equations.nodal.scatter import IntArray
 from erls.errors import Cause, SceneError
-from erls.maths.motion_maps import bracket, cobracket
-from erls.maths.rotation_maps import skews
 from erls.maths.so3 import Array, skew
 
 
@@ -73,7 +67,7 @@ class RigidBody:
 
 
 class RigidBodies:
-    """All rigid bodies of a system, as `erls.equations.nodal.elements.Elements`."""
+    """All rigid bodies of a system as arrays, for `erls.equations.nodal.body_forces`."""
 
     breakpoints: tuple[float, ...] = ()
 
@@ -81,40 +75,3 @@ class RigidBodies:
         self.nodes: IntArray = np.array([[b.node] for b in bodies], dtype=np.int64).reshape(-1, 1)
         self.matrices = np.array([b.matrix for b in bodies]).reshape(-1, 6, 6)
         self.gravity = np.asarray(gravity, dtype=float)
-
-    def remember(self, poses: Array, before: None) -> None:
-        """Nothing."""
-
-    def mass(self, poses: Array, memory: None) -> Array:
-        """(b, 6, 6) constant."""
-        return self.matrices
-
-    def forces(self, t: float, poses: Array, memory: None, v: Array, a: Array) -> Array:
-        """(b, 6) inertia less weight."""
-        push = a.copy()
-        push[:, :3] -= self._gravity(poses)
-        momentum = self.matrices @ v[:, :, None]
-        turning = np.swapaxes(bracket(v), 1, 2) @ momentum
-        result: Array = (self.matrices @ push[:, :, None] - turning)[:, :, 0]
-        return result
-
-    def derivatives(
-        self, t: float, poses: Array, memory: None, v: Array, a: Array, material: bool = False
-    ) -> tuple[Array, Array]:
-        """(b, 6, 6) twice: weight turns with the body; gyroscopic forces."""
-        stiffness = np.zeros_like(self.matrices)
-        stiffness[:, :, 3:] = -self.matrices[:, :, :3] @ skews(self._gravity(poses))
-        momentum = (self.matrices @ v[:, :, None])[:, :, 0]
-        return stiffness, -np.swapaxes(bracket(v), 1, 2) @ self.matrices - cobracket(momentum)
-
-    def energy(self, t: float, poses: Array, memory: None, v: Array) -> tuple[float, float]:
-        """Kinetic energy and that of gravity."""
-        kinetic = 0.5 * float(np.einsum("bi,bij,bj", v, self.matrices, v))
-        h = poses[:, 0]
-        first = np.stack([self.matrices[:, 5, 1], self.matrices[:, 3, 2], self.matrices[:, 4, 0]], axis=1)  # m c
-        moments = self.matrices[:, 0, 0, None] * h[:, :3, 3] + (h[:, :3, :3] @ first[:, :, None])[:, :, 0]
-        return kinetic, -float(moments.sum(axis=0) @ self.gravity)
-
-    def _gravity(self, poses: Array) -> Array:
-        turned: Array = (np.swapaxes(poses[:, 0, :3, :3], 1, 2) @ self.gravity[:, None])[:, :, 0]
-        return turned

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.equations.nodal.assembly import NodalSystem, Nodes
+from erls.equations.nodal.assembly import NodalSystem
+from erls.equations.nodal.nodes import Nodes
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError, SimulationError
 from erls.maths.saddle import Saddle, Scales

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from erls.equations.nodal.assembly import Nodes
 from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.scenes.build import Assembly
 from erls.equations.nodal.statics import Statics
@@ -238,7 +237,7 @@ def connection_forces(assembly: Assembly, t: float, poses: Array, multipliers: A
     """Force [N] and moment [N m] of each connection on its node, at the node, in the world's axes; the smallest where
     connections are redundant.
     """
-    system, q = assembly.full, Nodes(poses, assembly.full.start.memory)
+    system, q = assembly.full, replace(assembly.full.start, poses=poses)
     if assembly.left_out:
         force = np.asarray(assembly.system.constraint_matrix(t, q).T @ multipliers).ravel()
         multipliers = smallest_multipliers(system, t, q, force)

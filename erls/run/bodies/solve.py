@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from erls.equations.nodal.assembly import Nodes
 from erls.equations.nodal.redundant import refuse_open
 from erls.equations.nodal.scenes.build import Assembly, assemble
 from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
@@ -86,7 +86,7 @@ def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, progress: 
     result = Motion(scene, assembly, wall, (*_redundancy(assembly), *found.warnings), found)
     if assembly.left_out and found.failure is None:
         for t, poses in zip(*result.some_poses(), strict=True):
-            refuse_open(assembly.full, t, Nodes(poses, system.start.memory), assembly.left_out)
+            refuse_open(assembly.full, t, replace(system.start, poses=poses), assembly.left_out)
     return result
 
 

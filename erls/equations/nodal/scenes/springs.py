@@ -18,21 +18,21 @@ from erls.scene.bodies.schema import TurningSpring as TurningRecord
 
 
 def springs(record: BodySceneRecord, numbers: dict[str, int], poses: Array, file: str) -> list[Elements]:
-    """Springs of one kind to the ground, and of one kind between nodes, as one set of elements each.
+    """Springs of one kind as one set of elements.
 
     Raises
     ------
     SceneError
         BAD_FIELD: a line of no length.
     """
-    groups: dict[tuple[type, int], list[Any]] = {}
+    groups: dict[type, list[Any]] = {}
     for k, spring in enumerate(record.springs):
         ends = [numbers[name] for name in (spring.to, spring.node) if name != GROUND]
         frames = [poses[n] for n in ends] if len(ends) == 2 else [np.eye(4), poses[ends[0]]]
         make, _ = KINDS[type(spring)]
         made = make(spring, tuple(ends), frames[0], frames[1], f"{file}: springs[{k}]")
-        groups.setdefault((type(spring), len(ends)), []).append(made)
-    return [KINDS[kind][1](members) for (kind, _), members in groups.items()]
+        groups.setdefault(type(spring), []).append(made)
+    return [KINDS[kind][1](members) for kind, members in groups.items()]
 
 
 def _line(record: LineSpring, nodes: tuple[int, ...], first: Array, second: Array, place: str) -> Spring:

@@ -1,11 +1,21 @@
-"""Geometrically exact beams on SE(3): the formulas of `erls.equations.nodal.beam`, element by element."""
+"""Two-node geometrically exact beams with helicoidal interpolation on SE(3).
+
+V. Sonneville, A. Cardona, O. Brüls, Comput. Methods Appl. Mech. Eng. 268 (2014) 451–474. Between the section frames at
+its ends an element follows H(s) = H_A exp(s d / L), d = log(H_A⁻¹ H_B): the strain (d − d₀)/L is constant, exact for
+every helix, and free of locking. With the twists ν of the end sections, ḋ = P ν, P = [−T⁻¹(−d), T⁻¹(d)], so that
+
+    f = Pᵀ σ,  σ = K (d − d₀)/L,    K_t = Pᵀ K P / L + (∂Pᵀ/∂d σ) P,
+
+all functions of d alone. Inertia is that of the same interpolation: ν(s) = Q(s, d) ν at three Gauss points, and forces
+∫ Qᵀ (M ν̇ − ad(ν)ᵀ M ν) ds with ν̇ = Q a + Q̇ ν, which follow from the kinetic energy ½ ∫ νᵀ M ν ds.
+"""
 
 from __future__ import annotations
 
 import math
 
 from erls.equations.compiled_system import Array
-from erls.equations.nodal.kernels.contract import Model, Work
+from erls.equations.nodal.contract import Model, Work
 from erls.maths.coefficients import Three, inverse_coefficient, stumpff, tangent_coefficients
 from erls.maths.jit import inlined, part
 from erls.maths.motions import (
@@ -59,7 +69,7 @@ def _section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rot
 
 @inlined
 def bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple[Vector, Vector]:
-    """d of element e near that in ``before``; also written into ``out``."""
+    """d of element e, which goes on past a turn of π, near that in ``before``; also written into ``out``."""
     place, turn = _section(model, poses, e, 0)
     end, end_turn = _section(model, poses, e, 1)
     psi = logarithm_near(back_product(turn, end_turn), vector(before, e, 3))
@@ -180,15 +190,13 @@ def _unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
 
 
 @inlined
-def beam_derivatives(model: Model, work: Work, e: int) -> None:
-    """Mass, damping and stiffness of element e at ``work``'s poses, bends and twists."""
-    mass, damping, stiffness, rows = work.mass, work.damping, work.stiffness, work.rows
+def beam_derivatives(model: Model, work: Work, e: int, block: Array, material: int) -> None:
+    """Mass, damping and stiffness of element e at ``work``'s poses, bends and twists into a block of zeros."""
+    stiffness, rows = block[2], work.rows
     u, psi = vector(work.bent, e, 0), vector(work.bent, e, 3)
     b = inverse_coefficient(dot(psi, psi))
     push = _section_force(model, e, u, psi)
     for j in range(12):
-        for i in range(12):
-            mass[i, j] = damping[i, j] = stiffness[i, j] = 0.0
         c0, c1 = _unit_twist(model, e, j)
         apart = pair_minus(c1, c0)
         eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
@@ -197,6 +205,8 @@ def beam_derivatives(model: Model, work: Work, e: int) -> None:
         eta = _column(rows, j)
         force = of_matrix(model.beam_stiffness, e, eta[0], eta[1])
         _add_power(stiffness, rows, j, 1.0, force)
+        if material:
+            continue
         # derivative of Pᵀ σ at fixed σ as d moves along η
         outer = change_transposed(_HALF, b, u, psi, eta[0], eta[1], push[0], push[1])
         inner = pair_minus(cobracket(eta[0], eta[1], push[0], push[1]), outer)
@@ -206,11 +216,11 @@ def beam_derivatives(model: Model, work: Work, e: int) -> None:
                 stiffness[6 * side + i, j] += n[i]
                 stiffness[6 * side + 3 + i, j] += m[i]
     if model.beam_moving[e]:
-        _inertia_derivatives(model, work, e, u, psi)
+        _inertia_derivatives(model, work, e, block, u, psi)
 
 
 @inlined
-def _inertia_derivatives(model: Model, work: Work, e: int, u: Vector, psi: Vector) -> None:
+def _inertia_derivatives(model: Model, work: Work, e: int, block: Array, u: Vector, psi: Vector) -> None:
     rows, shape = work.rows, work.shape
     c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
     apart = pair_minus(c1, c0)
@@ -239,9 +249,37 @@ def _inertia_derivatives(model: Model, work: Work, e: int, u: Vector, psi: Vecto
         for j in range(12):
             q = _column(shape, j)
             heavy = of_matrix(model.beam_inertia, e, q[0], q[1])
-            _add_power(work.mass, shape, j, weight, heavy)
+            _add_power(block[0], shape, j, weight, heavy)
             tilt = of_matrix(model.beam_inertia, e, cross(q[1], pull), (0.0, 0.0, 0.0))
-            _add_power(work.stiffness, shape, j, weight, tilt)
+            _add_power(block[2], shape, j, weight, tilt)
             spin = cobracket(nu[0], nu[1], heavy[0], heavy[1])
             spin = pair_plus(spin, cobracket(q[0], q[1], momentum[0], momentum[1]))
-            _add_power(work.damping, shape, j, -weight, spin)
+            _add_power(block[1], shape, j, -weight, spin)
+
+
+@inlined
+def beam_energy(model: Model, work: Work, e: int) -> tuple[float, float, float]:
+    """Kinetic, elastic and that of gravity of element e."""
+    u, psi = vector(work.bent, e, 0), vector(work.bent, e, 3)
+    built = model.beam_built
+    push = _section_force(model, e, u, psi)
+    strain = minus(u, vector(built, e, 0)), minus(psi, vector(built, e, 3))
+    elastic = 0.5 * (dot(push[0], strain[0]) + dot(push[1], strain[1]))
+    kinetic = height = 0.0 * elastic
+    b = inverse_coefficient(dot(psi, psi))
+    c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
+    apart = pair_minus(c1, c0)
+    eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
+    place, turn = _section(model, work.poses, e, 0)
+    for k in range(3):
+        x = _POINTS[k]
+        xu, xpsi = scaled(x, u), scaled(x, psi)
+        c = stumpff(x * x * dot(psi, psi))
+        f, g = tangent_coefficients(c)
+        p = value(-f[0], g[0], xpsi, xu)
+        own = pair_scaled(x, series(f, g, xu, xpsi, eta[0], eta[1]))
+        nu = pair_plus(transformed(p, exponential(xpsi, c[0], c[1]), c0[0], c0[1]), own)
+        momentum = of_matrix(model.beam_inertia, e, nu[0], nu[1])
+        kinetic += 0.5 * _WEIGHTS[k] * (dot(nu[0], momentum[0]) + dot(nu[1], momentum[1]))
+        height += _WEIGHTS[k] * dot(vector(model.gravity, 0, 0), plus(place, times(turn, p)))
+    return kinetic, elastic, -model.beam_inertia[e, 0, 0] * height

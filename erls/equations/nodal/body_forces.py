@@ -1,11 +1,13 @@
-"""Rigid bodies and loads at nodes: the formulas of `erls.equations.nodal.rigid_body` and
-`erls.equations.nodal.loads`.
+"""Rigid bodies and loads at nodes.
+
+In the node's axes, with the constant inertia M (6, 6) and the momentum M ν (O. Brüls, M. Arnold, A. Cardona, ASME
+DETC2011-48132, eq. 20): M ν̇ − ad(ν)ᵀ M ν = M [Rᵀ g; 0].
 """
 
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array
-from erls.equations.nodal.kernels.contract import Model, Work
+from erls.equations.nodal.contract import Model, Work
 from erls.maths.jit import inlined, part
 from erls.maths.motions import cobracket, pair_minus, pair_plus
 from erls.maths.vectors import (
@@ -13,11 +15,14 @@ from erls.maths.vectors import (
     Vector,
     add,
     cross,
+    dot,
     minus,
     nine,
     of_matrix,
+    plus,
     scaled,
     three,
+    times,
     turned,
     unit,
     vector,
@@ -47,8 +52,8 @@ def body_forces(model: Model, work: Work) -> None:
 
 
 @inlined
-def body_derivatives(model: Model, work: Work, k: int) -> None:
-    """Mass, damping and stiffness of body k in the first six rows and columns."""
+def body_derivatives(model: Model, work: Work, k: int, block: Array) -> None:
+    """Mass, damping (gyroscopic) and stiffness (weight turns with the body) of body k into a block of zeros."""
     node = model.body_nodes[k]
     v, w = three(work.twist, 6 * node), three(work.twist, 6 * node + 3)
     momentum = of_matrix(model.bodies, k, v, w)
@@ -56,10 +61,10 @@ def body_derivatives(model: Model, work: Work, k: int) -> None:
     for j in range(6):
         a, b = unit(j), unit(j - 3)
         heavy = of_matrix(model.bodies, k, a, b)
-        _fill(work.mass, j, 1.0, heavy)
+        _fill(block[0], j, 1.0, heavy)
         spin = cobracket(v, w, heavy[0], heavy[1])
-        _fill(work.damping, j, -1.0, pair_plus(spin, cobracket(a, b, momentum[0], momentum[1])))
-        _fill(work.stiffness, j, 1.0, of_matrix(model.bodies, k, cross(b, down), _ZERO))
+        _fill(block[1], j, -1.0, pair_plus(spin, cobracket(a, b, momentum[0], momentum[1])))
+        _fill(block[2], j, 1.0, of_matrix(model.bodies, k, cross(b, down), _ZERO))
 
 
 @part
@@ -82,7 +87,7 @@ def _load(model: Model, poses: Array, k: int, factor: float) -> Twist:
 @inlined
 def load_forces(model: Model, work: Work, sample: Array) -> None:
     """Subtract loads from ``work.force``; their factors follow the joints in ``sample``."""
-    first = len(model.joint_nodes)
+    first = 3 * len(model.joint_nodes)
     for k in range(len(model.load_nodes)):
         at = 6 * model.load_nodes[k]
         force, moment = _load(model, work.poses, k, -sample[first + k])
@@ -91,12 +96,22 @@ def load_forces(model: Model, work: Work, sample: Array) -> None:
 
 
 @inlined
-def load_derivatives(model: Model, work: Work, sample: Array, k: int) -> None:
-    """Stiffness of load k in the first six rows and columns: dead ones turn in the node's axes."""
-    for j in range(6):
-        for i in range(6):
-            work.mass[i, j] = work.damping[i, j] = work.stiffness[i, j] = 0.0
+def load_derivatives(model: Model, work: Work, sample: Array, k: int, block: Array) -> None:
+    """Stiffness of load k into a block of zeros: dead ones turn in the node's axes."""
     if model.load_dead[k]:
-        force, moment = _load(model, work.poses, k, sample[len(model.joint_nodes) + k])
+        force, moment = _load(model, work.poses, k, sample[3 * len(model.joint_nodes) + k])
         for j in range(3):
-            _fill(work.stiffness, 3 + j, 1.0, (cross(unit(j), force), cross(unit(j), moment)))
+            _fill(block[2], 3 + j, 1.0, (cross(unit(j), force), cross(unit(j), moment)))
+
+
+@inlined
+def body_energy(model: Model, work: Work, k: int) -> tuple[float, float]:
+    """Kinetic, and that of gravity."""
+    node = model.body_nodes[k]
+    v, w = three(work.twist, 6 * node), three(work.twist, 6 * node + 3)
+    momentum = of_matrix(model.bodies, k, v, w)
+    inertia = model.bodies
+    first = inertia[k, 5, 1], inertia[k, 3, 2], inertia[k, 4, 0]  # m c
+    moment = plus(scaled(inertia[k, 0, 0], vector(work.poses, node, 0)), times(nine(work.poses, node, 3), first))
+    kinetic = 0.5 * (dot(v, momentum[0]) + dot(w, momentum[1]))
+    return kinetic, -dot(vector(model.gravity, 1, 0), moment)

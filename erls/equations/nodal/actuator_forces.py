@@ -1,12 +1,20 @@
-"""Forces along the free axis of joints and the joint coordinates: the formulas of `erls.equations.nodal.actuators`."""
+"""Forces along the free axis of joints: drives, springs, dampers, friction, rotors; and the joint coordinates.
+
+With the pose D of a joint's outer frame relative to its inner one, and the relative twist η in the outer frame's axes,
+the rate of the joint coordinate is η's entry about or along z, a row over the twists of both nodes. Forces act along
+that row. It does not change along the joint's own motion; with other motions it does, which the joint forbids.
+"""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from erls.equations.compiled_system import Array
-from erls.equations.nodal.kernels.contract import Knots, Model, Work
-from erls.equations.nodal.kernels.joints import frame_in_world, relative
+from erls.equations.nodal.contract import Model, Work
+from erls.equations.nodal.joint_forces import frame_in_world, relative
+from erls.maths.coefficients import angle_of
 from erls.maths.jit import inlined, part
 from erls.maths.motions import bracket, pair_minus, transformed, transposed
 from erls.maths.vectors import (
@@ -18,6 +26,7 @@ from erls.maths.vectors import (
     nine,
     plus,
     product,
+    put,
     scaled,
     three,
     times,
@@ -45,8 +54,8 @@ def _coordinate(model: Model, k: int, place: Vector, turn: Rotation, near: float
     """Joint coordinate on the turn next to ``near``."""
     if model.actuator_along[k] == 2:
         return place[2]
-    angle = math.atan2(turn[3] - turn[1], turn[0] + turn[4])
-    return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
+    angle = angle_of(turn[3] - turn[1], turn[0] + turn[4])
+    return angle + 2 * math.pi * np.round((near - angle).real / (2 * math.pi))
 
 
 @inlined
@@ -91,14 +100,28 @@ def _swing(model: Model, k: int, reach: Vector, axes: Rotation, twist: Array) ->
 @inlined
 def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> float:
     """What drive, spring, damper and friction give."""
-    at = len(model.joint_nodes) + len(model.load_nodes) + 3 * k
+    at = 3 * len(model.joint_nodes) + len(model.load_nodes) + 3 * k
     law = model.actuators
-    torque: float = sample[at + 2] + law[k, 6] * (sample[at] - angle) + law[k, 7] * (sample[at + 1] - rate)
-    torque = max(-law[k, 8], min(law[k, 8], torque))
+    torque = sample[at + 2] + law[k, 6] * (sample[at] - angle) + law[k, 7] * (sample[at + 1] - rate)
+    limit = law[k, 8]
+    if torque.real > limit.real:
+        torque = limit
+    elif torque.real < -limit.real:
+        torque = -limit
     torque -= law[k, 1] * (angle - law[k, 2]) + law[k, 3] * rate
     if law[k, 4] != 0.0:
-        torque -= law[k, 4] * math.tanh(rate / law[k, 5])
+        torque -= law[k, 4] * np.tanh(rate / law[k, 5])
     return torque
+
+
+@inlined
+def _turning(model: Model, work: Work, k: int, reach: Vector, axes: Rotation) -> tuple[Twist, Twist, float, float]:
+    """Rows of the coordinate's rate over the twists of both nodes, the rate and its own rate."""
+    inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
+    first, second = _rows(model, k, reach, axes)
+    rate = _along(first, work.twist, inner) + _along(second, work.twist, outer)
+    gain = _along(first, work.rate, inner) + _along(second, work.rate, outer)
+    return first, second, rate, gain + _swing(model, k, reach, axes, work.twist)
 
 
 @inlined
@@ -106,16 +129,12 @@ def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> N
     """Add inertia of rotors less efforts to ``work.force``; coordinates near ``before`` go into ``work.turned``."""
     for k in range(len(model.actuator_nodes)):
         place, turn, reach, axes = _posed(model, work.poses, k)
-        angle = _coordinate(model, k, place, turn, before[k])
-        work.turned[k] = angle
+        work.turned[k] = _coordinate(model, k, place, turn, before[k])
         if not model.actuator_active[k]:
             continue
         inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
-        first, second = _rows(model, k, reach, axes)
-        rate = _along(first, work.twist, inner) + _along(second, work.twist, outer)
-        gain = _along(first, work.rate, inner) + _along(second, work.rate, outer)
-        gain += _swing(model, k, reach, axes, work.twist)
-        balance = model.actuators[k, 0] * gain - _effort(model, k, sample, angle, rate)
+        first, second, rate, gain = _turning(model, work, k, reach, axes)
+        balance = model.actuators[k, 0] * gain - _effort(model, k, sample, work.turned[k], rate)
         if inner >= 0:
             add(work.force, 6 * inner, scaled(balance, first[0]))
             add(work.force, 6 * inner + 3, scaled(balance, first[1]))
@@ -124,22 +143,45 @@ def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> N
 
 
 @inlined
-def actuator_derivatives(model: Model, work: Work, k: int) -> None:
-    """Mass of the rotor, damping and stiffness of actuator k; a node that is the ground counts as one without share."""
+def actuator_derivatives(model: Model, work: Work, k: int, block: Array) -> None:
+    """Mass of the rotor; damping of dampers, friction and gains; stiffness of springs and gains into a block."""
+    if not model.actuator_active[k]:
+        return
     _, _, reach, axes = _posed(model, work.poses, k)
-    inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
-    first, second = _rows(model, k, reach, axes)
-    rate = _along(first, work.twist, inner) + _along(second, work.twist, outer)
+    first, second, rate, _ = _turning(model, work, k, reach, axes)
     law = model.actuators
     stiffness, damping = law[k, 1] + law[k, 6], law[k, 3] + law[k, 7]
     if law[k, 4] != 0.0:
-        damping += law[k, 4] / law[k, 5] / math.cosh(min(abs(rate) / law[k, 5], 300.0)) ** 2
+        damping += law[k, 4] / law[k, 5] / np.cosh(min(abs(rate / law[k, 5]), 300.0)) ** 2
     for i in range(12):
         for j in range(12):
             both = _entry(first, second, i) * _entry(first, second, j)
-            work.mass[i, j] = law[k, 0] * both
-            work.damping[i, j] = damping * both
-            work.stiffness[i, j] = stiffness * both
+            block[0, i, j] = law[k, 0] * both
+            block[1, i, j] = damping * both
+            block[2, i, j] = stiffness * both
+
+
+@inlined
+def actuator_energy(model: Model, work: Work, k: int) -> tuple[float, float]:
+    """Of the rotor, and of the spring."""
+    _, _, reach, axes = _posed(model, work.poses, k)
+    _, _, rate, _ = _turning(model, work, k, reach, axes)
+    law = model.actuators
+    return 0.5 * law[k, 0] * rate * rate, 0.5 * law[k, 1] * (work.turned[k] - law[k, 2]) ** 2
+
+
+@inlined
+def acting(model: Model, work: Work, sample: Array, k: int, out: Array) -> None:
+    """Of actuator k (10,): coordinate, rate, acceleration, effort, and the wrench on the outer node in its axes."""
+    _, _, reach, axes = _posed(model, work.poses, k)
+    _, second, rate, gain = _turning(model, work, k, reach, axes)
+    effort = 0.0 * rate
+    if model.actuator_active[k]:
+        effort = _effort(model, k, sample, work.turned[k], rate)
+    push = effort - model.actuators[k, 0] * gain
+    out[0], out[1], out[2], out[3] = work.turned[k], rate, gain, effort
+    put(out, 4, scaled(push, second[0]))
+    put(out, 7, scaled(push, second[1]))
 
 
 @part
@@ -158,15 +200,11 @@ def set_coordinates(model: Model, work: Work, before: Array) -> None:
 
 
 @inlined
-def store_coordinates(model: Model, work: Work, knots: Knots, at: int) -> None:
-    """Coordinates, rates and accelerations of all actuators behind the frames of knot ``at``."""
-    first_entry = knots.states.shape[2] - len(model.actuator_nodes)
+def store_coordinates(model: Model, work: Work, out: Array) -> None:
+    """Coordinates, rates and accelerations of all actuators at the end of a knot (3, s)."""
+    first_entry = out.shape[1] - len(model.actuator_nodes)
     for k in range(len(model.actuator_nodes)):
         _, _, reach, axes = _posed(model, work.poses, k)
-        inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
-        first, second = _rows(model, k, reach, axes)
+        _, _, rate, gain = _turning(model, work, k, reach, axes)
         column = first_entry + k
-        knots.states[at, 0, column] = work.turned[k]
-        knots.states[at, 1, column] = _along(first, work.twist, inner) + _along(second, work.twist, outer)
-        gain = _along(first, work.rate, inner) + _along(second, work.rate, outer)
-        knots.states[at, 2, column] = gain + _swing(model, k, reach, axes, work.twist)
+        out[0, column], out[1, column], out[2, column] = work.turned[k], rate, gain

@@ -1,12 +1,26 @@
-"""Conditions of joints, their forces and derivatives: the formulas of `erls.equations.nodal.joints`."""
+"""Joints as conditions on the pose of an outer frame relative to an inner one, D = (Q, p), and their forces.
+
+Every condition is linear in the entries of p and Q: c · p + ⟨C, Q⟩ = 0 (`erls.mechanism.joint_conditions`). With the
+relative twist η of the outer frame, in its axes, ṗ = Q η_v and Q̇ = Q η̃_ω. Only relative motion enters, so that a rigid
+motion of both frames changes nothing. Along a prescribed coordinate s(t) the inner frame runs ahead by exp(s ẑ) of the
+joint's z axis.
+"""
 
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array
-from erls.equations.nodal.kernels.contract import Model, Work
+from erls.equations.nodal.contract import Model, Work
 from erls.maths.coefficients import stumpff
 from erls.maths.jit import inlined, part
-from erls.maths.motions import cobracket, pair_minus, transformed, transposed
+from erls.maths.motions import (
+    bracket,
+    cobracket,
+    pair_minus,
+    pair_plus,
+    pair_scaled,
+    transformed,
+    transposed,
+)
 from erls.maths.rotations import exponential
 from erls.maths.vectors import (
     Rotation,
@@ -22,6 +36,7 @@ from erls.maths.vectors import (
     plus,
     product,
     scaled,
+    three,
     times,
     turned,
     unit,
@@ -84,18 +99,23 @@ def _along(model: Model, row: int, turn: Rotation) -> Twist:
     return pull, axial(back_product(turn, nine(model.conditions, row, 3)))
 
 
+@part
+def _violation(conditions: Array, row: int, place: Vector, turn: Rotation) -> float:
+    violation: float = dot(vector(conditions, row, 0), place)
+    entries = nine(conditions, row, 3)
+    for k in range(9):
+        violation += entries[k] * turn[k]
+    return violation
+
+
 @inlined
 def joint_forces(model: Model, work: Work, sample: Array) -> None:
     """Violations of all conditions, and the forces Bᵀλ in node axes, added to ``work.reaction``."""
     for j in range(len(model.joint_nodes)):
-        place, turn, reach, axes = _posed(model, work.poses, j, sample[j])
+        place, turn, reach, axes = _posed(model, work.poses, j, sample[3 * j])
         force = _ZERO, _ZERO
         for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
-            c, entries = vector(model.conditions, row, 0), nine(model.conditions, row, 3)
-            violation = dot(c, place)
-            for k in range(9):
-                violation += entries[k] * turn[k]
-            work.violation[row] = violation
+            work.violation[row] = _violation(model.conditions, row, place, turn)
             along, about = _along(model, row, turn)
             strength = work.multipliers[row]
             force = plus(force[0], scaled(strength, along)), plus(force[1], scaled(strength, about))
@@ -112,18 +132,67 @@ def joint_forces(model: Model, work: Work, sample: Array) -> None:
 
 
 @inlined
-def joint_derivatives(model: Model, work: Work, sample: Array, j: int) -> None:
-    """Gradients of the joint's conditions in ``work.gradient``, stiffness of Bᵀλ in ``work.stiffness``."""
-    _, turn, reach, axes = _posed(model, work.poses, j, sample[j])
+def joint_gradients(model: Model, work: Work, sample: Array, j: int) -> None:
+    """Violation and gradient of each condition of joint j, and its derivatives along the motion at ``work``'s twists:
+    Φ_t in ``work.drift``, Φ̈ − B a in ``work.bias`` (accelerations of the twists on R³×SO(3) included).
+    """
+    place, turn, reach, axes = _posed(model, work.poses, j, sample[3 * j])
     p, r = vector(model.joint_frames, j, 12), nine(model.joint_frames, j, 15)
-    pull, entries = _ZERO, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    driven, sign = model.joint_driven[j], model.joint_sign[j]
+    carried, own = _twist(model, work.twist, j, reach, axes)
+    axis = unit(driven), unit(driven - 3)
+    drive = pair_scaled(sign * sample[3 * j + 1], axis)
+    moved = transformed(place, turn, drive[0], drive[1])  # of the driven frame, as seen in the outer one
+    inner = pair_plus(carried, moved)
+    apart = pair_minus(own, inner)
+    # the inner frame's twist changes as it turns ahead, and as the outer frame moves against it
+    base, base_axes = _ahead(model, j, sample[3 * j])
+    held = _of_node(work.twist, model.joint_nodes[j, 0], base, base_axes)
+    change = pair_minus(pair_scaled(sign * sample[3 * j + 2], axis), bracket(drive[0], drive[1], held[0], held[1]))
+    change = transformed(place, turn, change[0], change[1])
+    bend = pair_minus(bracket(apart[0], apart[1], inner[0], inner[1]), change)
+    swing = times(turn, cross(apart[1], apart[0]))
+    curve = product(product(turn, _tilde(apart[1])), _tilde(apart[1]))
     for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
+        work.violation[row] = _violation(model.conditions, row, place, turn)
         along, about = _along(model, row, turn)
         n, m = transposed(reach, axes, along, about)
         end, end_moment = transposed(p, r, along, about)
         for i in range(3):
             work.gradient[row, i], work.gradient[row, 3 + i] = -n[i], -m[i]
             work.gradient[row, 6 + i], work.gradient[row, 9 + i] = end[i], end_moment[i]
+        work.drift[row] = -dot(along, moved[0]) - dot(about, moved[1])
+        work.bias[row] = _violation(model.conditions, row, swing, curve) + dot(along, bend[0]) + dot(about, bend[1])
+
+
+@part
+def _tilde(a: Vector) -> Rotation:
+    return 0.0, -a[2], a[1], a[2], 0.0, -a[0], -a[1], a[0], 0.0
+
+
+@part
+def _of_node(values: Array, node: int, p: Vector, r: Rotation) -> Twist:
+    """Twist of a frame of a node; the ground rests."""
+    if node < 0:
+        return (0.0 * p[0], 0.0 * p[0], 0.0 * p[0]), (0.0 * p[0], 0.0 * p[0], 0.0 * p[0])
+    return transformed(p, r, three(values, 6 * node), three(values, 6 * node + 3))
+
+
+@inlined
+def _twist(model: Model, values: Array, j: int, reach: Vector, axes: Rotation) -> tuple[Twist, Twist]:
+    """Twists of the outer frame as carried by the inner node, and by its own."""
+    frames = model.joint_frames
+    own = _of_node(values, model.joint_nodes[j, 1], vector(frames, j, 12), nine(frames, j, 15))
+    return _of_node(values, model.joint_nodes[j, 0], reach, axes), own
+
+
+@inlined
+def joint_stiffness(model: Model, work: Work, sample: Array, j: int, block: Array) -> None:
+    """Derivative of Bᵀλ of joint j by increments of both nodes into a block of zeros."""
+    _, turn, reach, axes = _posed(model, work.poses, j, sample[3 * j])
+    p, r = vector(model.joint_frames, j, 12), nine(model.joint_frames, j, 15)
+    pull, entries = _ZERO, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
         strength = work.multipliers[row]
         pull = plus(pull, scaled(strength, vector(model.conditions, row, 0)))
         c = nine(model.conditions, row, 3)
@@ -154,8 +223,5 @@ def joint_derivatives(model: Model, work: Work, sample: Array, j: int) -> None:
         n, m = transposed(reach, axes, inner[0], inner[1])
         end, end_moment = transposed(p, r, pushed[0], pushed[1])
         for i in range(3):
-            work.stiffness[i, k], work.stiffness[3 + i, k] = n[i], m[i]
-            work.stiffness[6 + i, k], work.stiffness[9 + i, k] = end[i], end_moment[i]
-            for row in range(i, 12, 3):
-                work.mass[row, k] = work.damping[row, k] = 0.0
-
+            block[2, i, k], block[2, 3 + i, k] = n[i], m[i]
+            block[2, 6 + i, k], block[2, 9 + i, k] = end[i], end_moment[i]

@@ -7,13 +7,10 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from erls.equations.compiled_system import Array
-from erls.equations.nodal.kernels.actuators import set_coordinates, store_coordinates
-from erls.equations.nodal.kernels.beam import bend
-from erls.equations.nodal.kernels.contract import ADVANCE, Knots, Model, Progress, Settings, State, Work
-from erls.equations.nodal.kernels.system import compose, set_twists
+from erls.equations.nodal.contract import ADVANCE, Knots, Model, Progress, Settings, State, Work
+from erls.equations.nodal.sums import compose, knot, remember, set_twists
 from erls.maths import band
 from erls.maths.jit import inlined, kernel
-from erls.maths.vectors import cross, dot, nine, plus, put, scaled, three, times, vector
 
 Forces: TypeAlias = Callable[[Model, Work, State, Array], None]
 Factor: TypeAlias = Callable[[Model, Work, Array, float, float, float], int]
@@ -194,9 +191,7 @@ def _correct(model: Model, work: Work, settings: Settings) -> float:
 def _settle(model: Model, state: State, work: Work) -> None:
     """Bring everything in ``work`` to its last increment."""
     compose(model, state.poses, work.increment, work.poses)
-    for e in range(len(model.beam_nodes)):
-        bend(model, work.poses, state.bent, work.bent, e)
-    set_coordinates(model, work, state.turned)
+    remember(model, work, state)
     set_twists(model, work)
 
 
@@ -220,6 +215,9 @@ def _accept(state: State, work: Work, settings: Settings) -> None:
         state.multipliers[i] = work.multipliers[i]
     for i in range(len(work.turned)):
         state.turned[i] = work.turned[i]
+    for k in range(len(work.wound)):
+        for i in range(3):
+            state.wound[k, i] = work.wound[k, i]
     for e in range(len(work.bent)):
         for i in range(6):
             state.bent[e, i] = work.bent[e, i]
@@ -231,25 +229,11 @@ def _accept(state: State, work: Work, settings: Settings) -> None:
 @inlined
 def _store(model: Model, work: Work, knots: Knots, at: int) -> None:
     """Positions and rotation matrices with their derivatives, joint coordinates, rates of twists, multipliers."""
-    for node in range(len(work.poses)):
-        v, w = three(work.twist, 6 * node), three(work.twist, 6 * node + 3)
-        push, gain = three(work.rate, 6 * node), three(work.rate, 6 * node + 3)
-        turn, entry = nine(work.poses, node, 3), 12 * node
-        for i in range(12):
-            knots.states[at, 0, entry + i] = work.poses[node, i]
-        put(knots.states[at, 1], entry, times(turn, v))
-        put(knots.states[at, 2], entry, times(turn, plus(push, cross(w, v))))
-        speed = dot(w, w)
-        for i in range(3):
-            row = vector(work.poses, node, 3 + 3 * i)
-            put(knots.states[at, 1], entry + 3 + 3 * i, cross(row, w))
-            second = plus(cross(row, gain), plus(scaled(dot(row, w), w), scaled(-speed, row)))
-            put(knots.states[at, 2], entry + 3 + 3 * i, second)
+    knot(model, work, knots.states[at])
     for i in range(len(work.a)):
         knots.accelerations[at, i] = work.a[i]
     for i in range(len(work.multipliers)):
         knots.multipliers[at, i] = work.multipliers[i]
-    store_coordinates(model, work, knots, at)
 
 
 

@@ -1,0 +1,174 @@
+"""The arrays of `erls.equations.nodal.contract` from elements and joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from erls.equations.nodal.actuators import Actuators
+from erls.equations.nodal.beam import Beams
+from erls.equations.nodal.contract import Model, Work
+from erls.equations.nodal.elements import Elements
+from erls.equations.nodal.joints import JointRows
+from erls.equations.nodal.loads import NodalLoads
+from erls.equations.nodal.nodes import rows_of
+from erls.equations.nodal.rigid_body import RigidBodies
+from erls.equations.nodal.scatter import IntArray
+from erls.equations.nodal.springs import Springs
+from erls.equations.nodal.turning_springs import TurningSprings
+from erls.maths.so3 import Array
+
+E = TypeVar("E")
+
+
+class Kinds:
+    """Elements sorted by kind; several sets of one kind follow each other."""
+
+    def __init__(self, elements: Sequence[Elements]) -> None:
+        self.beams = _one(elements, Beams) or Beams([], np.zeros((0, 4, 4)), np.zeros(3))
+        self.bodies = _one(elements, RigidBodies) or RigidBodies([], np.zeros(3))
+        self.loads = _one(elements, NodalLoads) or NodalLoads([])
+        self.actuators = _all(elements, Actuators)
+        self.springs = _all(elements, Springs) or [Springs([])]
+        self.windings = _all(elements, TurningSprings) or [TurningSprings([])]
+        known = (Beams, RigidBodies, NodalLoads, Actuators, Springs, TurningSprings)
+        strange = [type(e).__name__ for e in elements if not isinstance(e, known)]
+        if strange:
+            raise TypeError(f"there are no functions of {strange[0]}")
+
+    @property
+    def pairs(self) -> IntArray:
+        """(E, 2) nodes of all elements, in the order of `Model`."""
+        sets = [self.beams, self.bodies, self.loads, *self.actuators, *self.springs, *self.windings]
+        return np.concatenate([_pairs(e.nodes) for e in sets])
+
+
+def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, places: IntArray) -> Model:
+    """All constants.
+
+    Parameters
+    ----------
+    kinds : Kinds
+    rows : JointRows
+    local : bool
+        SE(3), or R³×SO(3).
+    metres : (n,) array
+        Per unit of each velocity.
+    places : (N,) array
+        Of all unknowns in the band, from `band_order`.
+    """
+    beams, bodies, loads, actuators = kinds.beams, kinds.bodies, kinds.loads, kinds.actuators
+    frames = [_frames(a.inner_frames, a.outer_frames) for a in actuators]
+    return Model(
+        local=int(local),
+        gravity=np.array([beams.gravity, bodies.gravity], dtype=float),
+        pairs=np.concatenate([kinds.pairs, rows.nodes]),
+        beam_nodes=beams.nodes,
+        beam_frames=_frames(beams.frames[:, 0], beams.frames[:, 1]),
+        beam_built=beams.built,
+        beam_stiffness=beams.stiffness,
+        beam_inertia=beams.inertia,
+        beam_moving=beams.inertia.any(axis=(1, 2)).astype(np.int64),
+        body_nodes=bodies.nodes[:, 0].copy(),
+        bodies=bodies.matrices,
+        load_nodes=loads.nodes[:, 0].copy(),
+        loads=loads.wrenches,
+        load_dead=loads.dead,
+        actuator_nodes=_joined([a.nodes for a in actuators], 2, np.int64),
+        actuator_frames=_joined(frames, 24),
+        actuator_along=np.concatenate([np.zeros(0, dtype=np.int64), *(a.along for a in actuators)]),
+        actuator_active=np.concatenate([np.zeros(0, dtype=np.int64), *(a.active for a in actuators)]),
+        actuators=_joined([a.laws for a in actuators], 9),
+        spring_nodes=np.concatenate([s.nodes for s in kinds.springs]),
+        springs=np.concatenate([s.laws for s in kinds.springs]),
+        winding_nodes=np.concatenate([s.nodes for s in kinds.windings]),
+        winding_frames=np.concatenate([s.frames for s in kinds.windings]),
+        windings=np.concatenate([s.laws for s in kinds.windings]),
+        joint_nodes=rows.nodes,
+        joint_frames=_frames(rows.inner, rows.outer),
+        joint_driven=np.array([rows.driven_along(j) for j in rows.joints], dtype=np.int64),
+        joint_sign=np.array([rows.sign(j) for j in rows.joints], dtype=float),
+        joint_rows=np.searchsorted(rows.joint_of_row, np.arange(len(rows.joints) + 1)).astype(np.int64),
+        conditions=np.ascontiguousarray(np.concatenate([rows.c, rows.entries.reshape(-1, 9)], axis=1)),
+        metres=metres,
+        place=places,
+        order=np.argsort(places).astype(np.int64),
+    )
+
+
+def room(model: Model, width: int, kind: type = float) -> Work:
+    """Memory for evaluations, and with the ``width`` of the band for steps (0 for none)."""
+    n, m, k, e = len(model.metres), len(model.conditions), len(model.metres) // 6, len(model.pairs)
+    unknowns = n + m if width else 0
+    per_velocity = ("v", "a", "increment", "twist", "rate", "force", "reaction", "inertia")
+    shapes: dict[str, tuple[int, ...]] = {
+        "poses": (k, 12),
+        "bent": model.beam_built.shape,
+        "turned": (len(model.actuators),),
+        "wound": (len(model.windings), 3),
+        **dict.fromkeys(per_velocity, (n,)),
+        **dict.fromkeys(("multipliers", "violation", "drift", "bias"), (m,)),
+        **dict.fromkeys(("correction", "ordered", "left", "right"), (unknowns,)),
+        "blocks": (e, 3, 12, 12),
+        "whole": (e, 12, 12),
+        **dict.fromkeys(("rows", "shape"), (6, 12)),
+        "gradient": (m, 12),
+        "factors": (k, 3, 6, 6),
+        "turning": (k, 3, 3),
+        "band": (unknowns, 3 * width + 1),
+    }
+    arrays = {name: np.zeros(shape, dtype=kind) for name, shape in shapes.items()}
+    return Work(**arrays, pivots=np.zeros(unknowns, dtype=np.int64))
+
+
+def band_order(count: int, pairs: IntArray, rows: JointRows) -> tuple[IntArray, int]:
+    """Numbers of all unknowns in the band, nodes and joints by the reverse Cuthill-McKee order; width of the band.
+
+    E. Cuthill, J. McKee, Proc. 24th Nat. Conf. ACM (1969) 157–172.
+    """
+    joints = len(rows.joints)
+    groups = [pair[pair >= 0] for pair in pairs]
+    groups += [np.append(pair[pair >= 0], count + k) for k, pair in enumerate(rows.nodes)]
+    along = np.concatenate([np.zeros(0, dtype=np.int64), *(np.repeat(g, len(g)) for g in groups)])
+    across = np.concatenate([np.zeros(0, dtype=np.int64), *(np.tile(g, len(g)) for g in groups)])
+    graph = sp.csr_array((np.ones(len(along)), (along, across)), shape=(count + joints, count + joints))
+    of_joints = np.bincount(rows.joint_of_row, minlength=joints)
+    sizes = np.concatenate([np.full(count, 6), of_joints]).astype(np.int64)
+    own = np.concatenate([[0], np.cumsum(sizes)])
+    places = np.zeros(own[-1], dtype=np.int64)
+    last = 0
+    for block in reverse_cuthill_mckee(graph, symmetric_mode=True):
+        places[own[block] : own[block + 1]] = np.arange(last, last + sizes[block])
+        last += sizes[block]
+    spans = [np.concatenate([places[own[b] : own[b + 1]] for b in g]) for g in groups]
+    return places, max((int(np.ptp(s)) for s in spans if len(s)), default=5)
+
+
+def _all(elements: Sequence[Elements], kind: type[E]) -> list[E]:
+    return [e for e in elements if isinstance(e, kind)]
+
+
+def _one(elements: Sequence[Elements], kind: type[E]) -> E | None:
+    found = _all(elements, kind)
+    if len(found) > 1:
+        raise ValueError(f"{kind.__name__}: give all of a system as one set")
+    return found[0] if found else None
+
+
+def _pairs(nodes: IntArray) -> IntArray:
+    if nodes.shape[1] == 2:
+        return nodes
+    return np.concatenate([nodes, np.full_like(nodes, -1)], axis=1)
+
+
+def _frames(first: Array, second: Array) -> Array:
+    """(e, 24) of poses (e, 4, 4)."""
+    return np.ascontiguousarray(np.concatenate([rows_of(first), rows_of(second)], axis=-1).reshape(-1, 24))
+
+
+def _joined(parts: Sequence[Any], columns: int, kind: type = float) -> Any:
+    return np.concatenate([np.zeros((0, columns), dtype=kind), *parts])
