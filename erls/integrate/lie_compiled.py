@@ -38,7 +38,7 @@ _PAUSE = 0.05  # s between looks at the observer and at interrupts
 
 
 class Compiled(Protocol):
-    """A system as arrays; see `erls.equations.nodal.compiled.CompiledSystem`."""
+    """A system as arrays; see `erls.equations.nodal.compiled.CompiledSteps`."""
 
     model: Any
     stored: int
@@ -70,8 +70,7 @@ def compiled_steps(
     if (make_steps := getattr(system, "make_steps", None)) is not None:
         own: Steps | None = make_steps(options, recorder)
         return own
-    offer = getattr(system, "compiled", None)
-    compiled = None if offer is None else offer()
+    compiled = getattr(system, "compiled", None)
     return None if compiled is None else CompiledSteps(system, compiled, options, recorder)
 
 

@@ -29,6 +29,7 @@ _ROOT = Path(__file__).parents[1]
 _IMPORT = re.compile(r"^\s*from (erls[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
 _listeners: list[Callable[[str], None]] = []
 _told: set[str] = set()  # subjects
+_fixed: set[Any] = set()  # kernels, whose signatures are fixed
 ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
 
 
@@ -153,19 +154,23 @@ def plain(function: F) -> F:
     It must not choose by its numbers, nor keep what it makes in tables.
     """
     source: Any = getattr(function, "py_func", function)
-    names = dict(source.__globals__)
-    for name in source.__code__.co_names:
-        if hasattr(names.get(name), "py_func"):
-            names[name] = plain(names[name])
-    twin: Any = FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__)
-    return twin  # type: ignore[no-any-return]
+    own = {name: plain(source.__globals__[name]) for name in _called(source)}
+    names = {**source.__globals__, **own}
+    return cast(F, FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__))
 
 
 @cache
 def any_scalar(function: F) -> F:
     """A kernel for other numbers than those of its signature: compiled on demand for what it is given, complex ones."""
     source: Any = getattr(function, "py_func", function)
-    return cast(F, _njit(source, _nrt=False)) if ENABLED else function
+    own = {name: any_scalar(source.__globals__[name]) for name in _called(source) if source.__globals__[name] in _fixed}
+    twin = FunctionType(source.__code__, {**source.__globals__, **own}, source.__name__, source.__defaults__)
+    return cast(F, _njit(twin, _nrt=False)) if ENABLED else function
+
+
+def _called(source: Any) -> list[str]:
+    """Names of the compiled functions that a function calls."""
+    return [name for name in source.__code__.co_names if hasattr(source.__globals__.get(name), "py_func")]
 
 
 def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
@@ -173,7 +178,15 @@ def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
 
     Unless ``counted``, it keeps no count of who refers to its arrays: atomic operations, which many arrays make dear.
     """
-    return lambda function: _njit(function, signature, _nrt=counted) if ENABLED else function
+
+    def compiled(function: F) -> F:
+        if not ENABLED:
+            return function
+        made: F = _njit(function, signature, _nrt=counted)
+        _fixed.add(made)
+        return made
+
+    return compiled
 
 
 def _njit(function: Any, *signature: Any, **options: Any) -> Any:

@@ -76,6 +76,7 @@ class NodalSystem:
         self._sampled: tuple[float, Array] = (np.nan, np.zeros(0))
         self._tied: tuple[float, Nodes | None, tuple[Array, ...]] = (np.nan, None, ())
         self.start = self.at(poses, built)
+        self.model.beam_built[:] = self.start.bent  # the same to the last bit: no strain as built
 
     @property
     def size(self) -> int:
