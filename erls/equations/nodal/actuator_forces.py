@@ -55,7 +55,8 @@ def _coordinate(model: Model, k: int, place: Vector, turn: Rotation, near: float
     if model.actuator_along[k] == 2:
         return place[2]
     angle = angle_of(turn[3] - turn[1], turn[0] + turn[4])
-    return angle + 2 * math.pi * np.round((near - angle).real / (2 * math.pi))
+    turns: float = np.round((near - angle).real / (2 * math.pi))
+    return angle + 2 * math.pi * turns
 
 
 @inlined
@@ -102,7 +103,7 @@ def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> f
     """What drive, spring, damper and friction give."""
     at = 3 * len(model.joint_nodes) + len(model.load_nodes) + 3 * k
     law = model.actuators
-    torque = sample[at + 2] + law[k, 6] * (sample[at] - angle) + law[k, 7] * (sample[at + 1] - rate)
+    torque: float = sample[at + 2] + law[k, 6] * (sample[at] - angle) + law[k, 7] * (sample[at + 1] - rate)
     limit = law[k, 8]
     if torque.real > limit.real:
         torque = limit

@@ -43,7 +43,7 @@ class Kinds:
     @property
     def pairs(self) -> IntArray:
         """(E, 2) nodes of all elements, in the order of `Model`."""
-        sets = [self.beams, self.bodies, self.loads, *self.actuators, *self.springs, *self.windings]
+        sets: list[Elements] = [self.beams, self.bodies, self.loads, *self.actuators, *self.springs, *self.windings]
         return np.concatenate([_pairs(e.nodes) for e in sets])
 
 
@@ -121,7 +121,7 @@ def room(model: Model, width: int, kind: type = float) -> Work:
         "turning": (k, 3, 3),
         "band": (unknowns, 3 * width + 1),
     }
-    arrays = {name: np.zeros(shape, dtype=kind) for name, shape in shapes.items()}
+    arrays: dict[str, Array] = {name: np.zeros(shape, dtype=kind) for name, shape in shapes.items()}
     return Work(**arrays, pivots=np.zeros(unknowns, dtype=np.int64))
 
 
