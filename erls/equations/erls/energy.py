@@ -31,7 +31,7 @@ from erls.equations.serial.records import (
     read_modes,
     read_serial,
 )
-from erls.maths.jit import inlined, kernel
+from erls.maths.jit import inlined, kernel, part
 from erls.maths.products import add_columns, clear, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import dot3
@@ -60,13 +60,15 @@ def _kinetic(chain: Chain, link: Link, state: LinkState, twist: Array) -> Any:
     return total
 
 
-@kernel(contract.ENERGY, counted=False)
-def energy(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> None:
-    """Kinetic (rotors included), elastic, gravity, springs [J]."""
+@part
+def add_energies(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
+) -> None:
+    """Energies; ``bends`` as in `erls.equations.erls.residual`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     move_frames(serial, chain, reals, integers, scratch, t, y, v, y[0:0])
-    if chain.bends >= 0:
+    if bends is not None:
         bend_frames(serial, chain, reals, integers, scratch, True)
     clear(out)
     for k in range(serial.links):
@@ -77,7 +79,7 @@ def energy(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array,
         modes = read_modes(reals, integers, serial.modes + k * MODES)
         twist, moment = state.twist, state.point[:3]
         clear(moment)
-        if chain.bends >= 0:
+        if bends is not None:
             bend = read_bend(reals, integers, chain.bends + k * BEND)
             if bend.curved:
                 bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
@@ -104,3 +106,9 @@ def energy(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array,
         moment[2] += link.mass[4, 0]
         out[2] -= link.mass[0, 0] * height[0] + dot3(state.down, moment)
         out[3] += joint.stiffness * (motion.coordinate[0] - joint.rest) ** 2 / 2
+
+
+@kernel(contract.ENERGY, counted=False)
+def energy(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> None:
+    """Kinetic (rotors included), elastic, gravity, springs [J]."""
+    add_energies(reals, integers, scratch, t, y, v, out, None)

@@ -165,7 +165,7 @@ def stiffened(mechanism: Mechanism) -> bool:
     )
 
 
-def pack_chain(mechanism: Mechanism, dense: int = DENSE) -> CompiledSystem:
+def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False) -> CompiledSystem:
     """The compiled form of a chain in the joint-angle gauge.
 
     Parameters
@@ -174,12 +174,16 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE) -> CompiledSystem:
     dense : int
         Coordinates up to which iteration matrices get dense factors. Beyond, they are solved link by link, with the
         damping that couples elastic coordinates of a link left out of them where that hardly slows iterations down.
+    complete : bool
+        Whether the wrenches of links are complete. No joint feels what a link carries by itself, and for the motion
+        that is left out: moments about axes about which no joint turns, and what acts on the ground.
     """
     links, count = mechanism.links, len(mechanism.links)
     free = [k for k, joint in enumerate(mechanism.joints) if not joint.drive.prescribed]
     modes = [link.elastic_modes for link in links]
     firsts = len(free) + np.concatenate([[0], np.cumsum(modes)]).astype(int)
-    found, axes = shapes(mechanism), rotation_axes(mechanism.joints)
+    found = shapes(mechanism)
+    axes = [np.eye(3)] * count if complete else rotation_axes(mechanism.joints)
     bends = stiffened(mechanism)
     curved = [bends and link.second_order is not None for link in links]
     integers: list[int] = [0]
@@ -241,6 +245,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE) -> CompiledSystem:
         centrifugal=int("centrifugal_load" in mechanism.effects),
         softening=int("spin_softening" in mechanism.effects),
         weight=int(bool(np.any(mechanism.gravity))),
+        complete=int(complete),
     )
     rigid, rigid_state = pack.rigid_links(mechanism, constants, scratch)
     serial = Serial(

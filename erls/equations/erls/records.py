@@ -32,6 +32,8 @@ class Chain(NamedTuple):
         Effects of `erls.mechanism.effects`, 0 or 1.
     weight : int
         Whether gravity acts.
+    complete : int
+        Whether wrenches are, also where no joint feels them.
     """
 
     links: int
@@ -48,6 +50,7 @@ class Chain(NamedTuple):
     centrifugal: int
     softening: int
     weight: int
+    complete: int
 
 
 class Link(NamedTuple):

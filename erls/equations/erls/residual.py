@@ -69,7 +69,7 @@ def _forces_of_links(
                 feel_curvature(bend, link, state, bent)
         if chain.weight:
             weigh_displaced(link, state)
-        if link.parent >= 0:  # on the ground the frame moves along the joint, which does not feel this
+        if link.parent >= 0 or chain.complete:  # on the ground it moves along the joint, which does not feel this
             add_force_cross(state.twist, state.momentum, state.wrench)
         for i in range(6):
             state.force[i] = state.modal[i]

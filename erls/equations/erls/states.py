@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from erls.equations import compiled_system as contract
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import LINK, LINK_STATE, read_chain, read_link, read_link_state
@@ -25,14 +27,16 @@ def _compose(before: Array, pose: Array, out: Array) -> None:
         )
 
 
-@kernel(contract.STATES, counted=False)
-def states(reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array) -> None:
-    """Rows of ``out``: pose (12,) of every link, (u, q_d) and its rate of every link, θ and θ̇ of every joint."""
+@part
+def put_states(
+    reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array, bends: Any
+) -> None:
+    """Rows of ``out``; ``bends`` as in `erls.equations.erls.residual`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     for row in range(len(t)):
         move_frames(serial, chain, reals, integers, scratch, t[row], y[row], v[row], y[row, 0:0])
-        if chain.bends >= 0:
+        if bends is not None:
             bend_frames(serial, chain, reals, integers, scratch, True)
         at, found = 12 * serial.links, out[row]
         for k in range(serial.links):
@@ -49,3 +53,9 @@ def states(reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array,
                 for i in range(len(values)):
                     found[at + i] = values[i]
                 at += len(values)
+
+
+@kernel(contract.STATES, counted=False)
+def states(reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array) -> None:
+    """Rows of ``out``: pose (12,) of every link; then of every link (u, q_d), its rate, θ and θ̇ of its joint."""
+    put_states(reals, integers, scratch, t, y, v, out, None)

@@ -1,0 +1,213 @@
+"""ERLS-CMS in the joint-angle gauge as a `TreeFormulation`: what runs ask of it, from its compiled functions.
+
+Independent coordinates y = (free joint coordinates θ_f, elastic coordinates q_d of all links). The rigid-body modal
+coordinates follow from compatibility, q_r = D(θ) q_d; prescribed joint coordinates follow from time. The dense form of
+the same equations, in the notation of the paper, is `erls.equations.erls.paper`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from erls.equations.compiled_system import CompiledSystem, function_in
+from erls.equations.erls.pack import pack_chain, shapes, stiffened
+from erls.equations.erls.paper.compatibility import Compatibility
+from erls.equations.erls.paper.frames import displaced_frames
+from erls.equations.erls.paper.second_order_compatibility import second_order_compatibility
+from erls.equations.erls.records import LINK_STATE, read_chain, read_link_state
+from erls.equations.formulation import Energy, Reaction, State
+from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.serial.joint_frames import FrameMotion
+from erls.equations.serial.node_reach import node_reach
+from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
+from erls.equations.serial.singular import singular_mass
+from erls.equations.serial.state_series import StateSeries
+from erls.maths.so3 import Array, skew
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.loops import LoopEnd
+
+
+class Erls:
+    """Equations of motion of a serial chain in the joint-angle gauge; a `TreeFormulation`.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    """
+
+    gauge = "joint-angle"
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.stiffened = stiffened(mechanism)
+        self.joints = len(mechanism.joints)
+        self.elastic = sum(link.elastic_modes for link in mechanism.links)
+        prescribed = np.array([joint.drive.prescribed for joint in mechanism.joints], dtype=bool)
+        self.free_joints = np.flatnonzero(~prescribed)
+        self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
+        self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
+
+    @property
+    def size(self) -> int:
+        """Number of independent coordinates."""
+        return len(self.free)
+
+    @cached_property
+    def compiled(self) -> CompiledSystem:
+        """The equations."""
+        return pack_chain(self.mechanism)
+
+    @cached_property
+    def _complete(self) -> CompiledSystem:
+        """The same with complete wrenches."""
+        return pack_chain(self.mechanism, dense=self.size, complete=True)
+
+    @cached_property
+    def compatibility(self) -> Compatibility:
+        """The dense elimination of rigid-body coordinates, for what is asked of it seldom."""
+        found = second_order_compatibility if self.stiffened else Compatibility
+        return found(self.mechanism, self.gauge)
+
+    @cached_property
+    def _shapes(self) -> list[Array]:
+        """(m, n) modal coordinates of each link per (u, q_d)."""
+        return [shape.modes for shape in shapes(self.mechanism)]
+
+    def _module(self, name: str) -> str:
+        """Where a function on states is: they are compiled apart for links with second-order displacements."""
+        return f"erls.equations.erls.{'stiffened_states' if self.stiffened else name}"
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Breakpoints of all drives."""
+        return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
+
+    @property
+    def length_scales(self) -> Array:
+        """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
+        return np.asarray(node_reach(self.mechanism, self.compatibility)[self.free])
+
+    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        """(n,) forces out of balance on the independent coordinates."""
+        system, out = self.compiled, np.empty(self.size)
+        system.residual(system.reals, system.integers, system.scratch, t, *map(_flat, (y, v, a)), out)
+        return out
+
+    def mass_matrix(self, t: float, y: Array) -> Array:
+        """(n, n) mass matrix over the independent coordinates."""
+        system, out = self.compiled, np.empty((self.size, self.size))
+        system.mass_matrix(system.reals, system.integers, system.scratch, t, _flat(y), out)
+        return out
+
+    def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
+        system, both = self.compiled, np.empty((2, self.size, self.size))
+        system.stiffness_and_damping(
+            system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), both[0], both[1]
+        )
+        return both[0], both[1]
+
+    def acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """(n,) accelerations from the equations of motion.
+
+        Raises
+        ------
+        SimulationError
+            The mass matrix is not positive definite; names the coordinate.
+        """
+        system, out = self.compiled, np.empty(self.size)
+        status = system.acceleration(system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), out)
+        if status:
+            raise singular_mass(self, t, self.mass_matrix(t, y))
+        return out
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
+        joints = self.mechanism.joints
+        y, v = np.zeros(self.size), np.zeros(self.size)
+        f = len(self.free_joints)
+        y[:f] = [joints[k].position for k in self.free_joints]
+        v[:f] = [joints[k].rate for k in self.free_joints]
+        if self.mechanism.static_start:
+            y = held_equilibrium(self, y, self.free_joints)
+        return y, v
+
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries:
+        """States at (k,) times."""
+        system, links = self.compiled, self.mechanism.links
+        sizes = [6 + link.elastic_modes for link in links]
+        out = np.empty((len(t), sum(14 + 2 * n for n in sizes)))
+        states = function_in(self._module("states"), "states")()
+        states(system.reals, system.integers, system.scratch, _flat(t), _flat(y), _flat(v), out)
+        poses = np.zeros((len(t), len(links), 4, 4))
+        flat = out[:, : 12 * len(links)].reshape(len(t), len(links), 12)
+        poses[..., :3, :3] = flat[..., :9].reshape(*flat.shape[:2], 3, 3)
+        poses[..., :3, 3], poses[..., 3, 3] = flat[..., 9:], 1.0
+        modal, theta, at = [], np.empty((2, len(t), len(links))), 12 * len(links)
+        for k, n in enumerate(sizes):
+            modal.append(out[:, at : at + n] @ self._shapes[k].T)
+            theta[:, :, k] = out[:, at + 2 * n : at + 2 * n + 2].T
+            at += 2 * n + 2
+        return StateSeries(np.asarray(t), [poses[:, k] for k in range(len(links))], modal, theta[0], *theta)
+
+    def state(self, t: float, y: Array, v: Array) -> State:
+        """Poses, modal coordinates and joint angles at a state."""
+        return self.series(np.array([t]), np.array([y]), np.array([v])).states()[0]
+
+    def energy(self, t: float, y: Array, v: Array) -> Energy:
+        """Energies of a state."""
+        system, out = self.compiled, np.empty(4)
+        energy = function_in(self._module("energy"), "energy")()
+        energy(system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), out)
+        return Energy(*out.tolist())
+
+    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
+        """Frames on displaced nodes of links, with rows over (θ, q_d); see `TreeFormulation`."""
+        return displaced_frames(self, t, y, v, ends)
+
+    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
+        """Joint reactions at a state."""
+        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
+
+    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
+        """Joint reactions that give these accelerations."""
+        system = self._complete
+        balance = np.empty(self.size)
+        system.residual(system.reals, system.integers, system.scratch, t, *map(_flat, (y, v, a)), balance)
+        serial = read_serial(system.reals, system.integers, int(system.integers[0]))
+        chain = read_chain(system.reals, system.integers, serial.own)
+        found = [
+            (
+                read_link_state(system.scratch, system.integers, chain.states + k * LINK_STATE).wrench.copy(),
+                read_joint_state(system.scratch, system.integers, serial.joint_states + k * JOINT_STATE).forces.copy(),
+            )
+            for k in range(self.joints)
+        ]
+        state = self.state(t, y, v)
+        result: list[Reaction] = []
+        for k, (link, (wrench, forces)) in enumerate(zip(self.mechanism.links, found, strict=True)):
+            shape, _ = link.model.node_shape(link.inboard.node)
+            place = link.inboard.position + shape @ state.modal[k]
+            turn = state.poses[k][:3, :3]
+            effort = forces[0] if self.mechanism.joints[k].drive.prescribed else forces[1]
+            moment = wrench[3:] - skew(place) @ wrench[:3]
+            result.append(Reaction(turn @ wrench[:3], turn @ moment, float(effort)))
+        return result
+
+    def describe(self) -> dict[str, Any]:
+        """Names and sizes for reports."""
+        return {
+            "formulation": "erls",
+            "gauge": self.gauge,
+            "joints": self.joints,
+            "elastic_coordinates": self.elastic,
+            "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
+        }
+
+
+def _flat(x: Array) -> Array:
+    return np.ascontiguousarray(x, dtype=float)

@@ -1,0 +1,25 @@
+"""What to tell where nothing resists the motion of a coordinate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from erls.equations.formulation import TreeFormulation
+from erls.errors import Cause, SimulationError
+from erls.maths.so3 import Array
+
+
+def singular_mass(equations: TreeFormulation, t: float, mass: Array) -> SimulationError:
+    """The failure for a mass matrix (n, n) over independent coordinates that is not positive definite."""
+    values, vectors = np.linalg.eigh(mass)
+    worst = int(equations.free[int(np.abs(vectors[:, 0]).argmax())])
+    joints = equations.mechanism.joints
+    name = f"joint {joints[worst].name!r}" if worst < len(joints) else f"elastic coordinate {worst - len(joints) + 1}"
+    return SimulationError(
+        Cause.SINGULAR_MASS,
+        f"nothing resists the motion of {name}",
+        where=f"t = {t:.6g} s",
+        value=float(values[0]),
+        limit="above 0",
+        remedy="give the link mass and inertia, or the joint rotor inertia",
+    )
