@@ -10,13 +10,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from erls.equations.erls.chain import Erls
 from erls.equations.formulation import Formulation, TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.substructures import Substructured
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split, split
 from erls.scene.settings import Simulation
+
+
+def _erls(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
+    if settings.gauge == "joint-angle" and not mechanism.loops:
+        from erls.equations.erls.formulation import Erls
+
+        return Erls(mechanism)
+    from erls.equations.erls.chain import Erls as Dense
+
+    return Dense(mechanism, settings.gauge)
 
 
 def _ffr(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
@@ -32,7 +41,7 @@ def _nodal(mechanism: Mechanism, settings: Simulation) -> Formulation:
 
 
 TREES: dict[str, Callable[[Mechanism, Simulation], TreeFormulation]] = {
-    "erls": lambda mechanism, settings: Erls(mechanism, settings.gauge),
+    "erls": _erls,
     "ffr": _ffr,
 }
 """In independent coordinates, on modal models."""

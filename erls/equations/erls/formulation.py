@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem, function_in
 from erls.equations.erls.pack import pack_chain, shapes, stiffened
@@ -119,11 +120,11 @@ class Erls:
         SimulationError
             The mass matrix is not positive definite; names the coordinate.
         """
-        system, out = self.compiled, np.empty(self.size)
-        status = system.acceleration(system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), out)
-        if status:
-            raise singular_mass(self, t, self.mass_matrix(t, y))
-        return out
+        force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
+        try:
+            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
+        except la.LinAlgError:
+            raise singular_mass(self, t, mass) from None
 
     def initial_state(self) -> tuple[Array, Array]:
         """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
