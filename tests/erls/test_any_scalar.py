@@ -1,0 +1,87 @@
+"""The equations in complex numbers: derivatives by complex steps, of states and of every constant.
+
+A complex step of 1e-30 has no error but rounding; central differences of the same source in real numbers have one of
+their own, about 1e-10 of the terms of the residual for the steps taken here, so 1e-6 asks for agreement of formulas.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import chain_cases
+import numpy as np
+import pytest
+import stiffened_cases
+
+from erls.equations import compiled_system as contract
+from erls.equations.compiled_system import CompiledSystem
+from erls.equations.erls.pack import pack_chain
+from erls.maths.jit import compiled_for
+
+CASES: list[tuple[Any, str]] = [
+    (chain_cases, "controllers"),
+    (chain_cases, "slides before a turn"),
+    (stiffened_cases, "arms, mixed"),
+]
+STEP = 1e-30
+AGREE = 1e-6
+
+
+def _complex(system: CompiledSystem, residual: Any, t: float, arguments: list[np.ndarray], reals: np.ndarray) -> np.ndarray:
+    out = np.zeros(system.size, dtype=complex)
+    residual(reals, system.integers, system.scratch.astype(complex), t, *arguments, out)
+    return out.imag / STEP
+
+
+def _real(system: CompiledSystem, t: float, arguments: list[np.ndarray], reals: np.ndarray) -> np.ndarray:
+    out = np.zeros(system.size)
+    system.residual(reals, system.integers, system.scratch, t, *arguments, out)
+    return out
+
+
+@pytest.mark.parametrize(("cases", "name"), CASES, ids=[name for _, name in CASES])
+def test_complex_steps_agree_with_differences(cases: Any, name: str, tmp_path: Path) -> None:
+    chain = cases.equations(tmp_path, name)
+    system = pack_chain(chain.mechanism)
+    residual = compiled_for(system.residual, contract.RESIDUAL_OF_COMPLEX)
+    at = cases.states(chain, name)[0]
+    arguments = [at.y, at.v, at.a]
+    base = _real(system, at.t, arguments, system.reals)
+    plain = np.zeros(system.size, dtype=complex)
+    complexes = [x.astype(complex) for x in arguments]
+    whole = system.reals.astype(complex)
+    residual(whole, system.integers, system.scratch.astype(complex), at.t, *complexes, plain)
+    np.testing.assert_allclose(plain.real, base, rtol=1e-9, atol=1e-11 * np.abs(base).max())
+    for number, values in enumerate(arguments):
+        for place in range(len(values)):
+            size = 1e-5 * max(1e-3, abs(values[place]))
+            shifted = [x.copy() for x in complexes]
+            shifted[number][place] += 1j * STEP
+            found = _complex(system, residual, at.t, shifted, whole)
+            sides = []
+            for sign in (1, -1):
+                moved = [x.copy() for x in arguments]
+                moved[number][place] += sign * size
+                sides.append(_real(system, at.t, moved, system.reals))
+            _close(found, (sides[0] - sides[1]) / (2 * size), base, size, (number, place))
+    active = np.flatnonzero(np.isfinite(system.reals))
+    rng = np.random.default_rng(3)
+    for place in rng.permutation(active)[:400]:
+        size = 1e-5 * max(1e-6, abs(system.reals[place]))
+        shifted = whole.copy()
+        shifted[place] += 1j * STEP
+        found = _complex(system, residual, at.t, complexes, shifted)
+        sides = []
+        for sign in (1, -1):
+            moved = system.reals.copy()
+            moved[place] += sign * size
+            sides.append(_real(system, at.t, arguments, moved))
+        _close(found, (sides[0] - sides[1]) / (2 * size), base, size, place)
+
+
+def _close(found: np.ndarray, expected: np.ndarray, base: np.ndarray, size: float, where: Any) -> None:
+    """To 1e-6 of the derivative, and of what rounding in the residual makes of a difference."""
+    noise = 1e-12 * np.abs(base).max() / size
+    limit = AGREE * np.abs(expected).max() + noise
+    assert np.abs(found - expected).max() <= limit, (where, found, expected)
