@@ -6,8 +6,9 @@ w make room for what row exchanges fill. (G. H. Golub, C. F. Van Loan, Matrix Co
 
 from __future__ import annotations
 
-from erls.equations.compiled_system import Array, IntArray
 from erls.maths.jit import part
+from erls.maths.so3 import Array
+from fe_import.model import IntArray
 
 
 @part

@@ -80,7 +80,8 @@ def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
     views = {"view1": vector_at, "view2": matrix_at, "view3": stack_at}
     names: dict[str, Any] = {record.__name__: record, "__name__": __name__, **views}
     exec(compile(source, f"<reader of {record.__qualname__}>", "exec"), names)
-    return generated(names["read"])
+    read: Callable[[Any, IntArray, int], R] = generated(names["read"])
+    return read
 
 
 class Memory:

@@ -38,7 +38,8 @@ if ENABLED:
         result = make_array(result_type)(context, builder)
         intp = context.get_value_type(types.intp)
         itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(base.dtype)))
-        strides, stride = [], itemsize
+        strides: list[Any] = []
+        stride = itemsize
         for n in reversed(shape):
             strides.insert(0, stride)
             stride = builder.mul(stride, n)

@@ -28,7 +28,9 @@ STEP = 1e-30
 AGREE = 1e-6
 
 
-def _complex(system: CompiledSystem, residual: Any, t: float, arguments: list[np.ndarray], reals: np.ndarray) -> np.ndarray:
+def _complex(
+    system: CompiledSystem, residual: Any, t: float, arguments: list[np.ndarray], reals: np.ndarray
+) -> np.ndarray:
     out = np.zeros(system.size, dtype=complex)
     residual(reals, system.integers, system.scratch.astype(complex), t, *arguments, out)
     return out.imag / STEP
@@ -67,7 +69,7 @@ def test_complex_steps_agree_with_differences(cases: Any, name: str, tmp_path: P
             _close(found, (sides[0] - sides[1]) / (2 * size), base, size, (number, place))
     active = np.flatnonzero(np.isfinite(system.reals))
     rng = np.random.default_rng(3)
-    for place in rng.permutation(active)[:400]:
+    for place in rng.permutation(active)[:150]:
         size = 1e-5 * max(1e-6, abs(system.reals[place]))
         shifted = whole.copy()
         shifted[place] += 1j * STEP

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from erls.maths.records import Matrix, Stack, Vector, reader, table_size
+from erls.maths.so3 import Array
 
 
 class Chain(NamedTuple):
@@ -145,10 +146,34 @@ class LinkState(NamedTuple):
 def link_state(modes: int, axes: int) -> LinkState:
     """Memory for a link."""
     n, pairs = 6 + modes, axes * (axes + 1) // 2
-    six = [np.zeros(6) for _ in range(14)]
-    six[7] = np.zeros(3)
-    vectors = [np.zeros(n) for _ in range(5)]
-    return LinkState(*six, *vectors, np.zeros((axes, n)), np.zeros((axes, n)), np.zeros((pairs, n)))
+
+    def room(*shape: int) -> Array:
+        return np.zeros(shape)
+
+    return LinkState(
+        u=room(6),
+        u_rate=room(6),
+        u_acceleration=room(6),
+        twist=room(6),
+        twist_rate=room(6),
+        w=room(6),
+        w_rate=room(6),
+        down=room(3),
+        wrench=room(6),
+        force=room(6),
+        momentum=room(6),
+        point=room(6),
+        other=room(6),
+        moments=room(6),
+        q=room(n),
+        q_rate=room(n),
+        q_acceleration=room(n),
+        modal=room(n),
+        speeds=room(n),
+        turned=room(axes, n),
+        turned_rate=room(axes, n),
+        squared=room(pairs, n),
+    )
 
 
 class Bend(NamedTuple):
@@ -259,14 +284,40 @@ class BendState(NamedTuple):
 
 def bend_state(kept: int, kept_before: int, axes: int) -> BendState:
     """Memory for a link with m = ``kept``, and its parent's."""
-    six = [np.zeros(6) for _ in range(11)]
-    threes = [np.zeros(3), np.zeros(3), np.zeros(3 * axes), np.zeros(3 * axes)]
-    rows = [np.zeros((6 + 3 * axes, kept)), np.zeros((6, kept)), np.zeros((6, kept_before)), np.zeros((6, kept_before))]
-    x = [np.zeros(kept) for _ in range(3)]
+
+    def room(*shape: int) -> Array:
+        return np.zeros(shape)
+
     return BendState(
-        *six, *threes, np.zeros(6 + 3 * axes), *rows, *x, np.zeros((6, kept)), np.zeros((6, 3)), np.zeros(3),
-        np.zeros(3), np.zeros(max(kept, kept_before)),
-    )  # fmt: skip
+        e=room(6),
+        e_rate=room(6),
+        e_acceleration=room(6),
+        carried=room(6),
+        push=room(6),
+        full=room(6),
+        full_rate=room(6),
+        added=room(6),
+        added_rate=room(6),
+        share=room(6),
+        share_rate=room(6),
+        moment=room(3),
+        moment_rate=room(3),
+        spin=room(3 * axes),
+        spin_rate=room(3 * axes),
+        weights=room(6 + 3 * axes),
+        rows=room(6 + 3 * axes, kept),
+        rows_rate=room(6, kept),
+        bow=room(6, kept_before),
+        bow_rate=room(6, kept_before),
+        x=room(kept),
+        x_rate=room(kept),
+        x_acceleration=room(kept),
+        pulls=room(6, kept),
+        turning=room(6, 3),
+        d=room(3),
+        b=room(3),
+        spare=room(max(kept, kept_before)),
+    )
 
 
 class Change(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def modes_record(first: int, mass: Array, link: Link, decoupled: DecoupledModes)
     )
 
 
-def put_all(memory: Memory, records: Sequence[Joint | JointState | Modes | RigidLink | RigidState]) -> int:
+def put_all(memory: Memory, records: Sequence[Any]) -> int:
     """Records one after the other; the place of the first."""
     first, *_ = [memory.put(record) for record in records]
     return first
