@@ -9,16 +9,24 @@ The rules 2 to 7 of `erls.integrate.base` hold here too.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array
+
+if TYPE_CHECKING:  # it imports the compiler
+    from erls.equations.stepped import Stepped
 
 Configuration: TypeAlias = Any  # never changed in place
 
 
 class ConstrainedSystem(Protocol):
     """Equations of motion with constraints, in redundant coordinates."""
+
+    @property
+    def compiled(self) -> Stepped | None:
+        """The same in compiled form, for one run; None where there is none."""
+        return None
 
     @property
     def size(self) -> int:

@@ -72,8 +72,13 @@ def _tied(mechanism: Mechanism, settings: Simulation) -> Integrate:
 def _compile_tied(system: Any, settings: Simulation) -> None:
     if settings.integrator != FIXED_STEP:
         _compile_named(system, settings)
-    elif system.compiled is not None:
-        import_module("erls.integrate.stepping.loops")
+        return
+    loop = "erls.integrate.stepping.generalized_alpha"
+    with compiling_beside(loop):
+        if system.compiled is not None:
+            import_module("erls.equations.loops.steps")
+    if system.compiled is not None:
+        import_module(loop)
 
 
 def _absolute(mechanism: Mechanism, settings: Simulation) -> Integrate:

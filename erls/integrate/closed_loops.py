@@ -13,14 +13,13 @@ from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Integrator, Observer, Options, Solution
 from erls.integrate.constrained import ConstrainedOptions
-from erls.integrate.constrained_run import ConstrainedRecorder
-from erls.integrate.lie_formulas import Steps
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.integrate.registry import integrator_named
 from erls.maths.so3 import Array
 
 if TYPE_CHECKING:
     from erls.equations.compiled_system import CompiledSystem
+    from erls.equations.stepped import Stepped
 
 NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
 AT = 1e-3  # of the same: adaptive steps would shrink for ever
@@ -37,7 +36,7 @@ class TiedCoordinates:
         self.length_scales, self.breakpoints = chain.metres, chain.breakpoints
         self._still = np.zeros(chain.size)
         # of a chain whose nodes have no kernels
-        self._compiled: CompiledSystem | None = None if chain.efforts.any else getattr(chain.bare, "compiled", None)
+        self._compiled: CompiledSystem | None = None if chain.efforts.any else chain.bare.compiled
 
     def compose(self, q: Array, increment: Array) -> Array:
         """q + increment."""
@@ -89,18 +88,21 @@ class TiedCoordinates:
         SimulationError
             LOOP_OPEN: a condition left out as redundant is violated.
         """
-        self.chain.refuse_open(t, self.chain.closure(t, q, v))
+        self._refuse_open(t, q, v)
         return q, v, a
 
-    def make_steps(self, options: ConstrainedOptions, recorder: ConstrainedRecorder) -> Steps | None:
-        """Compiled ones for equal steps of a chain in compiled form."""
-        compiled = self.chain.compiled
-        special = options.error_tolerance, options.iteration_matrix, options.start_from
-        if compiled is None or special != (None, "auto", "zero"):
+    @property
+    def compiled(self) -> Stepped | None:
+        """By kernels, for a chain in compiled form."""
+        chain = self.chain.compiled
+        if chain is None:
             return None
-        from erls.integrate.closed_loop_steps import ClosedSteps  # here: it imports the compiler
+        from erls.equations.loops.steps import stepped  # here: it imports the compiler
 
-        return ClosedSteps(self, compiled, options, recorder)
+        return stepped(chain, self._refuse_open)
+
+    def _refuse_open(self, t: float, q: Array, v: Array) -> None:
+        self.chain.refuse_open(t, self.chain.closure(t, q, v))
 
 
 def loop_integrator(name: str) -> Integrator:

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-import numpy as np
-
 from erls.equations.constrained_system import ConstrainedState, ConstrainedSystem
 from erls.errors import SimulationError
 from erls.integrate.base import Observer
 from erls.integrate.constrained import ConstrainedSolution
 from erls.integrate.driver import Recorder
-from erls.maths.so3 import Array
 
 
 class ConstrainedRecorder(Recorder):
@@ -41,6 +38,11 @@ class ConstrainedRecorder(Recorder):
         super().__init__(stored, observer, 256, apart, len(start.a) + len(start.multipliers))
         self._system, self._velocities = system, len(start.a)
 
+    @property
+    def kept(self) -> int:
+        """Numbers that the system stores of a knot."""
+        return self._size
+
     def begin_with(self, t: float, state: ConstrainedState) -> None:
         """Add the knot at which a leg begins."""
         self.begin(t, *self._system.stored(t, state.q, state.v, state.a), state.a, state.multipliers)
@@ -48,10 +50,6 @@ class ConstrainedRecorder(Recorder):
     def add(self, t: float, state: ConstrainedState) -> None:
         """Add a knot."""
         self.append(t, *self._system.stored(t, state.q, state.v, state.a), state.a, state.multipliers)
-
-    def extend_with(self, t: Array, states: Array, accelerations: Array, multipliers: Array) -> None:
-        """Add the knots of accepted steps: stored (k, 3, s), accelerations (k, n), multipliers (k, m)."""
-        self.extend(t, states, beside=np.hstack([accelerations, multipliers]))
 
     def solution(self, failure: SimulationError | None = None) -> ConstrainedSolution:
         """The run so far."""

@@ -1,17 +1,23 @@
-"""What integrators share: the walk from breakpoint to breakpoint, the record of knots, the end of a run."""
+"""What integrators share: the walk over legs, the size of chunks of steps, the record of knots, the end of a run."""
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from erls.equations.system import SecondOrderSystem
+from erls.equations.system import MovingSystem, SecondOrderSystem
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, Observer, Solution, StopRun, Work, legs
 from erls.integrate.thinning import thinned
 from erls.maths.so3 import Array
+
+_PAUSE = 0.05  # s between looks at the observer and at interrupts
+_SINGLE = 32  # first steps of an observed run, each looked at: a short run is seen step by step
+_FIRST, LARGEST_CHUNK = 32, 4096  # steps in one go
 
 
 class Recorder:
@@ -37,7 +43,7 @@ class Recorder:
     ) -> None:
         self.work = Work()
         self.warnings: list[str] = []
-        self._size, self._observer, self._apart = size, observer, apart
+        self._size, self._observer, self._apart, self.beside = size, observer, apart, beside
         self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
         self._begun = 0.0
         # how many knots are kept, accepted steps, and, where knots are dropped, the last one that was looked at and
@@ -63,7 +69,9 @@ class Recorder:
         ``beside`` (k, m) is kept beside them.
         """
         rows = knots.reshape(len(t), 3 * self._size)
-        self._add(t, rows if beside is None else np.hstack([rows, beside]), len(t) if steps is None else steps)
+        if beside is not None and self.beside:
+            rows = np.hstack([rows, beside])
+        self._add(t, rows, len(t) if steps is None else steps)
         if len(t):
             self._tell(float(t[-1]))
 
@@ -156,6 +164,30 @@ class Recorder:
         return t, rows
 
 
+class Pace:
+    """How many steps to make in one go: what takes about 50 ms; one where functions are called from Python.
+
+    As a context it measures the steps that were asked for last.
+    """
+
+    def __init__(self, recorder: Recorder, compiled: bool) -> None:
+        self._recorder, self._steps, self._largest = recorder, _FIRST, LARGEST_CHUNK if compiled else 1
+        self._asked, self._begun = 1, 0.0
+
+    def size(self) -> int:
+        """Steps to make next."""
+        few = self._recorder.observed and self._recorder.steps < _SINGLE
+        self._asked = 1 if few else min(self._steps, self._largest)
+        return self._asked
+
+    def __enter__(self) -> None:
+        self._begun = time.perf_counter()
+
+    def __exit__(self, *problem: object) -> None:
+        spent = max(time.perf_counter() - self._begun, 1e-6)
+        self._steps = max(1, min(4 * self._asked, math.ceil(_PAUSE * self._asked / spent)))
+
+
 Advance = Callable[[Leg, Array, Array, Array, Recorder], tuple[Array, Array]]
 
 
@@ -187,23 +219,41 @@ def integrate_legs(
         ``advance(leg, y, v, a, recorder) -> (y, v)`` adds the knots after the first one of a leg and returns
         the state at its end; raises `SimulationError` when it cannot.
     """
+
+    def go(walk: list[Leg]) -> None:
+        y, v = start
+        for leg in walk:
+            recorder.work.rhs_calls += 1
+            a = system.acceleration(leg.first, y, v)
+            if not np.isfinite(a).all():
+                raise not_finite(leg.start, a)
+            recorder.begin(leg.start, y, v, a)
+            if system.size == 0:  # every motion is prescribed and no link deforms: nothing to integrate
+                recorder.append(leg.end, y, v, a)
+                recorder.accept(leg.end)
+            elif leg.end > leg.start:
+                y, v = advance(leg, y, v, a, recorder)
+
+    start = np.array(y, dtype=float), np.array(v, dtype=float)
+    return run_to_end(system, times, recorder, go, lambda: recorder.append(times[0], *start, np.zeros_like(start[0])))
+
+
+def run_to_end(
+    system: MovingSystem,
+    times: tuple[float, float],
+    recorder: Recorder,
+    go: Callable[[list[Leg]], None],
+    stand: Callable[[], None],
+) -> Solution:
+    """What ``go`` records on its way over all legs; whatever ends it early becomes the failure of the solution.
+
+    ``stand`` records the start, of a run that failed at once.
+    """
     failure: SimulationError | None = None
-    y, v = np.array(y, dtype=float), np.array(v, dtype=float)
-    start, end = times
-    walk = legs(system, times) or [Leg(start, end, start, end)]
+    walk = legs(system, times) or [Leg(times[0], times[1], times[0], times[1])]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
         try:
-            for leg in walk:
-                recorder.work.rhs_calls += 1
-                a = system.acceleration(leg.first, y, v)
-                if not np.isfinite(a).all():
-                    raise not_finite(leg.start, a)
-                recorder.begin(leg.start, y, v, a)
-                if system.size == 0:  # every motion is prescribed and no link deforms: nothing to integrate
-                    recorder.append(leg.end, y, v, a)
-                    recorder.accept(leg.end)
-                elif leg.end > leg.start:
-                    y, v = advance(leg, y, v, a, recorder)
+            go(walk)
         except StopRun:
             pass
         except KeyboardInterrupt:
@@ -214,8 +264,8 @@ def integrate_legs(
             )
         except SimulationError as error:
             failure = error
-    if recorder.time is None:  # failed at once; a solution always has a knot
-        recorder.append(start, y, v, np.zeros_like(y))
+    if recorder.time is None:  # a solution always has a knot
+        stand()
     if failure is not None and not failure.where:
         failure.where = f"t = {recorder.time:.9g} s"
     return recorder.solution(failure)

@@ -17,24 +17,24 @@ has decayed.
 
 from __future__ import annotations
 
-import math
+from typing import Any, cast
 
 import numpy as np
 
-from erls.equations.consistency import consistent_start, refuse_redundant
+from erls.equations.consistency import consistent_acceleration, consistent_start, refuse_redundant
 from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
-from erls.errors import Cause, SimulationError
-from erls.integrate.base import Leg, Observer, StopRun, legs
+from erls.equations.system import metre_scales
+from erls.integrate.alpha_rules import Rules, Words
+from erls.integrate.alpha_steps import Steps, adaptive_steps, equal_steps
+from erls.integrate.base import Leg, Observer
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.constrained_run import ConstrainedRecorder
-from erls.integrate.lie_compiled import compiled_steps
-from erls.integrate.lie_formulas import FAILED, GROWTH, INACCURATE, MAX_HALVINGS, Limit, Steps
-from erls.integrate.lie_steps import NumpySteps
+from erls.integrate.driver import not_finite, run_to_end
+from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
 
-_SAFETY, _LARGEST_CHANGE = 0.9, 4.0  # of an adaptive step
-_FIRST, _SMALLEST = 1 / 64, 1e-6  # adaptive steps, of the largest
-_AT_ONCE, _HELD = 4096, 8  # adaptive steps that are asked for, and those after a rejected one, which do not grow
+_REFRESH_COST = 6.0  # of a fresh iteration matrix, in iterations
+_TOLERATED = 3.0  # iterations beyond the fewest, or beyond two, on average, before a fresh matrix is worth its cost
 
 
 def lie_generalized_alpha(
@@ -50,103 +50,68 @@ def lie_generalized_alpha(
     Fixed steps are equal inside a leg and end on breakpoints. Where Newton's method fails they are halved for a while.
     With ``options.error_tolerance`` they follow the local error, up to ``options.step``.
     """
-    walk = legs(system, times) or [Leg(times[0], times[1], times[0], times[1])]
     step = options.step or min((times[1] - times[0]) / 1000, 1e-3) or 1e-3
-    failure: SimulationError | None = None
     given = ConstrainedState(q, np.array(v, dtype=float), np.zeros(system.size), np.zeros(system.constraints))
     recorder = ConstrainedRecorder(system, times[0], given, observer, options.output_step)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
-        try:
-            refuse_redundant(system, walk[0].first, q)
-            q, v = consistent_start(system, walk[0].first, q, given.v, recorder.warnings)
-            steps = compiled_steps(system, options, recorder) or NumpySteps(system, options, recorder)
-            for leg in walk:
-                steps.begin(leg, q, v)
-                if leg.end > leg.start:
-                    if options.error_tolerance is None:
-                        _equal_steps(steps, leg, step, options, recorder)
-                    else:
-                        _adaptive_steps(steps, leg, step, options.error_tolerance, recorder)
-                q, v = steps.end()
-        except StopRun:
-            pass
-        except KeyboardInterrupt:
-            failure = SimulationError(
-                Cause.INTERRUPTED, "the run was interrupted", remedy="the motion up to this time was kept"
-            )
-        except SimulationError as error:
-            failure = error
-    if recorder.time is None:  # failed at once; a solution always has a knot
-        recorder.add(times[0], given)
-    if failure is not None and not failure.where:
-        failure.where = f"t = {recorder.time:.9g} s"
-    return recorder.solution(failure)
+
+    def go(walk: list[Leg]) -> None:
+        refuse_redundant(system, walk[0].first, q)
+        place, rate = consistent_start(system, walk[0].first, q, given.v, recorder.warnings)
+        steps = _steps(system, options, recorder)
+        for leg in walk:
+            start = _start_of_leg(system, leg, place, rate, recorder)
+            steps.begin(place, rate, np.concatenate([start.a, start.multipliers]))
+            if leg.end > leg.start:
+                before = recorder.steps
+                if options.error_tolerance is None:
+                    equal_steps(steps, leg, step, options.iteration_matrix != "frozen", recorder)
+                else:
+                    adaptive_steps(steps, leg, step, options.error_tolerance, recorder)
+                if options.project_velocity:
+                    recorder.work.factorizations += recorder.steps - before
+            place, rate = steps.end()
+
+    found = run_to_end(system, times, recorder, go, lambda: recorder.add(times[0], given))
+    assert isinstance(found, ConstrainedSolution)
+    return found
 
 
-def _equal_steps(
-    steps: Steps, leg: Leg, step: float, options: ConstrainedOptions, recorder: ConstrainedRecorder
-) -> None:
-    """Equal steps over a leg, each of 2^MAX_HALVINGS units of time, so that halved steps meet its end."""
-    unit = 1 << MAX_HALVINGS
-    count = max(1, math.ceil((leg.end - leg.start) / step * (1 - 1e-9)))
-    total, at, halvings, served = count * unit, 0, 0, 0
-    span = leg.end - leg.start
-    steps.set_step(span / count)
-    while at < total:
-        width = unit >> halvings
-        ends = np.arange(at + width, total + 1 if not halvings else at + width + 1, width)
-        times = np.where(ends == total, leg.end, leg.start + span * (ends / total))
-        made, status = steps.stretch(times, leg.last, Limit())
-        at, served = at + made * width, served + made
-        if status == FAILED:
-            recorder.work.rejected_steps += 1
-            halvings, served = halvings + 1, 0
-            if halvings > MAX_HALVINGS or options.iteration_matrix == "frozen":
-                raise steps.failure(float(times[made]))
-        elif halvings and served >= 4 and at % (2 * width) == 0:
-            halvings, served = halvings - 1, 0
-        else:
-            continue
-        steps.set_step(span / count / (1 << halvings))
+def _steps(system: ConstrainedSystem, options: ConstrainedOptions, recorder: ConstrainedRecorder) -> Any:
+    """By kernels, unless without the compiler, where a system has none, or where velocities are projected."""
+    from erls.equations.nodal.assembly import NodalSystem  # here: they import the compiler
+    from erls.equations.uncompiled import tied_steps_of
+    from erls.integrate.nodal_steps import CompiledSteps
 
-
-def _adaptive_steps(
-    steps: Steps, leg: Leg, largest: float, tolerance: float, recorder: ConstrainedRecorder
-) -> None:
-    """Steps whose local error stays below ``tolerance`` [m]; each change of their size leads to the end of the leg.
-
-    The error of a step is of third order (M. Géradin, A. Cardona, Flexible Multibody Dynamics, 2001, ch. 14).
-    """
-    t, h, held = leg.start, min(max(steps.h, _FIRST * largest), largest), False
-    while t < leg.end:
-        count = max(1, math.ceil((leg.end - t) / h * (1 - 1e-9)))
-        steps.set_step((leg.end - t) / count)
-        ahead = min(count, _HELD if held else _AT_ONCE)
-        times = t + (leg.end - t) * np.arange(1, ahead + 1) / count
-        if ahead == count:
-            times[-1] = leg.end
-        can_grow = not held and count > 1 and steps.h * GROWTH <= largest
-        made, status = steps.stretch(times, leg.last, Limit(tolerance, can_grow))
-        if made:
-            t = float(times[made - 1])
-        ratio = _SAFETY * (tolerance / max(steps.error, 1e-300)) ** (1 / 3)
-        if status == FAILED:
-            ratio = 1 / _LARGEST_CHANGE
-        elif status == INACCURATE:
-            ratio = min(ratio, 0.8)
-        held = status in (FAILED, INACCURATE)
-        recorder.work.rejected_steps += held
-        h = min(largest, steps.h * min(max(ratio, 1 / _LARGEST_CHANGE), _LARGEST_CHANGE))
-        if h < _SMALLEST * largest:
-            raise steps.failure(float(times[made])) if status == FAILED else _too_small(t, steps, tolerance)
-
-
-def _too_small(t: float, steps: Steps, tolerance: float) -> SimulationError:
-    return SimulationError(
-        Cause.STEP_TOO_SMALL,
-        f"a step of {steps.h:.3g} s still has an error of {steps.error:.3g} m",
-        where=f"t = {t:.9g} s",
-        value=f"{steps.h:.3g} s",
-        limit=f"{tolerance:.3g} m",
-        remedy="look for jumps of forces without breakpoint; or allow a larger error",
+    wanted = ENABLED if options.compiled is None else options.compiled
+    compiled = system.compiled if wanted and not options.project_velocity else None
+    rules = Rules(
+        options.spectral_radius,
+        options.newton_tolerance,
+        matrix=options.iteration_matrix,
+        guess=options.start_from,
+        balance=options.residual_tolerance,
+        patience=_REFRESH_COST,
+        renewal=_REFRESH_COST,
+        tolerated=_TOLERATED,
+        fewest=2,
+        over=2,
     )
+    if isinstance(system, NodalSystem) and compiled is not None:
+        return CompiledSteps(system, cast(Any, compiled), options, rules, recorder)
+    words = Words(system.constraint_names, "there", "a smaller step")
+    known = compiled or tied_steps_of(system, recorder.kept, options.project_velocity)
+    return Steps(known, metre_scales(system), rules, words, recorder)
+
+
+def _start_of_leg(
+    system: ConstrainedSystem, leg: Leg, q: Configuration, v: Array, recorder: ConstrainedRecorder
+) -> ConstrainedState:
+    """Acceleration and multipliers at the start of a leg, which becomes a knot."""
+    recorder.work.rhs_calls += 1
+    recorder.work.factorizations += 1
+    a, multipliers = consistent_acceleration(system, leg.first, q, v)
+    if not np.isfinite(a).all():
+        raise not_finite(leg.start, a)
+    state = ConstrainedState(q, v, a, multipliers)
+    recorder.begin_with(leg.start, state)
+    return state

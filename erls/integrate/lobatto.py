@@ -27,7 +27,6 @@ vibrations decide when, up to a hundred times (`erls.run.watches.motor_limits` w
 from __future__ import annotations
 
 import math
-import time
 from functools import cache
 from typing import Any
 
@@ -36,7 +35,7 @@ import numpy as np
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, Observer, Options, Solution
-from erls.integrate.driver import Recorder, integrate_legs, not_finite
+from erls.integrate.driver import Pace, Recorder, integrate_legs, not_finite
 from erls.maths.so3 import Array
 
 NODES = (0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0)
@@ -46,7 +45,6 @@ _FIRST_STEP = 1e-4  # s, at most
 _MAX_ITERATIONS = 10
 _REFRESH_COST = 2  # of fresh factors, in iterations
 _ROUNDING = 16 * np.finfo(float).eps
-_PAUSE = 0.05  # s between looks at the observer and at interrupts
 
 
 def lobatto(
@@ -82,17 +80,17 @@ class _Run:
     def __init__(
         self, system: SecondOrderSystem, times: tuple[float, float], options: Options, recorder: Recorder
     ) -> None:
+        from erls.equations.independent import ABSENT
         from erls.equations.uncompiled import uncompiled  # here: they import the compiler
         from erls.integrate.stepping import lobatto as loop
         from erls.integrate.stepping import stages as at
-        from erls.integrate.stepping.absent import FACTORING
 
         self.at, self.recorder, n = at, recorder, system.size
         compiled = system.compiled
         self.system = compiled or uncompiled(system)
         self.step = loop.advance if compiled else getattr(loop.advance, "py_func", loop.advance)
-        self.chunk, self.largest_chunk = (8, 4096) if compiled else (1, 1)  # steps
-        self.factoring = own = self.system.factoring or FACTORING
+        self.pace = Pace(recorder, compiled is not None)
+        self.factoring = own = self.system.factoring or ABSENT
         self.solving: tuple[Any, Any, Any, Any] = own.factor, own.solve, own.factor_complex, own.solve_complex
         if compiled is None:
             self.solving = None, None, None, None  # so that what the loop calls is compiled once, not in every process
@@ -123,41 +121,38 @@ class _Run:
         self.stages[0] = y, v, a
         self.last[:] = self.stages[0]
         while known[at.T] < leg.end:
-            begun = time.perf_counter()
-            going = self.make_steps()
-            spent = time.perf_counter() - begun
-            wanted = math.ceil(_PAUSE * self.chunk / max(spent, 1e-6))
-            self.chunk = max(1, min(2 * self.chunk, wanted, self.largest_chunk))
-            if not going:
+            if not self.make_steps():
                 raise self.failure()
         return self.stages[0, 0].copy(), self.stages[0, 1].copy()
 
     def make_steps(self) -> bool:
         """A chunk of steps; False when no step is small enough to go on."""
         at, system, counts = self.at, self.system, self.counts
-        times, knots = np.empty(3 * self.chunk), np.empty((3 * self.chunk, 3, system.size))
+        room = 3 * self.pace.size()
+        times, knots = np.empty(room), np.empty((room, 3, system.size))
         made = 0
         try:
-            made = self.step(
-                system.residual,
-                system.mass_matrix,
-                system.stiffness_and_damping,
-                *self.solving,
-                system.reals,
-                system.integers,
-                system.scratch,
-                *self.own,
-                self.mixed,
-                self.known,
-                counts,
-                self.coefficients,
-                self.stages,
-                self.last,
-                self.matrices,
-                self.vectors,
-                times,
-                knots,
-            )
+            with self.pace:
+                made = self.step(
+                    system.residual,
+                    system.mass_matrix,
+                    system.stiffness_and_damping,
+                    *self.solving,
+                    system.reals,
+                    system.integers,
+                    system.scratch,
+                    *self.own,
+                    self.mixed,
+                    self.known,
+                    counts,
+                    self.coefficients,
+                    self.stages,
+                    self.last,
+                    self.matrices,
+                    self.vectors,
+                    times,
+                    knots,
+                )
         finally:
             work = self.recorder.work
             work.rhs_calls += int(counts[at.RHS_CALLS])

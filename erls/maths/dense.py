@@ -15,11 +15,10 @@ import numpy as np
 
 from erls.maths.jit import part, reordered
 from erls.maths.so3 import Array
-from fe_import.model import IntArray
 
 
 @part
-def factor(a: Array, pivots: IntArray) -> int:
+def factor(a: Array, pivots: Any) -> int:
     """LU factors, with row exchanges, of the matrix whose columns are the rows of ``a``.
 
     Parameters
@@ -27,7 +26,7 @@ def factor(a: Array, pivots: IntArray) -> int:
     a : (n, n) array
         Becomes L (unit diagonal) and U, with the reciprocals of U's diagonal.
     pivots : (n,) array
-        Gets the row that each row was exchanged with.
+        Gets the row that each row was exchanged with; numbers of any kind.
 
     Returns
     -------
@@ -65,11 +64,11 @@ def factor(a: Array, pivots: IntArray) -> int:
 
 
 @part
-def solve(a: Array, pivots: IntArray, b: Array) -> None:
+def solve(a: Array, pivots: Any, b: Array) -> None:
     """Replace ``b`` (n,) by the solution, with what `factor` left."""
     n = a.shape[0]
     for k in range(n):
-        row = pivots[k]
+        row = int(pivots[k].real)
         b[k], b[row] = b[row], b[k]
     for k in range(n):
         column, weight = a[k], b[k]

@@ -57,11 +57,11 @@ def test_a_beam_that_lost_stability(changes: list[str]) -> None:
 
 def test_whatever_the_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The end is the first step beyond the limit, not that of the compiled steps that passed it."""
-    from erls.integrate import generalized_alpha_compiled
+    from erls.integrate import driver
 
     first = failed(SPIN_UP, SPINNING)[1]
     second = failed(SPIN_UP, [*SPINNING, "simulation.duration=10.2"])[1]  # 8 steps before the end
-    monkeypatch.setattr(generalized_alpha_compiled, "_LARGEST", 8)
+    monkeypatch.setattr(driver, "LARGEST_CHUNK", 8)
     third = failed(SPIN_UP, SPINNING)[1]
     for other in (second, third):
         assert other.end == pytest.approx(first.end, abs=1e-9)

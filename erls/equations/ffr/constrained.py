@@ -75,6 +75,10 @@ class ConstrainedFfr:
         return motion, pose(position=-interface.position) @ frame
 
     @property
+    def compiled(self) -> None:
+        """Plain Python."""
+
+    @property
     def size(self) -> int:
         """Number of velocity coordinates."""
         return self.elastic.stop

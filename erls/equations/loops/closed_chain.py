@@ -97,7 +97,7 @@ class ClosedChain:
             return None
         from erls.equations.loops.compiled import compile_loops  # here: it imports the compiler
 
-        return compile_loops(self, self.bare, chain, DECAY)
+        return compile_loops(self, self.bare, chain, (DECAY, OPEN * self.reach))
 
     @property
     def redundant(self) -> tuple[str, ...]:

@@ -53,7 +53,9 @@ class CompiledLoops(CompiledSystem):
         return gaps, np.sqrt(np.maximum(np.linalg.eigvalsh(squares)[:, 0], 0.0))
 
 
-def compile_loops(closed: ClosedChain, tree: Erls, chain: CompiledSystem, decay: float) -> CompiledLoops:
+def compile_loops(
+    closed: ClosedChain, tree: Erls, chain: CompiledSystem, numbers: tuple[float, float]
+) -> CompiledLoops:
     """The compiled form of a closed chain.
 
     Parameters
@@ -63,8 +65,8 @@ def compile_loops(closed: ClosedChain, tree: Erls, chain: CompiledSystem, decay:
         Its chain, without what acts in closing joints.
     chain : CompiledSystem
         Compiled form of that.
-    decay : float
-        Of violations [1/s].
+    numbers : tuple of float
+        Decay of violations [1/s]; what a loop that has come apart is open by [m].
     """
     pack = Packer(chain.integers, chain.reals)
     n, m, r, links = tree.size, len(closed.rows.names), len(closed.kept), len(tree.mechanism.links)
@@ -76,7 +78,7 @@ def compile_loops(closed: ClosedChain, tree: Erls, chain: CompiledSystem, decay:
     header[layout.ACTIVE] = int(closed.efforts.any)
     header[layout.ROTORS] = int(any(loop.freedom is not None and loop.freedom.rotor_inertia for loop in loops))
     header[layout.FACTORS], header[layout.METRES] = pack.put(factors), pack.put(closed.metres)
-    header[layout.NUMBERS] = pack.put(np.array([closed.reach, decay]))
+    header[layout.NUMBERS] = pack.put(np.array([closed.reach, *numbers]))
     header[layout.RECORDS] = len(pack.integers)
     pack.integers += [i for record in records for i in record]
     header[layout.ROWS] = len(pack.integers)

@@ -57,8 +57,8 @@ POSITION = 0  # (3,) of the node
 OFFSET = 3  # (12,) pose of the joint's frame there
 SHAPES = 15  # (6, modes) translation and rotation, column after column
 
-# numbers
-REACH, DECAY = 0, 1
+# numbers; the last one is what a loop that has come apart is open by [m]
+REACH, DECAY, OPEN = 0, 1, 2
 
 # motion of a frame: pose (rotation row after row, place), twist, its derivative
 POSE, TWIST, BIAS = 0, 12, 18

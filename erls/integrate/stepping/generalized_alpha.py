@@ -1,334 +1,341 @@
-"""The steps of generalized-α over a compiled system: the algorithm of `erls.integrate.generalized_alpha`.
+"""The steps of generalized-α, of all systems: `erls.integrate.generalized_alpha` has the formulas.
 
-``advance`` makes as many steps as there is room for knots, or until the leg ends or fails, and leaves everything that
-the next call needs in its arguments: numbers in ``known``, counts in ``counts``, vectors in the rows of ``state``. A
-system's own way of solving serves where it has one, with its factors in ``own``; otherwise that is empty, and dense
-factors are made in ``matrices``.
+A system gives them the functions of `erls.equations.stepped`. ``advance`` makes steps to given times
+and leaves everything that the next call needs in `Progress` and `Memory`. Multipliers λ follow the accelerations in one
+array, conditions follow the equations of motion, and corrections solve
+
+    [[M + α C + β K, Bᵀ], [B, 0]] [Δd; β Δλ] = [β r; Φ],   β = 1/β', α = γ'/β'
+
+which stays well conditioned as the step tends to zero. Where a system has no factors of its own, dense ones are made.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
-from erls.maths.jit import ENABLED, kernel, part
+from erls.equations.stepped import COMPOSE, SETTLE
+from erls.maths import dense
+from erls.maths.jit import ENABLED, inlined, kernel
 
-# known: settings of a run, then the formulas of a step (see set_step), then what the last iteration found
-START, SPAN, LAST, END = 0, 1, 2, 3  # of the leg; its last time for forces
-ALPHA_M, ALPHA_F, GAMMA, BETA, ASKED = 4, 5, 6, 7, 8
-H, TOLERANCE, TO_V, TO_A, SHARE, PULL, KEEP, Y_OLD, Y_NEW, V_OLD, V_NEW = range(9, 20)
-RATE, BEFORE, SIZE, GOAL = 20, 21, 22, 23
-SLOWEST, FASTEST, ROUNDING = 24, 25, 26  # bounds on rates; rounding of coordinates
-KNOWN = 27
-# counts; the first three of time units: reached, of the leg, in an unhalved step
-AT, TOTAL, UNIT, HALVINGS, SERVED, FACTORED, USUAL, EXCESS = range(8)
-MAX_HALVINGS, MAX_ITERATIONS, REFRESH_COST = 8, 9, 10
-RHS_CALLS, ITERATIONS, FACTORIZATIONS, REJECTED = 11, 12, 13, 14
-REASON = 15
-COUNTS = 16
-SINGULAR, NOT_FINITE, SLOW = 1, 2, 3  # reasons
-# rows of state
-Y, V, ACC, ALG, CHANGE, GUESS, Y1, V1, ACC1, RESIDUAL, CORRECTION, METRES, PER_METRE = range(13)
-STATE = 13
+DONE, FAILED, INACCURATE, TIMID, REFUSED = range(5)
+"""Ends of a stretch: all steps made; Newton's method failed; too large a local error; a larger step would do; the
+system refuses the knot."""
+
+AUTO, UPDATE, FROZEN = range(3)  # iteration matrices, as in `erls.scene.integrators.MATRICES`
+ZERO, LAST, EXTRAPOLATED = range(3)  # what accelerations and multipliers start from
+SINGULAR, SLOW, NOT_FINITE = 1, 2, 3  # reasons of a failure
+
+RATE, SPENT, BEFORE, SIZE, GOAL, ERROR = range(6)  # of `Progress.rates`
+FACTORED, USUAL, REASON, STEPS, EVALUATIONS, ITERATIONS, FACTORIZATIONS = range(7)  # of `Progress.counts`
+
+
+class Settings(NamedTuple):
+    """Formulas and limits of steps of one size.
+
+    Attributes
+    ----------
+    h, beta, gamma : float
+        Step [s] and coefficients of Newmark's formulas.
+    share, pull, keep : float
+        Weights of v̇₁, v̇₀ and a₀ in a₁.
+    to_v, to_a : float
+        γ' and β'.
+    last : float
+        Last time for forces [s].
+    tolerance, rounding, reach, balance : float
+        Iterations end with an error below ``tolerance`` [m], or the rounding (a share) of the configuration, or a
+        residual below ``balance`` times its terms with conditions open by no more than that share of ``reach`` [m];
+        negative: residuals are not looked at.
+    slowest, fastest : float
+        Bounds on a rate of convergence carried over from earlier steps.
+    patience, renewal, tolerated : float
+        Cost of a fresh matrix in iterations, which calls for one between steps, and within a step; iterations beyond
+        the fewest that do not.
+    error_limit, error_factor, growth : float
+        Largest local error [m], 0 for no limit; what turns |v̇₁ − v̇₀| into it; ratio of steps worth a change, or 0.
+    iterations, over, fewest : int
+        Most iterations; over how many of them a rate is taken (two where they rise and fall in turns); how many always
+        count as few.
+    matrix, guess : int
+        What is said above.
+    """
+
+    h: float
+    beta: float
+    gamma: float
+    share: float
+    pull: float
+    keep: float
+    to_v: float
+    to_a: float
+    last: float
+    tolerance: float
+    rounding: float
+    reach: float
+    balance: float
+    slowest: float
+    fastest: float
+    patience: float
+    renewal: float
+    tolerated: float
+    error_limit: float
+    error_factor: float
+    growth: float
+    iterations: int
+    over: int
+    fewest: int
+    matrix: int
+    guess: int
+
+
+class Progress(NamedTuple):
+    """What steps leave to each other and to whoever called for them.
+
+    Attributes
+    ----------
+    rates : (6,) array
+        Rate of convergence; iterations spent beyond the few that a fresh matrix needs; the last two corrections and
+        their goal [m]; local error of the last step [m].
+    counts : (7,) array
+        Whether there is an iteration matrix; fewest iterations with it; reason of a failure; steps made; evaluations,
+        iterations, factorizations.
+    """
+
+    rates: Array
+    counts: IntArray
+
+
+class Memory(NamedTuple):
+    """State and working memory of a run, of n velocities and m conditions.
+
+    Attributes
+    ----------
+    start, tried : (c,) arrays
+        Configurations.
+    v, alg, a : (n,), (n,), (n + m,) arrays
+        Velocity, algorithmic acceleration, acceleration and multipliers of the last knot.
+    increment, v1, a1 : arrays
+        Those of the step that is tried.
+    change, guess : (n,) arrays
+        Of the acceleration over the last step, and as expected over the next.
+    metres, per_metre : (n,) arrays
+    right, correction : (n + m + 2,) or (n,), (n + m,) arrays
+        Residual, and correction [m].
+    factors : array
+        Those of the system, or dense ones.
+    matrices, pivots : (3, n, n), (n,) arrays
+        Of dense factors; empty where the system has its own.
+    """
+
+    start: Array
+    tried: Array
+    v: Array
+    alg: Array
+    a: Array
+    increment: Array
+    v1: Array
+    a1: Array
+    change: Array
+    guess: Array
+    metres: Array
+    per_metre: Array
+    right: Array
+    correction: Array
+    factors: Array
+    matrices: Array
+    pivots: IntArray
+
 
 _ADVANCE: Any = None
 if ENABLED:
     from numba import types as _t
 
+    _cube, _reals, _flag = _t.float64[:, :, ::1], contract.REALS, _t.int64
     _ADVANCE = _t.int64(
+        contract.pointer(COMPOSE),
         contract.pointer(contract.RESIDUAL),
+        contract.pointer(SETTLE),
         contract.pointer(contract.MASS_MATRIX),
         contract.pointer(contract.STIFFNESS_AND_DAMPING),
         contract.pointer(contract.FACTOR),
         contract.pointer(contract.SOLVE),
-        contract.REALS,
+        _reals,
         contract.INTEGERS,
-        contract.REALS,
-        contract.REALS,
-        contract.REALS,
-        contract.INTEGERS,
+        _reals,
+        _t.NamedTuple((*(_t.float64,) * 21, *(_t.int64,) * 5), Settings),
+        _t.NamedTuple((_reals, contract.INTEGERS), Progress),
+        _t.NamedTuple((*(_reals,) * 15, _cube, contract.INTEGERS), Memory),
+        _reals,
         contract.MATRIX,
-        _t.float64[:, :, ::1],
-        contract.INTEGERS,
-        contract.REALS,
-        _t.float64[:, :, ::1],
+        _cube,
+        contract.MATRIX,
     )
 
 
-@part
-def set_step(known: Array, counts: IntArray, h: float) -> None:
-    """Formulas for steps of ``h``; a step that differs only by rounding keeps the matrix."""
-    if abs(h - known[H]) > 1e-6 * h:
-        counts[FACTORED] = 0
-    gamma, beta = known[GAMMA], known[BETA]
-    known[H] = h
-    known[TOLERANCE] = known[ASKED] * min(1.0, max(h / 1e-3, 0.01)) ** 3
-    share = (1 - known[ALPHA_F]) / (1 - known[ALPHA_M])
-    known[TO_V], known[TO_A] = gamma / (h * beta), 1 / (h * h * beta * share)
-    known[SHARE], known[PULL] = share, known[ALPHA_F] / (1 - known[ALPHA_M])
-    known[KEEP] = -known[ALPHA_M] / (1 - known[ALPHA_M])
-    known[Y_OLD], known[Y_NEW] = h * h * (0.5 - beta), h * h * beta
-    known[V_OLD], known[V_NEW] = h * (1 - gamma), h * gamma
-
-
-@part
-def change_step(known: Array, counts: IntArray, state: Array) -> None:
-    """Set the step of the present halvings, with a₀ moved along and nothing to foretell the next ÿ from."""
-    before = known[H]
-    count = counts[TOTAL] // counts[UNIT]
-    set_step(known, counts, known[SPAN] / count / (1 << counts[HALVINGS]))
-    ratio = known[H] / before
-    for i in range(state.shape[1]):
-        state[ALG, i] = state[ACC, i] + (state[ALG, i] - state[ACC, i]) * ratio
-        state[CHANGE, i] = state[GUESS, i] = 0.0
-
-
-@part
-def factor(a: Array, pivots: IntArray) -> int:
-    """LU factors, with row exchanges, of a matrix whose columns are the rows of ``a``; status as of dgetrf."""
-    n = a.shape[0]
-    status = 0
-    for k in range(n):
-        column = a[k]
-        row, largest = k, abs(column[k])
-        for i in range(k + 1, n):
-            if abs(column[i]) > largest:
-                row, largest = i, abs(column[i])
-        pivots[k] = row
-        if largest == 0.0:  # what is not finite shows in the solution
-            if status == 0:
-                status = k + 1
-            continue
-        if row != k:
-            for j in range(n):
-                a[j, k], a[j, row] = a[j, row], a[j, k]
-        inverse = 1.0 / column[k]
-        for i in range(k + 1, n):
-            column[i] *= inverse
-        for j in range(k + 1, n):
-            other = a[j]
-            weight = other[k]
-            for i in range(k + 1, n):
-                other[i] -= weight * column[i]
-    return status
-
-
-@part
-def back_solve(a: Array, pivots: IntArray, b: Array) -> None:
-    """Replace ``b`` by the solution, with what `factor` left."""
-    n = a.shape[0]
-    for k in range(n):
-        row = pivots[k]
-        b[k], b[row] = b[row], b[k]
-    for k in range(n):
-        column, weight = a[k], b[k]
-        for i in range(k + 1, n):
-            b[i] -= weight * column[i]
-    for k in range(n - 1, -1, -1):
-        column = a[k]
-        weight = b[k] / column[k]
-        b[k] = weight
-        for i in range(k):
-            b[i] -= weight * column[i]
-
-
-@part
-def predict(known: Array, state: Array) -> None:
-    """Y1, V1, ACC1 from the guess of the change of ÿ."""
-    h, y_old, y_new, v_old, v_new = known[H], known[Y_OLD], known[Y_NEW], known[V_OLD], known[V_NEW]
-    for i in range(state.shape[1]):
-        acc, alg = state[ACC, i], state[ALG, i]
-        acc1 = acc + state[GUESS, i]
-        alg1 = known[PULL] * acc + known[KEEP] * alg + known[SHARE] * acc1
-        state[ACC1, i] = acc1
-        state[Y1, i] = state[Y, i] + h * state[V, i] + y_old * alg + y_new * alg1
-        state[V1, i] = state[V, i] + v_old * alg + v_new * alg1
-
-
-@part
-def refresh(
-    mass_matrix: Callable[..., None],
-    stiffness_and_damping: Callable[..., None],
-    own_factor: Callable[..., int],
-    reals: Array,
-    integers: IntArray,
-    scratch: Array,
-    own: Array,
-    t: float,
-    known: Array,
-    counts: IntArray,
-    state: Array,
-    matrices: Array,
-    pivots: IntArray,
-) -> bool:
-    """Factor S at Y1, V1, scaled to newtons per metre, or S / β' in the system's own way; False when it is singular."""
-    n = state.shape[1]
-    if len(own) > 0:
-        alpha, beta = known[TO_V] / known[TO_A], 1 / known[TO_A]
-        info = own_factor(reals, integers, scratch, t, state[Y1], state[V1], alpha, beta, own)
-    else:
-        matrix, stiffness, damping, factors = matrices[0], matrices[1], matrices[2], matrices[3]
-        stiffness_and_damping(reals, integers, scratch, t, state[Y1], state[V1], stiffness, damping)
-        mass_matrix(reals, integers, scratch, t, state[Y1], matrix)
-        per = state[PER_METRE]
-        for i in range(n):
-            for j in range(n):
-                entry = known[TO_A] * matrix[i, j] + known[TO_V] * damping[i, j] + stiffness[i, j]
-                factors[j, i] = per[i] * entry * per[j]
-        info = factor(factors, pivots)
-    counts[FACTORIZATIONS] += 1
-    counts[FACTORED] = 1 if info == 0 else 0
-    known[RATE], counts[USUAL], counts[EXCESS] = known[SLOWEST], counts[MAX_ITERATIONS], 0
-    if info != 0:
-        counts[REASON] = SINGULAR
-        for i in range(n):
-            state[CORRECTION, i] = 1.0 if i == info - 1 else 0.0
-    return info == 0
-
-
-@part
-def iterate(
-    residual: Callable[..., None],
-    own_solve: Callable[..., None],
-    reals: Array,
-    integers: IntArray,
-    scratch: Array,
-    own: Array,
-    t: float,
-    known: Array,
-    counts: IntArray,
-    state: Array,
-    matrices: Array,
-    pivots: IntArray,
-) -> bool:
-    """Chord iteration on Y1, V1, ACC1; True when the remaining error is estimated within tolerance."""
-    n = state.shape[1]
-    y, v, acc = state[Y1], state[V1], state[ACC1]
-    metres, per_metre, out, correction = state[METRES], state[PER_METRE], state[RESIDUAL], state[CORRECTION]
-    largest = 0.0
+@inlined
+def predict(settings: Settings, memory: Memory) -> None:
+    """Increment, velocity and acceleration of a step from what its acceleration is expected to be."""
+    h, beta, gamma = settings.h, settings.beta, settings.gamma
+    y_old, y_new = h * h * (0.5 - beta), h * h * beta
+    v_old, v_new = h * (1 - gamma), h * gamma
+    v, algorithmic, a, a1, guess = memory.v, memory.alg, memory.a, memory.a1, memory.guess
+    n = len(v)
+    for i in range(len(a1)):
+        a1[i] = 0.0 if settings.guess == ZERO else a[i]
+        if settings.guess == EXTRAPOLATED and i < n:
+            a1[i] += guess[i]
     for i in range(n):
-        largest = max(largest, abs(metres[i] * y[i]))
-    rounding = known[ROUNDING] * largest
-    goal = known[TOLERANCE] + rounding
-    known[GOAL] = goal
-    rate, before, size = max(known[RATE], known[FASTEST]) ** 0.8, 0.0, 0.0
-    known[BEFORE] = 0.0
-    for k in range(1, counts[MAX_ITERATIONS] + 1):
-        counts[RHS_CALLS] += 1
-        counts[ITERATIONS] += 1
-        residual(reals, integers, scratch, t, y, v, acc, out)
-        if len(own) > 0:
-            for i in range(n):
-                correction[i] = out[i] / known[TO_A]
-            own_solve(reals, integers, own, correction)
-            for i in range(n):
-                correction[i] *= metres[i]
-        else:
-            for i in range(n):
-                correction[i] = out[i] * per_metre[i]
-            back_solve(matrices[3], pivots, correction)
-        size, total = 0.0, 0.0
-        for i in range(n):
-            size = max(size, abs(correction[i]))
-            total += correction[i]
-        # forces square what they are given: a size whose square overflows is as good as infinite
-        if not math.isfinite(size * size + total * total):
-            finite = True
-            for i in range(n):
-                finite = finite and math.isfinite(out[i])
-            for i in range(n):
-                correction[i] = correction[i] * abs(correction[i]) if finite else out[i]
-            counts[REASON] = NOT_FINITE
-            return False
-        for i in range(n):
-            move = correction[i] * per_metre[i]
-            y[i] -= move
-            v[i] -= known[TO_V] * move
-            acc[i] -= known[TO_A] * move
-        if k > 1:
-            rate = size / before
-        if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
-            known[RATE] = min(rate, known[SLOWEST])
-            counts[USUAL] = min(counts[USUAL], k)
-            if k > 1 and rate > known[FASTEST]:  # otherwise the last iteration just confirmed
-                counts[EXCESS] += k - counts[USUAL]
-            return True
-        left = counts[MAX_ITERATIONS] - k
-        # a first correction may be small by luck; later ones must lead to the goal in time
-        if rate > 2 or (k > 2 and (rate >= 1 or size * rate ** (left + 1) > goal * (1 - rate))):
-            break
-        known[BEFORE] = before = size
-    known[SIZE] = size
-    counts[REASON] = SLOW
-    return False
+        alg = algorithmic[i]
+        alg1 = settings.pull * a[i] + settings.keep * alg + settings.share * a1[i]
+        memory.increment[i] = h * v[i] + y_old * alg + y_new * alg1
+        memory.v1[i] = v[i] + v_old * alg + v_new * alg1
 
 
-@part
-def solve(
-    residual: Callable[..., None],
+@inlined
+def dense_factors(
     mass_matrix: Callable[..., None],
     stiffness_and_damping: Callable[..., None],
-    own_factor: Callable[..., int],
-    own_solve: Callable[..., None],
     reals: Array,
     integers: IntArray,
     scratch: Array,
-    own: Array,
     t: float,
-    known: Array,
-    counts: IntArray,
-    state: Array,
-    matrices: Array,
-    pivots: IntArray,
-) -> bool:
-    """One step to ``t``, into Y1, V1, ACC1; False when Newton's method fails even with a fresh matrix."""
-    fresh = counts[FACTORED] == 0 or counts[EXCESS] >= counts[REFRESH_COST]
-    while True:
-        predict(known, state)
-        if fresh and not refresh(
-            mass_matrix,
-            stiffness_and_damping,
-            own_factor,
-            reals,
-            integers,
-            scratch,
-            own,
-            t,
-            known,
-            counts,
-            state,
-            matrices,
-            pivots,
-        ):
-            return False
-        if iterate(residual, own_solve, reals, integers, scratch, own, t, known, counts, state, matrices, pivots):
-            return True
-        if fresh:
-            return False
-        fresh = True
+    alpha: float,
+    beta: float,
+    memory: Memory,
+) -> int:
+    """Factors of M + α C + β K, scaled to metres; 0, or 1 + the number of a coordinate."""
+    n, per = len(memory.v), memory.per_metre
+    mass, stiffness, damping = memory.matrices[0], memory.matrices[1], memory.matrices[2]
+    stiffness_and_damping(reals, integers, scratch, t, memory.tried, memory.v1, stiffness, damping)
+    mass_matrix(reals, integers, scratch, t, memory.tried, mass)
+    factors = memory.factors.reshape(n, n)
+    for i in range(n):
+        for j in range(n):
+            factors[j, i] = per[i] * (mass[i, j] + alpha * damping[i, j] + beta * stiffness[i, j]) * per[j]
+    return int(dense.factor(factors, memory.pivots))
 
 
-@part
-def accept(known: Array, state: Array) -> None:
-    """Move on to the end of the step, and foretell the next change of ÿ.
+@inlined
+def correct(
+    own_solve: Callable[..., None], reals: Array, integers: IntArray, settings: Settings, memory: Memory
+) -> float:
+    """Solve for a correction, apply it, and return its size [m]; infinite where a square of it is."""
+    n, beta = len(memory.v), 1 / settings.to_a
+    right, correction, per = memory.right, memory.correction, memory.per_metre
+    for i in range(n):
+        correction[i] = beta * right[i]
+    for k in range(n, len(correction)):
+        correction[k] = right[k]
+    if len(memory.pivots) > 0:
+        for i in range(n):
+            correction[i] *= per[i]
+        dense.solve(memory.factors.reshape(n, n), memory.pivots, correction)
+        for i in range(n):
+            correction[i] *= per[i]
+    else:
+        own_solve(reals, integers, memory.factors, correction)
+    size, total = 0.0, 0.0
+    for i in range(n):
+        size = max(size, abs(memory.metres[i] * correction[i]))
+        total += correction[i]
+    for k in range(n, len(correction)):
+        size = max(size, abs(memory.factors[k - n] * correction[k]))
+        total += correction[k]
+    # forces square what they are given: a size whose square overflows is as good as infinite
+    if not math.isfinite(size * size + total * total):
+        return math.inf
+    for i in range(len(correction)):
+        move = correction[i]
+        memory.a1[i] -= settings.to_a * move
+        if i < n:
+            memory.increment[i] -= move
+            memory.v1[i] -= settings.to_v * move
+            correction[i] = memory.metres[i] * move
+        else:
+            correction[i] = memory.factors[i - n] * move
+    return size
 
-    Extrapolate ÿ where that would have foretold it better; unresolved modes keep ÿ₀.
+
+@inlined
+def blame(memory: Memory) -> None:
+    """Into the correction, what is not finite: the residual, or where it is, the correction itself."""
+    finite, n = True, len(memory.v)
+    for i in range(len(memory.correction)):
+        finite = finite and math.isfinite(memory.right[i])
+    for i in range(len(memory.correction)):
+        x = memory.correction[i] * (memory.metres[i] if i < n else memory.factors[i - n])
+        memory.correction[i] = x * abs(x) if finite else memory.right[i]
+
+
+@inlined
+def is_balanced(settings: Settings, memory: Memory, largest: float) -> bool:
+    """Whether forces balance against the size of their terms, and the conditions hold."""
+    n, m, both, gap = len(memory.v), len(memory.a) - len(memory.v), 0.0, 0.0
+    for i in range(n):
+        force = memory.right[i] * memory.per_metre[i]
+        both += force * force
+    if not math.sqrt(both) <= settings.balance * (largest + memory.right[n + m + 1]):
+        return False
+    for i in range(m):
+        gap = max(gap, abs(memory.right[n + i]) * memory.factors[m + i])
+    return gap <= settings.balance * settings.reach
+
+
+@inlined
+def note(settings: Settings, progress: Progress, iterations: int, rate: float) -> None:
+    """How fast iteration was."""
+    rates, counts = progress.rates, progress.counts
+    rates[RATE] = min(rate, settings.slowest)
+    counts[USUAL] = min(counts[USUAL], iterations)
+    beyond = iterations - max(counts[USUAL], settings.fewest) - settings.tolerated
+    if iterations == 1 or rate <= settings.fastest:  # the last iteration just confirmed
+        beyond = min(beyond, 0.0)
+    rates[SPENT] = max(0.0, rates[SPENT] + beyond)
+
+
+@inlined
+def judge(settings: Settings, progress: Progress, memory: Memory) -> int:
+    """Whether the local error of a step is too large, or so small that a larger step would do."""
+    if settings.error_limit == 0.0:
+        return DONE
+    error = 0.0
+    for i in range(len(memory.v)):
+        error = max(error, memory.metres[i] * abs(memory.a1[i] - memory.a[i]))
+    error *= settings.error_factor
+    progress.rates[ERROR] = error
+    if error > settings.error_limit:
+        return INACCURATE
+    return TIMID if settings.growth > 0.0 and error * settings.growth**3 < settings.error_limit else DONE
+
+
+@inlined
+def accept(settings: Settings, memory: Memory) -> None:
+    """Move on to the end of the step, and foretell the next change of the acceleration.
+
+    It is extrapolated where that would have foretold it better; unresolved modes keep what they have.
     """
-    for i in range(state.shape[1]):
-        acc, acc1 = state[ACC, i], state[ACC1, i]
-        state[ALG, i] = known[PULL] * acc + known[KEEP] * state[ALG, i] + known[SHARE] * acc1
-        change = acc1 - acc
-        state[GUESS, i] = change if abs(change - state[CHANGE, i]) < abs(change) else 0.0
-        state[CHANGE, i] = change
-        state[Y, i], state[V, i], state[ACC, i] = state[Y1, i], state[V1, i], acc1
+    for i in range(len(memory.v)):
+        a, a1 = memory.a[i], memory.a1[i]
+        memory.alg[i] = settings.pull * a + settings.keep * memory.alg[i] + settings.share * a1
+        change = a1 - a
+        memory.guess[i] = change if abs(change - memory.change[i]) < abs(change) else 0.0
+        memory.change[i] = change
+        memory.v[i] = memory.v1[i]
+    for i in range(len(memory.a)):
+        memory.a[i] = memory.a1[i]
+    for i in range(len(memory.start)):
+        memory.start[i] = memory.tried[i]
 
 
 @kernel(_ADVANCE, counted=False)
 def advance(
+    compose: Callable[..., float],
     residual: Callable[..., None],
+    settle: Callable[..., int],
     mass_matrix: Callable[..., None],
     stiffness_and_damping: Callable[..., None],
     own_factor: Callable[..., int],
@@ -336,63 +343,122 @@ def advance(
     reals: Array,
     integers: IntArray,
     scratch: Array,
-    own: Array,
-    known: Array,
-    counts: IntArray,
-    state: Array,
-    matrices: Array,
-    pivots: IntArray,
+    settings: Settings,
+    progress: Progress,
+    memory: Memory,
     times: Array,
+    samples: Array,
     knots: Array,
+    beside: Array,
 ) -> int:
-    """Steps until ``times`` (k,) and ``knots`` (k, 3, n) are full or the leg ends.
+    """Steps to ``times`` (k,), with a row of ``samples`` each at the head of ``scratch``.
 
-    Returns
-    -------
-    int
-        Number of knots made; -1 - that number when the step after them fails at the smallest size.
+    What the system keeps of each goes into ``knots`` (k, 3, s), accelerations and multipliers into ``beside`` unless it
+    has no columns. Iterations have converged when the remaining error, rate/(1 − rate) |Δ|, is estimated within
+    tolerance, with the rate of earlier steps at first (E. Hairer & G. Wanner, Solving ODEs II, sec. IV.8), which counts
+    for less the older it gets; or when the residual is small against its terms.
     """
-    made, n = 0, state.shape[1]
-    if counts[AT] == 0:
-        set_step(known, counts, known[SPAN] / (counts[TOTAL] // counts[UNIT]))
-    while made < len(times) and counts[AT] < counts[TOTAL]:
-        target = counts[AT] + (counts[UNIT] >> counts[HALVINGS])
-        t = known[END] if target == counts[TOTAL] else known[START] + known[SPAN] * (target / counts[TOTAL])
-        if not solve(
-            residual,
-            mass_matrix,
-            stiffness_and_damping,
-            own_factor,
-            own_solve,
-            reals,
-            integers,
-            scratch,
-            own,
-            min(t, known[LAST]),
-            known,
-            counts,
-            state,
-            matrices,
-            pivots,
-        ):
-            counts[REJECTED] += 1
-            counts[HALVINGS] += 1
-            counts[SERVED] = 0
-            if counts[HALVINGS] > counts[MAX_HALVINGS]:
-                known[LAST] = t
-                return -1 - made
-            change_step(known, counts, state)
-            continue
-        accept(known, state)
-        counts[AT] = target
-        counts[SERVED] += 1
-        times[made] = t
-        for i in range(n):
-            knots[made, 0, i], knots[made, 1, i], knots[made, 2, i] = state[Y, i], state[V, i], state[ACC, i]
-        made += 1
-        halvings = counts[HALVINGS]
-        if halvings > 0 and counts[SERVED] >= 4 and target % (counts[UNIT] >> (halvings - 1)) == 0:
-            counts[HALVINGS] -= 1
-            counts[SERVED] = 0
-            change_step(known, counts, state)
-    return made
+    rates, counts, use = progress.rates, progress.counts, settings
+    n, most = len(memory.v), settings.iterations
+    m = len(memory.a) - n
+    counts[STEPS] = 0
+    for row in range(len(times)):
+        t = min(times[row], use.last)
+        for i in range(samples.shape[1]):
+            scratch[i] = samples[row, i]
+        begin_fresh = counts[FACTORED] == 0 or use.matrix == UPDATE
+        if use.matrix == AUTO and rates[SPENT] >= use.patience:
+            begin_fresh = True
+        converged = False
+        while not converged:
+            predict(use, memory)
+            fresh, found = begin_fresh, 0
+            rate = max(rates[RATE], use.fastest) ** 0.8
+            before = earlier = largest = size = rounding = goal = 0.0
+            rates[BEFORE] = 0.0
+            for k in range(most + 1):
+                extent = compose(reals, integers, scratch, memory.metres, memory.start, memory.increment, memory.tried)
+                if k == 0:
+                    rounding = use.rounding * extent
+                    goal = use.tolerance + rounding
+                    rates[GOAL] = goal
+                residual(reals, integers, scratch, t, memory.tried, memory.v1, memory.a1, memory.right)
+                counts[EVALUATIONS] += 1
+                if use.balance >= 0.0:
+                    force, reaction = memory.right[n + m], memory.right[n + m + 1]
+                    if not math.isfinite(force + reaction):
+                        for i in range(n + m):
+                            memory.correction[i] = memory.right[i]
+                        found = NOT_FINITE
+                        break
+                    largest = max(largest, force)
+                    if k > 0 and is_balanced(use, memory, largest):
+                        note(use, progress, k, rate)
+                        converged = True
+                        break
+                if k == most:
+                    found = SLOW
+                    break
+                if fresh:
+                    alpha, beta = use.to_v / use.to_a, 1 / use.to_a
+                    if len(memory.pivots) > 0:
+                        status = dense_factors(
+                            mass_matrix, stiffness_and_damping, reals, integers, scratch, t, alpha, beta, memory
+                        )
+                    else:
+                        status = own_factor(
+                            reals, integers, scratch, t, memory.tried, memory.v1, alpha, beta, memory.factors
+                        )
+                    counts[FACTORIZATIONS] += 1
+                    counts[FACTORED] = 1 if status == 0 else 0
+                    rates[RATE], rates[SPENT], counts[USUAL] = use.slowest, 0.0, most
+                    if k == 0 and use.renewal == math.inf:  # otherwise a slow one is renewed within the step
+                        rate = use.slowest**0.8
+                    if status != 0:
+                        for i in range(n + m):
+                            memory.correction[i] = 1.0 if i == status - 1 else 0.0
+                        found = SINGULAR
+                        break
+                size = correct(own_solve, reals, integers, use, memory)
+                counts[ITERATIONS] += 1
+                if not math.isfinite(size):
+                    blame(memory)
+                    found = NOT_FINITE
+                    break
+                if k > 0:
+                    rate = math.sqrt(size / earlier) if use.over == 2 and k > 1 else size / before
+                rates[SIZE] = size
+                if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
+                    compose(reals, integers, scratch, memory.metres, memory.start, memory.increment, memory.tried)
+                    note(use, progress, k + 1, rate)
+                    converged = True
+                    break
+                # a first correction may be small by luck; later ones must lead to the goal in time
+                left = 0.0
+                if k > 0:
+                    left = math.log(goal * (1 - rate) / size) / math.log(rate) if 0 < rate < 1 else math.inf
+                renewable = use.matrix == AUTO and use.renewal < math.inf and not fresh
+                if (k >= use.over and rate > 2) or (k > 1 and left > most - k and not renewable):
+                    found = SLOW
+                    break
+                fresh = use.matrix == UPDATE or (use.matrix == AUTO and k > 1 and left > use.renewal)
+                earlier = before
+                before = size
+                rates[BEFORE] = before
+            if not converged:
+                counts[REASON] = found
+                if begin_fresh or use.matrix == FROZEN:
+                    return FAILED
+                begin_fresh = True
+        status = judge(use, progress, memory)
+        if status == INACCURATE:
+            return status
+        if settle(reals, integers, scratch, t, memory.tried, memory.v1, memory.a1, knots[row]) != 0:
+            return REFUSED
+        accept(use, memory)
+        for i in range(beside.shape[1]):
+            beside[row, i] = memory.a[i]
+        counts[STEPS] = row + 1
+        if status == TIMID:
+            return status
+    return DONE

@@ -11,26 +11,22 @@ import numpy as np
 from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
 from erls.equations.system import metre_scales
 from erls.errors import SimulationError
-from erls.integrate.base import Leg
-from erls.integrate.constrained import ConstrainedOptions
-from erls.integrate.constrained_run import ConstrainedRecorder
-from erls.integrate.lie_formulas import (
+from erls.integrate.alpha_rules import (
     FASTEST_TRUSTED,
     GROWTH,
     MAX_ITERATIONS,
-    REFRESH_COST,
     ROUNDING,
     SINGULAR,
     SLOWEST_KNOWN,
-    TOLERATED,
     Formulas,
     Limit,
-    Steps,
+    Rules,
+    Words,
     newton_failure,
     too_slow,
 )
-from erls.integrate.lie_steps import start_of_leg
-from erls.maths.jit import ENABLED
+from erls.integrate.constrained import ConstrainedOptions
+from erls.integrate.constrained_run import ConstrainedRecorder
 from erls.maths.so3 import Array
 from erls.scene.integrators import MATRICES, STARTS
 
@@ -57,23 +53,6 @@ class Compiled(Protocol):
         """Memory for steps."""
 
 
-def compiled_steps(
-    system: ConstrainedSystem, options: ConstrainedOptions, recorder: ConstrainedRecorder
-) -> Steps | None:
-    """Steps by kernels, or None: without the compiler, where a system has none, or where velocities are projected.
-
-    A system brings steps of its own (``make_steps``) or is ``compiled`` for those of the nodal elements.
-    """
-    wanted = ENABLED if options.compiled is None else options.compiled
-    if not wanted or options.project_velocity:
-        return None
-    if (make_steps := getattr(system, "make_steps", None)) is not None:
-        own: Steps | None = make_steps(options, recorder)
-        return own
-    compiled = getattr(system, "compiled", None)
-    return None if compiled is None else CompiledSteps(system, compiled, options, recorder)
-
-
 class CompiledSteps:
     """State and memory of one run, as `erls.integrate.lie_formulas.Steps`."""
 
@@ -82,8 +61,10 @@ class CompiledSteps:
         system: ConstrainedSystem,
         compiled: Compiled,
         options: ConstrainedOptions,
+        rules: Rules,
         recorder: ConstrainedRecorder,
     ) -> None:
+        self.rules = rules
         from erls.equations.nodal import contract, matrix, step, sums
 
         self._kernel, self._functions = step, (sums.forces, matrix.iteration_matrix)
@@ -98,10 +79,10 @@ class CompiledSteps:
         self.reach = float(metre_scales(system).max(initial=1.0))
         self.state: Any
 
-    def begin(self, leg: Leg, q: Configuration, v: Array) -> None:
-        """Acceleration and multipliers at the start of a leg."""
-        known = start_of_leg(self.system, leg, q, v, self.recorder)
-        self.state = self.compiled.state(known, known.a)
+    def begin(self, q: Configuration, v: Array, a: Array) -> None:
+        """Start a leg with acceleration and multipliers."""
+        n = self.system.size
+        self.state = self.compiled.state(ConstrainedState(q, v, a[:n], a[n:]), a[:n])
 
     def set_step(self, h: float) -> None:
         """A step that differs only by rounding keeps the matrix."""
@@ -136,7 +117,8 @@ class CompiledSteps:
             )
             spent = time.perf_counter() - begun
             made = self._count()
-            self.recorder.extend_with(part[:made], *(of_knots[:made] for of_knots in knots))
+            beside = np.hstack([knots.accelerations, knots.multipliers])
+            self.recorder.extend(part[:made], knots.states[:made], beside=beside[:made])
             done += made
             self.steps = max(1, min(2 * self.steps, 4096, math.ceil(_PAUSE * max(made, 1) / max(spent, 1e-6))))
         self.error = float(self.progress.rates[kernel.ERROR])
@@ -151,22 +133,24 @@ class CompiledSteps:
         kernel, rates = self._kernel, self.progress.rates
         slow = too_slow(rates[kernel.BEFORE], rates[kernel.SIZE], rates[kernel.GOAL])
         reason = SINGULAR if self.progress.counts[kernel.REASON] == kernel.SINGULAR else slow
-        return newton_failure(self.system, self.options, t, self.h, self.memory.correction, reason)
+        words = Words(self.system.constraint_names, "there", "a smaller step")
+        return newton_failure(words, self.system.size, self.rules, t, self.h, self.memory.correction, reason)
 
     def _settings(self, limit: Limit) -> Any:
-        use, options = Formulas.of(self.options, self.h), self.options
+        use, options = Formulas.of(self.rules, self.h), self.options
         return self._contract.Settings(
             **{
                 name: getattr(use, name)
-                for name in ("h", "beta", "gamma", "share", "pull", "keep", "to_v", "to_a", "period", "tolerance")
+                for name in ("h", "beta", "gamma", "share", "pull", "keep", "to_v", "to_a", "tolerance")
             },
+            period=use.to_a**-0.5,
             rounding=ROUNDING * self.reach,
             reach=self.reach,
             balance=options.residual_tolerance,
             slowest=SLOWEST_KNOWN,
             fastest=FASTEST_TRUSTED,
-            patience=float(REFRESH_COST),
-            tolerated=float(TOLERATED),
+            patience=self.rules.patience,
+            tolerated=self.rules.tolerated,
             error_limit=limit.error,
             error_factor=use.error,
             growth=GROWTH if limit.can_grow else 0.0,

@@ -1,0 +1,161 @@
+"""A chain with closed loops as steps of generalized-α take it (`erls.equations.stepped`): coordinates that add, tied by
+the conditions in use.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from erls.equations import compiled_system as contract
+from erls.equations.compiled_system import Array, Factoring, IntArray
+from erls.equations.loops import layout as at
+from erls.equations.loops.compiled import CompiledLoops
+from erls.equations.loops.tree import forces, matrices
+from erls.equations.stepped import COMPOSE, SETTLE, Stepped
+from erls.maths import dense
+from erls.maths.jit import kernel
+
+
+@kernel(COMPOSE, counted=False)
+def compose(
+    reals: Array, integers: IntArray, scratch: Array, metres: Array, start: Array, increment: Array, out: Array
+) -> float:
+    """Add; what loops carry is exact to the rounding of the largest lever, however far coordinates have gone."""
+    largest = 1.0
+    for i in range(len(out)):
+        out[i] = start[i] + increment[i]
+        largest = max(largest, metres[i])
+    return largest
+
+
+@kernel(contract.RESIDUAL, counted=False)
+def residual(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
+) -> None:
+    """[M a - f + Φ_yᵀ λ; Φ], and the norms of both terms; ``a`` holds [a; λ]."""
+    n, r = len(y), at.place(integers, at.KEPT)
+    forces(reals, integers, scratch, t, y, v, a[:n], out[:n])
+    gradient = scratch[at.span(integers, at.GRADIENT, r * n)].reshape(r, n)
+    reaction, metres = scratch[at.span(integers, at.REDUCED, n)], reals[at.span(integers, at.METRES, n)]
+    for i in range(n):
+        reaction[i] = 0.0
+    for k in range(r):
+        row, multiplier = gradient[k], a[n + k]
+        for i in range(n):
+            reaction[i] += row[i] * multiplier
+    force = back = 0.0
+    for i in range(n):
+        x, y_back = out[i] / metres[i], reaction[i] / metres[i]
+        force += x * x
+        back += y_back * y_back
+        out[i] += reaction[i]
+    start = at.place(integers, at.VIOLATION)
+    for condition in range(at.place(integers, at.CONDITIONS)):
+        k = at.place_of(integers, condition)
+        if k >= 0:
+            out[n + k] = scratch[start + condition]
+    out[n + r], out[n + r + 1] = math.sqrt(force), math.sqrt(back)
+
+
+@kernel(contract.FACTOR, counted=False)
+def factor(
+    reals: Array,
+    integers: IntArray,
+    scratch: Array,
+    t: float,
+    y: Array,
+    v: Array,
+    alpha: float,
+    beta: float,
+    factors: Array,
+) -> int:
+    """LU factors of [[M + α C + β K, Φ_yᵀ], [Φ_y, 0]], scaled as in `erls.maths.saddle`.
+
+    ``factors`` holds the scales of multipliers and of conditions, the unit of mass, row exchanges, and the matrix.
+    """
+    n, r = len(y), at.place(integers, at.KEPT)
+    metres = reals[at.span(integers, at.METRES, n)]
+    gradient = scratch[at.span(integers, at.GRADIENT, r * n)].reshape(r, n)
+    mass = scratch[at.span(integers, at.MASS, n * n)].reshape(n, n)
+    stiffness = scratch[at.span(integers, at.FACTOR, n * n)].reshape(n, n)
+    damping = scratch[at.span(integers, at.DAMPING, n * n)].reshape(n, n)
+    matrices(reals, integers, scratch, t, y, v, stiffness, damping)
+    heaviest = 0.0
+    for i in range(n):
+        heaviest = max(heaviest, mass[i, i] / (metres[i] * metres[i]))
+    heaviest = heaviest if heaviest > 0.0 else 1.0
+    factors[2 * r] = heaviest
+    first = 2 * r + 1
+    whole = factors[first + n + r : first + (n + r) * (n + r + 1)].reshape(n + r, n + r)
+    for i in range(n):
+        for j in range(n):
+            entry = mass[i, j] + alpha * damping[i, j] + beta * stiffness[i, j]
+            whole[j, i] = entry / (heaviest * metres[i] * metres[j])
+    for k in range(r):
+        row, largest = gradient[k], 0.0
+        for i in range(n):
+            largest = max(largest, abs(row[i]) / metres[i])
+        scale = 1.0 / largest if largest > 0.0 else 1.0
+        factors[k], factors[r + k] = 1.0 / (scale * heaviest), scale
+        for i in range(n):
+            whole[n + k, i] = whole[i, n + k] = scale * row[i] / metres[i]
+        for j in range(r):
+            whole[n + k, n + j] = 0.0
+    return int(dense.factor(whole, factors[first : first + n + r]))
+
+
+@kernel(contract.SOLVE, counted=False)
+def solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
+    """Replace [b; Φ] by [x; β λ]."""
+    r = at.place(integers, at.KEPT)
+    n, first = len(b) - r, 2 * r + 1
+    metres, heaviest = reals[at.span(integers, at.METRES, n)], factors[2 * r]
+    whole = factors[first + n + r : first + (n + r) * (n + r + 1)].reshape(n + r, n + r)
+    for i in range(n):
+        b[i] /= heaviest * metres[i]
+    for k in range(r):
+        b[n + k] *= factors[r + k]
+    dense.solve(whole, factors[first : first + n + r], b)
+    for i in range(n):
+        b[i] /= metres[i]
+    for k in range(r):
+        b[n + k] /= factors[k]
+
+
+@kernel(SETTLE, counted=False)
+def settle(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, knot: Array
+) -> int:
+    """A knot; 1 where a condition, in use or left out, was violated too much when it was looked at last."""
+    limit, start = reals[at.place(integers, at.NUMBERS) + at.OPEN], at.place(integers, at.VIOLATION)
+    for condition in range(at.place(integers, at.CONDITIONS)):
+        if abs(scratch[start + condition]) * at.row_scale(reals, integers, condition) > limit:
+            return 1
+    for i in range(len(y)):
+        knot[0, i], knot[1, i], knot[2, i] = y[i], v[i], a[i]
+    return 0
+
+
+def stepped(chain: CompiledLoops, refuse: Callable[[float, Any, Array], None]) -> Stepped:
+    """A chain in compiled form; ``refuse`` raises where a loop has come apart."""
+    n, r = chain.size, chain.kept
+    return Stepped(
+        n,
+        r,
+        n,
+        True,
+        chain.reals,
+        chain.integers,
+        chain.scratch,
+        compose,
+        residual,
+        settle,
+        chain.mass_matrix,
+        chain.stiffness_and_damping,
+        Factoring(2 * r + 1 + (n + r) * (n + r + 1), factor, solve, factor, solve),
+        lambda y: y,
+        lambda y: y.copy(),
+        refuse=refuse,
+    )

@@ -1,0 +1,256 @@
+"""Steps of generalized-α over a run: the memory of their loop (`erls.integrate.stepping.generalized_alpha`), and walks
+over a leg with equal steps, or with steps that follow the local error.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from erls.equations.stepped import Stepped
+from erls.errors import Cause, SimulationError
+from erls.integrate.alpha_rules import (
+    FASTEST_TRUSTED,
+    GROWTH,
+    GUESSES,
+    MAX_HALVINGS,
+    MAX_ITERATIONS,
+    ROUNDING,
+    SINGULAR,
+    SLOWEST_KNOWN,
+    Formulas,
+    Limit,
+    Rules,
+    Words,
+    newton_failure,
+    too_slow,
+)
+from erls.integrate.base import Leg
+from erls.integrate.driver import Pace, Recorder
+from erls.maths.plain import plain
+from erls.maths.so3 import Array
+from erls.scene.integrators import MATRICES
+
+_SAFETY, _LARGEST_CHANGE = 0.9, 4.0  # of an adaptive step
+_FIRST, _SMALLEST = 1 / 64, 1e-6  # adaptive steps, of the largest
+_AT_ONCE, _HELD = 4096, 8  # steps that are asked for, and those after a rejected one, which do not grow
+
+
+class Steps:
+    """State and memory of one run.
+
+    Parameters
+    ----------
+    system : Stepped
+    metres : (n,) array
+        Per unit of each velocity coordinate.
+    rules : Rules
+    words : Words
+    recorder : Recorder
+    """
+
+    def __init__(self, system: Stepped, metres: Array, rules: Rules, words: Words, recorder: Recorder) -> None:
+        from erls.equations.independent import ABSENT
+        from erls.integrate.stepping import generalized_alpha as loop  # here: they import the compiler
+
+        self._loop, self._system, self._rules, self._words, self._recorder = loop, system, rules, words, recorder
+        own = system.factoring or ABSENT
+        functions = system.compose, system.residual, system.settle, system.mass_matrix, system.stiffness_and_damping
+        self._arguments = *functions, own.factor, own.solve, system.reals, system.integers, system.scratch
+        self._advance = loop.advance if system.compiled else plain(loop.advance)
+        self._pace = Pace(recorder, system.compiled)
+        self._metres, self._reach = metres, float(metres.max(initial=1.0))
+        self._progress = loop.Progress(np.zeros(6), np.zeros(7, dtype=np.int64))
+        self._progress.rates[loop.RATE] = SLOWEST_KNOWN
+        self._progress.counts[loop.USUAL] = MAX_ITERATIONS
+        self._memory: Any = None
+        self.h, self.error = 0.0, 0.0
+        """Step [s], and local error of the last one [m]."""
+
+    def begin(self, q: Any, v: Array, a: Array) -> None:
+        """Start a leg with consistent accelerations and multipliers (n + m,), which the algorithmic ones equal."""
+        start = self._system.pack(q)
+        if self._memory is None:
+            self._memory = self._room(start)
+        memory = self._memory
+        memory.start[:], memory.v[:], memory.a[:], memory.alg[:] = start, v, a, a[: len(v)]
+
+    def _room(self, start: Array) -> Any:
+        n, m, own = self._system.size, self._system.conditions, self._system.factoring
+        dense = n if own is None else 0
+        rows = [np.zeros(n) for _ in range(6)]
+        v, alg, increment, v1, change, guess = rows
+        return self._loop.Memory(
+            start=start.copy(),
+            tried=start.copy(),
+            v=v,
+            alg=alg,
+            a=np.zeros(n + m),
+            increment=increment,
+            v1=v1,
+            a1=np.zeros(n + m),
+            change=change,
+            guess=guess,
+            metres=np.array(self._metres, dtype=float),
+            per_metre=1 / self._metres,
+            right=np.zeros(n + m + 2 if m or self._rules.balance >= 0 else n),
+            correction=np.zeros(n + m),
+            factors=np.zeros(n * n if own is None else own.size),
+            matrices=np.zeros((3, dense, dense)),
+            pivots=np.zeros(dense, dtype=np.int64),
+        )
+
+    def set_step(self, h: float) -> None:
+        """Change the step, with a₀ moved along; one that differs only by rounding keeps the iteration matrix."""
+        memory = self._memory
+        if abs(h - self.h) > 1e-6 * h:
+            self._progress.counts[self._loop.FACTORED] = 0
+        if self.h:
+            a = memory.a[: len(memory.v)]
+            memory.alg[:] = a + (memory.alg - a) * (h / self.h)
+        memory.change[:] = memory.guess[:] = 0.0
+        self.h = h
+
+    def stretch(self, times: Array, last: float, limit: Limit) -> tuple[int, int]:
+        """Steps to ``times``, with forces up to ``last``, in chunks; how many were recorded, and what ended them."""
+        loop, settings = self._loop, self._settings(last, limit)
+        done, status = 0, loop.DONE
+        while done < len(times) and status == loop.DONE:
+            part = times[done : done + self._pace.size()]
+            knots = np.empty((len(part), 3, self._system.kept))
+            beside = np.empty((len(part), self._recorder.beside))
+            samples = self._system.samples(np.minimum(part, last))
+            try:
+                with self._pace:
+                    status = self._advance(
+                        *self._arguments, settings, self._progress, self._memory, part, samples, knots, beside
+                    )
+            finally:
+                made = self._count()
+            self._recorder.extend(part[:made], knots[:made], beside=beside[:made])
+            done += made
+        if status == loop.REFUSED:
+            self._system.refuse(float(times[done]), self._system.unpack(self._memory.tried), self._memory.v1)
+            status = loop.FAILED  # it does not insist
+        self.error = float(self._progress.rates[loop.ERROR])
+        return done, status
+
+    def end(self) -> tuple[Any, Array]:
+        """Configuration and velocity."""
+        return self._system.unpack(self._memory.start), self._memory.v.copy()
+
+    def failure(self, t: float) -> SimulationError:
+        """Why the step to ``t`` failed."""
+        loop, rates = self._loop, self._progress.rates
+        slow = too_slow(rates[loop.BEFORE], rates[loop.SIZE], rates[loop.GOAL])
+        reason = SINGULAR if self._progress.counts[loop.REASON] == loop.SINGULAR else slow
+        size, suspect = self._system.size, self._memory.correction
+        return newton_failure(self._words, size, self._rules, t, self.h, suspect, reason)
+
+    def _settings(self, last: float, limit: Limit) -> Any:
+        use, rules = Formulas.of(self._rules, self.h), self._rules
+        shared = ("h", "beta", "gamma", "share", "pull", "keep", "to_v", "to_a", "tolerance")
+        return self._loop.Settings(
+            **{name: getattr(use, name) for name in shared},
+            last=last,
+            rounding=ROUNDING,
+            reach=self._reach,
+            balance=rules.balance,
+            slowest=SLOWEST_KNOWN,
+            fastest=FASTEST_TRUSTED,
+            patience=rules.patience,
+            renewal=rules.renewal,
+            tolerated=rules.tolerated,
+            error_limit=limit.error,
+            error_factor=use.error,
+            growth=GROWTH if limit.can_grow else 0.0,
+            iterations=MAX_ITERATIONS,
+            over=rules.over,
+            fewest=rules.fewest,
+            matrix=MATRICES.index(rules.matrix),
+            guess=GUESSES.index(rules.guess),
+        )
+
+    def _count(self) -> int:
+        """Steps made by the last call, whose work is added to that of the run."""
+        loop, counts, work = self._loop, self._progress.counts, self._recorder.work
+        work.rhs_calls += int(counts[loop.EVALUATIONS])
+        work.newton_iterations += int(counts[loop.ITERATIONS])
+        work.factorizations += int(counts[loop.FACTORIZATIONS])
+        counts[[loop.EVALUATIONS, loop.ITERATIONS, loop.FACTORIZATIONS]] = 0
+        return int(counts[loop.STEPS])
+
+
+def equal_steps(steps: Steps, leg: Leg, step: float, halve: bool, recorder: Recorder) -> None:
+    """Equal steps over a leg, each of 2^MAX_HALVINGS units of time, so that halved steps meet its end.
+
+    Where Newton's method fails they are halved for a while, or the run fails unless ``halve``.
+    """
+    from erls.integrate.stepping.generalized_alpha import FAILED
+
+    unit = 1 << MAX_HALVINGS
+    count = max(1, math.ceil((leg.end - leg.start) / step * (1 - 1e-9)))
+    total, at, halvings, served = count * unit, 0, 0, 0
+    span = leg.end - leg.start
+    steps.set_step(span / count)
+    while at < total:
+        width = unit >> halvings
+        ahead = 1 if halvings else min(_AT_ONCE, (total - at) // width)
+        ends = at + width * np.arange(1, ahead + 1)
+        times = np.where(ends == total, leg.end, leg.start + span * (ends / total))
+        made, status = steps.stretch(times, leg.last, Limit())
+        at, served = at + made * width, served + made
+        if status == FAILED:
+            recorder.work.rejected_steps += 1
+            halvings, served = halvings + 1, 0
+            if halvings > MAX_HALVINGS or not halve:
+                raise steps.failure(float(times[made]))
+        elif halvings and served >= 4 and at % (2 * width) == 0:
+            halvings, served = halvings - 1, 0
+        else:
+            continue
+        steps.set_step(span / count / (1 << halvings))
+
+
+def adaptive_steps(steps: Steps, leg: Leg, largest: float, tolerance: float, recorder: Recorder) -> None:
+    """Steps whose local error stays below ``tolerance`` [m]; each change of their size leads to the end of the leg.
+
+    The error of a step is of third order (M. Géradin, A. Cardona, Flexible Multibody Dynamics, 2001, ch. 14).
+    """
+    from erls.integrate.stepping.generalized_alpha import FAILED, INACCURATE
+
+    t, h, held = leg.start, min(max(steps.h, _FIRST * largest), largest), False
+    while t < leg.end:
+        count = max(1, math.ceil((leg.end - t) / h * (1 - 1e-9)))
+        steps.set_step((leg.end - t) / count)
+        ahead = min(count, _HELD if held else _AT_ONCE)
+        times = t + (leg.end - t) * np.arange(1, ahead + 1) / count
+        if ahead == count:
+            times[-1] = leg.end
+        can_grow = not held and count > 1 and steps.h * GROWTH <= largest
+        made, status = steps.stretch(times, leg.last, Limit(tolerance, can_grow))
+        if made:
+            t = float(times[made - 1])
+        ratio = _SAFETY * (tolerance / max(steps.error, 1e-300)) ** (1 / 3)
+        if status == FAILED:
+            ratio = 1 / _LARGEST_CHANGE
+        elif status == INACCURATE:
+            ratio = min(ratio, 0.8)
+        held = status in (FAILED, INACCURATE)
+        recorder.work.rejected_steps += held
+        h = min(largest, steps.h * min(max(ratio, 1 / _LARGEST_CHANGE), _LARGEST_CHANGE))
+        if h < _SMALLEST * largest:
+            raise steps.failure(float(times[made])) if status == FAILED else _too_small(t, steps, tolerance)
+
+
+def _too_small(t: float, steps: Steps, tolerance: float) -> SimulationError:
+    return SimulationError(
+        Cause.STEP_TOO_SMALL,
+        f"a step of {steps.h:.3g} s still has an error of {steps.error:.3g} m",
+        where=f"t = {t:.9g} s",
+        value=f"{steps.h:.3g} s",
+        limit=f"{tolerance:.3g} m",
+        remedy="look for jumps of forces without breakpoint; or allow a larger error",
+    )
