@@ -54,7 +54,7 @@ class Compiled(Protocol):
 
 
 class CompiledSteps:
-    """State and memory of one run, as `erls.integrate.lie_formulas.Steps`."""
+    """State and memory of one run, as `erls.integrate.alpha_steps.Steps`."""
 
     def __init__(
         self,

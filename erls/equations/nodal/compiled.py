@@ -23,7 +23,7 @@ class _System(Protocol):
 
 
 class CompiledSteps:
-    """What steps ask for; see `erls.integrate.lie_compiled.Compiled`."""
+    """What steps ask for; see `erls.integrate.nodal_steps.Compiled`."""
 
     def __init__(self, system: _System) -> None:
         self.model, self.width, self.samples = system.model, system.width, system.samples

@@ -1,4 +1,4 @@
-"""Steps of Lie-group generalized-α, many at once: the algorithm of `erls.integrate.lie_steps`."""
+"""Steps of Lie-group generalized-α, many at once: the algorithm of `erls.integrate.stepping.generalized_alpha`."""
 
 from __future__ import annotations
 
