@@ -17,7 +17,7 @@ from pathlib import Path
 
 import erls
 from erls.parallel.workers import IDLE
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 SCENE = Path(__file__).parents[1] / "data/l_shape/steel_flat.toml"
 SETTINGS = ["simulation.integrator=lobatto", "simulation.tolerance=1e-4", "simulation.duration=2.0"]
@@ -27,7 +27,7 @@ def timed(variants: list[list[str]], workers: int | None) -> tuple[float, float]
     """Wall and CPU time of this process for all variants [s]."""
     wall, cpu = time.perf_counter(), time.process_time()
     runs = erls.simulate_many(SCENE, variants, workers=workers)
-    assert all(isinstance(run, Run) for run in runs)
+    assert all(isinstance(run, ChainRun) for run in runs)
     return time.perf_counter() - wall, time.process_time() - cpu
 
 

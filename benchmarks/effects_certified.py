@@ -45,7 +45,7 @@ from erls.auto.static import may_follow, static_cut  # noqa: E402
 from erls.equations.registry import formulate  # noqa: E402
 from erls.errors import SimulationError  # noqa: E402
 from erls.mechanism.chain import Mechanism  # noqa: E402
-from erls.run.record import Run  # noqa: E402
+from erls.run.chain.run import ChainRun  # noqa: E402
 from erls.scene.build import build_mechanism  # noqa: E402
 
 SHIPPED = [
@@ -126,7 +126,7 @@ def _slower(joint: dict[str, Any], duration: float, controlled: bool) -> dict[st
     return {**slow, "motor": {"rotor_inertia": 5e-3}, "drive": {**slow["drive"], **CONTROLLER}} if controlled else slow
 
 
-def timed(path: Path, changes: list[str], most: int = 6) -> tuple[float, float, Run, str]:
+def timed(path: Path, changes: list[str], most: int = 6) -> tuple[float, float, ChainRun, str]:
     """Least time with all and with auto [s], a run with auto, and what it decided.
 
     Where auto keeps all, both runs are the same but for deciding, whose time is added to that with all.
@@ -191,7 +191,7 @@ def _changes(name: str) -> list[str]:
     return [f"simulation.duration={SHORTER[name]}"] if name in SHORTER else []
 
 
-def distance(run: Run, other: Run) -> float:
+def distance(run: ChainRun, other: ChainRun) -> float:
     """Largest distance of watched points."""
     at = np.linspace(0.0, other.end, TIMES)
     sides = []
@@ -257,7 +257,7 @@ def label(cut: Cut) -> str:
     return "rigid" if "flexibility" in cut.off else f"{len(cut.off)} off"
 
 
-def compared(scene: erls.Scene, whole: Mechanism, choice: Choice, reference: Run) -> tuple[float, float]:
+def compared(scene: erls.Scene, whole: Mechanism, choice: Choice, reference: ChainRun) -> tuple[float, float]:
     """Actual and certified error of a run without something."""
     run = erls.simulate(named(scene, whole, choice))
     return distance(run, reference), certify(run, whole).error

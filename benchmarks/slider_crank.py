@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import erls
+from erls import simulate
 from erls.maths.so3 import Array
-from erls.run.bodies.solve import solve
 from erls.run.watches.deflection_range import deflection_errors
 
 ROOT = Path(__file__).parents[1]
@@ -34,7 +34,7 @@ def off_chord(pin: Array, middle: Array, slider: Array) -> Array:
 
 def main() -> None:
     """Print the tables."""
-    exact = solve(FOLDER / "fast_beams.toml")
+    exact = simulate(FOLDER / "fast_beams.toml")
     t = np.linspace(0.0, exact.end, 1001)  # type: ignore[union-attr]
     truth = [exact.position(name, t) for name in ("middle", "end")]  # type: ignore[arg-type]
     print(f"{'':16} {'middle [m]':>11} {'slider [m]':>11} {'estimate':>9} {'time [s]':>9}")

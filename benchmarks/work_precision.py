@@ -19,7 +19,7 @@ from vs_exudyn import error, robot_scene
 from erls.equations.registry import formulate
 from erls.integrate.base import Options, Solution
 from erls.integrate.registry import integrator_named
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.read import load_scene
@@ -57,7 +57,7 @@ def study(scene: Scene, names: list[str], runs: int) -> None:
     at, point = np.linspace(*span, 301), scene.record.points[-1].name
 
     def positions(found: Solution) -> np.ndarray:
-        return Run(scene, formulation, found, 0.0).position(point, at)
+        return ChainRun(scene, formulation, found, 0.0).position(point, at)
 
     def integrate(name: str, options: Options) -> Solution:
         return integrator_named(name)(formulation, span, y, v, options, None)

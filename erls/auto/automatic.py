@@ -17,7 +17,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import Certificate, in_order
 from erls.mechanism.without_effects import present
 from erls.run.all_modes import with_all_modes
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.run.watches.spin_stability import UNSTABLE
 from erls.run.watches.static_following import ABOVE
 from erls.scene.chain import Scene
@@ -28,10 +28,10 @@ _KEPT = 0.1  # of the tolerance: what an estimate, scaled by what the certificat
 def automatic(
     scene: Scene,
     whole: Mechanism,
-    integrate: Callable[[Scene, Mechanism], Run],
+    integrate: Callable[[Scene, Mechanism], ChainRun],
     tell: Callable[[str], None],
     strict: bool,
-) -> Run:
+) -> ChainRun:
     """Run a scene with the effects that matter.
 
     Parameters
@@ -94,14 +94,14 @@ def automatic(
 def _with_bandwidth(
     scene: Scene,
     whole: Mechanism,
-    integrate: Callable[[Scene, Mechanism], Run],
+    integrate: Callable[[Scene, Mechanism], ChainRun],
     tell: Callable[[str], None],
     strict: bool,
-) -> Run:
+) -> ChainRun:
     """The same, where modes above a bandwidth of the scene follow statically: judged as if all modes moved."""
-    runs: list[Run] = []
+    runs: list[ChainRun] = []
 
-    def integrate_slow(scene: Scene, mechanism: Mechanism) -> Run:
+    def integrate_slow(scene: Scene, mechanism: Mechanism) -> ChainRun:
         runs.append(integrate(scene, replace(mechanism, bandwidth=whole.bandwidth)))
         return with_all_modes(runs[-1])
 
@@ -138,7 +138,7 @@ class _Physics:
         self._add(addition(self.whole, f"without them the run fails ({problem.message})"))
         return True
 
-    def stiffens(self, run: Run, strict: bool) -> bool:
+    def stiffens(self, run: ChainRun, strict: bool) -> bool:
         """Whether a run without stiffening needs it: for lost stability and, strictly, by its own estimate."""
         if not self._may_add:
             return False
@@ -149,7 +149,7 @@ class _Physics:
         self._add(addition(self.whole, lost or off_by(error, tolerance)))
         return True
 
-    def warnings(self, run: Run) -> list[str]:
+    def warnings(self, run: ChainRun) -> list[str]:
         """That the estimate passes the tolerance."""
         error, tolerance = run.second_order_error or 0.0, self.settings.effects_tolerance
         if error <= tolerance:
@@ -164,7 +164,7 @@ class _Physics:
 _BEYOND = "links of beams can take formulation nodal or substructures; or give a larger simulation.effects_tolerance"
 
 
-def refuse_beyond(run: Run) -> None:
+def refuse_beyond(run: ChainRun) -> None:
     """Raise where a run estimates an error of its own beyond the tolerance, whatever effects are on.
 
     Raises
@@ -202,7 +202,7 @@ def named(scene: Scene, whole: Mechanism, choice: Choice) -> Scene:
     return replace(scene, record=msgspec.structs.replace(record, simulation=settings, links=links))
 
 
-def _certified(run: Run, whole: Mechanism, choice: Choice) -> Certificate:
+def _certified(run: ChainRun, whole: Mechanism, choice: Choice) -> Certificate:
     """The certificate; infinite where the error cannot be followed."""
     settings = run.scene.record.simulation
     tolerances = settings.effects_tolerance, settings.effects_effort_tolerance

@@ -20,7 +20,7 @@ from erls.integrate.base import hermite
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import Certificate
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from fe_import.model import IntArray
 
 FEWEST = 500  # steps
@@ -30,12 +30,12 @@ _ACCURACY = 1e-2  # of the tolerance
 _EVEN = 1.01  # ratio of steps that count as equal
 
 
-def certify(run: Run, whole: Mechanism) -> Certificate:
+def certify(run: ChainRun, whole: Mechanism) -> Certificate:
     """Estimate the error of a run that left out effects.
 
     Parameters
     ----------
-    run : Run
+    run : ChainRun
     whole : Mechanism
         With all effects.
 
@@ -103,7 +103,7 @@ def _swing(system: Any, deviation: Deviation) -> Array:
     return np.vstack([a[:1], a]) @ weight.T
 
 
-def _legs(run: Run, step: float) -> tuple[list[Knots], list[int]]:
+def _legs(run: ChainRun, step: float) -> tuple[list[Knots], list[int]]:
     """Knots of a run between jumps, and how many of them make a step.
 
     Where knots are too far apart for it, or not even, states between them with accelerations of their own.

@@ -25,7 +25,7 @@ from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.without_effects import with_rigid, without
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.chain import Scene
 
 BUDGET = 0.3  # of the tolerance: what a coarse run may overlook is in the rest
@@ -164,7 +164,7 @@ class _Looks:
     """Looks at cuts, one after the other, as long as they may pay."""
 
     scene: Scene
-    whole: Run
+    whole: ChainRun
     count: int
     room: _Room
     purse: Purse | None

@@ -11,12 +11,11 @@ from erls.auto.quick import quick
 from erls.equations.formulation import Formulation, State
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
-from erls.integrate.base import Solution
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.drives import Drive
 from erls.mechanism.substructures import is_split
-from erls.run.record import Run, node_positions
+from erls.run.chain.places import node_positions
 from erls.scene.chain import Scene
 from erls.scene.settings import Simulation
 
@@ -43,8 +42,6 @@ class Outputs:
     """Positions and drive forces of states of one formulation."""
 
     def __init__(self, scene: Scene, formulation: Formulation, watched: Watched) -> None:
-        empty = np.zeros((1, formulation.size))
-        self._run = Run(scene, formulation, Solution(np.zeros(1), empty, empty, empty))
         self.formulation, self.watched = formulation, watched
         self.driven = driven_joints(formulation.mechanism)
         self._static = formulation if isinstance(formulation, QuasiStatic) else None
@@ -55,7 +52,8 @@ class Outputs:
 
     def positions(self, state: State) -> Array:
         """(points, 3) in the world [m]."""
-        return np.array([node_positions(self._run, state, k, np.array([node]))[0] for k, node in self.watched])
+        mechanism = self.formulation.mechanism
+        return np.array([node_positions(mechanism, state, k, np.array([node]))[0] for k, node in self.watched])
 
     def efforts(self, t: float, y: Array, v: Array) -> Array:
         """(driven joints,) [N m or N]."""

@@ -25,7 +25,7 @@ from erls.integrate.base import Options, hermite
 from erls.integrate.choice import integrator
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.chain import Scene
 from erls.scene.settings import Simulation
 
@@ -86,7 +86,7 @@ def resolved(settings: Simulation, found: Vibrations) -> Resolution:
     return resolution(found, UNRESOLVED * settings.effects_tolerance)
 
 
-def coarse_run(scene: Scene, mechanism: Mechanism, count: int, start: State | None = None) -> Run:
+def coarse_run(scene: Scene, mechanism: Mechanism, count: int, start: State | None = None) -> ChainRun:
     """A run in ``count`` steps; failures stand in the run."""
     settings = scene.record.simulation
     coarse = msgspec.structs.replace(
@@ -98,17 +98,17 @@ def coarse_run(scene: Scene, mechanism: Mechanism, count: int, start: State | No
     solution = integrator(mechanism, coarse)(formulation, (0.0, settings.duration), y, v, options, None)
     if solution.failure is not None and solution.failure.cause == Cause.INTERRUPTED:
         raise solution.failure
-    return Run(scene, formulation, solution)
+    return ChainRun(scene, formulation, solution)
 
 
-def too_coarse(run: Run, count: int) -> bool:
+def too_coarse(run: ChainRun, count: int) -> bool:
     """Whether joints turn so fast that the steps say nothing."""
     s = run.solution
     free = np.diag(quick(solved(run.formulation)).stiffness_and_damping(float(s.t[0]), s.y[0], s.v[0])[0]) == 0
     return bool(np.abs(s.v[:, free]).max(initial=0.0) * (s.t[-1] - s.t[0]) / count > _TURN)
 
 
-def difference(whole: Run, less: Run) -> Difference:
+def difference(whole: ChainRun, less: ChainRun) -> Difference:
     """Between two coarse runs, at the times when they are farthest apart; the second one may lack coordinates."""
     if less.solution.failure is not None:
         return Difference(np.inf, None)
@@ -129,7 +129,7 @@ def difference(whole: Run, less: Run) -> Difference:
     return Difference(largest_distance(ours, others), effort_error(our_efforts, other_efforts))
 
 
-def deformation(run: Run, link: str = "") -> float:
+def deformation(run: ChainRun, link: str = "") -> float:
     """Largest distance that the deformation of a link, or of all, moves a named point by [m]; none of its modes left
     out comes cheaper, except by chance.
     """

@@ -21,7 +21,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import in_order
 from erls.mechanism.links import link_mass_properties
 from erls.mechanism.without_effects import present, with_rigid, without
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.chain import Scene
 
 T = TypeVar("T")
@@ -101,7 +101,7 @@ def effect_sizes(scene: Scene, mechanism: Mechanism, names: Iterable[str]) -> tu
 
 
 def _size(
-    scene: Scene, whole: Run, less: Mechanism, faster: Mechanism, count: int
+    scene: Scene, whole: ChainRun, less: Mechanism, faster: Mechanism, count: int
 ) -> tuple[Difference, float, float]:
     """Difference, largest force, and share of the operations of an evaluation."""
     settings = scene.record.simulation
@@ -125,7 +125,7 @@ def _reach(mechanism: Mechanism) -> float:
     return sum(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in mechanism.links)
 
 
-def _force(whole: Run, less: Formulation) -> float:
+def _force(whole: ChainRun, less: Formulation) -> float:
     """Largest difference of generalized forces along the coarse run; without flexibility, what holds the modes.
 
     Forces F count as sqrt(μ Fᵀ M⁻¹ F) with the mass μ of all links: one that acts on all mass alike counts as it is,

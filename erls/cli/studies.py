@@ -1,101 +1,16 @@
-"""The commands that run a scene more than once: ``erls compare`` and ``erls study``."""
+"""The commands that run a scene many times: ``erls study``."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from erls.cli.terminal import Json, Output, Progress, print_json, refuse_unwritable, tell
-
-if TYPE_CHECKING:
-    from erls.errors import SceneError
-
-Set = Annotated[list[str] | None, Parameter(name="--set", negative="")]
-Workers = Annotated[int | None, Parameter(name="--workers")]
+from erls.cli.reports import Set, Workers, bad, check_output, dumped, exit_code, tell_written, write
+from erls.cli.terminal import Json, Output, Progress, print_json, tell
 
 study = App(name="study", help="Run a scene many times and report what changes.", help_format="plaintext")
-
-
-def compare(
-    scene: Path,
-    /,
-    *more: Path,
-    formulations: str = "",
-    output: Output = None,
-    set_: Set = None,
-    workers: Workers = None,
-    json: Json = False,
-) -> int:
-    """Simulate a scene in several formulations and report distances, cost and whether they are as expected.
-
-    Of several scenes: how far formulations depart from the nodal one (the first unless it is asked for) against how far
-    links bend. Scenes that it cannot compute are named.
-
-    Parameters
-    ----------
-    scene
-        Scene (TOML).
-    more
-        Further scenes.
-    formulations
-        Separated by commas; erls,ffr unless given. Besides them: nodal (beam elements, for any deflection),
-        erls-minimum-norm (five rows per joint), erls-fem (links not reduced).
-    output
-        Report to write: .html a self-contained page with plots, .csv the histories (of several scenes the
-        departures), .json the JSON object.
-    set_
-        Change a field of the scene, KEY=VALUE; may be repeated.
-    workers
-        Runs at a time; as many as cores unless given.
-    json
-        Print one JSON object.
-    """
-    from erls.report.compare_page import comparison_csv, comparison_page, comparison_text
-    from erls.studies.compare import compare as run_comparison
-    from erls.studies.compare import comparison_summary
-
-    for path in (scene, *more):
-        _check_output(output, path, (".html", ".csv", ".json"))
-    names = [name.strip() for name in formulations.split(",") if name.strip()]
-    if more:
-        return _compare_scenes([scene, *more], names or ["erls", "ffr"], output, set_ or [], workers, json)
-    with Progress("comparing") as advance:
-        result = run_comparison(scene, names, overrides=set_ or (), progress=advance, workers=workers)
-    summary = comparison_summary(result)
-    if output is not None:
-        makers = {".html": comparison_page, ".csv": comparison_csv}
-        _write(output, makers[output.suffix](result) if output.suffix in makers else _dumped(summary))
-    if json:
-        print_json({**summary, "output": None if output is None else str(output)})
-    else:
-        print(comparison_text(result))
-        _tell_written(output)
-    return _exit_code(result.complete, [error.exit_code for error in result.errors.values()])
-
-
-def _compare_scenes(
-    scenes: list[Path], names: list[str], output: Path | None, changes: list[str], workers: int | None, json: bool
-) -> int:
-    """The part of `compare` for several scenes; 2 when none could be compared."""
-    from erls.report.scenes_page import scenes_csv, scenes_page, scenes_text
-    from erls.studies.compare_scenes import compare_scenes, scenes_summary
-
-    with Progress("comparing") as advance:
-        result = compare_scenes(scenes, names, overrides=changes, progress=advance, workers=workers)
-    summary = scenes_summary(result)
-    if output is not None:
-        makers = {".html": scenes_page, ".csv": scenes_csv}
-        _write(output, makers[output.suffix](result) if output.suffix in makers else _dumped(summary))
-    if json:
-        print_json({**summary, "output": None if output is None else str(output)})
-    else:
-        print(scenes_text(result))
-        _tell_written(output)
-    errors = [error for c in result.comparisons.values() for error in c.errors.values()]
-    failed = [e.exit_code for e in errors if e.exit_code != 2]  # what a formulation refuses is stated
-    return _exit_code(result.complete, failed if result.departures else [*failed, 2])
 
 
 @study.command
@@ -146,7 +61,7 @@ def modes(
     from erls.report.mode_page import beside_summary, mode_study_page, mode_study_text, read_printed
     from erls.studies.mode_count import Tolerances, study_modes, study_summary
 
-    _check_output(output, scene, (".html", ".json"))
+    check_output(output, scene, (".html", ".json"))
     printed = None if beside is None else read_printed(beside)
     with Progress("mode study") as advance:
         result = study_modes(
@@ -162,14 +77,14 @@ def modes(
     if printed is not None:
         summary["beside"] = beside_summary(result, printed)
     if output is not None:
-        _write(output, mode_study_page(result, printed) if output.suffix == ".html" else _dumped(summary))
+        write(output, mode_study_page(result, printed) if output.suffix == ".html" else dumped(summary))
     if json:
         print_json({**summary, "output": None if output is None else str(output)})
     else:
         print(mode_study_text(result, printed))
-        _tell_written(output)
+        tell_written(output)
     failed = [point.error.exit_code for point in result.points if point.error is not None]
-    return _exit_code(result.complete, failed) or (0 if result.converged is not None else 4)
+    return exit_code(result.complete, failed) or (0 if result.converged is not None else 4)
 
 
 @study.command
@@ -239,7 +154,7 @@ def cost(
     from erls.studies.cost import cost_summary, study_cost
     from erls.studies.grid import Grid
 
-    _check_output(output, scene, (".html", ".csv", ".json"))
+    check_output(output, scene, (".html", ".csv", ".json"))
     if apply is not None:
         check_copy(apply, scene)
     grid = Grid(_names(formulations), _names(integrators), tuple(effects or ()), tuple(_counts(modes, "--modes") or ()))
@@ -259,18 +174,18 @@ def cost(
     summary = cost_summary(result)
     if output is not None:
         makers = {".html": cost_page, ".csv": cost_csv}
-        _write(output, makers[output.suffix](result) if output.suffix in makers else _dumped(summary))
+        write(output, makers[output.suffix](result) if output.suffix in makers else dumped(summary))
     if apply is not None and result.chosen is not None:
         write_copy(apply, scene, result.chosen_overrides, "\n".join([summary["recommendation"], *_kept(set_)]))
     if json:
         print_json({**summary, "output": None if output is None else str(output)})
     else:
         print(cost_text(result))
-        _tell_written(output)
-        _tell_written(apply if result.chosen is not None else None)
+        tell_written(output)
+        tell_written(apply if result.chosen is not None else None)
         for line in _kept(set_) if apply is not None and result.chosen is not None else ():
             tell(line)
-    return _exit_code(result.complete, []) or (0 if result.chosen is not None else 4)
+    return exit_code(result.complete, []) or (0 if result.chosen is not None else 4)
 
 
 def _kept(changes: list[str] | None) -> list[str]:
@@ -282,46 +197,8 @@ def _names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
-def _exit_code(complete: bool, failed: list[int]) -> int:
-    """130 after an interrupt, else the worst of the runs that failed."""
-    return 130 if not complete else max(failed, default=0)
-
-
-def _check_output(output: Path | None, scene: Path, suffixes: tuple[str, ...]) -> None:
-    if output is None:
-        return
-    if output.suffix not in suffixes:
-        remedy = "end in " + ", ".join(suffixes)
-        raise _bad("the ending of the report decides its form", "--output", output.name, remedy)
-    refuse_unwritable(output, scene)
-
-
 def _counts(text: str, option: str = "--counts") -> list[int] | None:
     try:
         return [int(part) for part in text.split(",") if part.strip()] or None
     except ValueError:
-        raise _bad("not whole numbers", option, text, "separate them by commas, e.g. 1,2,6,12") from None
-
-
-def _bad(message: str, where: str, value: object, remedy: str) -> SceneError:
-    from erls.errors import Cause, SceneError
-
-    return SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)
-
-
-def _write(path: Path, text: str) -> None:
-    from erls.files.output import replacing
-
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _dumped(summary: dict[str, object]) -> str:
-    from erls.cli.terminal import json_text
-
-    return json_text(summary) + "\n"
-
-
-def _tell_written(output: Path | None) -> None:
-    if output is not None:
-        tell(f"written to {output}")
+        raise bad("not whole numbers", option, text, "separate them by commas, e.g. 1,2,6,12") from None

@@ -17,7 +17,7 @@ Json = Annotated[bool, Parameter(name="--json", negative="")]
 Output = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 
 
-def report_times(text: str, end: float) -> list[float]:
+def report_times(text: str, end: float, unit: str = "s") -> list[float]:
     """Times of ``--at``."""
     from erls.errors import Cause, SceneError
 
@@ -33,8 +33,8 @@ def report_times(text: str, end: float) -> list[float]:
                 "not a time within the run",
                 where="--at",
                 value=part.strip(),
-                limit=f"0 to {end:g} s",
-                remedy="give times in seconds, separated by commas",
+                limit=f"0 to {end:g} {unit}".rstrip(),
+                remedy=f"give {'times in seconds' if unit else 'load parameters'}, separated by commas",
             )
         result.append(value)
     return result

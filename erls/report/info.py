@@ -8,12 +8,10 @@ from typing import Any
 import msgspec
 
 from erls.errors import Cause, SceneError
-from erls.report.body_page import result_report
-from erls.report.tables import modal_report, run_report, table
-from erls.run.bodies.result_file import SCHEMA as RESULT_SCHEMA
-from erls.run.bodies.result_file import read_summary
+from erls.report.runs import run_report
+from erls.report.tables import modal_report, table
+from erls.run.file import EARLIER, load_run
 from erls.run.file import SCHEMA as RUN_SCHEMA
-from erls.run.file import load_run
 from erls.scene.bodies.schema import BodyScene
 from erls.scene.chain import Scene
 from erls.scene.read import load_scene
@@ -43,14 +41,11 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
     if start == _HDF5:
         with open_for_reading(path, SceneError, Cause.RUN_FILE) as reader:
             schema = reader.attribute("schema", str) if "schema" in reader.attribute_names() else ""
-        if schema == RUN_SCHEMA:
+        if schema in (RUN_SCHEMA, EARLIER):
             run = load_run(path)
             failure = None if run.failure is None else run.failure.as_dict()
             text = "\n".join([run_report(run), *(f"warning: {w}" for w in run.warnings)])
             return {"file": "run", **run.summary(), "failure": failure}, text
-        if schema == RESULT_SCHEMA:
-            found = read_summary(path)
-            return {"file": "result of bodies", **found}, f"{result_report(found)}\n\nstatus: {found['status']}"
         if schema != MODAL_SCHEMA:
             raise SceneError(
                 Cause.NOT_READABLE,
@@ -123,7 +118,7 @@ def _body_scene_info(scene: BodyScene) -> tuple[dict[str, Any], str]:
     simulation = msgspec.to_builtins(record.simulation)
     text = f"{scene.name}: scene of bodies and beams\n\n" + table(("name", "kind", ""), rows)
     text += "\n\nsimulation: " + ", ".join(f"{k} = {v}" for k, v in simulation.items() if v is not None)
-    return {"file": "scene of bodies", "scene": scene.name, **msgspec.to_builtins(record)}, text
+    return {"file": "scene", "scene": scene.name, **msgspec.to_builtins(record)}, text
 
 
 def _source(link: Any) -> str:

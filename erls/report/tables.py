@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from fe_import.modal.inertia import MassProperties
 from fe_import.modal.model import HealthCheck, ModalModel
 
@@ -90,8 +90,8 @@ def _mass_table(reduced: MassProperties, full: MassProperties) -> str:
     return "Mass properties\n" + table(("", "reduced", "full model", "difference"), rows)
 
 
-def run_report(run: Run, times: Sequence[float] = ()) -> str:
-    """Summary of a run, and joints and points at given times (its end unless given)."""
+def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
+    """Summary of a chain's run, and joints and points at given times (its end unless given)."""
     s = run.summary(times or [run.end])
     drift = s["energy"]["max_drift"]
     if "nodes" in s:

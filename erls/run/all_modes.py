@@ -8,19 +8,19 @@ import numpy as np
 
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.integrate.base import legs
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 
-def with_all_modes(run: Run) -> Run:
+def with_all_modes(run: ChainRun) -> ChainRun:
     """The same motion in the coordinates of all modes; the run itself where none follows statically.
 
     Parameters
     ----------
-    run : Run
+    run : ChainRun
 
     Returns
     -------
-    Run
+    ChainRun
         Its formulation is that of all modes, its knots hold their places, rates and, of the slow motion, accelerations.
     """
     formulation, s = run.formulation, run.solution

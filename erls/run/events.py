@@ -6,19 +6,20 @@ the root of the interpolated motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from erls.integrate.base import Solution
+from erls.equations.formulation import Formulation, State
+from erls.integrate.base import Solution, hermite
+from erls.mechanism.chain import Mechanism
+from erls.run.chain.places import point_position
 from erls.scene.chain import Event
 from erls.scene.check import OF_POINTS
 
-if TYPE_CHECKING:
-    from erls.run.record import Run
 
 @dataclass(frozen=True)
 class Happening:
@@ -43,32 +44,35 @@ def event_value(event: Event) -> float:
     return float(np.radians(event.value_deg) if event.value is None else event.value)  # type: ignore[arg-type]
 
 
-def happenings(run: Run, since: float | None = None) -> tuple[Happening, ...]:
-    """What happened in a run, in the order of time.
+def happenings(
+    events: Sequence[Event], formulation: Formulation, solution: Solution, since: float | None = None
+) -> tuple[Happening, ...]:
+    """What happened in a motion, in the order of time.
 
     Parameters
     ----------
-    run : Run
+    events : sequence of Event
+    formulation : Formulation
+    solution : Solution
     since : float, optional
         Knots from this time on; all of them unless given.
     """
-    events = run.scene.record.events
     if not events:
         return ()
-    s = run.solution
+    s = solution
     first = 0 if since is None else int(np.searchsorted(s.t, since))
-    knots = range(first, len(s.t))
-    states = [run.formulation.state(float(s.t[k]), s.y[k], s.v[k]) for k in knots]
+    states = [formulation.state(float(s.t[k]), s.y[k], s.v[k]) for k in range(first, len(s.t))]
     found = []
     for event in events:
-        height = _height(run, event)
+        height = _height(formulation.mechanism, event)
         values = [height(state) for state in states]
         for k, (before, after) in enumerate(pairwise(values), start=first):
             rising = before < 0 <= after
             if s.t[k] < s.t[k + 1] and (
                 (rising and event.direction != "falling") or (before > 0 >= after and event.direction != "rising")
             ):
-                found.append(Happening(event.name, _root(run, height, float(s.t[k]), float(s.t[k + 1])), rising))
+                time = _root(formulation, s, height, float(s.t[k]), float(s.t[k + 1]))
+                found.append(Happening(event.name, time, rising))
     return tuple(sorted(found, key=lambda happening: happening.time))
 
 
@@ -80,21 +84,26 @@ def cut(solution: Solution, time: float) -> Solution:
     return replace(solution, **own)
 
 
-def _height(run: Run, event: Event) -> Callable[..., float]:
+def _height(mechanism: Mechanism, event: Event) -> Callable[[State], float]:
     """The coordinate less the value, of a state."""
     value = event_value(event)
     if event.joint:
-        number, what = run.joint_names.index(event.joint), {"angle": "angles", "rate": "rates"}[event.coordinate]
+        names = [joint.name for joint in mechanism.joints]
+        number, what = names.index(event.joint), {"angle": "angles", "rate": "rates"}[event.coordinate]
         return lambda state: float(getattr(state, what)[number]) - value
-    number, axis = run.point_names.index(event.point), OF_POINTS.index(event.coordinate)
-    return lambda state: float(run.point_position(state, number)[axis]) - value
+    number = [point.name for point in mechanism.points].index(event.point)
+    axis = OF_POINTS.index(event.coordinate)
+    return lambda state: float(point_position(mechanism, state, number)[axis]) - value
 
 
-def _root(run: Run, height: Callable[..., float], start: float, end: float) -> float:
+def _root(
+    formulation: Formulation, s: Solution, height: Callable[[State], float], start: float, end: float
+) -> float:
     from scipy.optimize import brentq  # here: only events need it
 
     def at(t: float) -> float:
-        return height(run.states([t])[0])
+        y, v = hermite(s.t, s.y, s.v, s.a, np.array([t]))
+        return height(formulation.state(t, y[0], v[0]))
 
     ends = at(start), at(end)
     if ends[0] * ends[1] > 0:  # rounding of the interpolation: the crossing is at an end

@@ -10,7 +10,7 @@ from erls.equations.formulation import State
 from erls.maths.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
 from erls.mechanism.loops import LoopEnd
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 _STEP = 1e-5  # s, of central differences: 1e-6 m/s² of rounding, and below 1 kHz 3e-4 of the acceleration
 
@@ -43,13 +43,13 @@ class _Carried:
     inertia: Array
 
 
-def link_loads(run: Run, number: int, times: Array) -> LinkLoads:
+def link_loads(run: ChainRun, number: int, times: Array) -> LinkLoads:
     """Loads on link ``number`` at times (k,): joint reactions, weight and inertia of payloads and motors on its
     interfaces. A payload elsewhere on the link is left to the modes.
 
     Parameters
     ----------
-    run : Run
+    run : ChainRun
     number : int
     times : (k,) array
         Within the run [s].
@@ -68,7 +68,7 @@ def link_loads(run: Run, number: int, times: Array) -> LinkLoads:
     return LinkLoads(modal, loads.reshape(len(times), -1), omega)
 
 
-def _joint_loads(run: Run, number: int, times: Array, states: list[State]) -> Array:
+def _joint_loads(run: ChainRun, number: int, times: Array, states: list[State]) -> Array:
     """(k, i, 6) what the joints do to the interfaces of a link."""
     mechanism = run.formulation.mechanism
     link = mechanism.links[number]
@@ -100,19 +100,19 @@ def _joint_loads(run: Run, number: int, times: Array, states: list[State]) -> Ar
     return result
 
 
-def _end(run: Run, state: State, end: LoopEnd) -> Array:
+def _end(run: ChainRun, state: State, end: LoopEnd) -> Array:
     """(3,) world position of the frame of a closing joint, which sits on its node."""
     return end.frame[:3, 3] if end.link is None else _place(run, state, end.link, end.node)
 
 
-def _place(run: Run, state: State, number: int, node: int) -> Array:
+def _place(run: ChainRun, state: State, number: int, node: int) -> Array:
     """(3,) world position of a node."""
     model, frame = run.formulation.mechanism.links[number].model, state.poses[number]
     local = model.nodes[node] + model.translation_shapes[node] @ state.modal[number]
     return np.asarray(frame[:3, :3] @ local + frame[:3, 3])
 
 
-def _carried(run: Run, number: int) -> list[_Carried]:
+def _carried(run: ChainRun, number: int) -> list[_Carried]:
     """Payloads on interface nodes of a link, and the motor of the joint after it."""
     link = run.formulation.mechanism.links[number]
     nodes = [i.node for i in link.model.interface_nodes]
@@ -129,7 +129,7 @@ def _omega(three: tuple[State, State, State], number: int, step: float) -> Array
 
 
 def _weight_and_inertia(
-    run: Run, number: int, body: _Carried, three: tuple[State, State, State], omega: Array, step: float
+    run: ChainRun, number: int, body: _Carried, three: tuple[State, State, State], omega: Array, step: float
 ) -> Array:
     """(6,) what a carried body does to its interface node: its weight minus its rate of momentum, mesh axes."""
     model = run.formulation.mechanism.links[number].model

@@ -19,15 +19,15 @@ from erls.errors import Cause, SceneError
 from erls.files.output import replacing
 from erls.maths.so3 import Array
 from erls.mechanism.links import Link
+from erls.run.chain.run import ChainRun
 from erls.run.link_loads import link_loads
-from erls.run.record import Run
 from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
 from fe_import.modal.recovery_maps import UNITS, RecoveryMaps, spin_products
 from fe_import.recovery.recover import mode_acceleration, mode_displacement, required_maps
 
 
-def recovery_places(run: Run, link: str) -> RecoveryMaps:
+def recovery_places(run: ChainRun, link: str) -> RecoveryMaps:
     """Where stress or section forces of a link are known: nodes, elements, axes.
 
     Raises
@@ -40,12 +40,12 @@ def recovery_places(run: Run, link: str) -> RecoveryMaps:
     return required_maps(_link(run, link)[1].model, f"link {link!r}")
 
 
-def stress(run: Run, link: str, t: ArrayLike, *, static_correction: bool = True) -> Array:
+def stress(run: ChainRun, link: str, t: ArrayLike, *, static_correction: bool = True) -> Array:
     """Nodal stress of a solid link.
 
     Parameters
     ----------
-    run : Run
+    run : ChainRun
     link : str
     t : float or array
         Times within the run [s].
@@ -67,7 +67,7 @@ def stress(run: Run, link: str, t: ArrayLike, *, static_correction: bool = True)
     return _recovered(run, link, t, "stress", static_correction)
 
 
-def section_forces(run: Run, link: str, t: ArrayLike, *, static_correction: bool = True) -> Array:
+def section_forces(run: ChainRun, link: str, t: ArrayLike, *, static_correction: bool = True) -> Array:
     """Section forces of a frame link.
 
     Parameters and errors are those of `stress`.
@@ -91,7 +91,9 @@ table [recovery] to its link description and reduce it again
     return _recovered(run, link, t, "section forces", static_correction)
 
 
-def export_recovery(run: Run, link: str, path: Path | str, t: ArrayLike, *, static_correction: bool = True) -> None:
+def export_recovery(
+    run: ChainRun, link: str, path: Path | str, t: ArrayLike, *, static_correction: bool = True
+) -> None:
     """Write a CSV table: time, node, element (counted from 0; empty for nodal stress), position, six components.
 
     Parameters and errors are those of `stress`; NOT_WRITABLE.
@@ -109,7 +111,7 @@ def export_recovery(run: Run, link: str, path: Path | str, t: ArrayLike, *, stat
                 rows.writerow([time, node, "" if element < 0 else element, *where, *row.tolist()])
 
 
-def _recovered(run: Run, link: str, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
+def _recovered(run: ChainRun, link: str, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
     """(..., p, 6) components at the places of the link's recovery maps."""
     maps = recovery_places(run, link)
     if _link(run, link)[1].pieces:
@@ -135,7 +137,7 @@ def _recovered(run: Run, link: str, t: ArrayLike, quantity: str, static_correcti
     return np.asarray((values + warm).reshape(*times.shape, len(maps.nodes), 6))
 
 
-def _of_pieces(run: Run, link: Link, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
+def _of_pieces(run: ChainRun, link: Link, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
     """(..., p, 6) components at the places of a split link."""
     solved_for = replace(run, formulation=solved(run.formulation))
     parts = [_recovered(solved_for, piece.name, t, quantity, static_correction) for piece in link.pieces]
@@ -168,7 +170,7 @@ def _direction(model: ModalModel, node: int, element: int) -> Array:
     return np.asarray(along / np.linalg.norm(along))
 
 
-def _link(run: Run, name: str) -> tuple[int, Link]:
+def _link(run: ChainRun, name: str) -> tuple[int, Link]:
     choose(name, run.link_names, "link", SceneError)
     number = run.link_names.index(name)
     return number, run.formulation.mechanism.links[number]

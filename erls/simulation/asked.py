@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from erls.run.record import Run
-from erls.run.watches.base import Watch
+from erls.run.chain.run import ChainRun
 from erls.run.watches.progress import Checkpoint, Progress
 
 
@@ -19,11 +18,11 @@ class Asked:
     tell: Callable[[str], None]
     checkpoint: Path | None
     strict: bool
-    like: Run | None
+    like: ChainRun | None
 
-    def watches(self) -> list[Watch]:
+    def watches(self) -> list[Progress | Checkpoint]:
         """What looks at each run on the caller's behalf."""
-        found: list[Watch] = [] if self.progress is None else [Progress(self.progress)]
+        found: list[Progress | Checkpoint] = [] if self.progress is None else [Progress(self.progress)]
         if self.checkpoint is not None:
             found.append(Checkpoint(self.checkpoint))
         return found

@@ -14,7 +14,7 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.parallel.crew import Crew, reported
 from erls.parallel.worker_process import stopped
 from erls.parallel.workers import IDLE, possible
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.simulation.packed_run import PackedRun, packed
 from erls.simulation.variants import Variants
 from fe_import.errors import ReportedError
@@ -29,7 +29,7 @@ def simulate_many(
     *,
     progress: Callable[[float, float], None] = lambda done, total: None,
     workers: int | None = None,
-) -> list[Run | ReportedError]:
+) -> list[ChainRun | ReportedError]:
     """Simulate variants of a scene, on several cores where that pays.
 
     This process takes one variant after the other. When by the time that they took more than a second of work is left,
@@ -50,7 +50,7 @@ def simulate_many(
 
     Returns
     -------
-    list of Run or ReportedError
+    list of ChainRun or ReportedError
         In the order of the variants. What failed is its error; after an interrupt, what had not finished is an error
         with cause INTERRUPTED, which holds what was computed of it, if anything.
 
@@ -98,12 +98,12 @@ class _Batch:
         name = uuid.uuid4().hex
         tasks = [_Task(name, scene, overrides) for overrides in variants]
         self.crew = Crew(_run, tasks, prepare=_prepare, preparation=tasks[0] if tasks else None)
-        self.found: dict[int, Run | ReportedError] = {}
+        self.found: dict[int, ChainRun | ReportedError] = {}
         self.stopping = False
         self.spent, self.made = 0.0, 0  # by this process: seconds, and runs
         self.begun: float | None = None  # the one that it is at
 
-    def results(self) -> list[Run | ReportedError]:
+    def results(self) -> list[ChainRun | ReportedError]:
         """In the order of the variants."""
         try:
             self._work()
@@ -169,7 +169,7 @@ class _Batch:
             if not self.stopping:
                 self.progress(len(self.found), len(self.variants))
 
-    def _received(self, problem: ReportedError | None, run: PackedRun | None) -> Run | ReportedError:
+    def _received(self, problem: ReportedError | None, run: PackedRun | None) -> ChainRun | ReportedError:
         made = None if run is None else self.here.unpacked(run)
         if isinstance(problem, SimulationError) and made is not None:
             problem.run = made
@@ -206,7 +206,7 @@ def _run(task: _Task) -> tuple[ReportedError | None, PackedRun | None]:
             raise _interrupted()
 
     found = _variants(task).run(task.overrides, look)
-    if isinstance(found, Run):
+    if isinstance(found, ChainRun):
         return None, packed(found)
     run = getattr(found, "run", None)
     return found, None if run is None else packed(run)

@@ -11,8 +11,8 @@ from erls.integrate.base import Solution
 from erls.integrate.choice import compile_kernels, integrator, options_of
 from erls.maths.jit import announcing
 from erls.mechanism.chain import Mechanism
+from erls.run.chain.run import ChainRun
 from erls.run.file import self_contained
-from erls.run.record import Run
 from erls.run.watches.base import Begun, Plan
 from erls.run.watches.watching import Warnings, Watching
 from erls.scene.build import build_mechanism
@@ -23,7 +23,7 @@ from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
 
 
-def run_chain(scene: Scene, asked: Asked) -> Run:
+def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     """Build the mechanism of a scene and run it, with all effects that it names or those that ``auto`` chooses."""
     settings = scene.record.simulation
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
@@ -40,14 +40,14 @@ def run_chain(scene: Scene, asked: Asked) -> Run:
     return run(scene, built.mechanism)
 
 
-def models_of(run: Run) -> tuple[list[ModalModel], list[LinkDescription | None], list[list[ModalModel]]]:
+def models_of(run: ChainRun) -> tuple[list[ModalModel], list[LinkDescription | None], list[list[ModalModel]]]:
     """Modal models of the links of a run, descriptions, and modal models of their pieces, for `build_mechanism`."""
     links = run.formulation.mechanism.links
     pieces = [[piece.model for piece in link.pieces] for link in links]
     return [link.model for link in links], [link.description for link in links], pieces
 
 
-def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -> Run:
+def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -> ChainRun:
     """Run a mechanism as the scene says."""
     settings, plan, told = scene.record.simulation, Plan(scene, mechanism), warnings.beside()
     watching = Watching(plan, told, asked.watches())
@@ -58,10 +58,10 @@ def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -
     y, v = formulation.initial_state()
     begun = time.perf_counter()
 
-    def run_of(solution: Solution) -> Run:
-        return Run(scene, formulation, solution, time.perf_counter() - begun, tuple(told.texts))
+    def run_of(solution: Solution) -> ChainRun:
+        return ChainRun(scene, formulation, solution, time.perf_counter() - begun, tuple(told.texts))
 
-    watching.begins(Begun(plan, formulation, run_of))
+    watching.begins(Begun(settings.duration, run_of, plan, formulation))
     integrate = integrator(mechanism, settings)
     times, options = (0.0, settings.duration), options_of(settings)
     solution = integrate(formulation, times, y, v, options, watching.observe)

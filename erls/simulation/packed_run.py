@@ -10,7 +10,7 @@ from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
 from erls.integrate.base import Solution
 from erls.mechanism.effects import Certificate
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.simulation.chains import models_of
@@ -18,7 +18,7 @@ from erls.simulation.chains import models_of
 
 @dataclass(frozen=True)
 class PackedRun:
-    """What a `Run` is without its formulation.
+    """What a `ChainRun` is without its formulation.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class PackedRun:
     certificate: Certificate | None
 
 
-def packed(run: Run) -> PackedRun:
+def packed(run: ChainRun) -> PackedRun:
     """A run to be sent."""
     s = run.solution
     if isinstance(run.formulation, QuasiStatic):
@@ -43,13 +43,13 @@ def packed(run: Run) -> PackedRun:
     return PackedRun(run.scene, s, run.wall_s, run.warnings, run.certificate)
 
 
-def unpacked(run: PackedRun, like: Run | None) -> Run:
+def unpacked(run: PackedRun, like: ChainRun | None) -> ChainRun:
     """A run that was sent.
 
     Parameters
     ----------
     run : PackedRun
-    like : Run, optional
+    like : ChainRun, optional
         One with the same links, whose modal models serve again.
     """
     if like is not None and run.scene.record.simulation.bandwidth is None:
@@ -58,20 +58,20 @@ def unpacked(run: PackedRun, like: Run | None) -> Run:
     if isinstance(formulation, QuasiStatic):
         y, v, a = (formulation.restored(values) for values in (s.y, s.v, s.a))
         s = replace(s, y=y, v=v, a=a)
-    return Run(run.scene, formulation, s, run.wall_s, run.warnings, run.certificate)
+    return ChainRun(run.scene, formulation, s, run.wall_s, run.warnings, run.certificate)
 
 
-def formulated(scene: Scene, like: Run | None) -> Formulation:
+def formulated(scene: Scene, like: ChainRun | None) -> Formulation:
     """The equations of motion of a scene; modal models of a run with the same links serve again."""
     built = build_mechanism(scene) if like is None else build_mechanism(scene, lambda text: None, *models_of(like))
     return formulate(built.mechanism, scene.record.simulation)
 
 
-class LaterRun(Run):
-    """A `Run` whose formulation is put together when it is first asked for: many are never asked."""
+class LaterRun(ChainRun):
+    """A `ChainRun` whose formulation is put together when it is first asked for: many are never asked."""
 
     @classmethod
-    def of(cls, run: PackedRun, like: Run) -> LaterRun:
+    def of(cls, run: PackedRun, like: ChainRun) -> LaterRun:
         """The run, with the modal models of one with the same links."""
         result = cls.__new__(cls)
         vars(result).update(vars(run), _like=like)

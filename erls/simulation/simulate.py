@@ -4,50 +4,81 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, overload
 
+from erls.run.chain.run import ChainRun
 from erls.run.record import Run
+from erls.scene.bodies.schema import BodyScene
 from erls.scene.build import Message
 from erls.scene.chain import Scene
-from erls.scene.read import load_chain
+from erls.scene.read import AnyScene, load_scene
+from erls.scene.records import SceneFile
 from erls.simulation.asked import Asked
+from erls.simulation.bodies import run_bodies
 from erls.simulation.chains import run_chain
 
 Progress = Callable[[float, float], None]  # (time, duration)
 
-RUNS: dict[type[Scene], Callable[[Scene, Asked], Run]] = {Scene: run_chain}
+RUNS: dict[type[SceneFile], Callable[[Any, Asked], Run]] = {Scene: run_chain, BodyScene: run_bodies}
 """What runs a kind of scene: one line each."""
 
 
+@overload
 def simulate(
-    scene: Scene | Path | str,
+    scene: Scene,
+    *,
+    progress: Progress | None = ...,
+    tell: Message = ...,
+    checkpoint: Path | None = ...,
+    strict: bool = ...,
+    like: ChainRun | None = ...,
+) -> ChainRun: ...
+
+
+@overload
+def simulate(
+    scene: AnyScene | Path | str,
+    *,
+    progress: Progress | None = ...,
+    tell: Message = ...,
+    checkpoint: Path | None = ...,
+    strict: bool = ...,
+    like: ChainRun | None = ...,
+) -> Run: ...
+
+
+def simulate(
+    scene: AnyScene | Path | str,
     *,
     progress: Progress | None = None,
     tell: Message = lambda text: None,
     checkpoint: Path | None = None,
     strict: bool = False,
-    like: Run | None = None,
+    like: ChainRun | None = None,
 ) -> Run:
     """Simulate a scene.
 
     Parameters
     ----------
-    scene : Scene, Path or str
+    scene : Scene, BodyScene, Path or str
     progress : callable, optional
         Called with (time, duration) after each step.
     tell : callable, optional
         Told about each preparation that takes time, and every warning as soon as it is known.
     checkpoint : Path, optional
-        Run file to which a long run saves what it has, every 20 s of work.
+        Run file to which a long motion saves what it has, every 20 s of work.
     strict : bool
         With ``effects = "auto"``: whether to repeat the run where what was left out passes the tolerance, and to fail
         where its own estimate still does.
-    like : Run, optional
+    like : ChainRun, optional
         A run of a scene with the same links, whose modal models serve again instead of being read. Where links are
         split, it is of the nodal formulation if the scene is.
 
     Returns
     -------
     Run
+        Of a chain `erls.run.chain.run.ChainRun`; of bodies and beams `erls.run.bodies.motion.BodyMotion`, or
+        `erls.run.bodies.rest.BodyRest` where equilibria, buckling loads or frequencies are asked for.
 
     Raises
     ------
@@ -64,7 +95,8 @@ def simulate(
     >>> run = erls.simulate(scene)
     >>> bool(run.position("tip", 0.01)[2] < 0)
     True
+    >>> bool(abs(erls.simulate("data/statics/roll_up.toml").position("tip", 1.0)).max() < 1e-10)  # back at the root
+    True
     """
-    if not isinstance(scene, Scene):
-        scene = load_chain(scene)
-    return RUNS[type(scene)](scene, Asked(progress, tell, checkpoint, strict, like))
+    loaded = load_scene(scene) if isinstance(scene, (Path, str)) else scene
+    return RUNS[type(loaded)](loaded, Asked(progress, tell, checkpoint, strict, like))

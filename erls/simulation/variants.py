@@ -9,7 +9,7 @@ import msgspec
 
 from erls.equations.registry import formulate
 from erls.integrate.choice import compile_kernels
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.read import load_chain
@@ -30,9 +30,9 @@ class Variants:
 
     def __init__(self, scene: Path | str) -> None:
         self.scene = scene
-        self._runs: dict[tuple[bytes, bool], Run] = {}
+        self._runs: dict[tuple[bytes, bool], ChainRun] = {}
 
-    def run(self, overrides: Sequence[str], progress: Progress) -> Run | ReportedError:
+    def run(self, overrides: Sequence[str], progress: Progress) -> ChainRun | ReportedError:
         """The run of a variant, or its failure.
 
         Parameters
@@ -56,13 +56,13 @@ class Variants:
         formulation = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
         compile_kernels(formulation, scene.record.simulation)
 
-    def unpacked(self, sent: PackedRun) -> Run:
+    def unpacked(self, sent: PackedRun) -> ChainRun:
         """A run that was computed by another process."""
         run = unpacked(sent, self._runs.get(_links(sent.scene)))
         self._know(run)
         return run
 
-    def _know(self, run: Run) -> None:
+    def _know(self, run: ChainRun) -> None:
         """Have later runs with the same links share those of this one."""
         self._runs.setdefault(_links(run.scene), run)
         if len(self._runs) > _MOST_KEPT:

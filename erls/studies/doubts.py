@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from erls.equations.quasi_static.formulation import QuasiStatic
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.run.watches.deflection_range import NOTABLE, deflection_errors
 from erls.run.watches.spin_stability import UNSTABLE
 from erls.run.watches.static_following import static_error
 
 
-def foretold_error(run: Run, linear: bool) -> float:
+def foretold_error(run: ChainRun, linear: bool) -> float:
     """Largest error [m] that a run warns of; infinite when a link loses stability, 0 when nothing is known.
 
     Parameters
     ----------
-    run : Run
+    run : ChainRun
     linear : bool
         Whether its judge shares what links lose by being linear in their own frames: estimates of that count then even
         where they are too small for a warning.

@@ -11,7 +11,8 @@ import numpy as np
 from erls.equations.formulation import State
 from erls.integrate.base import hermite
 from erls.maths.so3 import Array
-from erls.run.record import Run, node_positions
+from erls.run.chain.places import node_positions
+from erls.run.chain.run import ChainRun
 
 _NUDGE = 1e-4  # s; the second difference along a parabola of time has errors of its square and of rounding, both 1e-8
 
@@ -65,12 +66,12 @@ class Outputs:
     summary: dict[str, Any]
 
 
-def run_outputs(run: Run, times: Sequence[float] | Array) -> Outputs:
+def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
     """Sample a run.
 
     Parameters
     ----------
-    run : Run
+    run : ChainRun
     times : (k,) array
         Within the run [s].
     """
@@ -114,18 +115,18 @@ def run_outputs(run: Run, times: Sequence[float] | Array) -> Outputs:
     )
 
 
-def _points(run: Run, state: State) -> Array:
+def _points(run: ChainRun, state: State) -> Array:
     """(p, 3) places of all named points."""
     count = len(run.point_names)
     return np.array([run.point_position(state, k) for k in range(count)]).reshape(count, 3)
 
 
-def _deflection(run: Run, state: State) -> float:
+def _deflection(run: ChainRun, state: State) -> float:
     """Largest distance of a node from its link's rigid shape, which follows the inboard interface."""
     largest = 0.0
     for k, link in enumerate(run.formulation.mechanism.links):
         nodes = link.model.nodes
-        moved = node_positions(run, state, k)
+        moved = node_positions(run.formulation.mechanism, state, k)
         frame = state.poses[k]
         inboard = link.inboard.node
         turn = frame[:3, :3]

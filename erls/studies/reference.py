@@ -19,7 +19,7 @@ import numpy as np
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.effects import DEFAULT, in_order, named_effects
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.chain import Scene
 from erls.studies.effect_sets import STIFFENING, label_of
 from erls.studies.refinement import Level, TooShort, refine
@@ -187,6 +187,6 @@ def _with(scene: Scene, **fields: Any) -> Scene:
     return replace(scene, record=msgspec.structs.replace(scene.record, simulation=settings))
 
 
-def sampled(run: Run, points: Sequence[str], times: Array) -> Array:
+def sampled(run: ChainRun, points: Sequence[str], times: Array) -> Array:
     """Positions (k, points, 3) [m] of named points at k times [s]."""
     return np.stack([run.position(name, times) for name in points], axis=1)

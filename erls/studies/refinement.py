@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from erls.maths.so3 import Array
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.chain import Scene
 from erls.simulation.simulate import simulate
 from fe_import.errors import ReportedError
@@ -81,7 +81,7 @@ class _Watch:
 
 def refine(
     levels: Sequence[Level],
-    sample: Callable[[Run], Array],
+    sample: Callable[[ChainRun], Array],
     error: Callable[[Sequence[Array]], float],
     wanted: tuple[float, float],
     time_s: tuple[float, float],

@@ -15,6 +15,7 @@ from erls.run.record import Run
 from erls.view.camera import Size
 from erls.view.checks import Progress, bad, check, drawing, no_picture, surveyed
 from erls.view.export import export_csv, export_paraview
+from erls.view.figures import figure_of
 from erls.view.film import FILMS, film
 from erls.view.stage import Stage
 from erls.view.text import caption, displacement, point_labels, time_labels, written
@@ -46,7 +47,7 @@ def picture(
     times : sequence of float, optional
         [s]; six even ones unless given. The last is drawn solid, the others as ghosts, fainter the earlier.
     magnification : float
-        Of the displacement against the Equivalent Rigid Link System; 1 is true.
+        Of the displacement against the Equivalent Rigid Link System, at rest against where all is built; 1 is true.
     size : (width, height)
         [pixel]
 
@@ -64,16 +65,15 @@ def picture(
 
 
 def _picture(run: Run, times: Sequence[float] | None, magnification: float, size: Size) -> Image:
-    if times is None or not len(times):
-        times = np.linspace(float(run.solution.t[0]), run.end, _INSTANTS if run.end > run.solution.t[0] else 1).tolist()
-    states = run.states(list(times))
-    motion = surveyed(run, magnification, states)
-    *earlier, last = states
-    with drawing(), Stage(run, motion, magnification, size, finer=2) as stage:
+    figure = figure_of(run, magnification)
+    poses = figure.poses(run.spread(_INSTANTS) if times is None or not len(times) else times)
+    motion = surveyed(figure, magnification, poses)
+    *earlier, last = poses
+    with drawing(), Stage(figure, motion, magnification, size, finer=2) as stage:
         empty = stage.image()
         blended = empty.astype(np.float32)
-        for k, state in enumerate(earlier):
-            stage.pose(state, ghost=True)
+        for k, pose in enumerate(earlier):
+            stage.pose(pose, ghost=True)
             ghost = stage.image()
             weight = 0.15 + 0.4 * (k + 1) / len(earlier)
             covers = (ghost != empty).any(axis=2, keepdims=True)
@@ -81,10 +81,10 @@ def _picture(run: Run, times: Sequence[float] | None, magnification: float, size
         stage.pose(last)
         solid = stage.image()
         blended = np.where((solid != empty).any(axis=2, keepdims=True), solid, blended)  # over every ghost
-        sheet = written(stage, np.rint(blended).astype(np.uint8), caption(run, states, magnification))
+        sheet = written(stage, np.rint(blended).astype(np.uint8), caption(run, poses, magnification))
         labels = point_labels(stage, last)
-        if len(states) > 1:
-            labels += time_labels(stage, states)
+        if len(poses) > 1:
+            labels += time_labels(stage, poses)
         sheet.place(labels)
     return sheet.image
 
@@ -100,8 +100,9 @@ def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800)) -> None
     check(magnification, size)
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         raise no_picture("there is no display for a window")
-    motion = surveyed(run, magnification, None)
-    with drawing(), Window(run, motion, magnification, size) as window:
+    figure = figure_of(run, magnification)
+    motion = surveyed(figure, magnification, None)
+    with drawing(), Window(figure, motion, magnification, size) as window:
         if window.hidden:
             raise no_picture("the display cannot be opened")
         window.interact(f"{run.scene.name}  ·  {displacement(magnification)}")

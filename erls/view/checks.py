@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from erls.equations.formulation import State
 from erls.errors import Cause, SceneError, SimulationError
-from erls.run.record import Run
 from erls.view.camera import Size
+from erls.view.figure import Figure, Pose
 from erls.view.stage import Motion
 
 Progress = Callable[[int, int], None]  # (done, total)
@@ -33,10 +32,10 @@ def check(magnification: float, size: Size, path: Path | str = "", endings: Sequ
         raise bad("size", "not a usable size", size, "100 to 8000 pixels each", "give width and height")
 
 
-def surveyed(run: Run, magnification: float, states: Sequence[State] | None) -> Motion:
-    """The survey of a run, for some states or for all of it; refused where magnification makes it infinite."""
+def surveyed(figure: Figure, magnification: float, poses: Sequence[Pose] | None) -> Motion:
+    """The survey of a run, for some poses or for all of it; refused where magnification makes it infinite."""
     with np.errstate(over="ignore", invalid="ignore"):
-        motion = Motion.of(run, magnification, states)
+        motion = Motion.of(figure, magnification, poses)
     if motion is None:
         raise bad("magnification", "the mechanism would be infinitely large", magnification, None, "lower it")
     return motion

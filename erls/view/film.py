@@ -16,6 +16,7 @@ from erls.maths.so3 import Array
 from erls.run.record import Run
 from erls.view.camera import Size
 from erls.view.checks import Progress, bad, check, drawing, surveyed
+from erls.view.figures import figure_of
 from erls.view.stage import Stage
 from erls.view.text import caption, point_labels, written
 
@@ -70,15 +71,16 @@ def film(
     times = _frame_times(run, fps, speed, 50 if Path(path).suffix.lower() == ".gif" else 240)
     size = (size[0] - size[0] % 2, size[1] - size[1] % 2)
     with replacing(path) as temporary:
-        motion = surveyed(run, magnification, None)
-        with drawing(), Stage(run, motion, magnification, size) as stage, FilmWriter(temporary, size, fps) as writer:
+        figure = figure_of(run, magnification)
+        motion = surveyed(figure, magnification, None)
+        with drawing(), Stage(figure, motion, magnification, size) as stage, FilmWriter(temporary, size, fps) as writer:
             sides: dict[str, int] = {}
             for k, time in enumerate(times.tolist()):
-                (state,) = run.states([time])
-                stage.pose(state)
+                (pose,) = figure.poses(run.nearest([time]))
+                stage.pose(pose)
                 stage.paths(time)
-                sheet = written(stage, stage.image(), caption(run, [state], magnification, speed))
-                sides = sheet.place(point_labels(stage, state), sides)
+                sheet = written(stage, stage.image(), caption(run, [pose], magnification, speed))
+                sides = sheet.place(point_labels(stage, pose), sides)
                 writer.add(sheet.image)
                 if progress is not None:
                     progress(k + 1, len(times))
@@ -88,13 +90,12 @@ def _frame_times(run: Run, fps: int, speed: float, most: int) -> Array:
     """(n,) times of the frames, first and last of the run included."""
     if not 1 <= fps <= most:
         raise bad("fps", "not a usable frame rate", fps, f"1 to {most}", "give for example 30")
-    start = float(run.solution.t[0])
     if not (np.isfinite(speed) and speed > 0):
         raise bad("speed", "speed must be positive", speed, None, "1 is real time, 0.5 slow motion")
-    frames = (run.end - start) * fps / speed
+    frames = (run.end - run.start) * fps / speed
     if not frames <= _MOST_FRAMES:
         raise bad("speed", "the film would be too long", speed, f"{_MOST_FRAMES} frames", "raise speed, lower fps")
-    return np.linspace(start, run.end, round(frames) + 1)
+    return np.linspace(run.start, run.end, round(frames) + 1)
 
 
 class FilmWriter:

@@ -1,4 +1,4 @@
-"""Shapes of a picture: the deformed links, joints and ground as surfaces. Geometry only, no window."""
+"""Shapes of a picture: parts, joints and ground as surfaces. Geometry only, no window."""
 
 from __future__ import annotations
 
@@ -7,13 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from erls.equations.formulation import State
-from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
-from erls.mechanism.links import Link
-from erls.run.record import Run, node_positions
 from fe_import.model import IntArray
 
 _SMOOTH = math.cos(math.radians(20.0))  # a frame that turns more at a node has a corner there
@@ -25,45 +20,14 @@ _SIDES = 24
 class JointPlace:
     """A joint in the world: its displaced frames on the inner and on the outer side, and the nodes they ride on.
 
-    ``inner`` and ``outer`` are (4, 4) poses; ``inner_node`` is None on the ground.
+    ``type`` is that of the joint; ``inner`` and ``outer`` are (4, 4) poses; ``inner_node`` is None on the ground.
     """
 
-    revolute: bool
+    type: str
     inner: Array
     outer: Array
     inner_node: Array | None
     outer_node: Array
-
-
-def deflection(run: Run, state: State, link: int) -> Array:
-    """(n, 3) displacement of a link's nodes against the equivalent rigid link, world axes [m]."""
-    model, turn = run.formulation.mechanism.links[link].model, state.poses[link][:3, :3]
-    return np.asarray((model.translation_shapes @ state.modal[link]) @ turn.T)
-
-
-def joint_places(run: Run, state: State, magnification: float) -> list[JointPlace]:
-    """Every joint in its displaced place."""
-    mechanism = run.formulation.mechanism
-    result = []
-    for k, joint in enumerate(mechanism.joints):
-        inner, inner_node = joint.before, None
-        if k:
-            before, interface = mechanism.links[k - 1], mechanism.links[k - 1].outboard
-            if interface is not None:
-                inner = _displaced(before, interface, joint.before, state, k - 1, magnification)
-                inner_node = node_positions(run, state, k - 1, [interface.node], magnification)[0]
-        after = mechanism.links[k]
-        outer = _displaced(after, after.inboard, inverse(joint.after), state, k, magnification)
-        outer_node = node_positions(run, state, k, [after.inboard.node], magnification)[0]
-        result.append(JointPlace(joint.type.revolute, inner, outer, inner_node, outer_node))
-    return result
-
-
-def _displaced(link: Link, interface: Any, frame: Array, state: State, number: int, factor: float) -> Array:
-    """(4, 4) world pose of a frame that rides on an interface of a deformed link."""
-    u = factor * (link.interface_shape(interface, frame) @ state.modal[number])
-    step = pose(Rotation.from_rotvec(u[3:]).as_matrix(), u[:3])
-    return np.asarray(state.poses[number] @ frame @ step)
 
 
 def chains(nodes: Array, lines: IntArray) -> list[list[int]]:
@@ -102,13 +66,19 @@ def chains(nodes: Array, lines: IntArray) -> list[list[int]]:
     return result
 
 
-def link_surface(link: Link, positions: Array, values: Array, radius: float) -> Any:
-    """A deformed link: its surface triangles, and its line elements as tubes with round ends.
+def part_surface(
+    positions: Array, triangles: Any, runs: list[list[int]], root: int, values: Array, radius: float
+) -> Any:
+    """A deformed part: its surface triangles, and its lines as tubes with round ends.
 
     Parameters
     ----------
-    link : Link
     positions : (n, 3) array
+    triangles : (t, 3) int array
+    runs : list of lists of int
+        Smooth chains of nodes.
+    root : int
+        The node of a part without either.
     values : (n,) array
         Carried along as the point data "value".
     radius : float
@@ -122,24 +92,23 @@ def link_surface(link: Link, positions: Array, values: Array, radius: float) -> 
     import pyvista as pv
 
     parts = []
-    if len(link.model.triangles):
-        solid = pv.PolyData.from_regular_faces(positions, link.model.triangles)
+    if len(triangles):
+        solid = pv.PolyData.from_regular_faces(positions, triangles)
         solid["value"] = values
         parts.append(with_normals(solid))
-    runs = chains(link.model.nodes, link.model.lines)
     if runs:
         wire = polylines(positions, runs)
         wire["value"] = values
         parts.append(wire.tube(radius=radius, n_sides=_SIDES, capping=True))
     ends = sorted({n for c in runs for n in (c[0], c[-1])})
     if not parts:  # a rigid link with a single point
-        ends = [link.inboard.node]
+        ends = [root]
     if ends:
         dots = pv.PolyData(positions[ends])
         dots["value"] = values[ends]
         ball = pv.Sphere(radius=radius if runs else 2 * radius, theta_resolution=_SIDES, phi_resolution=_SIDES)
         parts.append(dots.glyph(geom=ball, scale=False, orient=False))
-    return _joined(parts)
+    return joined(parts)
 
 
 def polylines(points: Array, runs: list[list[int]]) -> Any:
@@ -150,24 +119,71 @@ def polylines(points: Array, runs: list[list[int]]) -> Any:
 
 
 def joints_surface(places: list[JointPlace], unit: float) -> Any:
-    """Revolute joints as cylinders along their axis, prismatic ones as boxes on a rail, rigid arms as rods."""
-    import pyvista as pv
-
+    """Joints as what their types look like, rigid arms as rods."""
     parts = []
     for place in places:
-        if place.revolute:
-            body = pv.Cylinder(direction=(0, 0, 1), radius=2.2 * unit, height=5 * unit, resolution=48)
-            pin = pv.Cylinder(direction=(0, 0, 1), radius=0.6 * unit, height=8 * unit, resolution=24)
-            parts += [s.transform(place.inner, inplace=False) for s in (body, pin)]
-        else:
-            half = 2.5 * unit
-            box = pv.Box(bounds=(-half, half, -half, half, -1.6 * half, 1.6 * half))
-            parts.append(box.transform(place.outer, inplace=False))
-            parts += _rod(place.inner[:3, 3], place.outer[:3, 3], 0.8 * unit)
+        parts += _JOINTS.get(place.type, _ball)(place, unit)
         if place.inner_node is not None:
-            parts += _rod(place.inner_node, place.inner[:3, 3], 0.7 * unit)
-        parts += _rod(place.outer_node, place.outer[:3, 3], 0.7 * unit)
-    return _joined([with_normals(p) for p in parts])
+            parts += rod(place.inner_node, place.inner[:3, 3], 0.7 * unit)
+        parts += rod(place.outer_node, place.outer[:3, 3], 0.7 * unit)
+    return joined([with_normals(p) for p in parts])
+
+
+def _pin(unit: float, radius: float, height: float, direction: tuple[int, int, int] = (0, 0, 1)) -> Any:
+    import pyvista as pv
+
+    return pv.Cylinder(direction=direction, radius=radius * unit, height=height * unit, resolution=48)
+
+
+def _box(unit: float, half: float, height: float) -> Any:
+    import pyvista as pv
+
+    a, b = half * unit, height * unit
+    return pv.Box(bounds=(-a, a, -a, a, -b, b))
+
+
+def _revolute(place: JointPlace, unit: float) -> list[Any]:
+    """A cylinder and a pin along the axis."""
+    return [s.transform(place.inner, inplace=False) for s in (_pin(unit, 2.2, 5.0), _pin(unit, 0.6, 8.0))]
+
+
+def _prismatic(place: JointPlace, unit: float) -> list[Any]:
+    """A box on a rail."""
+    rail = rod(place.inner[:3, 3], place.outer[:3, 3], 0.8 * unit)
+    return [_box(unit, 2.5, 4.0).transform(place.outer, inplace=False), *rail]
+
+
+def _cylindrical(place: JointPlace, unit: float) -> list[Any]:
+    """A sleeve on a rail."""
+    rail = rod(place.inner[:3, 3], place.outer[:3, 3], 0.8 * unit)
+    return [s.transform(place.outer, inplace=False) for s in (_pin(unit, 2.2, 7.0), _pin(unit, 0.8, 10.0))] + rail
+
+
+def _universal(place: JointPlace, unit: float) -> list[Any]:
+    """A cross of two pins, x of the inner frame and y of the outer one."""
+    first, second = _pin(unit, 0.9, 6.0, (1, 0, 0)), _pin(unit, 0.9, 6.0, (0, 1, 0))
+    return [first.transform(place.inner, inplace=False), second.transform(place.outer, inplace=False)]
+
+
+def _fixed(place: JointPlace, unit: float) -> list[Any]:
+    """A block."""
+    return [_box(unit, 1.8, 1.8).transform(place.outer, inplace=False)]
+
+
+def _ball(place: JointPlace, unit: float) -> list[Any]:
+    """A ball: a spherical joint, and any other."""
+    import pyvista as pv
+
+    return [pv.Sphere(radius=2.2 * unit, center=place.outer[:3, 3])]
+
+
+_JOINTS = {
+    "revolute": _revolute,
+    "prismatic": _prismatic,
+    "cylindrical": _cylindrical,
+    "universal": _universal,
+    "fixed": _fixed,
+}
 
 
 def with_normals(surface: Any) -> Any:
@@ -175,11 +191,13 @@ def with_normals(surface: Any) -> Any:
     return surface.triangulate().compute_normals(split_vertices=True, feature_angle=SHARP)
 
 
-def _joined(parts: list[Any]) -> Any:
+def joined(parts: list[Any]) -> Any:
+    """Surfaces as one."""
     return parts[0].append_polydata(*parts[1:]) if len(parts) > 1 else parts[0]
 
 
-def _rod(start: Array, end: Array, radius: float) -> list[Any]:
+def rod(start: Array, end: Array, radius: float) -> list[Any]:
+    """A round rod between two places, none between places that meet."""
     import pyvista as pv
 
     if np.linalg.norm(end - start) < radius:
@@ -188,12 +206,12 @@ def _rod(start: Array, end: Array, radius: float) -> list[Any]:
 
 
 def ground_surface(place: Array, towards: Array, unit: float) -> Any:
-    """A hatched plate across the first joint's axis.
+    """A hatched plate across a joint's axis.
 
     Parameters
     ----------
     place : (4, 4) array
-        First joint frame.
+        Joint frame.
     towards : (3,) array
         Direction to the viewer; the plate stands behind the joint.
     unit : float
@@ -211,22 +229,6 @@ def ground_surface(place: Array, towards: Array, unit: float) -> Any:
     for x in np.linspace(-half + slant, half, 5):
         for y in (-half, half):
             start, end = np.array([x, y, side * far]), np.array([x - slant, y, side * (far + slant)])
-            parts += _rod(start, end, 0.28 * unit)
-            parts += _rod(start[[1, 0, 2]], end[[1, 0, 2]], 0.28 * unit)
-    return _joined([with_normals(p) for p in parts]).transform(place, inplace=False)
-
-
-def rigid_outline(run: Run, state: State) -> list[Any]:
-    """The links without displacement, as thin lines: the Equivalent Rigid Link System."""
-    import pyvista as pv
-
-    result = []
-    for k, link in enumerate(run.formulation.mechanism.links):
-        positions = node_positions(run, state, k, magnification=0.0)
-        if len(link.model.triangles):
-            solid = pv.PolyData.from_regular_faces(positions, link.model.triangles)
-            result.append(solid.extract_feature_edges(SHARP))
-        runs = chains(link.model.nodes, link.model.lines)
-        if runs:
-            result.append(polylines(positions, runs))
-    return result
+            parts += rod(start, end, 0.28 * unit)
+            parts += rod(start[[1, 0, 2]], end[[1, 0, 2]], 0.28 * unit)
+    return joined([with_normals(p) for p in parts]).transform(place, inplace=False)

@@ -8,25 +8,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from erls.equations.formulation import State
 from erls.maths.so3 import Array
-from erls.run.record import Run, node_positions
 from erls.view.camera import Box, Camera, Pixels, Size, Walls, text_unit
-from erls.view.shapes import (
-    SHARP,
-    deflection,
-    ground_surface,
-    joint_places,
-    joints_surface,
-    link_surface,
-    polylines,
-    rigid_outline,
-    with_normals,
-)
+from erls.view.figure import Figure, Pose
+from erls.view.shapes import SHARP, polylines, with_normals
 
 COLOURS = "turbo"  # of the deflection; its dark ends are cut
 GHOST = (0.42, 0.50, 0.60)
-LINKS = ("#3d6b99", "#c26a2d", "#4f8a5b", "#8a5a96", "#a04848", "#4a8f95")
+PARTS = ("#3d6b99", "#c26a2d", "#4f8a5b", "#8a5a96", "#a04848", "#4a8f95")
 POINTS = ("#b3123f", "#1d4e89", "#2f7d32", "#7b3fa0", "#a65a00", "#00707a")
 _PATH_SAMPLES = 1001
 _BOX_SAMPLES = 201
@@ -56,28 +45,23 @@ class Motion:
     unit: float
 
     @classmethod
-    def of(cls, run: Run, magnification: float, shown: Sequence[State] | None = None) -> Motion | None:
-        """Survey a run; if ``shown`` states are given, the box is theirs and the deflection that of the last.
+    def of(cls, figure: Figure, magnification: float, shown: Sequence[Pose] | None = None) -> Motion | None:
+        """Survey a run; if ``shown`` poses are given, the box is theirs and the deflection that of the last.
 
         None where the mechanism has no finite size.
         """
-        times = np.linspace(float(run.solution.t[0]), run.end, _PATH_SAMPLES if run.end > run.solution.t[0] else 1)
-        states = run.states(times)
-        mechanism = run.formulation.mechanism
-        paths = [
-            np.array([node_positions(run, s, p.link, [p.node], magnification)[0] for s in states])
-            for p in mechanism.points
-        ]
-        every = max(len(states) // _BOX_SAMPLES, 1)
-        seen = states[::every] if shown is None else shown
-        unit = 0.01 * max(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in mechanism.links)
-        extent, largest = [mechanism.joints[0].before[:3, 3]], 0.0
-        for k in range(len(mechanism.links)):
-            for s in seen:
-                positions = node_positions(run, s, k, magnification=magnification)
+        times = figure.run.spread(_PATH_SAMPLES)
+        poses = figure.poses(times)
+        paths = [np.array(path) for path in zip(*(p.points(magnification) for p in poses), strict=True)]
+        every = max(len(poses) // _BOX_SAMPLES, 1)
+        seen = poses[::every] if shown is None else shown
+        unit = 0.01 * figure.size
+        extent, largest = list(figure.fixed()), 0.0
+        for p in seen:
+            for positions in p.nodes(magnification):
                 extent += [positions.min(axis=0), positions.max(axis=0)]
-                if shown is None or s is shown[-1]:
-                    largest = max(largest, float(np.linalg.norm(deflection(run, s, k), axis=1).max()))
+            if shown is None or p is shown[-1]:
+                largest = max(largest, *(float(moved.max()) for moved in p.deflections()))
         points = np.concatenate([np.array(extent), *paths])
         if not (np.abs(points) < 1e15).all():
             return None
@@ -108,11 +92,11 @@ class Stage:
 
     off_screen: bool | None = True
 
-    def __init__(self, run: Run, motion: Motion, magnification: float, size: Size, finer: int = 1) -> None:
+    def __init__(self, figure: Figure, motion: Motion, magnification: float, size: Size, finer: int = 1) -> None:
         import pyvista as pv
 
-        self.run, self.motion, self.magnification, self.finer = run, motion, magnification, finer
-        self.camera = Camera.fitting(motion.box, run.formulation.mechanism.gravity, size)
+        self.figure, self.motion, self.magnification, self.finer = figure, motion, magnification, finer
+        self.camera = Camera.fitting(motion.box, figure.gravity, size)
         self.walls = Walls(motion.box, self.camera)
         self.line = finer * text_unit(size) / 14.5  # a thin line [pixel]
         window = [finer * size[0], finer * size[1]]
@@ -153,15 +137,14 @@ class Stage:
 
     def _furniture(self) -> None:
         """What does not move: walls, ground, paths."""
-        mechanism, motion = self.run.formulation.mechanism, self.motion
         self._lines(self.walls.lines(), "#dfe3e8", 1.0)
-        ground = ground_surface(mechanism.joints[0].before, self.camera.towards, motion.unit)
-        self._add(ground, color="#a3aab3")
-        self.paths(motion.times[-1])
+        for ground in self.figure.ground(self.camera.towards, self.motion.unit):
+            self._add(ground, color="#a3aab3")
+        self.paths(self.motion.times[-1])
 
     def _directions(self) -> None:
         """Axes triad and gravity arrow in the corner of the picture."""
-        gravity, em = self.run.formulation.mechanism.gravity, text_unit(self.camera.size)
+        gravity, em = self.figure.gravity, text_unit(self.camera.size)
         self.corner = (4.2 * em, self.camera.size[1] - 4.2 * em)
         origin = self.camera.lift(*self.corner)
         for axis, colour in enumerate(("#c62828", "#2e7d32", "#1565c0")):
@@ -196,7 +179,7 @@ class Stage:
         behind = -3 * motion.unit * self.camera.towards  # unseen in a parallel view; pale never covers strong
         for k, path in enumerate(motion.paths):
             for part, strong in ((path[:count], True), (path[max(count - 1, 0) :] + behind, False)):
-                if len(part) > 1:
+                if len(part) > 1 and np.ptp(part, axis=0).max() > 1e-3 * motion.unit:  # what stays has no path
                     colour = POINTS[k % len(POINTS)] if strong else "#c9ced6"
                     # a fine tube: lines of short pieces look ragged
                     width = (1.6 if strong else 1.2) * self.line / self.finer * self.camera.pixel
@@ -204,50 +187,37 @@ class Stage:
                     actors.append(self._add(curve, color=colour, lighting=False))
         self._actors["paths"] = actors
 
-    def pose(self, state: State, ghost: bool = False) -> None:
-        """Put the mechanism in a state, instead of any earlier one; a ghost is drawn in one pale colour."""
+    def pose(self, pose: Pose, ghost: bool = False) -> None:
+        """Draw the mechanism in a pose, instead of any earlier one; a ghost is drawn in one pale colour."""
         self._remove("pose")
-        run, motion = self.run, self.motion
-        actors = []
-        for k, link in enumerate(run.formulation.mechanism.links):
-            positions = node_positions(run, state, k, magnification=self.magnification)
-            values = 1e3 * np.linalg.norm(deflection(run, state, k), axis=1)
-            surface = link_surface(link, positions, values, motion.unit)
+        motion, actors = self.motion, []
+        for k, part in enumerate(pose.parts(self.magnification, motion.unit)):
             if ghost:
-                actors.append(self._add(surface, color=GHOST, scalars=None))
+                actors.append(self._add(part.surface, color=GHOST, scalars=None))
             elif motion.elastic:
                 limits = [0.0, 1e3 * motion.largest]
                 look = {"scalars": "value", "cmap": colour_map(), "clim": limits, "show_scalar_bar": False}
-                actors.append(self._add(surface, **look))
+                actors.append(self._add(part.surface, **look))
             else:
-                actors.append(self._add(surface, color=LINKS[k % len(LINKS)], scalars=None))
-            if len(link.model.triangles) and not ghost:
-                edges = surface.extract_feature_edges(SHARP, boundary_edges=False, non_manifold_edges=False)
+                actors.append(self._add(part.surface, color=PARTS[k % len(PARTS)], scalars=None))
+            if part.sharp and not ghost:
+                edges = part.surface.extract_feature_edges(SHARP, boundary_edges=False, non_manifold_edges=False)
                 if edges.n_points:
                     actors.append(self._add(edges, color="#333333", line_width=0.8 * self.line))
-        places = joint_places(run, state, self.magnification)
-        if ghost and places[0].revolute:
-            places = places[1:]  # the first one does not move
-        if places:
-            actors.append(self._add(joints_surface(places, motion.unit), color=GHOST if ghost else "#596069"))
+        joints = pose.joints(self.magnification, motion.unit, moving=ghost)
+        if joints is not None:
+            actors.append(self._add(joints, color=GHOST if ghost else "#596069"))
         if not ghost:
-            actors += self._dots(state)
+            actors += self._dots(pose)
             if self.magnification != 1.0:
-                outline = rigid_outline(run, state)
-                actors += [self._add(m, color="#777777", line_width=1.0 * self.line) for m in outline]
+                actors += [self._add(m, color="#777777", line_width=1.0 * self.line) for m in pose.outline()]
         self._actors["pose"] = actors
 
-    def _dots(self, state: State) -> list[Any]:
+    def _dots(self, pose: Pose) -> list[Any]:
         import pyvista as pv
 
-        places = self.point_places(state)
-        balls = [pv.Sphere(radius=1.5 * self.motion.unit, center=p) for p in places]
+        balls = [pv.Sphere(radius=1.5 * self.motion.unit, center=p) for p in pose.points(self.magnification)]
         return [self._add(b, color=POINTS[k % len(POINTS)]) for k, b in enumerate(balls)]
-
-    def point_places(self, state: State) -> list[Array]:
-        """(3,) places of the named points."""
-        points = self.run.formulation.mechanism.points
-        return [node_positions(self.run, state, p.link, [p.node], self.magnification)[0] for p in points]
 
     def _remove(self, name: str) -> None:
         for actor in self._actors.pop(name, []):

@@ -16,7 +16,7 @@ class Window(Stage):
     def _directions(self) -> None:
         """Axes triad in the corner; gravity as an arrow at the walls, where it turns with the scene."""
         self.plotter.add_axes()
-        gravity = self.run.formulation.mechanism.gravity
+        gravity = self.figure.gravity
         if gravity.any():
             box = self.motion.box
             length = 0.15 * float((box.high - box.low)[self.camera.vertical])
@@ -36,13 +36,13 @@ class Window(Stage):
     def show_time(self, time: float) -> None:
         """Put the mechanism at a time."""
         start, end = float(self.motion.times[0]), float(self.motion.times[-1])
-        (state,) = self.run.states([min(max(time, start), end)])
-        self.pose(state)
-        self.paths(state.time)
-        for k, (point, place) in enumerate(
-            zip(self.run.formulation.mechanism.points, self.point_places(state), strict=True)
+        (pose,) = self.figure.poses(self.figure.run.nearest([min(max(time, start), end)]))
+        self.pose(pose)
+        self.paths(pose.time)
+        for k, (name, place) in enumerate(
+            zip(self.figure.run.point_names, pose.points(self.magnification), strict=True)
         ):
-            self._texts(np.array([place]), [f"  {point.name}"], POINTS[k % len(POINTS)], name=f"point {k}")
+            self._texts(np.array([place]), [f"  {name}"], POINTS[k % len(POINTS)], name=f"point {k}")
 
     @property
     def hidden(self) -> bool:
@@ -59,9 +59,11 @@ class Window(Stage):
         if self.motion.elastic:
             bar = {"title": "deflection [mm]", "vertical": True, "position_x": 0.9, "position_y": 0.3, "height": 0.4}
             self.plotter.add_scalar_bar(mapper=self._actors["pose"][0].mapper, color="black", n_labels=6, **bar)
+        axis = self.figure.run.axis
+        title = f"{axis.symbol} [{axis.unit}]" if axis.unit else axis.name
         if end > start:
             self.plotter.add_slider_widget(
-                self.show_time, (start, end), value=start, title="t [s]", color="black", fmt="%.3f",
+                self.show_time, (start, end), value=start, title=title, color="black", fmt="%.3f",
                 pointa=(0.2, 0.05), pointb=(0.8, 0.05),
                 slider_width=0.015, tube_width=0.006, title_height=0.018,
             )  # fmt: skip

@@ -16,8 +16,8 @@ from fuzzing_hdf5 import edited
 import erls
 from erls.mechanism.tables import read_csv
 from erls.report.mode_page import Printed, read_printed
+from erls.run.chain.run import ChainRun
 from erls.run.file import load_run
-from erls.run.record import Run
 from erls.scene.build import build_mechanism
 from erls.scene.chain import SceneRecord
 from erls.scene.read import load_scene
@@ -91,7 +91,7 @@ def run_bytes() -> bytes:
         return (folder / "r.h5").read_bytes()
 
 
-def run_facts(run: Run) -> Facts:
+def run_facts(run: ChainRun) -> Facts:
     """Scene, knots, models, and what the run says of itself."""
     links = [link.model for link in run.formulation.mechanism.links]
     solution = run.solution
@@ -116,7 +116,7 @@ def _printed_facts(printed: Printed) -> Facts:
     return frozenset([head, *((modes, *values) for modes, values in printed.rows.items())])
 
 
-def _load(folder: Path) -> Run:
+def _load(folder: Path) -> ChainRun:
     return load_run(folder / "r.h5")
 
 

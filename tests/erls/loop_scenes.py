@@ -12,7 +12,7 @@ from erls.equations.erls.chain import Erls
 from erls.equations.ffr.equations import Ffr
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.maths.so3 import Array
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.simulation.simulate import simulate
 
 LENGTHS, GROUND = (0.15, 0.45, 0.35), 0.5
@@ -87,7 +87,7 @@ def slider_crank(**changes: Any) -> dict[str, Any]:
     return scenes.merged(data, changes)
 
 
-def run(folder: Path, data: dict[str, Any], name: str = "erls", **simulation: Any) -> Run:
+def run(folder: Path, data: dict[str, Any], name: str = "erls", **simulation: Any) -> ChainRun:
     """Simulate in one of `FORMULATIONS`; adaptive integrators choose their steps unless told."""
     settings = {**data["simulation"], **FORMULATIONS[name], **simulation}
     if simulation.get("integrator", "generalized_alpha") != "generalized_alpha" and "step" not in simulation:
@@ -104,7 +104,7 @@ def chain(folder: Path, data: dict[str, Any], name: str = "erls") -> ClosedChain
     return ClosedChain(Erls(mechanism, settings.get("gauge", "joint-angle")))
 
 
-def work(run: Run, *joints: str) -> float:
+def work(run: ChainRun, *joints: str) -> float:
     """∫ effort · rate dt over a run, by Gauss's rule with 24 points."""
     at, weights = np.polynomial.legendre.leggauss(24)
     t = run.end * (at + 1) / 2

@@ -12,7 +12,7 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"
@@ -30,7 +30,7 @@ def test_variants_are_the_runs_one_by_one() -> None:
     ]
     runs = erls.simulate_many(TALL, variants)
     for run, overrides in zip(runs, variants, strict=True):
-        assert isinstance(run, Run)
+        assert isinstance(run, ChainRun)
         alone = erls.simulate(erls.load_scene(TALL, overrides))
         np.testing.assert_array_equal(run.solution.y, alone.solution.y)
         assert run.warnings == alone.warnings
@@ -55,7 +55,7 @@ def test_an_interrupt_keeps_what_was_computed() -> None:
     results = erls.simulate_many(
         ROBOT, [["simulation.duration=0.01"], long, long], progress=lambda done, total: timer.start(), workers=1
     )
-    assert isinstance(results[0], Run)
+    assert isinstance(results[0], ChainRun)
     assert [stopped.cause for stopped in results[1:]] == [Cause.INTERRUPTED] * 2  # type: ignore[union-attr]
     assert results[1].run.end > 0  # type: ignore[union-attr]
     assert results[2].run is None  # type: ignore[union-attr]

@@ -20,7 +20,7 @@ import erls
 from erls.errors import Cause, SceneError, SimulationError
 from erls.parallel.crew import Crew, reported
 from erls.parallel.workers import IDLE
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.simulation.batch import _run, _Task
 from erls.simulation.packed_run import LaterRun, PackedRun, packed
 from erls.simulation.variants import Variants
@@ -58,7 +58,7 @@ def elsewhere(scene: Path, variants: list[list[str]]) -> list[tuple[ReportedErro
     return [found[k] for k in range(len(variants))]
 
 
-def same(run: Run, other: Run) -> None:
+def same(run: ChainRun, other: ChainRun) -> None:
     """To the bit; coordinates of modes that follow statically to rounding."""
     to = 0.0 if run.scene.record.simulation.bandwidth is None else 1e-9
     for name in ("t", "y", "v", "a"):
@@ -99,7 +99,7 @@ def test_runs_of_workers_are_those_of_this_process(scene: str, variants: list[li
         assert problem is None
         assert sent is not None
         run = here.run(overrides, lambda t, duration: None)
-        assert isinstance(run, Run)
+        assert isinstance(run, ChainRun)
         came = here.unpacked(sent)
         same(came, run)
         links = zip(came.formulation.mechanism.links, run.formulation.mechanism.links, strict=True)
@@ -111,11 +111,11 @@ def test_a_run_that_came_serves_like_one_made_here(early: None, tmp_path: Path) 
     variants = [[SHORT, f"joints.0.initial.position_deg={angle}"] for angle in range(4)]
     runs = erls.simulate_many(DATA / "l_shape/steel_tall.toml", variants, workers=2)
     alone = erls.simulate_many(DATA / "l_shape/steel_tall.toml", variants, workers=1)
-    assert [type(run) for run in alone] == [Run] * 4
+    assert [type(run) for run in alone] == [ChainRun] * 4
     came = next(k for k, run in enumerate(runs) if isinstance(run, LaterRun))
     run, other = runs[came], alone[came]
     assert isinstance(run, LaterRun)
-    assert isinstance(other, Run)
+    assert isinstance(other, ChainRun)
     assert "formulation" not in vars(run)
     assert run.end == other.end
     assert "formulation" not in vars(run)
@@ -126,8 +126,8 @@ def test_a_run_that_came_serves_like_one_made_here(early: None, tmp_path: Path) 
     erls.save_run(tmp_path / "a.run.h5", run)
     same(erls.load_run(tmp_path / "a.run.h5"), replace(other, scene=erls.load_run(tmp_path / "a.run.h5").scene))
     for one, two in zip(runs, alone, strict=True):
-        assert isinstance(one, Run)
-        assert isinstance(two, Run)
+        assert isinstance(one, ChainRun)
+        assert isinstance(two, ChainRun)
         same(one, two)
 
 
@@ -140,8 +140,8 @@ def test_failures_come_as_values(early: None) -> None:
         DATA / "l_shape/steel_tall.toml", variants, workers=2, progress=lambda *at: seen.append(at)
     )
     alone = erls.simulate_many(DATA / "l_shape/steel_tall.toml", variants, workers=1)
-    assert [type(r) if isinstance(r, ReportedError) else Run for r in results] == [
-        Run, SceneError, SceneError, SimulationError, Run, SimulationError,
+    assert [type(r) if isinstance(r, ReportedError) else ChainRun for r in results] == [
+        ChainRun, SceneError, SceneError, SimulationError, ChainRun, SimulationError,
     ]  # fmt: skip
     for one, two in zip(results, alone, strict=True):
         if isinstance(one, ReportedError) and isinstance(two, ReportedError):
@@ -168,13 +168,13 @@ def test_an_interrupt_reaches_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Crew, "_exchange", then_interrupt)
     results = erls.simulate_many(DATA / "robot/two_link.toml", [[SHORT], long, long, long], workers=2)
     monkeypatch.undo()
-    assert isinstance(results[0], Run)
+    assert isinstance(results[0], ChainRun)
     assert [r.cause for r in results[1:]] == [Cause.INTERRUPTED] * 3
     ends = [getattr(r.run, "end", 0.0) for r in results[1:]]
     assert min(ends[:2]) > 0
     assert ends[2] == 0
     again = erls.simulate_many(DATA / "robot/two_link.toml", [[SHORT]] * 2, workers=2)
-    assert all(isinstance(r, Run) for r in again)
+    assert all(isinstance(r, ChainRun) for r in again)
 
 
 def test_a_worker_that_dies_loses_one_task() -> None:

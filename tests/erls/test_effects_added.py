@@ -22,7 +22,7 @@ from erls.cli.main import main
 from erls.errors import Cause, SimulationError
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import DEFAULT
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.read import load_scene
@@ -32,7 +32,7 @@ SPIN_UP, FAST, L_SHAPE = (DATA / f for f in ("spin_up/beam.toml", "slider_crank/
 ADDED = "effects: added: geometric_stiffening, foreshortening: "
 
 
-def _auto(path: Path, *changes: str, strict: bool = False) -> tuple[Run, list[str]]:
+def _auto(path: Path, *changes: str, strict: bool = False) -> tuple[ChainRun, list[str]]:
     told: list[str] = []
     return erls.simulate(load_scene(path, ["effects=auto", *changes]), tell=told.append, strict=strict), told
 
@@ -131,7 +131,7 @@ def test_runs_that_fail_change_the_physics_once() -> None:
     whole = build_mechanism(scene).mechanism
 
     def failing(stiffened: bool, cause: Cause) -> Any:
-        def integrate(given: Scene, mechanism: Mechanism) -> Run:
+        def integrate(given: Scene, mechanism: Mechanism) -> ChainRun:
             if (mechanism.effects >= STIFFENING) == stiffened:
                 raise SimulationError(cause, "as the test wants")
             return erls.simulate(replace(given))

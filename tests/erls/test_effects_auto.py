@@ -33,7 +33,7 @@ from erls.integrate.generalized_alpha import generalized_alpha
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import DEFAULT, EFFECTS, Certificate
 from erls.mechanism.without_effects import with_rigid, without
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.read import load_scene
@@ -97,7 +97,7 @@ def test_error_motion_compiled_and_uncompiled(tmp_path: Path) -> None:
         assert np.abs(other).max() > 1e-6
 
 
-def _distance(run: Run, reference: Run) -> float:
+def _distance(run: ChainRun, reference: ChainRun) -> float:
     times = np.linspace(0.0, reference.end, 301)
     watched = watched_nodes(reference.formulation.mechanism)
     sides = [[Outputs(r.scene, r.formulation, watched).positions(s) for s in r.states(times)] for r in (run, reference)]
@@ -127,7 +127,7 @@ def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return scenes.l_scene(folder, simulation={"duration": 0.5, "step": 1e-3})
 
 
-def _auto(path: Path, *changes: str, **options: Any) -> tuple[Run, list[str]]:
+def _auto(path: Path, *changes: str, **options: Any) -> tuple[ChainRun, list[str]]:
     told: list[str] = []
     return erls.simulate(load_scene(path, ["effects=auto", *changes]), tell=told.append, **options), told
 
@@ -246,7 +246,7 @@ def test_a_run_that_fails_is_repeated_with_all(pendulum: Path, monkeypatch: pyte
     told: list[str] = []
 
     def failing(cause: Cause) -> Any:
-        def integrate(scene: Scene, mechanism: Mechanism) -> Run:
+        def integrate(scene: Scene, mechanism: Mechanism) -> ChainRun:
             if mechanism.effects != whole.effects:
                 raise SimulationError(cause, "as the test wants")
             return erls.simulate(replace(scene))
@@ -267,7 +267,7 @@ def test_an_error_that_cannot_be_followed_is_not_certified(pendulum: Path, monke
     """Infinite, with a warning."""
     monkeypatch.setattr(automatic_module, "choose_effects", _misjudged(frozenset({"coriolis"}), 1e-7))
 
-    def lost(run: Run, whole: Mechanism) -> Certificate:
+    def lost(run: ChainRun, whole: Mechanism) -> Certificate:
         raise SimulationError(Cause.NEWTON_FAILED, "as the test wants")
 
     monkeypatch.setattr(automatic_module, "certify", lost)

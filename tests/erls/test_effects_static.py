@@ -27,7 +27,7 @@ from erls.auto.static import may_follow, static_cut, vibrating_efforts
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism
 from erls.scene.read import load_scene
 
@@ -170,7 +170,7 @@ def test_drive_forces_of_a_vibrating_link(led: Path) -> None:
 # (3) runs and certificates
 
 
-def _distance(run: Run, reference: Run) -> float:
+def _distance(run: ChainRun, reference: ChainRun) -> float:
     times = np.linspace(0.0, reference.end, 401)
     watched = watched_nodes(reference.formulation.mechanism)
     sides = [[Outputs(r.scene, r.formulation, watched).positions(s) for s in r.states(times)] for r in (run, reference)]
@@ -239,7 +239,7 @@ def test_a_static_run_that_fails_is_repeated(led: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(automatic_module, "choose_effects", lambda scene, mechanism: misjudged)
     scene, told = load_scene(led, ["simulation.duration=0.1", "effects=auto"]), []  # type: ignore[var-annotated]
 
-    def integrate(scene: Any, mechanism: Any) -> Run:
+    def integrate(scene: Any, mechanism: Any) -> ChainRun:
         if mechanism.bandwidth is not None:
             raise SimulationError(Cause.NO_EQUILIBRIUM, "as the test wants")
         return erls.simulate(replace(scene))

@@ -10,7 +10,7 @@ from scenes import ROOT
 
 import erls
 from erls.errors import Cause, SceneError
-from erls.run.record import node_positions
+from erls.run.chain.places import node_positions
 from erls.view.export import export_csv, export_paraview
 
 
@@ -35,9 +35,9 @@ def test_paraview(run, magnification, tmp_path):
     states = dict(zip(times, run.states(times), strict=True))
     for d in listed:
         mesh, k, state = meshio.read(tmp_path / d["file"]), int(d["part"]), states[float(d["timestep"])]
-        expected = node_positions(run, state, k, magnification=magnification)
+        expected = node_positions(run.formulation.mechanism, state, k, magnification=magnification)
         np.testing.assert_allclose(mesh.points, expected, rtol=0, atol=1e-12)
-        rigid = node_positions(run, state, k, magnification=0.0)
+        rigid = node_positions(run.formulation.mechanism, state, k, magnification=0.0)
         moved = expected - rigid
         np.testing.assert_allclose(magnification * mesh.point_data["displacement"], moved, rtol=0, atol=1e-12)
         assert (mesh.point_data["link"] == k + 1).all()

@@ -10,7 +10,7 @@ import scenes
 
 import erls
 from erls.maths.so3 import Array
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 SCENE = scenes.ROOT / "data/slider_crank/fast.toml"
 REFERENCE = np.loadtxt(scenes.ROOT / "tests/data/fast_slider_crank.csv", delimiter=",")
@@ -21,7 +21,7 @@ PIECES = {n: (f"links.rod.substructures={n}", "simulation.effects=all") for n in
 
 
 @cache
-def run(*overrides: str) -> Run:
+def run(*overrides: str) -> ChainRun:
     return erls.simulate(erls.load_scene(SCENE, overrides))
 
 

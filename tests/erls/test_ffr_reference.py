@@ -15,7 +15,7 @@ from erls.equations.ffr.body_frame import BODY_FRAMES, elastic_basis
 from erls.equations.ffr.standard_data import StandardData
 from erls.errors import SceneError
 from erls.maths.so3 import Array, skew
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 DATA = scenes.ROOT / "data"
 SHIPPED = [str(p.relative_to(DATA)) for p in scenes.shipped()]
@@ -30,7 +30,7 @@ def _table(name: str) -> dict[str, Array]:
     return dict(zip(columns, np.loadtxt(path, delimiter=",").T, strict=True))
 
 
-def _distance(run: Run, point: str, table: dict[str, Array], prefix: str) -> float:
+def _distance(run: ChainRun, point: str, table: dict[str, Array], prefix: str) -> float:
     rows = table["t"] <= run.end
     expected = np.stack([table[f"{prefix}_{axis}"][rows] for axis in "xyz"], axis=1)
     return float(np.linalg.norm(run.position(point, table["t"][rows]) - expected, axis=1).max())

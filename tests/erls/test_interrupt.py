@@ -23,7 +23,8 @@ START = """
 import sys
 import erls.scene.build
 import erls.run.watches.progress
-from erls.cli.main import Progress, main
+from erls.cli.main import main
+from erls.cli.terminal import Progress
 
 erls.run.watches.progress.CHECKPOINT_S = {checkpoint}
 advance = Progress.advance

@@ -14,7 +14,7 @@ import scenes
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.errors import SceneError
 from erls.maths.so3 import Array
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
 from fe_import.errors import ReportedError
@@ -107,7 +107,7 @@ def test_both_motors_on_the_ground(tmp_path: Path, name: str) -> None:
     assert len(summary["loops"][0]["redundant"]) == 3
 
 
-def _work(run: Run, *joints: str) -> float:
+def _work(run: ChainRun, *joints: str) -> float:
     """Of joints and of the closing one, by Gauss's rule."""
     nodes, weights = np.polynomial.legendre.leggauss(24)
     t = run.end * (nodes + 1) / 2

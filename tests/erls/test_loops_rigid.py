@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
+from erls.run.chain.run import ChainRun
 from erls.run.file import load_run, write_run
-from erls.run.record import Run
 
 RATE = 360.0  # deg/s
 PLANAR = ("translation along z", "rotation about x", "rotation about y")
@@ -110,7 +110,7 @@ def test_generalized_alpha_is_of_second_order_in_loops(tmp_path: Path) -> None:
     assert _widest(runs[0]) < 1e-10
 
 
-def _widest(run: Run) -> float:
+def _widest(run: ChainRun) -> float:
     """Largest opening at knots [m], before states are moved onto the conditions."""
     chain, knots = run.formulation, zip(run.solution.t.tolist(), run.solution.y, run.solution.v, strict=True)
     assert isinstance(chain, ClosedChain)

@@ -15,8 +15,8 @@ from erls.integrate.base import hermite
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.rigid_dynamics import inverse_dynamics
+from erls.run.chain.run import ChainRun
 from erls.run.file import load_run, write_run
-from erls.run.record import Run
 from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
 from erls.studies.outputs import run_outputs
@@ -25,7 +25,7 @@ from fe_import.errors import ReportedError
 ROBOT = scenes.ROOT / "data" / "robot" / "two_link.toml"
 
 
-def _run(path: Path, formulation: str = "nodal", *changes: str) -> Run:
+def _run(path: Path, formulation: str = "nodal", *changes: str) -> ChainRun:
     return simulate(load_scene(path, [f'simulation.formulation="{formulation}"', *changes]))
 
 
@@ -33,7 +33,7 @@ def _simulation(duration: float, step: float, **more: Any) -> dict[str, Any]:
     return {"simulation": {"duration": duration, "step": step, **more}}
 
 
-def _farthest(one: Run, other: Run, point: str, times: Array) -> float:
+def _farthest(one: ChainRun, other: ChainRun, point: str, times: Array) -> float:
     return float(np.linalg.norm(one.position(point, times) - other.position(point, times), axis=1).max())
 
 

@@ -9,14 +9,15 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
 
+from erls import simulate
 from erls.cli.main import main
 from erls.errors import Cause, SceneError, SimulationError
-from erls.run.bodies.result_file import read_summary, write_result
-from erls.run.bodies.solve import solve
-from erls.scene.read import load_chain, load_scene
+from erls.report.info import file_info
+from erls.run.file import load_run
+from erls.scene.read import load_chain
+from erls.view import write_view
 from fe_import.errors import ReportedError
 
 CLAMP, BEAM, LOAD = STRIP["connections"][0], STRIP["beams"][0], STRIP["loads"][0]
@@ -87,7 +88,7 @@ def test_faults_are_named(tmp_path: Path, base: dict[str, Any], change: dict[str
     """Every one has its cause, file and field, and says what to do."""
     path = body_scene(tmp_path, base, **change)
     with pytest.raises(ReportedError) as caught:
-        solve(path)
+        simulate(path)
     assert caught.value.cause.name == cause
     assert caught.value.where.startswith(f"{path}: {field}")
     assert caught.value.remedy
@@ -97,7 +98,7 @@ def test_faults_are_named(tmp_path: Path, base: dict[str, Any], change: dict[str
 def test_no_equilibrium(tmp_path: Path) -> None:
     """A beam that nothing holds; what was found is kept."""
     with pytest.raises(SimulationError) as caught:
-        solve(body_scene(tmp_path, STRIP, connections=[]))
+        simulate(body_scene(tmp_path, STRIP, connections=[]))
     assert caught.value.cause is Cause.NO_EQUILIBRIUM
     assert caught.value.run.statics.path == ()
 
@@ -124,21 +125,24 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert [s["t"] for s in found["samples"]] == [0.1, 0.2]
     assert found["analysis"] == "dynamics"
     with h5py.File(output) as file:
-        assert file["points/bob"].shape == (201, 3)
-        np.testing.assert_allclose(file["points/bob"][-1], found["samples"][1]["points"]["bob"], atol=1e-12)
-    assert _json(capsys, "info", output)["steps"] == found["steps"]
+        assert file["knots/position"].shape == (201, 12)
+        np.testing.assert_allclose(file["output/points/bob"][-1], found["samples"][1]["points"]["bob"], atol=1e-12)
+    loaded = load_run(output)
+    assert _json(capsys, "info", output) == {
+        "file": "run", **loaded.summary(), "failure": None
+    }  # fmt: skip
+    assert loaded.summary([0.1, 0.2]) == {k: v for k, v in found.items() if k != "output"}
     assert _json(capsys, "info", pendulum)["bodies"][0]["name"] == "bob"
-    assert _json(capsys, "view", output, code=2)["error"]["value"] == "a result of bodies"
     strip, output = str(body_scene(tmp_path, STRIP)), str(tmp_path / "rest.h5")
     assert main(["simulate", strip, "-o", output, "--set", "simulation.load_steps=3"]) == 0
     text = capsys.readouterr().out
     assert "tangent full" in text
     assert "0.333333" in text
     assert _json(capsys, "info", output)["load_steps"] == 3
-    assert main(["info", output]) == 0
-    assert "status: complete" in capsys.readouterr().out
-    for wrong, where in ((["--at", "0.5"], "--at"), (["--formulation", "erls"], "--formulation")):
+    for wrong, where in ((["--at", "0.5"], "--at"), (["--formulation", "erls"], f"{strip}: simulation.formulation")):
         assert _json(capsys, "simulate", strip, *wrong, code=2)["error"]["where"] == where
+    for command in ("effects", "compare"):
+        assert "no chain" in _json(capsys, command, strip, code=2)["error"]["message"]
 
 
 def test_failures_keep_what_was_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -146,20 +150,21 @@ def test_failures_keep_what_was_found(tmp_path: Path, capsys: pytest.CaptureFixt
     output = tmp_path / "rest.h5"
     path = body_scene(tmp_path, STRIP, connections=[])
     assert main(["simulate", str(path), "-o", str(output)]) == 3
-    assert read_summary(output)["status"] == str(Cause.NO_EQUILIBRIUM)
+    run = load_run(output)
+    assert run.failure is not None
+    assert run.failure.cause is Cause.NO_EQUILIBRIUM
+    assert run.summary()["samples"] == []
+    with pytest.raises(SceneError, match="nothing to draw"):
+        write_view(run, tmp_path / "a.png")
     assert "what was computed" in capsys.readouterr().err
 
 
-def test_result_files_are_checked(tmp_path: Path) -> None:
-    """Another file, and a summary that is none."""
-    write_result(tmp_path / "good.h5", solve(body_scene(tmp_path, STRIP)))
-    assert read_summary(tmp_path / "good.h5")["analysis"] == "statics"
-    with h5py.File(tmp_path / "other.h5", "w") as file:
-        file.attrs["schema"], file.attrs["schema_version"] = "erls run", 1
-    with pytest.raises(SceneError) as caught:
-        read_summary(tmp_path / "other.h5")
-    assert caught.value.cause is Cause.RUN_FILE
-    scenes_file = load_scene(body_scene(tmp_path, STRIP))
-    assert scenes_file.name == "bodies"
-    assert scenes_file.folder == tmp_path
-    assert scenes.ROOT.is_dir()
+def test_files_of_earlier_versions_are_refused(tmp_path: Path) -> None:
+    """With what to do; scenes of bodies gave other files once."""
+    with h5py.File(tmp_path / "old.h5", "w") as file:
+        file.attrs["schema"], file.attrs["schema_version"] = b"erls result of bodies", np.int64(1)
+    for read in (load_run, file_info):
+        with pytest.raises(SceneError, match="simulate again") as caught:
+            read(tmp_path / "old.h5")
+        assert caught.value.cause is Cause.RUN_FILE
+        assert str(tmp_path / "old.h5") in caught.value.where

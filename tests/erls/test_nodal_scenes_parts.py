@@ -11,8 +11,9 @@ import pytest
 import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
 
-from erls.run.bodies.result import Motion, Rest
-from erls.run.bodies.solve import solve
+from erls import simulate
+from erls.run.bodies.motion import BodyMotion
+from erls.run.bodies.rest import BodyRest
 from erls.scene.bodies import analyses, schema
 from erls.scene.read import load_scene
 
@@ -20,15 +21,15 @@ EI_Y, EI_Z = 1e6 * 0.1 * 0.02**3 / 12, 1e6 * 0.02 * 0.1**3 / 12
 GA = 5e5 * 0.1 * 0.02 * 5 / 6
 
 
-def _rest(folder: Path, base: dict[str, Any] = STRIP, **changes: Any) -> Rest:
-    found = solve(body_scene(folder, base, **changes))
-    assert isinstance(found, Rest)
+def _rest(folder: Path, base: dict[str, Any] = STRIP, **changes: Any) -> BodyRest:
+    found = simulate(body_scene(folder, base, **changes))
+    assert isinstance(found, BodyRest)
     return found
 
 
-def _moving(folder: Path, base: dict[str, Any] = PENDULUM, **changes: Any) -> Motion:
-    found = solve(body_scene(folder, base, **changes))
-    assert isinstance(found, Motion)
+def _moving(folder: Path, base: dict[str, Any] = PENDULUM, **changes: Any) -> BodyMotion:
+    found = simulate(body_scene(folder, base, **changes))
+    assert isinstance(found, BodyMotion)
     return found
 
 
@@ -36,7 +37,7 @@ def _moving(folder: Path, base: dict[str, Any] = PENDULUM, **changes: Any) -> Mo
 def test_cantilever(tmp_path: Path, height: list[int], bending: float) -> None:
     """P L³/(3EI) less what eight constant curvatures miss, and P L/(kGA); the height decides which bending."""
     beam = {**STRIP["beams"][0], "local_z": height}
-    moved = _rest(tmp_path, beams=[beam], loads=[{"node": "tip", "force": [0.0, 0.0, 1e-5]}]).position("tip")[2]
+    moved = _rest(tmp_path, beams=[beam], loads=[{"node": "tip", "force": [0.0, 0.0, 1e-5]}]).position("tip", 1.0)[2]
     assert moved == pytest.approx(1e-5 * (8 / (3 * bending) * (1 - 1 / (4 * 64)) + 2 / GA), rel=1e-5)
 
 
@@ -50,7 +51,7 @@ def test_quarter_arc(tmp_path: Path, force: list[int], axis: int, arm: float, ch
     found = _rest(tmp_path, nodes=nodes, beams=[beam], loads=[load])
     start = [2.0, 2.0, 0.0][axis]
     bend = 1e-3 * 8 / EI_Z * arm
-    assert found.position("tip")[axis] - start == pytest.approx(bend, rel=0.01)
+    assert found.position("tip", 1.0)[axis] - start == pytest.approx(bend, rel=0.01)
     middle = found.assembly.system.start.poses[found.assembly.numbers["strip/8"], :3, 3]
     np.testing.assert_allclose(middle, [np.sqrt(2), 2 - np.sqrt(2), 0], atol=1e-14)
 
@@ -62,7 +63,7 @@ def test_dead_and_follower_loads(tmp_path: Path) -> None:
     for follower in (False, True):
         force = {"node": "tip", "force": [1e-9, 0.0, 0.0], "follower": follower}
         found = _rest(tmp_path, loads=[moment, force], simulation={"load_steps": 4, "tangent": "material"})
-        np.testing.assert_allclose(found.position("tip"), [4 / np.pi, 4 / np.pi, 0], atol=1e-6)
+        np.testing.assert_allclose(found.position("tip", 1.0), [4 / np.pi, 4 / np.pi, 0], atol=1e-6)
         pushes.append(found.summary()["samples"][-1]["connections"]["clamp"]["force"])
     np.testing.assert_allclose(pushes, [[-1e-9, 0, 0], [0, -1e-9, 0]], atol=1e-13)
 
@@ -72,8 +73,8 @@ def test_factors_over_the_load_parameter(tmp_path: Path) -> None:
     factor = [{"shape": "table", "times": [0.0, 0.5, 1.0], "values": [0.0, 1.0, 0.0]}]
     loads = [{**STRIP["loads"][0], "factor": factor}]
     found = _rest(tmp_path, loads=loads, simulation={"load_steps": 2})
-    whole = _rest(tmp_path).position("tip")
-    np.testing.assert_allclose([found.position("tip", 0), found.position("tip", 1)], [whole, [2, 0, 0]], atol=1e-13)
+    whole = _rest(tmp_path).position("tip", 1.0)
+    np.testing.assert_allclose([found.position("tip", 0.5), found.position("tip", 1.0)], [whole, [2, 0, 0]], atol=1e-13)
 
 
 def test_weight_of_beams_and_masses(tmp_path: Path) -> None:
@@ -88,7 +89,7 @@ def test_a_prescribed_turn_carries_a_beam(tmp_path: Path) -> None:
     root = {"name": "hinge", "type": "revolute", "node": "root", "axis": [0, 0, 1]}
     turn = {"shape": "polynomial", "from_deg": 0.0, "to_deg": 90.0, "duration": 1.0}
     found = _rest(tmp_path, loads=[], connections=[{**root, "motion": turn}], simulation={"load_steps": 4})
-    np.testing.assert_allclose(found.position("tip"), [0, 2, 0], atol=1e-9)
+    np.testing.assert_allclose(found.position("tip", 1.0), [0, 2, 0], atol=1e-9)
 
 
 def test_free_body(tmp_path: Path) -> None:
@@ -169,8 +170,8 @@ def test_the_scene_of_the_documentation_shows_every_field(tmp_path: Path) -> Non
     (block,) = (b for b in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if 'name = "door on a beam"' in b)
     path = tmp_path / "door.toml"
     path.write_text(block, encoding="utf-8")
-    found = solve(load_scene(path, ["simulation.duration=0.02"]))
-    assert isinstance(found, Motion)
+    found = simulate(load_scene(path, ["simulation.duration=0.02"]))
+    assert isinstance(found, BodyMotion)
     assert found.end == 0.02
     records = (schema.BodySceneRecord, schema.Body, schema.Beam, schema.PointMass, schema.Connection, schema.LineSpring,
                schema.TurningSpring, schema.Load, *get_args(analyses.Analysis))  # fmt: skip

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from body_scenes_data import STRIP, body_scene
 
+from erls import simulate
 from erls.cli.main import main
 from erls.errors import Cause, SimulationError
-from erls.run.bodies.result import Motion, Rest
-from erls.run.bodies.solve import solve
+from erls.run.bodies.motion import BodyMotion
+from erls.run.bodies.rest import BodyRest
 
 BEND = np.radians(30.0)
 
@@ -41,8 +42,8 @@ def _shafts() -> dict[str, Any]:
 
 def test_hookes_joint(tmp_path: Path) -> None:
     """Twelve freedoms, fifteen conditions, of which three follow; tan α₂ = tan α₁ cos 30°."""
-    found = solve(body_scene(tmp_path, _shafts()))
-    assert isinstance(found, Motion)
+    found = simulate(body_scene(tmp_path, _shafts()))
+    assert isinstance(found, BodyMotion)
     assert len(found.assembly.left_out) == 3
     (warning,) = found.warnings
     assert "3 conditions follow from the others" in warning
@@ -70,8 +71,8 @@ def test_three_bearings_share_the_load(tmp_path: Path) -> None:
             for name, x in (("left", -1.0), ("right", 1.0))
         ],
     }
-    found = solve(body_scene(tmp_path, scene))
-    assert isinstance(found, Motion)
+    found = simulate(body_scene(tmp_path, scene))
+    assert isinstance(found, BodyMotion)
     assert len(found.assembly.left_out) == 5
     forces = found.samples([0.01])[0]["connections"]
     np.testing.assert_allclose(forces["left"]["force"], [0, 0, 9.81 / 2], atol=1e-9)
@@ -82,11 +83,11 @@ def test_statics_and_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixt
     """A clamp given twice carries half each; the warning goes to stderr and into the JSON."""
     clamps = [{**STRIP["connections"][0], "name": name} for name in ("one", "two")]
     path = body_scene(tmp_path, STRIP, connections=clamps)
-    found = solve(path)
-    assert isinstance(found, Rest)
-    single = solve(body_scene(tmp_path, STRIP))
-    assert isinstance(single, Rest)
-    np.testing.assert_allclose(found.position("tip"), single.position("tip"), atol=1e-12)
+    found = simulate(path)
+    assert isinstance(found, BodyRest)
+    single = simulate(body_scene(tmp_path, STRIP))
+    assert isinstance(single, BodyRest)
+    np.testing.assert_allclose(found.position("tip", 1.0), single.position("tip", 1.0), atol=1e-12)
     path = body_scene(tmp_path, STRIP, connections=clamps)
     assert main(["simulate", str(path), "--json"]) == 0
     out, err = capsys.readouterr()
@@ -107,6 +108,6 @@ def test_a_special_position_is_no_redundancy(tmp_path: Path) -> None:
     ]
     scene = {"simulation": {"type": "dynamics", "duration": 0.2, "step": 2e-3}, "bodies": rods}
     with pytest.raises(SimulationError) as caught:
-        solve(body_scene(tmp_path, scene, connections=connections))
+        simulate(body_scene(tmp_path, scene, connections=connections))
     assert caught.value.cause is Cause.REDUNDANT_CONSTRAINTS
     assert "as built" in str(caught.value)

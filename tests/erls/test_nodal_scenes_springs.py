@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from body_scenes_data import PENDULUM, body_scene
 
+from erls import simulate
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.springs import Spring, Springs
@@ -16,8 +17,7 @@ from erls.equations.nodal.turning_springs import TurningSpring, TurningSprings
 from erls.errors import Cause
 from erls.maths import motion_maps as motions
 from erls.maths import rotation_maps as rotations
-from erls.run.bodies.result import Motion
-from erls.run.bodies.solve import solve
+from erls.run.bodies.motion import BodyMotion
 from fe_import.errors import ReportedError
 
 SLIDE = {"name": "slide", "type": "prismatic", "node": "bob", "axis": [1, 0, 0]}
@@ -64,11 +64,11 @@ def test_rigid_motions_do_nothing(kind: str) -> None:
     np.testing.assert_allclose(system.residual(0, moved, v, v), system.residual(0, system.start, v, v), atol=1e-13)
 
 
-def _run(folder: Path, connection: dict[str, Any], spring: dict[str, Any], **body: Any) -> Motion:
+def _run(folder: Path, connection: dict[str, Any], spring: dict[str, Any], **body: Any) -> BodyMotion:
     bodies = [{**PENDULUM["bodies"][0], **body}]
     scene = {**PENDULUM, "gravity": [0.0, 0.0, 0.0], "simulation": {"type": "dynamics", "duration": 0.5, "step": 2e-3}}
-    found = solve(body_scene(folder, scene, bodies=bodies, connections=[connection], springs=[spring]))
-    assert isinstance(found, Motion)
+    found = simulate(body_scene(folder, scene, bodies=bodies, connections=[connection], springs=[spring]))
+    assert isinstance(found, BodyMotion)
     return found
 
 
@@ -116,8 +116,8 @@ def test_bodies_on_springs_between_them(tmp_path: Path) -> None:
     spring = {**LINE, "node": "b", "to": "a"}
     spring.pop("to_position")
     scene = {**PENDULUM, "gravity": [0.0, 0.0, 0.0], "connections": []}
-    found = solve(body_scene(tmp_path, scene, bodies=bodies, springs=[spring]))
-    assert isinstance(found, Motion)
+    found = simulate(body_scene(tmp_path, scene, bodies=bodies, springs=[spring]))
+    assert isinstance(found, BodyMotion)
     a, b = found.position("a", 0.2), found.position("b", 0.2)
     np.testing.assert_allclose((a + b) / 2, [0.5, 0, 0], atol=1e-12)
     omega = np.sqrt(200.0)
@@ -143,6 +143,6 @@ FAULTS = [
 def test_faults(tmp_path: Path, spring: dict[str, Any], cause: str, field: str) -> None:
     """Cause and field."""
     with pytest.raises(ReportedError) as caught:
-        solve(body_scene(tmp_path, PENDULUM, springs=[spring]))
+        simulate(body_scene(tmp_path, PENDULUM, springs=[spring]))
     assert caught.value.cause.name == Cause[cause].name
     assert caught.value.where.endswith(f"springs[0].{field}")

@@ -16,8 +16,8 @@ from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
 from erls.errors import Cause, SceneError, SimulationError
 from erls.integrate.base import hermite
+from erls.run.chain.run import ChainRun
 from erls.run.file import load_run, write_run
-from erls.run.record import Run
 from erls.run.watches.static_following import static_error
 from erls.scene.build import build_mechanism
 
@@ -26,7 +26,7 @@ TIGHT = ["simulation.integrator=lobatto", "simulation.tolerance=1e-8"]
 STATIC_START = 'initial.deformation="static"'
 
 
-def _run(path: Path, *overrides: str) -> Run:
+def _run(path: Path, *overrides: str) -> ChainRun:
     return erls.simulate(erls.load_scene(path, overrides))
 
 
@@ -37,12 +37,12 @@ def _reduced(path: Path, *overrides: str) -> QuasiStatic:
     return found
 
 
-def _points(run: Run, times: np.ndarray) -> np.ndarray:
+def _points(run: ChainRun, times: np.ndarray) -> np.ndarray:
     states = run.states(times)
     return np.array([[run.point_position(s, k) for s in states] for k in range(len(run.point_names))])
 
 
-def _error(run: Run, whole: Run, count: int = 16) -> float:
+def _error(run: ChainRun, whole: ChainRun, count: int = 16) -> float:
     """Largest distance of a named point; not at jumps of forces."""
     times = np.linspace(2e-3, run.end - 2e-3, count)
     return float(np.linalg.norm(_points(run, times) - _points(whole, times), axis=-1).max())
@@ -174,10 +174,10 @@ def test_payload_on_the_robot(tmp_path: Path) -> None:
     whole = _run(path, *common)
     times = np.linspace(0.01, 0.89, 9)
 
-    def efforts(run: Run) -> np.ndarray:
+    def efforts(run: ChainRun) -> np.ndarray:
         return np.array([run.joint_effort(name, times) for name in run.joint_names])
 
-    def reactions(run: Run) -> np.ndarray:
+    def reactions(run: ChainRun) -> np.ndarray:
         return np.concatenate([np.hstack(run.reaction(name, times)) for name in run.joint_names])
 
     run = _run(path, *common, "simulation.bandwidth=60")

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 import erls
 from erls.errors import Cause, ReportedError
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.run.recovery import export_recovery, recovery_places
 
 Array = NDArray[np.float64]
 ENDS = {"recovery": {"nodes": ["root", "tip"]}}
 
 
-def in_link_axes(run: Run, link: int, joint: str, t: Array) -> Array:
+def in_link_axes(run: ChainRun, link: int, joint: str, t: Array) -> Array:
     """(k, 6) reaction of a joint in the mesh axes of a link."""
     turns = np.array([s.poses[link][:3, :3] for s in run.states(t)])
     return np.concatenate([np.einsum("kji,kj->ki", turns, part) for part in run.reaction(joint, t)], axis=1)
@@ -32,7 +32,7 @@ def relative(found: Array, expected: Array) -> tuple[float, float]:
     return tuple(float(off[:, part].max() / np.abs(expected[:, part]).max()) for part in (slice(3), slice(3, 6)))  # type: ignore[return-value]
 
 
-def at_node(run: Run, link: str, t: Array, name: str, **options: Any) -> Array:
+def at_node(run: ChainRun, link: str, t: Array, name: str, **options: Any) -> Array:
     """(k, 6) section forces of a link at the one element end on a node."""
     maps = recovery_places(run, link)
     model = run.formulation.mechanism.links[run.link_names.index(link)].model
@@ -111,7 +111,7 @@ def test_the_outer_joint_loads_the_inner_link(tmp_path: Path) -> None:
     assert moment < 2e-3
 
 
-def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any]) -> Run:
+def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any]) -> ChainRun:
     """A straight arm of 40 elements along x, turned about z at a constant rate, with a payload on its tip.
 
     Strongly damped: what the sudden centrifugal force stirs up is gone after 10 ms.

@@ -13,7 +13,7 @@ import scipy.linalg as la
 import erls
 import erls.scene.build
 from erls.equations.erls.chain import Erls
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 DATA = scenes.ROOT / "data"
 EULER = {"theory": "euler-bernoulli"}
@@ -27,18 +27,18 @@ def _table(name: str) -> dict[str, np.ndarray]:
     return dict(zip(columns, values.T, strict=True))
 
 
-def _distance(run: Run, point: str, table: dict[str, np.ndarray], prefix: str) -> float:
+def _distance(run: ChainRun, point: str, table: dict[str, np.ndarray], prefix: str) -> float:
     expected = np.stack([table[f"{prefix}_{axis}"] for axis in "xyz"], axis=1)
     return float(np.linalg.norm(run.position(point, table["t"]) - expected, axis=1).max())
 
 
 @pytest.fixture(scope="module")
-def runs() -> dict[str, Run]:
+def runs() -> dict[str, ChainRun]:
     """The shipped L scenes, as they are; made when first asked for."""
     return {}
 
 
-def _shipped(runs: dict[str, Run], name: str, *changes: str) -> Run:
+def _shipped(runs: dict[str, ChainRun], name: str, *changes: str) -> ChainRun:
     key = " ".join((name, *changes))
     if key not in runs:
         runs[key] = erls.simulate(erls.load_scene(DATA / name, changes))
@@ -46,7 +46,7 @@ def _shipped(runs: dict[str, Run], name: str, *changes: str) -> Run:
 
 
 @pytest.mark.parametrize(("case", "limit"), [("steel_flat", 5e-5), ("steel_tall", 2e-4), ("aluminium", 5e-4)])
-def test_l_pendulum_against_nonlinear_beam(runs: dict[str, Run], case: str, limit: float) -> None:
+def test_l_pendulum_against_nonlinear_beam(runs: dict[str, ChainRun], case: str, limit: float) -> None:
     """Tip over 2 s. A converged modal model without geometric stiffening stays within 3.2e-5, 1.5e-4, 3.9e-4 m."""
     run = _shipped(runs, f"l_shape/{case}.toml")
     assert run.end == 2.0
@@ -54,7 +54,7 @@ def test_l_pendulum_against_nonlinear_beam(runs: dict[str, Run], case: str, limi
 
 
 @pytest.mark.parametrize("gauge", ["joint-angle", "minimum-norm"])
-def test_robot_against_nonlinear_beam(runs: dict[str, Run], gauge: str) -> None:
+def test_robot_against_nonlinear_beam(runs: dict[str, ChainRun], gauge: str) -> None:
     """Ends of both links over 1.5 s within 5e-4 m; a converged modal model stays within 3.0e-4 m."""
     run = _shipped(runs, "robot/two_link.toml", f'simulation.gauge="{gauge}"')
     table = _table("two_link_nonlinear_beam")
@@ -62,7 +62,7 @@ def test_robot_against_nonlinear_beam(runs: dict[str, Run], gauge: str) -> None:
     assert _distance(run, "end1", table, "end1") <= 5e-4
 
 
-def test_table_3_with_fitted_material(runs: dict[str, Run]) -> None:
+def test_table_3_with_fitted_material(runs: dict[str, ChainRun]) -> None:
     """The printed row 18 at 0.5 s within 6e-4 m and 0.08 deg (the fit's own accuracy), θ being the coordinate."""
     run = _shipped(runs, "l_shape/table3_fit.toml")
     assert np.degrees(run.joint_coordinate("shoulder", 0.5)) == pytest.approx(113.50, abs=0.08)
@@ -185,7 +185,7 @@ def test_consistent_frame_mass_does_not_commute_with_rotations(tmp_path: Path) -
     assert symmetric["consistent"] > 1e-6
 
 
-def test_solid_and_frame_agree(runs: dict[str, Run]) -> None:
+def test_solid_and_frame_agree(runs: dict[str, ChainRun]) -> None:
     """The flat L as 100 hexahedra and as beams: six clamped frequencies within 3 %, tip accordingly.
 
     The static sag of the tip is about 17 mm; 3 % of frequency is 6 % of flexibility, so the tips stay within 2 mm.

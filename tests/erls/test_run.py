@@ -15,7 +15,7 @@ import erls
 from erls.errors import Cause, SceneError
 from erls.integrate.base import hermite
 from erls.mechanism.chain import poses
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 END = 0.05
 TIMES = np.array([[0.0, 0.0107, 0.02], [0.0333, 0.0499, END]])
@@ -28,7 +28,7 @@ PENDULUM = {
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def run(tmp_path_factory: pytest.TempPathFactory) -> ChainRun:
     """Three flexible links, the second joint driven, a spring, a damper and a payload."""
     folder = tmp_path_factory.mktemp("run")
     path = scenes.three_links(folder, "prescribed", payloads=[{"point": "end", "mass": 0.1}])
@@ -63,7 +63,7 @@ QUESTIONS = {
 
 
 @pytest.mark.parametrize("question", QUESTIONS)
-def test_shape_of_times_stands_in_front(run: Run, question: str) -> None:
+def test_shape_of_times_stands_in_front(run: ChainRun, question: str) -> None:
     """A scalar, a list, a matrix and no times at all; the same values one by one."""
     ask, shape = QUESTIONS[question]
     found = ask(run, TIMES)
@@ -78,7 +78,7 @@ def test_shape_of_times_stands_in_front(run: Run, question: str) -> None:
     assert ask(run, []).shape == (0, *shape)
 
 
-def test_position_from_first_principles(run: Run) -> None:
+def test_position_from_first_principles(run: ChainRun) -> None:
     """Node + mode shapes times modal coordinates, carried by the rigid chain at θ: 1e-14 m."""
     mechanism = run.formulation.mechanism
     for t in TIMES.ravel():
@@ -92,7 +92,7 @@ def test_position_from_first_principles(run: Run) -> None:
             np.testing.assert_allclose(run.position(point.name, t), expected[:3], atol=1e-14)
 
 
-def test_knots_are_reproduced_and_both_sides_of_a_knot_agree(run: Run) -> None:
+def test_knots_are_reproduced_and_both_sides_of_a_knot_agree(run: ChainRun) -> None:
     """Dense output passes through the integrator's own states."""
     s = run.solution
     found = hermite(s.t, s.y, s.v, s.a, s.t)
@@ -102,7 +102,7 @@ def test_knots_are_reproduced_and_both_sides_of_a_knot_agree(run: Run) -> None:
     assert run.end == END
 
 
-def test_rate_is_the_derivative_of_the_angle(run: Run) -> None:
+def test_rate_is_the_derivative_of_the_angle(run: ChainRun) -> None:
     """Of every joint, in the gauge where the coordinate is not the angle: central differences, 1e-5 of the largest."""
     h = 2e-7
     times = np.linspace(0.011, 0.049, 9) + 0.37e-4  # inside steps
@@ -112,7 +112,7 @@ def test_rate_is_the_derivative_of_the_angle(run: Run) -> None:
         np.testing.assert_allclose(rate, difference, atol=1e-5 * np.abs(rate).max())
 
 
-def test_the_prescribed_joint_follows_its_motion(run: Run) -> None:
+def test_the_prescribed_joint_follows_its_motion(run: ChainRun) -> None:
     """Angle, coordinate and rate, whatever the links do."""
     drive = run.formulation.mechanism.joints[1].drive
     expected = np.array([drive.reference(t) for t in TIMES.ravel()])
@@ -121,7 +121,7 @@ def test_the_prescribed_joint_follows_its_motion(run: Run) -> None:
 
 
 @pytest.mark.parametrize("t", [-1e-6, END + 1e-6, np.nan, np.inf, [0.01, 7.0]])
-def test_times_outside_are_refused(run: Run, t: Any) -> None:
+def test_times_outside_are_refused(run: ChainRun, t: Any) -> None:
     """With the time and what the run covers."""
     for ask, _ in QUESTIONS.values():
         with pytest.raises(SceneError) as caught:
@@ -131,7 +131,7 @@ def test_times_outside_are_refused(run: Run, t: Any) -> None:
         assert caught.value.remedy
 
 
-def test_rounding_of_a_time_is_forgiven(run: Run) -> None:
+def test_rounding_of_a_time_is_forgiven(run: ChainRun) -> None:
     """0.1 + 0.2 asks for 0.3."""
     late = END * (1 + 1e-12)
     np.testing.assert_allclose(run.position("end", late), run.position("end", END), atol=1e-12)
@@ -148,7 +148,7 @@ def test_rounding_of_a_time_is_forgiven(run: Run) -> None:
         (lambda run: run.elastic_coordinates("d", 0.0), "known: a, b, c"),
     ],
 )
-def test_unknown_names_get_a_suggestion(run: Run, ask: Any, words: str) -> None:
+def test_unknown_names_get_a_suggestion(run: ChainRun, ask: Any, words: str) -> None:
     """Of points, joints and links."""
     with pytest.raises(SceneError) as caught:
         ask(run)
@@ -156,7 +156,7 @@ def test_unknown_names_get_a_suggestion(run: Run, ask: Any, words: str) -> None:
     assert words in str(caught.value)
 
 
-def test_names(run: Run) -> None:
+def test_names(run: ChainRun) -> None:
     """In the order of the scene."""
     assert run.point_names == ("middle", "end")
     assert run.joint_names == ("j1", "j2", "j3")
@@ -216,7 +216,7 @@ def test_reaction_of_a_flexible_link_at_rest_is_its_weight(tmp_path: Path) -> No
         np.testing.assert_allclose(moment, [0.125 * weight, -0.375 * weight, 0], atol=0.01 * weight * 0.375)
 
 
-def test_reactions_balance_the_whole_mechanism(run: Run) -> None:
+def test_reactions_balance_the_whole_mechanism(run: ChainRun) -> None:
     """The ground's force = Σ m (a - g): by second differences of the centre of mass, 1e-4 of the weight.
 
     The rate of change of the links' linear momentum is what the ground and gravity do.
@@ -243,7 +243,7 @@ def test_reactions_balance_the_whole_mechanism(run: Run) -> None:
     np.testing.assert_allclose(force, second - mass * mechanism.gravity, atol=0.02 * np.abs(force).max())
 
 
-def test_samples(run: Run) -> None:
+def test_samples(run: ChainRun) -> None:
     """Joints and points at each time, as asked for one by one; plain floats."""
     found = run.samples([0.0, 0.0333])
     assert [s["t"] for s in found] == [0.0, 0.0333]
@@ -274,7 +274,7 @@ PROMISED = {
 }
 
 
-def test_summary_keeps_its_promises(run: Run) -> None:
+def test_summary_keeps_its_promises(run: ChainRun) -> None:
     """Every promised key with its type; strict JSON; the driven scene has no drift."""
     summary = run.summary([0.01])
     for key, kind in PROMISED.items():
@@ -306,7 +306,7 @@ def test_drift_is_told_only_where_energy_should_stay(tmp_path: Path, changes: di
         assert abs(energy["final"] - energy["initial"]) <= energy["max_drift"] < 1e-4
 
 
-def test_a_run_of_one_knot_answers(run: Run) -> None:
+def test_a_run_of_one_knot_answers(run: ChainRun) -> None:
     """A run that failed at once still tells where it stood."""
     s = run.solution
     stub = replace(run, solution=replace(s, t=s.t[:1], y=s.y[:1], v=s.v[:1], a=s.a[:1]))

@@ -15,8 +15,8 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
+from erls.run.chain.run import ChainRun
 from erls.run.file import load_run, write_run
-from erls.run.record import Run
 from erls.scene.read import load_scene
 from fe_import.errors import ReportedError
 from fe_import.files.hdf5.files import write_strings
@@ -62,12 +62,12 @@ def _few_output_times() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def run(tmp_path_factory: pytest.TempPathFactory) -> ChainRun:
     return erls.simulate(chain(tmp_path_factory.mktemp("chain")))
 
 
 @pytest.fixture(scope="module")
-def file(run: Run) -> Path:
+def file(run: ChainRun) -> Path:
     """Its run file; the files that the scene names are gone."""
     folder = run.scene.folder
     write_run(folder / "run.h5", run)
@@ -76,7 +76,7 @@ def file(run: Run) -> Path:
     return folder / "run.h5"
 
 
-def answers(run: Run) -> dict[str, Any]:
+def answers(run: ChainRun) -> dict[str, Any]:
     """Whatever can be asked."""
     found: dict[str, Any] = {f"position {n}": run.position(n, TIMES) for n in run.point_names}
     for name in run.joint_names:
@@ -90,7 +90,7 @@ def answers(run: Run) -> dict[str, Any]:
     return found | {kind: getattr(energy, kind) for kind in ("kinetic", "elastic", "gravity", "springs", "total")}
 
 
-def assert_equal_runs(a: Run, b: Run) -> None:
+def assert_equal_runs(a: ChainRun, b: ChainRun) -> None:
     """To rounding: BLAS adds in another order where an array lies otherwise in memory, 1e-16 seen."""
     expected = answers(b)
     for question, answer in answers(a).items():
@@ -98,7 +98,7 @@ def assert_equal_runs(a: Run, b: Run) -> None:
         np.testing.assert_allclose(answer, expected[question], rtol=0, atol=1e-14 * largest, err_msg=question)
 
 
-def test_equal_answers_without_the_files(run: Run, file: Path) -> None:
+def test_equal_answers_without_the_files(run: ChainRun, file: Path) -> None:
     """Positions, angles, energies, reactions; also the summary, warnings and work."""
     loaded = load_run(file)
     assert_equal_runs(run, loaded)
@@ -148,7 +148,7 @@ def test_models_are_stored_once(file: Path) -> None:
     assert links[0].model is links[2].model
 
 
-def test_output_group_for_other_programs(run: Run, file: Path) -> None:
+def test_output_group_for_other_programs(run: ChainRun, file: Path) -> None:
     """Plain h5py reads points, joints and energies at even times; they are the run's."""
     with h5py.File(file) as f:
         output = f["output"]
@@ -172,7 +172,7 @@ def test_output_group_for_other_programs(run: Run, file: Path) -> None:
         assert json.loads(f["scene"][()])["simulation"]["duration"] == run.end
 
 
-def failed(run: Run, cause: Cause = Cause.NEWTON_FAILED, knots: int = 20) -> Run:
+def failed(run: ChainRun, cause: Cause = Cause.NEWTON_FAILED, knots: int = 20) -> ChainRun:
     """The run as if it had stopped early."""
     s = run.solution
     failure = SimulationError(cause, "it stopped", where="t = 0.01 s", value="step 1e-9 s", remedy="try again")
@@ -181,7 +181,7 @@ def failed(run: Run, cause: Cause = Cause.NEWTON_FAILED, knots: int = 20) -> Run
 
 
 @pytest.mark.parametrize(("cause", "knots"), [(Cause.INTERRUPTED, 20), (Cause.NEWTON_FAILED, 1), (Cause.NOT_FINITE, 5)])
-def test_status_and_failure_survive(run: Run, tmp_path: Path, cause: Cause, knots: int) -> None:
+def test_status_and_failure_survive(run: ChainRun, tmp_path: Path, cause: Cause, knots: int) -> None:
     """Cause, whole message, warnings and the knots up to then."""
     stopped = failed(run, cause, knots)
     write_run(tmp_path / "r.h5", stopped)
@@ -198,7 +198,7 @@ def test_status_and_failure_survive(run: Run, tmp_path: Path, cause: Cause, knot
     assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "r.h5").read_bytes()
 
 
-def test_an_unfinished_run_counts_as_interrupted(run: Run, tmp_path: Path) -> None:
+def test_an_unfinished_run_counts_as_interrupted(run: ChainRun, tmp_path: Path) -> None:
     """What a checkpoint leaves behind when the process is killed."""
     write_run(tmp_path / "r.h5", run, "unfinished")
     failure = load_run(tmp_path / "r.h5").failure
@@ -210,7 +210,7 @@ def test_an_unfinished_run_counts_as_interrupted(run: Run, tmp_path: Path) -> No
 # writing
 
 
-def test_a_failing_write_leaves_the_old_file(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_write_leaves_the_old_file(run: ChainRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Disk full in the middle, an interrupt, a missing folder: the old file is whole, nothing else lies there."""
     path = tmp_path / "r.h5"
     write_run(path, run)

@@ -10,8 +10,8 @@ import scenes
 
 import erls
 from erls.errors import Cause, SimulationError
+from erls.run.chain.run import ChainRun
 from erls.run.file import load_run, write_run
-from erls.run.record import Run
 from erls.run.watches.runaway import LARGEST
 from erls.run.watches.spin_stability import spin_warnings
 
@@ -21,7 +21,7 @@ SPINNING = ["simulation.effects=all"]
 HEAVY = ['simulation.effects=["all", "geometric_stiffening", "foreshortening"]', "gravity=[0, 0, -1e6]"]
 
 
-def failed(scene: Path, changes: list[str]) -> tuple[SimulationError, Run, list[str]]:
+def failed(scene: Path, changes: list[str]) -> tuple[SimulationError, ChainRun, list[str]]:
     """How a run fails, what was computed, and what was told."""
     told: list[str] = []
     with pytest.raises(SimulationError) as caught:

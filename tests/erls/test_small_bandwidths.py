@@ -7,12 +7,12 @@ import pytest
 import scenes
 
 import erls
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 
 FLAT = scenes.ROOT / "data/l_shape/steel_flat.toml"
 
 
-def swung(bandwidth: float, *changes: str) -> Run:
+def swung(bandwidth: float, *changes: str) -> ChainRun:
     settings = ["simulation.duration=0.2", f"simulation.bandwidth={bandwidth!r}", *changes]
     return erls.simulate(erls.load_scene(FLAT, settings))
 

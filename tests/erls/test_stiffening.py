@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,8 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import ALL, DEFAULT
 from erls.mechanism.links import Link, Payload, payload_invariants
 from erls.mechanism.second_order import link_second_order
-from erls.run.record import Run, node_positions
+from erls.run.chain.places import node_positions
+from erls.run.chain.run import ChainRun
 from erls.run.watches.spin_stability import critical_speed
 from erls.scene.build import build_mechanism
 from fe_import import load_link, reduce_link
@@ -32,7 +32,7 @@ STIFF = 'simulation.effects=["all", "geometric_stiffening", "foreshortening"]'
 EXPLICIT = ('simulation.integrator="dop853"', "simulation.rtol=1e-11", "simulation.step=0.1")
 
 
-def _in_turning_axes(run: Run, times: Any) -> np.ndarray:
+def _in_turning_axes(run: ChainRun, times: Any) -> np.ndarray:
     """Tip of the spin-up beam along and across its root's direction, less its length."""
     x, y, _ = run.position("tip", times).T
     angle = run.joint_angle("hub", times)
@@ -207,7 +207,7 @@ def test_formulations_agree_to_third_order(chain: Mechanism) -> None:
         found = []
         for one in equations:
             y, v = joints + size * elastic, rates + 3 * size * elastic
-            end = node_positions(SimpleNamespace(formulation=one), one.state(0.0, y, v), 2)[-1]  # type: ignore[arg-type]
+            end = node_positions(one.mechanism, one.state(0.0, y, v), 2)[-1]
             energy = one.energy(0.0, y, v)
             found.append(np.array([*end, energy.kinetic, energy.gravity]))
         apart = np.abs(np.array(found[:2]) - found[2])

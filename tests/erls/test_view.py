@@ -15,8 +15,10 @@ import erls
 from erls.errors import Cause, SceneError, SimulationError
 from erls.view import film, picture, show, write_view
 from erls.view.camera import Box, Camera, Walls
+from erls.view.chain import joint_places
 from erls.view.checks import surveyed
-from erls.view.shapes import chains, joint_places
+from erls.view.figures import figure_of
+from erls.view.shapes import chains
 from erls.view.stage import Motion
 from erls.view.window import Window
 
@@ -54,8 +56,9 @@ def test_picture_shows_the_link_at_its_tip(pendulum, tmp_path):
     image = pixels(path)
     assert image.shape == (500, 800, 3)
     assert 0.5 < (image.min(axis=2) > 250).mean() < 0.98
-    states = pendulum.states(np.linspace(0, 0.05, 6))
-    camera = Camera.fitting(Motion.of(pendulum, 1.0, states).box, np.array([0, 0, -9.81]), size)
+    figure = figure_of(pendulum)
+    poses = figure.poses(np.linspace(0, 0.05, 6))
+    camera = Camera.fitting(Motion.of(figure, 1.0, poses).box, np.array([0, 0, -9.81]), size)
     for name in ("tip", "elbow"):
         x, y = camera.project(pendulum.position(name, 0.05)).round().astype(int)
         assert coloured(image)[y - 2 : y + 3, x - 2 : x + 3].mean() > 0.5
@@ -199,7 +202,7 @@ def test_window_needs_a_display(display, pendulum, monkeypatch):
 
 def test_window_follows_its_slider(robot, monkeypatch):
     monkeypatch.setattr("pyvista.OFF_SCREEN", True)
-    with Window(robot, surveyed(robot, 1.0, None), 1.0, SIZE) as window:
+    with Window(figure_of(robot), surveyed(figure_of(robot), 1.0, None), 1.0, SIZE) as window:
         shown = []
         monkeypatch.setattr(window.plotter, "show", lambda **_: shown.append(window.image().astype(int)))
         window.interact("two links")
@@ -236,7 +239,7 @@ def test_chains_end_at_corners_and_branches():
 
 def test_both_sides_of_a_joint_meet(robot):
     (state,) = robot.states([0.05])
-    for place in joint_places(robot, state, 1.0):
+    for place in joint_places(robot.formulation.mechanism, state, 1.0):
         np.testing.assert_allclose(place.inner[:3, 3], place.outer[:3, 3], atol=1e-6)
         np.testing.assert_allclose(place.inner[:3, 2], place.outer[:3, 2], atol=1e-4)
         np.testing.assert_allclose(place.outer_node, place.outer[:3, 3], atol=1e-9)

@@ -1,1 +1,1 @@
-"""What scenes of bodies give: motions, equilibria, buckling loads, frequencies."""
+"""Runs of scenes of bodies and beams: motions, equilibria, and what their files hold."""

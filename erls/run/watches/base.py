@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from erls.equations.formulation import Formulation
 from erls.equations.registry import TREES
@@ -31,6 +31,7 @@ from erls.equations.serial.state_series import StateSeries
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Solution
 from erls.mechanism.chain import Mechanism
+from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.scene.chain import Scene
 from erls.scene.settings import Simulation
@@ -93,19 +94,26 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Begun:
-    """A run whose equations of motion stand; ``run_of`` makes a run of knots so far."""
+class Started:
+    """A run of any kind of scene: how long it will be [s]; ``run_of`` makes a run of knots so far."""
+
+    duration: float
+    run_of: Callable[[Any], Run]
+
+
+@dataclass(frozen=True)
+class Begun(Started):
+    """A run of a chain whose equations of motion stand."""
 
     plan: Plan
     formulation: Formulation
-    run_of: Callable[[Solution], Run]
 
 
 @dataclass(frozen=True)
 class Ended:
     """A run that has come to its end, as planned or not."""
 
-    run: Run
+    run: ChainRun
 
     @cached_property
     def seen(self) -> StateSeries:

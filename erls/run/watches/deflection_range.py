@@ -17,7 +17,7 @@ from erls.errors import SimulationError
 from erls.integrate.base import hermite
 from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism, poses
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.run.watches.base import NOTHING, Ended, Finding, Watch
 from erls.run.watches.deflection_estimate import DeflectionError, LinkMotion, deflection_error
 
@@ -40,12 +40,12 @@ class DeflectionRange(Watch):
         return Finding(deflection_warnings(ended.run, errors), error=sum(found.error for found in errors.values()))
 
 
-def deflection_errors(run: Run) -> dict[str, DeflectionError]:
+def deflection_errors(run: ChainRun) -> dict[str, DeflectionError]:
     """Estimated error of every flexible link that is linear in its frame: see `erls.run.watches.deflection_estimate`.
 
     Parameters
     ----------
-    run : Run
+    run : ChainRun
 
     Returns
     -------
@@ -85,7 +85,7 @@ def deflection_errors(run: Run) -> dict[str, DeflectionError]:
     return _of_links(run, mechanism, found)
 
 
-def deflection_warnings(run: Run, errors: Mapping[str, DeflectionError] | None = None) -> list[str]:
+def deflection_warnings(run: ChainRun, errors: Mapping[str, DeflectionError] | None = None) -> list[str]:
     """Links whose estimated error is more than 0.2 % of their size, with the reason and what to do."""
     result = []
     links = {link.name: link for link in run.formulation.mechanism.links}
@@ -109,7 +109,7 @@ def deflection_warnings(run: Run, errors: Mapping[str, DeflectionError] | None =
     return result
 
 
-def _motions(run: Run, links: list[int], times: Array, step: float) -> dict[int, LinkMotion]:
+def _motions(run: ChainRun, links: list[int], times: Array, step: float) -> dict[int, LinkMotion]:
     """Motion of some links, with the loads on their interfaces."""
     seen = run.series(np.concatenate([times - step, times, times + step]))
     loads = _loads(run, times, seen)
@@ -132,7 +132,7 @@ def _axial(matrices: Array) -> Array:
     return np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1) / 2
 
 
-def _loads(run: Run, times: Array, seen: StateSeries) -> list[Array]:
+def _loads(run: ChainRun, times: Array, seen: StateSeries) -> list[Array]:
     """(k, 6 i) of every link: what the next joint and closing joints do to its interfaces, in its axes; the middle
     third of the states is at these times.
     """
@@ -197,7 +197,7 @@ def _reach(mechanism: Mechanism, places: list[Array], number: int) -> float:
     )
 
 
-def _of_links(run: Run, mechanism: Mechanism, found: dict[int, DeflectionError]) -> dict[str, DeflectionError]:
+def _of_links(run: ChainRun, mechanism: Mechanism, found: dict[int, DeflectionError]) -> dict[str, DeflectionError]:
     """By name of link; of the pieces of one link errors and shortenings add up, and the rest is the largest."""
     if not isinstance(run.formulation, Substructured):
         return {mechanism.links[k].name: error for k, error in found.items()}

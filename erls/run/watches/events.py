@@ -22,14 +22,14 @@ class Events(Watch):
 
     def begins(self, begun: Begun) -> Finding:
         """Nothing; it learns which events stop the run."""
-        self._run_of = begun.run_of
-        self._stops = {event.name for event in begun.plan.scene.record.events if event.stop}
+        self._events, self._formulation = begun.plan.scene.record.events, begun.formulation
+        self._stops = {event.name for event in self._events if event.stop}
         return NOTHING
 
     def during(self, t: float, knots: Knots) -> Finding:
         """Times of events since the last look; their steps are to be kept, so that the run shows them."""
         solution, times = knots(), []
-        for happening in happenings(self._run_of(solution), self._since):
+        for happening in happenings(self._events, self._formulation, solution, self._since):
             times.append(happening.time)
             if happening.name in self._stops:
                 self._happened = happening

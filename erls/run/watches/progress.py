@@ -8,7 +8,7 @@ from pathlib import Path
 
 from erls.errors import SceneError
 from erls.run.file import write_run
-from erls.run.watches.base import NOTHING, Begun, Finding, Knots, Watch
+from erls.run.watches.base import NOTHING, Finding, Knots, Started, Watch
 
 CHECKPOINT_S = 20.0  # a killed run loses at most this much work
 
@@ -19,9 +19,9 @@ class Progress(Watch):
     def __init__(self, advance: Callable[[float, float], None]) -> None:
         self._advance, self._duration = advance, 0.0
 
-    def begins(self, begun: Begun) -> Finding:
+    def begins(self, begun: Started) -> Finding:
         """Nothing; it learns the duration."""
-        self._duration = begun.plan.settings.duration
+        self._duration = begun.duration
         return NOTHING
 
     def during(self, t: float, knots: Knots) -> Finding:
@@ -36,7 +36,7 @@ class Checkpoint(Watch):
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def begins(self, begun: Begun) -> Finding:
+    def begins(self, begun: Started) -> Finding:
         """Nothing; the clock starts."""
         self._run_of, self._saved = begun.run_of, time.perf_counter()
         return NOTHING

@@ -6,7 +6,7 @@ import numpy as np
 
 from erls.equations.serial.state_series import StateSeries
 from erls.mechanism.chain import Mechanism
-from erls.run.record import Run
+from erls.run.chain.run import ChainRun
 from erls.run.watches.base import NOTHING, Ended, Finding, Watch
 
 _LARGE_DEFLECTION = 0.1  # of the link's size; the second-order error of a small-displacement model is then about 1 %
@@ -22,7 +22,7 @@ class SmallDisplacements(Watch):
         return NOTHING if ended.meaningless else Finding(range_warnings(ended.run, ended.seen))
 
 
-def range_warnings(run: Run, seen: StateSeries) -> list[str]:
+def range_warnings(run: ChainRun, seen: StateSeries) -> list[str]:
     """Links whose displacement left the range of small displacements, in which a modal model holds."""
     if seen.nodes is not None:
         return []  # the links may deflect as they like

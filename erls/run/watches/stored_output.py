@@ -10,7 +10,8 @@ from erls.errors import SimulationError
 from erls.integrate.base import hermite
 from erls.integrate.thinning import output_step
 from erls.maths.so3 import Array
-from erls.run.record import Run, node_positions
+from erls.run.chain.places import node_positions
+from erls.run.chain.run import ChainRun
 from erls.run.watches.base import NOTHING, Ended, Finding, Plan, Watch
 
 IntArray = NDArray[np.int64]
@@ -32,7 +33,7 @@ class StoredOutput(Watch):
         return NOTHING if ended.meaningless else Finding(output_warnings(ended.run))
 
 
-def output_error(run: Run) -> float:
+def output_error(run: ChainRun) -> float:
     """Largest distance of points (interfaces, where none are named) from interpolation between stored states [m].
 
     It is estimated at some of these, from interpolation without them and, over twice the distance, without their
@@ -58,7 +59,7 @@ def output_error(run: Run) -> float:
     return twice * float(np.clip(twice / fourfold, 1 / _ORDER, 1.0)) if fourfold < np.inf else twice
 
 
-def output_warnings(run: Run) -> list[str]:
+def output_warnings(run: ChainRun) -> list[str]:
     """At most one: between stored states motion is not resolved to the tolerance of the scene."""
     settings = run.scene.record.simulation
     found = output_error(run)
@@ -71,7 +72,7 @@ def output_warnings(run: Run) -> list[str]:
     ]
 
 
-def _places(run: Run, middles: IntArray, reach: int) -> Array:
+def _places(run: ChainRun, middles: IntArray, reach: int) -> Array:
     """(k, p, 3) positions of points at some knots, interpolated from those ``reach`` before and after; 0 for their own.
     """
     s = run.solution
@@ -85,4 +86,5 @@ def _places(run: Run, middles: IntArray, reach: int) -> Array:
     nodes = [(p.link, np.array([p.node])) for p in mechanism.points] or [
         (k, np.array([i.node for i in link.model.interface_nodes])) for k, link in enumerate(mechanism.links)
     ]
-    return np.array([np.concatenate([node_positions(run, state, *own) for own in nodes]) for state in states])
+    mechanism = run.formulation.mechanism
+    return np.array([np.concatenate([node_positions(mechanism, state, *own) for own in nodes]) for state in states])

@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import cache
 
 from erls.integrate.base import Solution, StopRun
+from erls.run.chain.run import ChainRun
 from erls.run.events import cut
-from erls.run.record import Run
 from erls.run.watches.base import Begun, Ended, Finding, Knots, Plan, Watch
 from erls.run.watches.registry import WATCHES
 
@@ -100,7 +100,7 @@ class Watching:
                 solution = cut(solution, finding.end)
         return solution
 
-    def judged(self, run: Run) -> Run:
+    def judged(self, run: ChainRun) -> ChainRun:
         """The run with all that there is to say about it.
 
         Raises

@@ -52,8 +52,8 @@ class Assembly:
         Nodes whose places are reported.
     velocity : (n,) array
         At the start, as the system's group has it.
-    elements : int
-        Beam elements.
+    beams : dict
+        Elements of each beam, in their order.
     """
 
     system: NodalSystem
@@ -62,7 +62,12 @@ class Assembly:
     numbers: dict[str, int]
     reported: tuple[str, ...]
     velocity: Array
-    elements: int
+    beams: dict[str, list[Beam]]
+
+    @property
+    def elements(self) -> int:
+        """Number of beam elements."""
+        return sum(map(len, self.beams.values()))
 
 
 def assemble(scene: BodyScene) -> Assembly:
@@ -77,9 +82,10 @@ def assemble(scene: BodyScene) -> Assembly:
     numbers = {name: k for k, name in enumerate([*record.nodes, *(b.name for b in record.bodies)])}
     poses = [pose(position=np.array(x)) for x in record.nodes.values()]
     poses += [pose(fixed_axes(*np.radians(b.rotation_deg)), np.array(b.position)) for b in record.bodies]
-    beams: list[Beam] = []
-    for k, beam in enumerate(record.beams):
-        beams += _elements(record, beam, numbers, poses, f"{file}: beams[{k}]", file)
+    beams = {
+        beam.name: _elements(record, beam, numbers, poses, f"{file}: beams[{k}]", file)
+        for k, beam in enumerate(record.beams)
+    }
     gravity, built = np.array(record.gravity), np.array(poses)
     bodies = _bodies(record, numbers, file)
     dynamic = isinstance(record.simulation, Dynamics)
@@ -89,7 +95,7 @@ def assemble(scene: BodyScene) -> Assembly:
     ]
     elements: list[Elements] = []
     if beams:
-        elements.append(Beams(beams, built, gravity))
+        elements.append(Beams([e for own in beams.values() for e in own], built, gravity))
     if bodies:
         elements.append(RigidBodies(bodies, gravity))
     if loads:
@@ -105,7 +111,7 @@ def assemble(scene: BodyScene) -> Assembly:
     system = NodalSystem(built, elements, joints, group) if left_out else full
     reported = tuple(dict.fromkeys([*record.nodes, *(b.name for b in record.bodies), *record.report]))
     velocity = _velocity(record, numbers, built, world)
-    return Assembly(system, full, left_out, numbers, reported, velocity, len(beams))
+    return Assembly(system, full, left_out, numbers, reported, velocity, beams)
 
 
 def _elements(

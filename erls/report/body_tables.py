@@ -1,14 +1,18 @@
-"""Plain text about results of scenes of bodies."""
+"""Plain text about runs of bodies and beams."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from erls.report.tables import table
+from erls.run.bodies.motion import BodyMotion
+from erls.run.bodies.run import BodyRun
 
 
-def result_report(s: dict[str, Any]) -> str:
-    """Text of the JSON of ``erls simulate``."""
+def body_report(run: BodyRun, times: Sequence[float] = ()) -> str:
+    """Summary of a run of bodies, nodes and connections at given times: its end, or all load steps, unless given."""
+    s = run.summary(times or ([run.end] if isinstance(run, BodyMotion) else ()))
     lines = [
         f"{s['scene']}: {s['analysis']} on {s['group']}, {s['bodies']} bodies, {s['elements']} beam elements, "
         f"{s['nodes']} nodes, {s['conditions']} conditions"
@@ -27,6 +31,8 @@ def result_report(s: dict[str, Any]) -> str:
         )
     else:
         lines.append(_work(f"tangent {s['tangent']}", s) + f", {s['wall_s']:.2f} s")
+    if run.failure is not None:
+        lines.append(f"stopped early: {run.failure}")
     parts = ["\n".join(lines)]
     if s.get("tangents"):
         parts.append("\n".join(_work(f"tangent {name}", w) for name, w in s["tangents"].items()))

@@ -1,0 +1,87 @@
+"""The commands that look at files: ``erls info`` and ``erls view``."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from erls.cli.terminal import Json, Output, Progress, print_json, refuse_unwritable, report_times
+
+
+def info(file: Path, /, *, json: Json = False) -> None:
+    """Show what is in a link, modal, scene or run file.
+
+    Of a modal file: the modes with frequency, kind and effective mass, the mass properties against those of the full
+    model, and the health checks.
+
+    Parameters
+    ----------
+    file
+        The file.
+    json
+        Print one JSON object.
+    """
+    from erls.report.info import file_info
+
+    summary, text = file_info(file)
+    if json:
+        return print_json(summary)
+    print(text)
+
+
+def view(
+    run: Path,
+    /,
+    *,
+    output: Output = None,
+    at: str = "",
+    magnify: float = 1.0,
+    fps: int = 30,
+    speed: float = 1.0,
+    json: Json = False,
+) -> None:
+    """Make a picture, film or export of a run; without -o, open a window.
+
+    The ending of the output decides: .png or .jpg a picture, .mp4 or .gif a film, .pvd the deformed links, or beams and
+    bodies, for ParaView, .csv a table of joints, points, forces and energies.
+
+    Parameters
+    ----------
+    run
+        Run file.
+    output
+        File to write.
+    at
+        Times in seconds, at rest load parameters, separated by commas, instead of even ones (picture, .pvd, .csv).
+    magnify
+        Factor on the displacement of the links, or of bodies and beams at rest; 1 shows it true.
+    fps
+        Frames per second of a film.
+    speed
+        Film time over real time; 0.5 is slow motion.
+    json
+        Print one JSON object.
+    """
+    from erls.run.file import load_run
+    from erls.view import show, write_view
+
+    loaded = load_run(run)
+    if output is None:
+        show(loaded)
+        return
+    refuse_unwritable(output, run)
+    begun = time.perf_counter()
+    times = report_times(at, loaded.end, loaded.axis.unit) or None
+    with Progress("drawing") as advance:
+        write_view(
+            loaded,
+            output,
+            times=times,
+            magnification=magnify,
+            fps=fps,
+            speed=speed,
+            progress=lambda done, total: advance(done, total),
+        )
+    if json:
+        return print_json({"run": str(run), "output": str(output), "wall_s": time.perf_counter() - begun})
+    print(f"written to {output}")

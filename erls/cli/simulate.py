@@ -1,0 +1,95 @@
+"""The command ``erls simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from erls.cli.terminal import Json, Output, Progress, print_json, refuse_unwritable, remove, report_times, tell
+
+if TYPE_CHECKING:
+    from erls.scene.records import Record
+
+
+def simulate(
+    scene: Path,
+    /,
+    *,
+    output: Output = None,
+    formulation: str | None = None,
+    set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
+    at: str = "",
+    strict: Annotated[bool, Parameter(negative="")] = False,
+    json: Json = False,
+) -> None:
+    """Simulate a scene; links are reduced on the fly and cached by content.
+
+    Parameters
+    ----------
+    scene
+        Scene (TOML).
+    output
+        Run file to write (HDF5); none unless given.
+    formulation
+        Formulation instead of the one in the scene: erls, ffr or nodal.
+    set_
+        Change a field of the scene, KEY=VALUE; may be repeated. For example simulation.step=1e-4,
+        links.arm.elastic_modes=8, joints.0.initial.position_deg=30.
+    at
+        Times in seconds, separated by commas, at which to report joints and points.
+    strict
+        With effects = "auto": repeat the run where what was left out passes the tolerance; exit code 4 where no effect
+        brings its own estimate within it.
+    json
+        Print one JSON object.
+    """
+    from erls.errors import Cause, SimulationError
+    from erls.report.runs import run_report
+    from erls.run.file import write_run
+    from erls.scene.read import load_scene
+    from erls.simulation.simulate import simulate as run_simulation
+
+    changes = list(set_ or [])
+    if formulation is not None:
+        changes.append(f'simulation.formulation="{formulation}"')
+    loaded = load_scene(scene, changes)
+    times = _asked(at, loaded.record.simulation)
+    if output is not None:
+        refuse_unwritable(output, scene)
+    partial = output.with_name(f"{output.name}.partial") if output is not None else None
+    try:
+        with Progress("simulating") as advance:
+            run = run_simulation(loaded, progress=advance, tell=tell, checkpoint=partial, strict=strict)
+    except SimulationError as problem:
+        if output is None and problem.run is not None:
+            hint = "give -o RUN.h5 to keep what was computed"
+            problem.remedy = hint if problem.cause == Cause.INTERRUPTED else f"{problem.remedy}; {hint}"
+        elif output is not None and problem.run is not None and problem.run.worth_a_file:
+            write_run(output, problem.run)
+            axis = problem.run.axis
+            tell(f"what was computed, up to {axis.symbol} = {axis.text(f'{problem.run.end:.6g}')}, is in {output}")
+            remove(partial)
+        raise
+    if output is not None:
+        write_run(output, run)
+        remove(partial)
+    if json:
+        return print_json({**run.summary(times), "output": None if output is None else str(output)})
+    print(run_report(run, times))
+    if output is not None:
+        print(f"\nwritten to {output}")
+
+
+def _asked(at: str, settings: Record) -> list[float]:
+    """Times of ``--at``, which only motions have."""
+    from erls.errors import Cause, SceneError
+    from erls.scene.records import Stepping
+
+    if isinstance(settings, Stepping):
+        return report_times(at, settings.duration)
+    if at.strip():
+        message, remedy = "nothing moves: every load step is reported", "leave it out, or change simulation.load_steps"
+        raise SceneError(Cause.TIME_OUT_OF_RANGE, message, where="--at", value=at, remedy=remedy)
+    return []

@@ -1,0 +1,134 @@
+"""The motion of a scene of bodies and beams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from erls.errors import SimulationError
+from erls.integrate.base import hermite
+from erls.integrate.constrained import ConstrainedSolution
+from erls.maths import motion_maps as motions
+from erls.maths.so3 import Array
+from erls.run.bodies.run import BodyRun
+
+_MOST_ENERGIES = 2001
+
+
+@dataclass(frozen=True)
+class BodyMotion(BodyRun):
+    """A motion with dense output.
+
+    Attributes
+    ----------
+    solution : ConstrainedSolution
+        Places and rotation matrices of the nodes at the knots, multipliers of the connections.
+    """
+
+    solution: ConstrainedSolution
+
+    @property
+    def failure(self) -> SimulationError | None:
+        """Why the run ended early."""
+        return self.solution.failure
+
+    @cached_property
+    def times(self) -> Array:
+        """(k,) times of the steps, each once."""
+        return np.unique(self.solution.t)
+
+    def poses(self, t: ArrayLike, nodes: Sequence[int] | None = None) -> Array:
+        """(k, n, 4, 4) poses of nodes, all unless given."""
+        y, v = self._interpolated(self.within(t), nodes)
+        return frames_and_twists(y, v)[0]
+
+    def velocities(self, t: Array) -> Array:
+        """(k, 6 n) velocities of all nodes, as the system's group has them."""
+        poses, twists = frames_and_twists(*self._interpolated(self.within(t), None))
+        return self._of_group(poses, twists)
+
+    def multipliers(self, t: Array) -> Array:
+        """(k, m) between steps in proportion."""
+        s = self.solution
+        found = np.empty((len(t), s.multipliers.shape[1]))
+        for k, values in enumerate(s.multipliers.T):
+            found[:, k] = np.interp(t, s.t, values)
+        return found
+
+    def energies(self) -> tuple[Array, Array]:
+        """Times (k,) of knots, and total energy (k,) there [J]."""
+        s, system = self.solution, self.assembly.system
+        pick = np.unique(np.linspace(0, len(s.t) - 1, min(len(s.t), _MOST_ENERGIES)).astype(np.int64))
+        knots = (x[pick].reshape(len(pick), -1, 12) for x in (s.y[:, : 12 * system.count], s.v[:, : 12 * system.count]))
+        poses, twists = frames_and_twists(*knots)
+        q, totals = system.start, []
+        for t, pose, velocity in zip(s.t[pick], poses, self._of_group(poses, twists), strict=True):
+            q = system.at(pose, q)
+            totals.append(sum(system.energy(float(t), q, velocity)))
+        return s.t[pick], np.array(totals)
+
+    @property
+    def conservative(self) -> bool:
+        """Whether total energy should stay constant."""
+        record = self.scene.record
+        damped = any(s.damping for s in record.springs)
+        return not record.loads and not damped and all(c.motion is None for c in record.connections)
+
+    def summary(self, times: Sequence[float] = ()) -> dict[str, Any]:
+        """The JSON of ``erls simulate``."""
+        _, totals = self.energies()
+        work = self.solution.work
+        return {
+            **self.facts(),
+            "integrator": "lie_generalized_alpha",
+            "duration": self.end,
+            "steps": work.steps,
+            "rhs_calls": work.rhs_calls,
+            "newton_iterations": work.newton_iterations,
+            "iterations_per_step": work.newton_iterations / max(work.steps, 1),
+            "factorizations": work.factorizations,
+            "wall_s": self.wall_s,
+            "energy": {
+                "initial": float(totals[0]),
+                "final": float(totals[-1]),
+                "max_drift": float(np.ptp(totals)) if self.conservative else None,
+            },
+            "samples": self.samples(times),
+            "warnings": list(self.warnings),
+        }
+
+    def _interpolated(self, times: Array, nodes: Sequence[int] | None) -> tuple[Array, Array]:
+        """(k, n, 12) places and rotation matrices of nodes, and their rates."""
+        s, count = self.solution, self.assembly.system.count
+        own = np.arange(count) if nodes is None else np.asarray(nodes)
+        columns = (12 * own[:, None] + np.arange(12)).ravel()
+        own_knots = s.y[:, columns], s.v[:, columns], s.a[:, columns]
+        y, v = hermite(s.t, *own_knots, np.clip(times, s.t[0], self.end))
+        return y.reshape(len(times), len(own), 12), v.reshape(len(times), len(own), 12)
+
+    def _of_group(self, poses: Array, twists: Array) -> Array:
+        """(k, 6 n) velocities from twists in node axes."""
+        if not self.assembly.system.local:
+            twists = twists.copy()
+            twists[..., :3] = (poses[..., :3, :3] @ twists[..., :3, None])[..., 0]
+        return twists.reshape(len(twists), -1)
+
+
+def frames_and_twists(place: Array, rate: Array) -> tuple[Array, Array]:
+    """Poses (k, n, 4, 4) and twists (k, n, 6) in node axes, from stored places and rotation matrices (k, n, 12) and
+    their rates; rotations made orthogonal.
+    """
+    shape = (*place.shape[:2], 3, 3)
+    left, _, right = np.linalg.svd(place[..., 3:].reshape(shape))
+    turn = left @ right
+    back = np.swapaxes(turn, -1, -2)
+    spin = back @ rate[..., 3:].reshape(shape)
+    twist = np.empty((*shape[:2], 6))
+    twist[..., :3] = (back @ rate[..., :3, None])[..., 0]
+    twist[..., 3:] = (spin - np.swapaxes(spin, -1, -2))[..., [2, 0, 1], [1, 2, 0]] / 2
+    return motions.poses(turn, place[..., :3]), twist

@@ -1,0 +1,1 @@
+"""Runs of chains: their answers, places of their nodes, and what their files hold."""

@@ -1,0 +1,227 @@
+"""The run of a chain: its motion, energies and forces at any time, and its summary."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from erls.equations.formulation import Energy, Reaction
+from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.substructures import solved
+from erls.errors import SceneError
+from erls.maths.so3 import Array
+from erls.mechanism.effects import conserves_energy, in_order
+from erls.mechanism.joints import Joint
+from erls.mechanism.loops import LoopFreedom
+from erls.run.chain.kinematics import ChainMotion
+from erls.run.events import Happening, happenings
+from erls.run.record import Curve, plain, vector
+from fe_import.files.toml import choose
+
+_ENERGIES = ("kinetic", "elastic", "gravity", "springs")
+
+
+@dataclass(frozen=True)
+class ChainRun(ChainMotion):
+    """A motion with dense output; times are scalars or arrays [s], results have their shape in front.
+
+    Attributes
+    ----------
+    scene : Scene
+    formulation : Formulation
+        The equations of motion, with the mechanism.
+    solution : Solution
+        Knots of the motion and the work done.
+    wall_s : float
+        Time that the integration took.
+    warnings : tuple of str
+        What the user should know before trusting the run.
+    certificate : Certificate or None
+        Of a run with ``effects = "auto"``.
+    second_order_error : float or None
+        Estimate of `erls.run.watches.deflection_range`, of all links [m]; None where it was not made.
+
+    Examples
+    --------
+    >>> import erls
+    >>> scene = erls.load_scene("data/l_shape/steel_tall.toml", ["simulation.duration=0.01"])
+    >>> run = erls.simulate(scene)
+    >>> run.position("tip", 0.0).tolist()
+    [0.5, 0.5, 0.0]
+    >>> run.position("tip", [0.0, 0.005, 0.01]).shape
+    (3, 3)
+    >>> bool(run.joint_angle("shoulder", 0.01) > 0)
+    True
+    >>> run.elastic_coordinates("l", 0.01).shape
+    (18,)
+    >>> force, moment = run.reaction("shoulder", 0.0)
+    >>> force.shape, moment.shape
+    ((3,), (3,))
+    """
+
+    @cached_property
+    def events(self) -> tuple[Happening, ...]:
+        """Events of the scene that happened, in the order of time."""
+        return happenings(self.scene.record.events, self.formulation, self.solution)
+
+    def energy(self, t: ArrayLike) -> Energy:
+        """Kinetic, elastic, gravity and spring energy [J], each of the shape of ``t``."""
+        shape, flat, y, v = self._interpolated(t)
+        found = [self.formulation.energy(*at) for at in zip(flat.tolist(), y, v, strict=True)]
+        return Energy(*(np.array([getattr(e, kind) for e in found]).reshape(shape) for kind in _ENERGIES))  # type: ignore[arg-type]
+
+    def reaction(self, joint: str, t: ArrayLike) -> tuple[Array, Array]:
+        """(..., 3) force [N] and (..., 3) moment [N m] on the joint's outer link, at its displaced interface node,
+        world axes.
+        """
+        found = self._reactions(joint, t)
+        shape = (*np.shape(t), 3)
+        return np.array([r.force for r in found]).reshape(shape), np.array([r.moment for r in found]).reshape(
+            shape
+        )
+
+    def joint_effort(self, joint: str, t: ArrayLike) -> Array:
+        """(...) torque [N m] or force [N] of drive, spring, damper and friction; for a prescribed motion, what its
+        motor must give.
+        """
+        return np.array([r.effort for r in self._reactions(joint, t)]).reshape(np.shape(t))
+
+    def _reactions(self, joint: str, t: ArrayLike) -> list[Reaction]:
+        choose(joint, self.joint_names, "joint", SceneError)
+        number = self.joint_names.index(joint)
+        return [found[number] for found in self._all_reactions(t)]
+
+    def _all_reactions(self, t: ArrayLike) -> list[list[Reaction]]:
+        """Of all joints at each time: every time is solved once."""
+        _, flat, y, v = self._interpolated(t)
+        return [self.formulation.reactions(*at) for at in zip(flat.tolist(), y, v, strict=True)]
+
+    @property
+    def loop_names(self) -> tuple[str, ...]:
+        """Closing joints."""
+        return tuple(loop.name for loop in self.formulation.mechanism.loops)
+
+    def loop_reaction(self, loop: str, t: ArrayLike) -> tuple[Array, Array]:
+        """(..., 3) force [N] and (..., 3) moment [N m] of a closing joint on its ``link``, at its displaced node, world
+        axes.
+        """
+        choose(loop, self.loop_names, "loop", SceneError)
+        number = self.loop_names.index(loop)
+        _, flat, y, v = self._interpolated(t)
+        chain = solved(self.formulation)
+        assert isinstance(chain, ClosedChain)
+        found = [chain.loop_forces(*at)[number] for at in zip(flat.tolist(), y, v, strict=True)]
+        shape = (*np.shape(t), 3)
+        return np.array([f.force for f in found]).reshape(shape), np.array([f.moment for f in found]).reshape(shape)
+
+    def loop_coordinate(self, loop: str, t: ArrayLike) -> Array:
+        """(...) coordinate of a revolute or prismatic closing joint [rad or m]."""
+        return self._of_loop(loop, t, lambda chain, *at: chain.loop_motion(*at)[0])
+
+    def loop_rate(self, loop: str, t: ArrayLike) -> Array:
+        """(...) its rate [rad/s or m/s]."""
+        return self._of_loop(loop, t, lambda chain, *at: chain.loop_motion(*at)[1])
+
+    def loop_effort(self, loop: str, t: ArrayLike) -> Array:
+        """(...) torque [N m] or force [N] of drive, spring, damper and friction along it; for a prescribed motion, what
+        its motor must give.
+        """
+        return self._of_loop(loop, t, lambda chain, *at: chain.loop_effort(*at))
+
+    def _of_loop(self, loop: str, t: ArrayLike, what: Callable[..., float]) -> Array:
+        names = [x.name for x in self.formulation.mechanism.loops if x.freedom is not None]
+        choose(loop, names, "loop", SceneError)
+        number, chain = self.loop_names.index(loop), solved(self.formulation)
+        _, flat, y, v = self._interpolated(t)
+        found = [what(chain, *at, number) for at in zip(flat.tolist(), y, v, strict=True)]
+        return np.array(found).reshape(np.shape(t))
+
+    @property
+    def conservative(self) -> bool:
+        """Whether total energy should stay constant: no drives, damping or friction."""
+        mechanism = self.formulation.mechanism
+        joints: list[Joint | LoopFreedom] = [*mechanism.joints]
+        joints += [x.freedom for x in mechanism.loops if x.freedom is not None]
+        passive = all(j.drive.kind == "free" and not j.forces.damping and not j.forces.friction for j in joints)
+        damped = any(link.damping.any() for link in mechanism.links)
+        return passive and not damped and conserves_energy(mechanism.effects)
+
+    def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
+        """Joints and points at given times, as in the JSON of ``erls simulate``."""
+        result = []
+        for t, s in zip(times, self.states(times), strict=True):
+            joints = {
+                name: {"coordinate": float(s.coordinates[k]), "angle": float(s.angles[k])}
+                for k, name in enumerate(self.joint_names)
+            }
+            points = {name: self.point_position(s, k).tolist() for k, name in enumerate(self.point_names)}
+            result.append({"t": float(t), "joints": joints, "points": points})
+        return result
+
+    def columns(self, times: Array) -> dict[str, Array]:
+        """Of each point x, y, z; of each joint coordinate, physical angle, its rate, effort, reaction force and moment
+        on the outer link (world axes); energies.
+        """
+        states = self.states(times)
+        columns = {"t [s]": times}
+        for k, name in enumerate(self.point_names):
+            vector(columns, plain(name), "m", [self.point_position(s, k) for s in states])
+        reactions = self._all_reactions(times)
+        for k, joint in enumerate(self.formulation.mechanism.joints):
+            name, unit, effort = plain(joint.name), *(("rad", "N m") if joint.type.revolute else ("m", "N"))
+            columns[f"{name}.coordinate [{unit}]"] = np.array([s.coordinates[k] for s in states])
+            columns[f"{name}.angle [{unit}]"] = np.array([s.angles[k] for s in states])
+            columns[f"{name}.rate [{unit}/s]"] = np.array([s.rates[k] for s in states])
+            columns[f"{name}.effort [{effort}]"] = np.array([r[k].effort for r in reactions])
+            vector(columns, f"{name}.force", "N", [r[k].force for r in reactions])
+            vector(columns, f"{name}.moment", "N m", [r[k].moment for r in reactions])
+        energy = self.energy(times)
+        for kind in (*_ENERGIES, "total"):
+            columns[f"energy.{kind} [J]"] = np.asarray(getattr(energy, kind))
+        return columns
+
+    def curves(self, times: Array) -> dict[str, Curve]:
+        """Points, joints, energies."""
+        states, found = self.states(times), {}
+        for k, name in enumerate(self.point_names):
+            positions = np.array([self.point_position(s, k) for s in states])
+            found[f"points/{name}"] = Curve(positions, "m", "world position; time, axis")
+        for k, name in enumerate(self.joint_names):
+            for what in ("coordinates", "angles", "rates"):
+                values = np.array([getattr(s, what)[k] for s in states])
+                found[f"joints/{name}/{what}"] = Curve(values, "rad or m, per s", "joint motion")
+        energy = self.energy(times)
+        for kind in (*_ENERGIES, "total"):
+            found[f"energy/{kind}"] = Curve(np.asarray(getattr(energy, kind)), "J", f"{kind} energy")
+        return found
+
+    def summary(self, times: Sequence[float] = ()) -> dict[str, Any]:
+        """The JSON of ``erls simulate``; ``max_drift`` is None where energy is not conserved."""
+        totals = self.energy(self.looks(201)).total
+        work = self.solution.work
+        return {
+            "scene": self.scene.name,
+            **self.formulation.describe(),
+            "effects": in_order(self.formulation.mechanism.effects),
+            **({} if self.certificate is None else self.certificate.summary()),
+            "integrator": self.solution.choice or self.scene.record.simulation.integrator,
+            "duration": self.end,
+            "steps": work.steps,
+            "rhs_calls": work.rhs_calls,
+            "newton_iterations": work.newton_iterations,
+            "factorizations": work.factorizations,
+            "wall_s": self.wall_s,
+            "energy": {
+                "initial": float(np.asarray(totals)[0]),
+                "final": float(np.asarray(totals)[-1]),
+                "max_drift": float(np.ptp(totals)) if self.conservative else None,
+            },
+            "samples": self.samples(times),
+            **({"events": [asdict(happening) for happening in self.events]} if self.scene.record.events else {}),
+            "warnings": list(self.warnings),
+        }

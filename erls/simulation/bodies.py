@@ -1,0 +1,117 @@
+"""The run of a scene of bodies and beams: its motion, equilibria, buckling loads or natural frequencies."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from erls.equations.nodal.redundant import refuse_open
+from erls.equations.nodal.scenes.build import Assembly, assemble
+from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
+from erls.equations.nodal.statics import Statics, solve_statics
+from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.run.bodies.motion import BodyMotion
+from erls.run.bodies.rest import BodyRest, Modes, work
+from erls.run.watches.base import Started
+from erls.scene.bodies.analyses import TANGENTS, AtRest, Buckling, Dynamics, Frequencies, StaticSteps
+from erls.scene.bodies.schema import BodyScene
+from erls.simulation.asked import Asked
+
+
+def run_bodies(scene: BodyScene, asked: Asked) -> BodyMotion | BodyRest:
+    """Find what a scene of bodies asks for.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Bad input: names file, field, value and remedy.
+    SimulationError
+        A failure or an interrupt; what was computed is in its attribute ``run``.
+    """
+    assembly = assemble(scene)
+    analysis = scene.record.simulation
+    if isinstance(analysis, Dynamics):
+        run: BodyMotion | BodyRest = _motion(scene, assembly, analysis, asked)
+    else:
+        run = _rest(scene, assembly, analysis)
+    for text in run.warnings:
+        asked.tell(f"warning: {text}")
+    if run.failure is not None:
+        run.failure.run = run
+        raise run.failure
+    return run
+
+
+def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, asked: Asked) -> BodyMotion:
+    options = ConstrainedOptions(
+        step=analysis.step,
+        spectral_radius=analysis.spectral_radius,
+        newton_tolerance=analysis.newton_tolerance,
+        iteration_matrix=analysis.iteration_matrix,
+        residual_tolerance=analysis.residual_tolerance,
+    )
+    begun, watches = time.perf_counter(), asked.watches()
+
+    def run_of(found: ConstrainedSolution) -> BodyMotion:
+        warnings = (*_redundancy(assembly), *found.warnings)
+        return BodyMotion(scene, assembly, time.perf_counter() - begun, warnings, found)
+
+    def observe(t: float, knots: Callable[[], ConstrainedSolution]) -> None:
+        for watch in watches:
+            for note in watch.during(t, knots).notes:
+                asked.tell(note)
+
+    for watch in watches:
+        watch.begins(Started(analysis.duration, run_of))
+    times = (0.0, analysis.duration)
+    system = assembly.system
+    run = run_of(lie_generalized_alpha(system, times, system.start, assembly.velocity, options, observe))  # type: ignore[arg-type]
+    if assembly.left_out and run.failure is None:
+        looks = run.spread(21)
+        for t, poses in zip(looks.tolist(), run.poses(looks), strict=True):
+            refuse_open(assembly.full, t, replace(system.start, poses=poses), assembly.left_out)
+    return run
+
+
+def _rest(scene: BodyScene, assembly: Assembly, analysis: AtRest) -> BodyRest:
+    system = assembly.system
+    tangents: dict[str, dict[str, Any]] = {}
+    begun = time.perf_counter()
+    end = analysis.load if isinstance(analysis, (Buckling, Frequencies)) else 1.0
+    found = solve_statics(system, system.start, analysis.load_steps, analysis.tangent, end=end)
+    modes = _modes(assembly, analysis, found) if found.failure is None else None
+    wall = time.perf_counter() - begun
+    if isinstance(analysis, StaticSteps) and analysis.compare_tangents:
+        for name in TANGENTS:
+            own = name == analysis.tangent
+            tangents[name] = work(found if own else solve_statics(system, system.start, analysis.load_steps, name))
+    for e in found.path if assembly.left_out else ():
+        refuse_open(assembly.full, e.t, e.q, assembly.left_out)
+    return BodyRest(scene, assembly, wall, _redundancy(assembly), found, modes, tangents)
+
+
+def _redundancy(assembly: Assembly) -> tuple[str, ...]:
+    """A warning that names what was left out."""
+    if not assembly.left_out:
+        return ()
+    names = "; ".join(assembly.left_out)
+    return (
+        f"{len(assembly.left_out)} conditions follow from the others and are left out: {names}; forces of connections "
+        "are the smallest that do the same",
+    )
+
+
+def _modes(assembly: Assembly, analysis: AtRest, found: Statics) -> Modes | None:
+    """What a buckling or frequency analysis finds about the last equilibrium."""
+    system, last = assembly.system, found.path[-1]
+    if isinstance(analysis, Buckling):
+        quantity, modes = "load", buckling_loads(system, last, analysis.count)
+    elif isinstance(analysis, Frequencies):
+        quantity, modes = "frequency_hz", natural_frequencies(system, last, analysis.count)
+    else:
+        return None
+    shapes = modes.shapes.reshape(len(modes.values), -1, 6)
+    return Modes(quantity, modes.values, (last.q.poses[:, :3, :3] @ shapes[:, :, :3, None])[..., 0])

@@ -1,0 +1,152 @@
+"""What the run of a chain looks like: deformed links, joints, the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from erls.equations.formulation import State
+from erls.maths.se3 import inverse, pose
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import Link
+from erls.run.chain.places import node_positions
+from erls.run.chain.run import ChainRun
+from erls.view.figure import Figure, Part, PartMesh, Pose
+from erls.view.shapes import SHARP, JointPlace, chains, ground_surface, joints_surface, part_surface, polylines
+
+
+@dataclass(frozen=True)
+class ChainFigure(Figure):
+    """A run of a chain."""
+
+    run: ChainRun
+    part = "link"
+
+    @property
+    def gravity(self) -> Array:
+        """(3,) [m/s²]"""
+        return self.run.formulation.mechanism.gravity
+
+    @property
+    def size(self) -> float:
+        """Of the largest link [m]."""
+        links = self.run.formulation.mechanism.links
+        return max(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in links)
+
+    def fixed(self) -> Array:
+        """(1, 3) the first joint."""
+        return np.array([self.run.formulation.mechanism.joints[0].before[:3, 3]])
+
+    def ground(self, towards: Array, unit: float) -> list[Any]:
+        """A plate behind the first joint."""
+        return [ground_surface(self.run.formulation.mechanism.joints[0].before, towards, unit)]
+
+    def poses(self, times: Sequence[float] | Array) -> list[ChainPose]:
+        """The chain at each time."""
+        mechanism = self.run.formulation.mechanism
+        return [ChainPose(state.time, mechanism, state) for state in self.run.states(list(times))]
+
+
+@dataclass(frozen=True)
+class ChainPose(Pose):
+    """A chain in a state."""
+
+    time: float
+    mechanism: Mechanism
+    state: State
+
+    def points(self, magnification: float) -> list[Array]:
+        """(3,) places of the named points."""
+        return [self._nodes(p.link, magnification, [p.node])[0] for p in self.mechanism.points]
+
+    def nodes(self, magnification: float) -> list[Array]:
+        """(n, 3) nodes of each link."""
+        return [self._nodes(k, magnification) for k in range(len(self.mechanism.links))]
+
+    def deflections(self) -> list[Array]:
+        """(n,) of each link against the equivalent rigid one [m]."""
+        return [np.linalg.norm(self._displacement(k), axis=1) for k in range(len(self.mechanism.links))]
+
+    def anchor(self) -> Array:
+        """(3,) the last link."""
+        return np.asarray(self.state.poses[-1][:3, 3])
+
+    def parts(self, magnification: float, unit: float) -> list[Part]:
+        """Deformed links."""
+        found = []
+        for link, places, moved in zip(
+            self.mechanism.links, self.nodes(magnification), self.deflections(), strict=True
+        ):
+            model, root = link.model, link.inboard.node
+            surface = part_surface(places, model.triangles, chains(model.nodes, model.lines), root, 1e3 * moved, unit)
+            found.append(Part(surface, bool(len(model.triangles))))
+        return found
+
+    def joints(self, magnification: float, unit: float, moving: bool) -> Any:
+        """Joints on their links."""
+        places = joint_places(self.mechanism, self.state, magnification)
+        if moving and places[0].type == "revolute":
+            places = places[1:]  # the first one does not move
+        return joints_surface(places, unit) if places else None
+
+    def outline(self) -> list[Any]:
+        """The links without displacement: the Equivalent Rigid Link System."""
+        import pyvista as pv
+
+        result = []
+        for link, places in zip(self.mechanism.links, self.nodes(0.0), strict=True):
+            if len(link.model.triangles):
+                solid = pv.PolyData.from_regular_faces(places, link.model.triangles)
+                result.append(solid.extract_feature_edges(SHARP))
+            runs = chains(link.model.nodes, link.model.lines)
+            if runs:
+                result.append(polylines(places, runs))
+        return result
+
+    def meshes(self, magnification: float) -> list[PartMesh]:
+        """Links, in the order of their nodes."""
+        found = []
+        for k, (link, places) in enumerate(zip(self.mechanism.links, self.nodes(magnification), strict=True)):
+            model = link.model
+            cells = [(kind, c) for kind, c in (("line", model.lines), ("triangle", model.triangles)) if len(c)]
+            cells = cells or [("vertex", np.arange(len(places))[:, None])]
+            found.append(PartMesh(link.name, places, cells, self._displacement(k)))
+        return found
+
+    def _nodes(self, link: int, magnification: float, nodes: Any = slice(None)) -> Array:
+        return node_positions(self.mechanism, self.state, link, nodes, magnification)
+
+    def _displacement(self, link: int) -> Array:
+        """(n, 3) against the equivalent rigid link, world axes [m]."""
+        model, turn = self.mechanism.links[link].model, self.state.poses[link][:3, :3]
+        return np.asarray((model.translation_shapes @ self.state.modal[link]) @ turn.T)
+
+
+def joint_places(mechanism: Mechanism, state: State, magnification: float) -> list[JointPlace]:
+    """Every joint in its displaced place."""
+    result = []
+    for k, joint in enumerate(mechanism.joints):
+        inner, inner_node = joint.before, None
+        if k:
+            before, interface = mechanism.links[k - 1], mechanism.links[k - 1].outboard
+            if interface is not None:
+                inner = _displaced(before, interface, joint.before, state, k - 1, magnification)
+                inner_node = node_positions(mechanism, state, k - 1, [interface.node], magnification)[0]
+        after = mechanism.links[k]
+        outer = _displaced(after, after.inboard, inverse(joint.after), state, k, magnification)
+        outer_node = node_positions(mechanism, state, k, [after.inboard.node], magnification)[0]
+        kind = "revolute" if joint.type.revolute else "prismatic"
+        result.append(JointPlace(kind, inner, outer, inner_node, outer_node))
+    return result
+
+
+def _displaced(link: Link, interface: Any, frame: Array, state: State, number: int, factor: float) -> Array:
+    """(4, 4) world pose of a frame that rides on an interface of a deformed link."""
+    u = factor * (link.interface_shape(interface, frame) @ state.modal[number])
+    step = pose(Rotation.from_rotvec(u[3:]).as_matrix(), u[:3])
+    return np.asarray(state.poses[number] @ frame @ step)

@@ -1,0 +1,114 @@
+"""What a run looks like: the contract between runs of every kind and the stage, exports and texts.
+
+To draw a further kind of run: a `Figure` and its `Pose`, one file, and a line in `erls.view.figures`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from erls.maths.so3 import Array
+from erls.run.record import Run
+
+
+@dataclass(frozen=True)
+class Part:
+    """A link, beam or body as drawn.
+
+    Attributes
+    ----------
+    surface : pyvista.PolyData
+        With the deflection [mm] as the point data "value".
+    sharp : bool
+        Whether its sharp edges are drawn as lines.
+    """
+
+    surface: Any
+    sharp: bool = False
+
+
+@dataclass(frozen=True)
+class PartMesh:
+    """A link, beam or body for ParaView: (n, 3) points, cells by kind, and true displacements (n, 3) [m]."""
+
+    name: str
+    points: Array
+    cells: list[tuple[str, Any]]
+    displacement: Array
+
+
+class Pose(ABC):
+    """The mechanism at one time; ``magnification`` is that of displacements, 1 is true."""
+
+    time: float
+
+    @abstractmethod
+    def points(self, magnification: float) -> list[Array]:
+        """(3,) places of the named points."""
+
+    @abstractmethod
+    def nodes(self, magnification: float) -> list[Array]:
+        """(n, 3) places of each part."""
+
+    @abstractmethod
+    def deflections(self) -> list[Array]:
+        """(n,) lengths of the displacements of each part's nodes [m]."""
+
+    @abstractmethod
+    def anchor(self) -> Array:
+        """(3,) where its time stands if no point is named."""
+
+    @abstractmethod
+    def parts(self, magnification: float, unit: float) -> list[Part]:
+        """Parts as surfaces; ``unit`` is the radius of a beam."""
+
+    @abstractmethod
+    def joints(self, magnification: float, unit: float, moving: bool) -> Any:
+        """Joints as one surface, None without; ``moving``: without those that stay where they are."""
+
+    @abstractmethod
+    def outline(self) -> list[Any]:
+        """What displacements count from, as thin lines."""
+
+    @abstractmethod
+    def meshes(self, magnification: float) -> list[PartMesh]:
+        """Parts for ParaView."""
+
+
+class Figure(ABC):
+    """What is drawn of a run.
+
+    Attributes
+    ----------
+    run : Run
+    part : str
+        What its parts are called in ParaView.
+    """
+
+    run: Run
+    part: str
+
+    @property
+    @abstractmethod
+    def gravity(self) -> Array:
+        """(3,) [m/s²]"""
+
+    @property
+    @abstractmethod
+    def size(self) -> float:
+        """Of the largest part [m]."""
+
+    @abstractmethod
+    def fixed(self) -> Array:
+        """(k, 3) places that belong into every picture."""
+
+    @abstractmethod
+    def ground(self, towards: Array, unit: float) -> list[Any]:
+        """Where it stands, as surfaces; ``towards`` the viewer."""
+
+    @abstractmethod
+    def poses(self, times: Sequence[float] | Array) -> Sequence[Pose]:
+        """The mechanism at each time."""
