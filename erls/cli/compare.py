@@ -44,7 +44,7 @@ def compare(
     """
     from erls.report.compare_page import comparison_csv, comparison_page, comparison_text
     from erls.studies.compare import compare as run_comparison
-    from erls.studies.compare import comparison_summary
+    from erls.studies.compare_result import comparison_summary
 
     for path in (scene, *more):
         check_output(output, path, (".html", ".csv", ".json"))

@@ -59,7 +59,8 @@ def modes(
         Print one JSON object.
     """
     from erls.report.mode_page import beside_summary, mode_study_page, mode_study_text, read_printed
-    from erls.studies.mode_count import Tolerances, study_modes, study_summary
+    from erls.studies.mode_count import study_modes
+    from erls.studies.mode_result import Tolerances, study_summary
 
     check_output(output, scene, (".html", ".json"))
     printed = None if beside is None else read_printed(beside)
@@ -151,7 +152,8 @@ def cost(
     """
     from erls.report.cost_page import cost_csv, cost_page, cost_text
     from erls.studies.apply import check_copy, write_copy
-    from erls.studies.cost import cost_summary, study_cost
+    from erls.studies.cost import study_cost
+    from erls.studies.cost_result import cost_summary
     from erls.studies.grid import Grid
 
     check_output(output, scene, (".html", ".csv", ".json"))

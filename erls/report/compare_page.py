@@ -10,7 +10,7 @@ import numpy as np
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
 from erls.report.tables import table
-from erls.studies.compare import Comparison, Distance, Pair
+from erls.studies.compare_result import Comparison, Distance, Pair
 from erls.studies.spectrum import amplitude_spectrum, peaks
 
 _HISTORIES = (

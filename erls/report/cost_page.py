@@ -11,7 +11,7 @@ from erls.maths.so3 import Array
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
 from erls.report.tables import table
-from erls.studies.cost import CostStudy, recommendation
+from erls.studies.cost_result import CostStudy, recommendation
 from erls.studies.ladder import CostPoint
 
 _HEADER = (

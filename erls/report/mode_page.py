@@ -14,7 +14,7 @@ from erls.errors import Cause, SceneError
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
 from erls.report.tables import table
-from erls.studies.mode_count import SUCCESSIVE, ModeStudy, Point
+from erls.studies.mode_result import SUCCESSIVE, ModeStudy, Point
 
 _LARGEST_FILE = 1_000_000
 _READING = "largest change of each figure over the run from the row above"

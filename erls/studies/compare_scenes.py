@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from erls.errors import Cause, SceneError
-from erls.studies.compare import COLUMNS, Comparison, compare, comparison_summary, distance
+from erls.studies.compare import COLUMNS, compare
+from erls.studies.compare_result import Comparison, comparison_summary, distance
 from fe_import.errors import ReportedError
 from fe_import.files.toml import choose
 

@@ -17,7 +17,8 @@ import erls
 from erls.cli.main import main
 from erls.errors import Cause, SceneError, SimulationError
 from erls.report.cost_page import cost_csv, cost_page, cost_text
-from erls.studies.cost import CostStudy, cost_summary, pareto_front, recommendation, study_cost
+from erls.studies.cost import study_cost
+from erls.studies.cost_result import CostStudy, cost_summary, pareto_front, recommendation
 from erls.studies.effect_sets import STIFFENED
 from erls.studies.grid import Grid, ladders
 from erls.studies.ladder import CostPoint, Setting, failed, overrides_of

@@ -11,7 +11,7 @@ import pytest
 
 from erls.cli.main import main
 from erls.studies.apply import write_copy
-from erls.studies.cost import CostStudy
+from erls.studies.cost_result import CostStudy
 from erls.studies.grid import Grid
 from erls.studies.ladder import CostPoint, Setting, overrides_of
 from erls.studies.reference import Reference

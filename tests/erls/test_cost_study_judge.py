@@ -17,7 +17,8 @@ from erls.mechanism.effects import DEFAULT, Certificate
 from erls.report.cost_page import cost_page, cost_text
 from erls.scene.chain import Scene
 from erls.studies import ladder, refinement
-from erls.studies.cost import CostStudy, cheapest, cost_summary, recommendation, study_cost
+from erls.studies.cost import study_cost
+from erls.studies.cost_result import CostStudy, cheapest, cost_summary, recommendation
 from erls.studies.doubts import foretold_error
 from erls.studies.effect_sets import STIFFENED, STIFFENING, as_field, each_once, label_of, own_set, parse_sets
 from erls.studies.grid import Grid

@@ -19,9 +19,11 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.report.compare_page import comparison_csv, comparison_page, comparison_text
 from erls.report.html import Curve, Plot, figure, page
 from erls.report.mode_page import beside, mode_study_page, mode_study_text, read_printed
-from erls.studies.compare import compare, comparison_summary, distance, pair
-from erls.studies.mode_count import Change, Tolerances, changed, relative_change, study_modes
+from erls.studies.compare import compare
+from erls.studies.compare_result import comparison_summary, distance, pair
+from erls.studies.mode_count import study_modes
 from erls.studies.mode_overrides import default_counts
+from erls.studies.mode_result import Change, Tolerances, changed, relative_change
 from erls.studies.outputs import Outputs, run_outputs
 from erls.studies.pool import run_all
 from erls.studies.spectrum import amplitude_spectrum, peaks
