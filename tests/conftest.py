@@ -43,6 +43,8 @@ KERNELS = (
         "equations.erls.stiffened.compiled_functions",
         "equations.erls.stiffened.elimination",
         "auto.deviation",
+        "equations.erls.paper.functions",
+        "equations.erls.paper.acceleration",
     ),
 )
 """Modules with compiled code, shared out to two processes."""

@@ -19,7 +19,11 @@ from erls.scene.settings import Simulation
 
 
 def _erls(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
-    if settings.gauge == "joint-angle" and not mechanism.loops:
+    if settings.gauge == "minimum-norm":
+        from erls.equations.erls.paper.dense_chain import DenseChain  # here: a run imports what it needs
+
+        return DenseChain(mechanism, settings.gauge)
+    if not mechanism.loops:
         from erls.equations.erls.formulation import Erls
 
         return Erls(mechanism)
@@ -29,7 +33,7 @@ def _erls(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
 
 
 def _ffr(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
-    from erls.equations.ffr.equations import Ffr  # here, like those below: a run imports what it needs
+    from erls.equations.ffr.equations import Ffr
 
     return Ffr(mechanism, settings.body_frame)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias
@@ -97,8 +96,7 @@ def _compile_named(system: Any, settings: Simulation) -> None:
         if system.compiled is not None:
             system.compiled.load_acceleration()
         return
-    both = settings.gauge == "joint-angle"  # the equations are compiled too, for all that is known
-    with compiling_beside(loop) if both else nullcontext():
+    with compiling_beside(loop):
         compiled = system.compiled
     if compiled is not None:
         import_module(loop)

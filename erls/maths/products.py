@@ -129,3 +129,21 @@ def add_transposed_product(a: Array, b: Array, out: Array) -> None:
             weight, row = a[k, i], out[i]
             for j in range(len(row)):
                 row[j] += weight * other[j]
+
+
+@reordered
+def add_scaled_product(factor: Any, a: Array, b: Array, out: Array) -> None:
+    """Add to ``out`` the factor times A B, of matrices (m, k), (k, n)."""
+    for i in range(a.shape[0]):
+        row = out[i]
+        for k in range(a.shape[1]):
+            weight, other = factor * a[i, k], b[k]
+            for j in range(len(row)):
+                row[j] += weight * other[j]
+
+
+@part
+def clear_matrix(a: Array) -> None:
+    """Zeros."""
+    for i in range(a.shape[0]):
+        clear(a[i])

@@ -23,7 +23,7 @@ import numpy as np
 
 from erls.maths.jit import generated
 from erls.maths.so3 import Array
-from erls.maths.views import matrix_at, stack_at, vector_at
+from erls.maths.views import matrix_at, plain_at, stack_at, vector_at
 from fe_import.model import IntArray
 
 Vector = Annotated[Array, 1]
@@ -62,6 +62,16 @@ def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
     callable
         ``read(numbers, integers, at)`` with the place of the table.
     """
+    return generated(_reader(record, {"view1": vector_at, "view2": matrix_at, "view3": stack_at}))
+
+
+def python_reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
+    """The same for Python: what compiled functions left in working memory is seen through it."""
+    return _reader(record, {"view1": plain_at, "view2": plain_at, "view3": plain_at})
+
+
+def _reader(record: type[R], views: dict[str, Any]) -> Callable[[Any, IntArray, int], R]:
+    """The reader that makes its arrays by these functions."""
     parts, place = [], 0
     for _, axes, whole in _fields(record):
         if axes is None:
@@ -77,10 +87,9 @@ def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
             parts.append(f"view{axes}({flat}, {', '.join([start, *dims])})")
         place += 1 + axes
     source = f"def read(numbers, integers, at):\n    return {record.__name__}({', '.join(parts)})\n"
-    views = {"view1": vector_at, "view2": matrix_at, "view3": stack_at}
     names: dict[str, Any] = {record.__name__: record, "__name__": __name__, **views}
     exec(compile(source, f"<reader of {record.__qualname__}>", "exec"), names)
-    read: Callable[[Any, IntArray, int], R] = generated(names["read"])
+    read: Callable[[Any, IntArray, int], R] = names["read"]
     return read
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from erls.maths.jit import ENABLED
 
 
-def _plain(array: Any, start: int, *shape: int) -> Any:
+def plain_at(array: Any, start: int, *shape: int) -> Any:
     """The same in plain Python."""
     size = 1
     for n in shape:
@@ -19,11 +19,11 @@ def _plain(array: Any, start: int, *shape: int) -> Any:
     return array[start : start + size].reshape(shape)
 
 
-vector_at: Any = _plain
+vector_at: Any = plain_at
 """``vector_at(array, start, n)``: (n,)."""
-matrix_at: Any = _plain
+matrix_at: Any = plain_at
 """``matrix_at(array, start, m, n)``: (m, n)."""
-stack_at: Any = _plain
+stack_at: Any = plain_at
 """``stack_at(array, start, k, m, n)``: (k, m, n)."""
 
 if ENABLED:

@@ -1,8 +1,8 @@
 """Values of all equations of motion at the random states of the tests, frozen in ``tests/data/frozen``.
 
 They were computed by the NumPy equations in the notation of the papers, before kernels took their place, on one modal
-model (``arm.h5``), so that they depend on no reduction. A table of `TABLES` is one file; its entries are called
-``CASE/STATE/QUANTITY``. Inputs are t, y, v and a; of mass matrices the lower triangle is stored.
+model (``arm.h5``, that of `scenes.arm_link`), so that they depend on no reduction. A table of `TABLES` is one file; its
+entries are called ``CASE/STATE/QUANTITY``. Inputs are t, y, v and a; of mass matrices the lower triangle is stored.
 
 ``PYTHONPATH=. python tests/erls/frozen_values.py [TABLE ...]`` freezes the values of the present code.
 """
@@ -50,33 +50,30 @@ class Table:
     ----------
     cases : tuple of str
     build : callable
-        ``build(folder, case, plain)``: a formulation, without compiled functions where ``plain``.
+        ``build(folder, case)``: a formulation.
     states : callable
         ``states(formulation, case)``: where it is evaluated.
     """
 
     cases: tuple[str, ...]
-    build: Callable[[Path, str, bool], Any]
+    build: Callable[[Path, str], Any]
     states: Callable[[Any, str], Iterable[State]]
 
 
-def _tree(mechanism: Mechanism, plain: bool, formulation: str = "erls", **settings: Any) -> TreeFormulation:
-    found = TREES[formulation](mechanism, Simulation(duration=1.0, formulation=formulation, **settings))
-    if plain and getattr(found, "compiled", None) is not None:
-        found.compiled = None  # type: ignore[attr-defined]
-    return found
+def _tree(mechanism: Mechanism, formulation: str = "erls", **settings: Any) -> TreeFormulation:
+    return TREES[formulation](mechanism, Simulation(duration=1.0, formulation=formulation, **settings))
 
 
-def _with(mechanism: Mechanism, effects: Iterable[str]) -> Mechanism:
+def with_effects(mechanism: Mechanism, effects: Iterable[str]) -> Mechanism:
     return replace(mechanism, effects=mechanism.effects | frozenset(effects))
 
 
 def _chains(cases: Any, names: Iterable[str], which: slice, effects: Iterable[str] = (), **settings: Any) -> Table:
     """Open chains of a file of cases."""
 
-    def build(folder: Path, name: str, plain: bool) -> TreeFormulation:
+    def build(folder: Path, name: str) -> TreeFormulation:
         chosen = {"body_frame": cases.body_frame(name)} if cases is ffr_cases else {}
-        return _tree(_with(cases.mechanism(folder, name, SOURCE), effects), plain, **settings, **chosen)
+        return _tree(with_effects(cases.mechanism(folder, name, SOURCE), effects), **settings, **chosen)
 
     at = chain_cases if cases is ffr_cases else cases
     return Table(tuple(names), build, lambda system, name: at.states(system, name)[which])
@@ -85,11 +82,8 @@ def _chains(cases: Any, names: Iterable[str], which: slice, effects: Iterable[st
 def _loops(effects: Iterable[str] = (), names: Iterable[str] = loop_cases.CASES, **settings: Any) -> Table:
     """Closed chains."""
 
-    def build(folder: Path, name: str, plain: bool) -> ClosedChain:
-        found = ClosedChain(_tree(_with(loop_cases.mechanism(folder, name, SOURCE), effects), plain, **settings))
-        if plain:
-            found.compiled = None
-        return found
+    def build(folder: Path, name: str) -> ClosedChain:
+        return ClosedChain(_tree(with_effects(loop_cases.mechanism(folder, name, SOURCE), effects), **settings))
 
     return Table(tuple(names), build, lambda system, name: loop_cases.states(system, name)[1:])
 
@@ -97,9 +91,9 @@ def _loops(effects: Iterable[str] = (), names: Iterable[str] = loop_cases.CASES,
 def _static(static: bool, **settings: Any) -> Table:
     """Chains whose fast modes follow statically."""
 
-    def build(folder: Path, name: str, plain: bool) -> QuasiStatic:
+    def build(folder: Path, name: str) -> QuasiStatic:
         mechanism = quasi_static_cases.mechanism(folder, name, static, SOURCE)
-        found = quasi_static(lambda given: _tree(given, plain, **settings), mechanism, 1.0)
+        found = quasi_static(lambda given: _tree(given, **settings), mechanism, 1.0)
         assert isinstance(found, QuasiStatic)
         return found
 
@@ -243,10 +237,10 @@ def _halves(values: np.ndarray, expected: np.ndarray, free: int) -> Iterator[tup
 
 
 def freeze(table: Table, folder: Path) -> Values:
-    """The entries of a table by the NumPy equations."""
+    """The entries of a table by the present equations."""
     result: Values = {}
     for case in table.cases:
-        system = table.build(folder, case, True)
+        system = table.build(folder, case)
         for k, at in enumerate(table.states(system, case)):
             found = {**{name: np.array(getattr(at, name)) for name in INPUTS}, **functions(system, at)}
             if isinstance(system, ClosedChain):

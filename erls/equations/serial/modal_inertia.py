@@ -39,6 +39,13 @@ class ModalInertia:
     data : LinkSecondOrder
     basis : (m, k) array, optional
         Modal coordinates, in the modes of the link, of each coordinate; the modes themselves without it.
+
+    Attributes
+    ----------
+    tensor : (n, m, m) array
+        K less what second-order momenta contribute.
+    per_mass : (n, n) array
+        σ⁻¹.
     """
 
     def __init__(self, invariants: InertiaInvariants, data: LinkSecondOrder, basis: Array | None = None) -> None:
@@ -47,11 +54,12 @@ class ModalInertia:
         tensor = data.modal - np.tensordot(share.T, data.momentum, 1)
         tensor = tensor if basis is None else basis.T @ tensor @ basis
         self.elastic, self.size = tensor.shape[:2]
+        self.tensor = tensor
         self._rows = np.ascontiguousarray(tensor.transpose(0, 2, 1)).reshape(-1, self.size)  # q meets the last index
         self._flat = tensor.reshape(self.elastic, -1)
         rigid, coupling, own = invariants.m[:6, :6], invariants.m[:6, 6:], invariants.m[6:, 6:]
         moved = np.linalg.lstsq(rigid, coupling, rcond=_NO_INERTIA)[0]
-        self._per_mass = np.linalg.inv(own - coupling.T @ moved)
+        self.per_mass = np.linalg.inv(own - coupling.T @ moved)
 
     def _at(self, q: Array) -> Array:
         """(n, m) K(q): k per q̇."""
@@ -62,16 +70,16 @@ class ModalInertia:
         n = self.size - self.elastic
         coupling, coupling_rate = self._at(q), self._at(qd)
         rate = coupling_rate @ qd + coupling @ qdd
-        pushed = qd[n:] + self._per_mass @ (coupling @ qd)
+        pushed = qd[n:] + self.per_mass @ (coupling @ qd)
         weighted = (pushed @ self._flat).reshape(self.size, self.size)
-        result = (qdd[n:] + self._per_mass @ rate) @ coupling + (weighted.T - weighted) @ qd
+        result = (qdd[n:] + self.per_mass @ rate) @ coupling + (weighted.T - weighted) @ qd
         result[n:] += rate
         return np.asarray(result)
 
     def mass_matrix(self, q: Array) -> Array:
         """(m, m) of T₃ = ½ q̇ᵀ M₃ q̇."""
         coupling = self._at(q)
-        result = coupling.T @ self._per_mass @ coupling
+        result = coupling.T @ self.per_mass @ coupling
         n = self.size - self.elastic
         result[n:] += coupling
         result[:, n:] += coupling.T
@@ -80,7 +88,7 @@ class ModalInertia:
     def kinetic_energy(self, q: Array, qd: Array) -> float:
         """T₃ at a state."""
         k = self._at(q) @ qd
-        return float(qd[self.size - self.elastic :] @ k + k @ self._per_mass @ k / 2)
+        return float(qd[self.size - self.elastic :] @ k + k @ self.per_mass @ k / 2)
 
 
 def modal_inertia(link: Link, effects: Set[str], basis: Array | None = None) -> ModalInertia | None:

@@ -10,23 +10,28 @@ from erls.mechanism.chain import Mechanism, poses
 
 
 def node_reach(mechanism: Mechanism, compatibility: Compatibility) -> Array:
+    """The same as `reach_of_nodes` from the compatibility of links."""
+    elastic = sum(link.elastic_modes for link in mechanism.links)
+    theta = np.array([joint.position for joint in mechanism.joints])
+    return reach_of_nodes(mechanism, compatibility.displacement(theta, np.zeros(elastic))[1])
+
+
+def reach_of_nodes(mechanism: Mechanism, d: Array) -> Array:
     """Largest displacement of any node per unit of each coordinate, from the initial configuration.
 
     Parameters
     ----------
     mechanism : Mechanism
-    compatibility : Compatibility
-        Of its links.
+    d : (6 links, elastic) array
+        Rigid-body modal coordinates per unit of the elastic ones there.
 
     Returns
     -------
     (joints + elastic,) array
         Of θ, then of q_d.
     """
-    places = compatibility.layout
     joints, elastic = len(mechanism.joints), sum(link.elastic_modes for link in mechanism.links)
     theta = np.array([joint.position for joint in mechanism.joints])
-    _, d = compatibility.displacement(theta, np.zeros(elastic))
     frames = poses(mechanism, theta)
     world = [
         link.model.nodes @ frame[:3, :3].T + frame[:3, 3] for link, frame in zip(mechanism.links, frames, strict=True)
@@ -38,11 +43,13 @@ def node_reach(mechanism: Mechanism, compatibility: Compatibility) -> Array:
         reach = np.linalg.norm(np.cross(axis_frame[:3, 2], arms), axis=1).max()
         scales[k] = max(reach, 1e-3) if joint.type.revolute else 1.0
     scales[joints:] = 0.0
+    first = 0
     for k, link in enumerate(mechanism.links):
         rows = d[6 * k : 6 * k + 6]
         moved = np.einsum("nim,md->nid", link.model.translation_shapes[:, :, :6], rows)
-        moved[:, :, places.elastic_of[k]] += link.model.translation_shapes[:, :, 6:]
+        moved[:, :, first : first + link.elastic_modes] += link.model.translation_shapes[:, :, 6:]
         size = np.linalg.norm(moved, axis=1).max(axis=0)
         scales[joints:] = np.maximum(scales[joints:], size)
+        first += link.elastic_modes
     scales[joints:] = np.maximum(scales[joints:], 1e-12)
     return scales

@@ -1,0 +1,278 @@
+"""ERLS-CMS in the dense form of the paper, with either gauge; it serves the minimum-norm gauge.
+
+Independent coordinates y = (free joint coordinates θ_f, elastic coordinates q_d of all links). The rigid-body modal
+coordinates follow from compatibility, q_r = D(θ) q_d; prescribed joint coordinates follow from time. The equations
+are the projection of every link's inertia forces, weights and elastic forces on the virtual displacements
+
+    δν_k = J_k δθ,   δq = (D δq_d + G δθ, δq_d)
+
+(ERLS-CMS paper, eq. 69-75, with the inertia forces from the kinetic energy).
+
+Under the minimum-norm gauge the row along a joint's freedom is missing, and θ is no joint angle: torque, springs,
+friction and rotor act on the physical angle, θ plus what the links' displacement adds. Prescribed joints keep six rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from erls.equations.compiled_system import CompiledSystem
+from erls.equations.erls.paper.pack import is_stiffened, pack_chain
+from erls.equations.erls.paper.records import (
+    BODY_STATE,
+    ROW_STATE,
+    Balance,
+    BodyState,
+    Elimination,
+    Paper,
+    RowState,
+)
+from erls.equations.formulation import Energy, Reaction, State
+from erls.equations.serial.displaced_frame import displaced_frame
+from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.serial.joint_frames import FrameMotion, attached, carried
+from erls.equations.serial.node_reach import reach_of_nodes
+from erls.equations.serial.records import Serial
+from erls.equations.serial.state_series import StateSeries
+from erls.errors import Cause, SimulationError
+from erls.maths.records import python_reader
+from erls.maths.so3 import Array, skew
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import node_shape6
+from erls.mechanism.loops import LoopEnd
+
+_see_serial, _see_paper, _see_balance = python_reader(Serial), python_reader(Paper), python_reader(Balance)
+_see_elimination, _see_link, _see_joint = python_reader(Elimination), python_reader(BodyState), python_reader(RowState)
+
+
+class DenseChain:
+    """Equations of motion of a serial chain; a `Formulation`.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    gauge : str
+        ``"minimum-norm"`` or ``"joint-angle"``.
+    """
+
+    def __init__(self, mechanism: Mechanism, gauge: str = "minimum-norm") -> None:
+        self.mechanism, self.gauge = mechanism, gauge
+        self.stiffened = is_stiffened(mechanism)
+        self.joints = len(mechanism.joints)
+        self.elastic = sum(link.elastic_modes for link in mechanism.links)
+        prescribed = np.array([joint.drive.prescribed for joint in mechanism.joints], dtype=bool)
+        self.free_joints, self.prescribed_joints = np.flatnonzero(~prescribed), np.flatnonzero(prescribed)
+        self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
+        self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
+        self.damping = np.concatenate([link.damping for link in mechanism.links])
+
+    @cached_property
+    def compiled(self) -> CompiledSystem:
+        """The equations."""
+        return pack_chain(self.mechanism, self.gauge)
+
+    @property
+    def size(self) -> int:
+        """Number of independent coordinates."""
+        return len(self.free)
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Breakpoints of all drives."""
+        return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
+
+    @property
+    def length_scales(self) -> Array:
+        """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
+        y, v = self._start()
+        self.residual(0.0, y, v, v)
+        return np.asarray(reach_of_nodes(self.mechanism, self.elimination.d)[self.free])
+
+    @property
+    def _memory(self) -> tuple[Array, Any, Array]:
+        return self.compiled.reals, self.compiled.integers, self.compiled.scratch
+
+    @cached_property
+    def _places(self) -> Paper:
+        """Where the records are."""
+        reals, integers, _ = self._memory
+        return _see_paper(reals, integers, _see_serial(reals, integers, integers[0]).own)
+
+    @property
+    def elimination(self) -> Elimination:
+        """C, C_r⁺, D, G and n of the last evaluation."""
+        _, integers, scratch = self._memory
+        return _see_elimination(scratch, integers, self._places.elimination)
+
+    def link(self, k: int) -> BodyState:
+        """Motion and forces of a link, of the last evaluation."""
+        _, integers, scratch = self._memory
+        return _see_link(scratch, integers, self._places.body_states + k * BODY_STATE)
+
+    def joint(self, k: int) -> RowState:
+        """Compatibility and physical angle of a joint, of the last evaluation."""
+        _, integers, scratch = self._memory
+        return _see_joint(scratch, integers, self._places.row_states + k * ROW_STATE)
+
+    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        """(n,) forces out of balance on the independent coordinates."""
+        out = np.empty(self.size)
+        self.compiled.residual(*self._memory, t, *map(_numbers, (y, v, a)), out)
+        return out
+
+    def mass_matrix(self, t: float, y: Array) -> Array:
+        """(n, n) mass matrix over the independent coordinates."""
+        out = np.empty((self.size, self.size))
+        self.compiled.mass_matrix(*self._memory, t, _numbers(y), out)
+        return out
+
+    def full_mass_matrix(self, t: float, y: Array) -> Array:
+        """(joints + elastic)² mass matrix over (θ, q_d), prescribed joints included."""
+        self.mass_matrix(t, y)
+        _, integers, scratch = self._memory
+        return np.array(_see_balance(scratch, integers, self._places.balance).mass)
+
+    def acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """(n,) accelerations from the equations of motion.
+
+        Raises
+        ------
+        SimulationError
+            The mass matrix is not positive definite; names the coordinate.
+        """
+        out = np.empty(self.size)
+        if self.compiled.acceleration(*self._memory, t, _numbers(y), _numbers(v), out) != 0:
+            raise self._singular(t, self.mass_matrix(t, y))
+        return out
+
+    def _singular(self, t: float, mass: Array) -> SimulationError:
+        values, vectors = np.linalg.eigh(mass)
+        worst = self.free[int(np.abs(vectors[:, 0]).argmax())]
+        elastic = f"elastic coordinate {worst - self.joints + 1}"
+        name = f"joint {self.mechanism.joints[worst].name!r}" if worst < self.joints else elastic
+        return SimulationError(
+            Cause.SINGULAR_MASS,
+            f"nothing resists the motion of {name}",
+            where=f"t = {t:.6g} s",
+            value=float(values[0]),
+            limit="above 0",
+            remedy="give the link mass and inertia, or the joint rotor inertia",
+        )
+
+    def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
+        stiffness, damping = np.empty((2, self.size, self.size))
+        self.compiled.stiffness_and_damping(*self._memory, t, _numbers(y), _numbers(v), stiffness, damping)
+        return stiffness, damping
+
+    def _start(self) -> tuple[Array, Array]:
+        """(y, v) at time 0 with undeformed links."""
+        y, v = np.zeros((2, self.size))
+        for place, k in enumerate(self.free_joints):
+            y[place], v[place] = self.mechanism.joints[k].position, self.mechanism.joints[k].rate
+        return y, v
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
+        y, v = self._start()
+        return (held_equilibrium(self, y, self.free_joints) if self.mechanism.static_start else y), v
+
+    def state(self, t: float, y: Array, v: Array) -> State:
+        """Poses, modal coordinates and joint angles at a state."""
+        self.residual(t, y, v, np.zeros(0))
+        turns = np.array([self.joint(k).turn for k in range(self.joints)])
+        links = [self.link(k) for k in range(self.joints)]
+        return State(
+            time=t,
+            poses=[_pose(link.world) for link in links],
+            modal=[link.q.copy() for link in links],
+            coordinates=self.elimination.place[: self.joints].copy(),
+            angles=turns[:, 0],
+            rates=turns[:, 1],
+        )
+
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries | None:
+        """None: states are found one by one."""
+        return None
+
+    def energy(self, t: float, y: Array, v: Array) -> Energy:
+        """Energies of a state; the mass matrix is that of the kinetic energy."""
+        mass = self.full_mass_matrix(t, y)
+        self.residual(t, y, v, np.zeros(0))
+        place, rate = self.elimination.place[self.joints :], self.elimination.rate
+        springs = 0.0
+        for k, joint in enumerate(self.mechanism.joints):
+            springs += joint.forces.stiffness * (self.joint(k).turn[0] - joint.forces.rest) ** 2 / 2
+        return Energy(
+            kinetic=float(rate @ mass @ rate / 2),
+            elastic=float(self.stiffness @ place**2 / 2),
+            gravity=float(sum(self.link(k).potential[0] for k in range(self.joints))),
+            springs=float(springs),
+        )
+
+    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
+        """Frames on displaced nodes of links, with rows over (θ, q_d); see `TreeFormulation`."""
+        self.residual(t, y, v, np.zeros(0))
+        driven = self.elimination.acceleration.copy()  # of prescribed joints
+        result: list[FrameMotion] = []
+        for k, node, offset in ((int(end.link or 0), end.node, end.frame) for end in ends):
+            link, model = self.link(k), self.mechanism.links[k].model
+            second = self.mechanism.links[k].second_order if self.stiffened else None
+            bias = link.bias + link.moves @ driven
+            local = displaced_frame(
+                model.nodes[node],
+                *node_shape6(model, node),
+                link.q,
+                link.velocity[6:],
+                bias[6:],
+                link.moves[6:],
+                None if second is None else second.node(node),
+            )
+            rigid = FrameMotion(_pose(link.world), link.moves[:6].copy(), link.velocity[:6].copy(), bias[:6])
+            result.append(attached(carried(rigid, local), offset))
+        return result
+
+    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
+        """Joint reactions at a state."""
+        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
+
+    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
+        """Joint reactions that give these accelerations."""
+        self.residual(t, y, v, a)
+        _, integers, scratch = self._memory
+        balance = _see_balance(scratch, integers, self._places.balance)
+        result: list[Reaction] = []
+        for k, link in enumerate(self.mechanism.links):
+            found = self.link(k)
+            node = link.inboard.position + link.model.node_shape(link.inboard.node)[0] @ found.q
+            force, turn = found.borne[:3], _pose(found.world)[:3, :3]
+            moment = found.borne[3:] - skew(node) @ force
+            prescribed = self.mechanism.joints[k].drive.prescribed
+            effort = balance.force[k] if prescribed else self.joint(k).turn[3]
+            result.append(Reaction(turn @ force, turn @ moment, float(effort)))
+        return result
+
+    def describe(self) -> dict[str, Any]:
+        """Names and sizes for reports."""
+        return {
+            "formulation": "erls",
+            "gauge": self.gauge,
+            "joints": self.joints,
+            "elastic_coordinates": self.elastic,
+            "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
+        }
+
+
+def _numbers(x: Array) -> Array:
+    return np.ascontiguousarray(x, dtype=float)
+
+
+def _pose(world: Array) -> Array:
+    """(4, 4) of twelve numbers."""
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = world[:9].reshape(3, 3), world[9:]
+    return result
