@@ -171,6 +171,9 @@ def _direction(model: ModalModel, node: int, element: int) -> Array:
 
 
 def _link(run: ChainRun, name: str) -> tuple[int, Link]:
+    if not isinstance(run, ChainRun):
+        message, remedy = "stress and section forces are those of links", "ask a run of a chain"
+        raise SceneError(Cause.BAD_FIELD, message, where="run", value=type(run).__name__, remedy=remedy)
     choose(name, run.link_names, "link", SceneError)
     number = run.link_names.index(name)
     return number, run.formulation.mechanism.links[number]
