@@ -139,7 +139,7 @@ def reordered(function: F) -> F:
 
 def inlined(function: F) -> F:
     """A `part` that becomes one with its caller: for what takes many arrays."""
-    return _njit(function, **_PART, forceinline=True) if ENABLED else function
+    return _njit(function, **_PART, inline="always") if ENABLED else function
 
 
 def generated(function: F) -> F:

@@ -9,9 +9,9 @@ from pathlib import Path
 import chain_cases
 import numpy as np
 import scenes
-from erls.equations.ffr.compiled import compile_frames
 
 from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.pack import pack_frames
 from erls.mechanism.chain import Mechanism
 
 ON_MEAN_AXES = ("one link, payload, spring", "parallel axes with a slide", "axes that part", "controllers")
@@ -62,7 +62,7 @@ def all_results(folder: Path) -> dict[str, np.ndarray]:
         assert chain.compiled is not None
         for what, values in chain_cases.evaluate(chain.compiled, chain_cases.states(chain, case)[1]).items():
             result[f"{case}/{what}"] = values
-        solved = chain_cases.solved(compile_frames(chain, dense=0), chain_cases.states(chain, case)[1])
+        solved = chain_cases.solved(pack_frames(chain.given, dense=0), chain_cases.states(chain, case)[1])
         result.update({f"{case}/solved {kind}": x for kind, x in solved.items()})
     return result
 

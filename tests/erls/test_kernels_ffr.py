@@ -145,11 +145,19 @@ def test_generalized_alpha_takes_the_same_steps(case: str, tmp_path: Path) -> No
     assert fast.work.factorizations == pytest.approx(slow.work.factorizations, abs=4)
 
 
-def test_no_compiled_form_with_modal_inertia(tmp_path: Path) -> None:
-    """Of second order, with the stiffening that it belongs to; the NumPy equations serve it."""
-    mechanism = ffr_cases.equations(tmp_path, "tangent: one link").mechanism
-    both = replace(mechanism, effects=mechanism.effects | {"geometric_stiffening", "modal_inertia"})
-    assert Ffr(both).compiled is None
+@pytest.mark.parametrize("case", [c for c in ffr_cases.CASES if "stiffened" in c])
+def test_modal_inertia_is_compiled(case: str, tmp_path: Path) -> None:
+    """Of second order, with the stiffening that it belongs to: residual and mass matrix, against NumPy."""
+    given = ffr_cases.equations(tmp_path, case)
+    mechanism = replace(given.mechanism, effects=given.mechanism.effects | {"modal_inertia"})
+    chain = Ffr(mechanism, given.body_frame)
+    f = len(chain.free_joints)
+    for at in chain_cases.states(chain, case):
+        found = chain_cases.evaluate(chain.compiled, at)
+        residual = chain.residual(at.t, at.y, at.v, at.a)
+        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
+        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
+        assert _distance(found["mass"], chain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
 
 
 def test_pieces_of_links_run_compiled() -> None:

@@ -11,12 +11,12 @@ import ffr_cases
 import numpy as np
 import pytest
 import scenes
-from erls.equations.ffr.compiled import compile_frames
 
 from erls.equations.erls import compiled as erls_compiled
 from erls.equations.erls.chain import Erls
 from erls.equations.erls.compiled import compile_chain
 from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.pack import pack_frames
 from erls.equations.serial.decoupled_modes import decoupled_modes
 from erls.integrate.base import Options
 from erls.integrate.generalized_alpha import generalized_alpha
@@ -58,7 +58,7 @@ def test_floating_frames_solve_what_dense_factors_solve(case: str, tmp_path: Pat
     at = chain_cases.states(chain, case)[1]
     assert chain.compiled is not None
     matrices = chain_cases.evaluate(chain.compiled, at)
-    for kind, found in chain_cases.solved(compile_frames(chain, dense=0), at).items():
+    for kind, found in chain_cases.solved(pack_frames(chain.given, dense=0), at).items():
         expected, rounding = chain_cases.solved_densely(matrices, matrices["damping"], at, kind)
         np.testing.assert_allclose(found, expected, rtol=0, atol=rounding)
 
@@ -71,12 +71,11 @@ def test_integrators_go_the_same_way(
 ) -> None:
     """With dense factors and link by link: the same motion within the iterations' error, at about the same work."""
     chain: Any = ffr_cases.equations(tmp_path, f"tangent: {name}") if frames else chain_cases.equations(tmp_path, name)
-    compiled: Any = compile_frames if frames else compile_chain
     y, v = chain.initial_state()
     options = Options(2e-3 if integrate is generalized_alpha else None, tolerance=1e-5)
     runs = []
     for dense in (10**6, 0):
-        system = compiled(chain, dense)
+        system = pack_frames(chain.given, dense) if frames else compile_chain(chain, dense)
         assert system is not None
         assert (system.factoring is None) == (dense > 0)
         monkeypatch.setitem(chain.__dict__, "compiled", system)  # in place of the cached property

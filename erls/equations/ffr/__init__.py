@@ -1,12 +1,10 @@
-"""FFR in independent coordinates as kernels: a serial chain of floating frames, one link at a time.
+"""FFR in independent coordinates: floating frames of reference on joints, one link at a time.
 
-From the frame of a link its displaced outboard node follows, from that the joint's frame on the next link, from that,
-displaced by the inboard node, the frame of the next link: three changes of frame, ν' = Ad⁻¹ν + ξ, for velocities and
-accelerations outward, and their transposes for wrenches inward (`erls.equations.ffr.recursion` multiplies the three
-to one). So a residual takes time in proportion to the number of links. The mass matrix comes from composite inertias
-(Featherstone, Rigid Body Dynamics Algorithms, ch. 6); accelerations take its Cholesky factors. Many coordinates are
-solved for by eliminating link after link instead (`factoring`).
+From the floating frame of a link the node follows on which a joint stands, displaced, from that the frame behind the
+joint, from that, displaced by the inboard node, the floating frame of the next link: three changes of frame for
+velocities and accelerations outward, and their transposes for wrenches inward. So a residual takes time in proportion
+to the number of links. Mass matrices and solutions link by link come from what `segments` says of each link.
 
-`layout` says where everything lies, `erls.equations.ffr.compiled` puts it there. Of the kernels of ERLS it uses
-vector algebra and curves over time.
+`records` says what is kept of a link, `pack` puts it into memory, `motion` and `nodes` go outward, `inertia` and `bent`
+hold the forces of a link, `residual` goes inward.
 """

@@ -1,147 +1,164 @@
-"""Inertia of a link with second-order displacements, by a corrected twist of its frame: ν' = ν + M₀⁻¹ (C₂ η̇ + H ν).
+"""Second-order displacements ½ ηᵀ Ψ η of a link: geometric stiffening, and modal inertia.
 
-Formulas of `erls.equations.ffr.second_order`; C₂ are the first six rows of BENDING, H = [0, -S̃; 0, ½ ηᵀ W η].
+Beside the blocks of T = ½ νᵀ M ν + νᵀ C η̇ + ½ η̇ᵀ M_e η̇ the second-order displacement has, with the tensors of
+`fe_import.second_order.data` in the elastic coordinates,
+
+    C₂(η) = [S_ab η; ηᵀ P],   H(η) = [0, -S̃; 0, ½ ηᵀ W η],   S = ½ ηᵀ S_ab η
+
+(O. Wallrapp and R. Schwertassek, Int. J. Numer. Methods Eng. 32 (1991) 1833-1850). Added to C and M as C₂ and H + Hᵀ
+they could make the mass matrix indefinite where elastic motion cancels that of the frame. The frame's twist is
+corrected instead, ν' = ν + M₀⁻¹ (C₂ η̇ + H ν), which gives the same to second order in η and stays positive. The forces
+on η and on the frame are those of Lagrange and of Boltzmann and Hamel in the uncorrected twist.
+
+Modal inertia, derived in `erls.equations.serial.modal_inertia`, adds T₃ = η̇·k + ½ kᵀ σ⁻¹ k with k = K(η) η̇.
 """
 
 from __future__ import annotations
 
-from erls.equations.compiled_system import Array, IntArray
-from erls.equations.ffr import layout as at
-from erls.equations.ffr.rows import add_rows, cross3, vector
-from erls.equations.serial.linear import add_columns
-from erls.maths.jit import part
+from typing import Any
+
+from erls.equations.ffr.records import BentBody, BentState, BodyState
+from erls.maths.jit import inlined, part
+from erls.maths.products import add_columns, add_rows, clear
+from erls.maths.so3 import Array
+from erls.maths.spatial import add_cross
+
+
+@inlined
+def bend(bent: BentBody, state: BentState, q: Array) -> None:
+    """C₂, W η, S and ½ ηᵀ W η, and K."""
+    e = len(q)
+    rows, spun = state.bending.reshape(6 * e), state.spun.reshape(9 * e)
+    clear(rows)
+    clear(spun)
+    add_columns(bent.bend, q, 1.0, rows)
+    add_columns(bent.spin, q, 1.0, spun)
+    square = state.square.reshape(9)
+    clear(state.moment)
+    clear(square)
+    add_rows(state.bending[:3], q, 0.5, state.moment)
+    add_rows(state.spun, q, 0.5, square)
+    if len(bent.per_modal) > 0:
+        warp = state.warp.reshape(e * e)
+        clear(warp)
+        add_columns(bent.warp, q, 1.0, warp)
+
+
+@inlined
+def bend_rates(bent: BentBody, state: BentState, rates: Array) -> None:
+    """Derivatives of what `bend` gives; of W η only that of ½ ηᵀ W η."""
+    e = len(rates)
+    rows = state.bending_rate.reshape(6 * e)
+    clear(rows)
+    add_columns(bent.bend, rates, 1.0, rows)
+    square = state.square_rate.reshape(9)
+    clear(state.moment_rate)
+    clear(square)
+    add_rows(state.bending[:3], rates, 1.0, state.moment_rate)
+    add_rows(state.spun, rates, 1.0, square)
 
 
 @part
-def _add_block(block: Array, x: Array, out: Array) -> None:
+def _add_block(moment: Array, square: Array, x: Array, out: Array) -> None:
     """Add H x."""
-    t0, t1, t2 = cross3(block[0], block[1], block[2], x[3], x[4], x[5])
-    out[0] -= t0
-    out[1] -= t1
-    out[2] -= t2
-    for i in range(3):
-        out[3 + i] += block[3 + 3 * i] * x[3] + block[4 + 3 * i] * x[4] + block[5 + 3 * i] * x[5]
+    add_cross(moment, x[3:], -1.0, out[:3])
+    add_rows(square, x[3:], 1.0, out[3:])
 
 
 @part
-def _add_block_back(block: Array, x: Array, out: Array) -> None:
+def _add_block_back(moment: Array, square: Array, x: Array, out: Array) -> None:
     """Add Hᵀ x."""
-    t0, t1, t2 = cross3(block[0], block[1], block[2], x[0], x[1], x[2])
-    out[3] += t0 + block[3] * x[3] + block[6] * x[4] + block[9] * x[5]
-    out[4] += t1 + block[4] * x[3] + block[7] * x[4] + block[10] * x[5]
-    out[5] += t2 + block[5] * x[3] + block[8] * x[4] + block[11] * x[5]
+    add_cross(moment, x[:3], 1.0, out[3:])
+    add_columns(square, x[3:], 1.0, out[3:])
 
 
-@part
-def _add_per_mass(reals: Array, start: int, x: Array, out: Array) -> None:
-    """Add M₀⁻¹ x."""
+@inlined
+def correct_frame(bent: BentBody, bending: BentState, state: BodyState, rates: Array, moved: Array) -> None:
+    """Corrected twist and its rate in the place of the frame's own; ``moved`` is η̈, empty for zero."""
+    more, more_rate = state.spare[:6], state.spare[6:]
     for i in range(6):
-        total = 0.0
-        for j in range(6):
-            total += reals[start + 6 * i + j] * x[j]
-        out[i] += total
-
-
-@part
-def correct_frame(reals: Array, integers: IntArray, scratch: Array, record: int, rates: Array, moved: Array) -> None:
-    """Put the corrected twist and its rate into FRAME, what was there into LINEAR."""
-    e, memory = len(rates), integers[record + at.MEMORY]
-    link = scratch[memory : memory + at.VECTORS]
-    frame, linear = link[at.FRAME : at.FRAME + 12], link[at.LINEAR : at.LINEAR + 12]
-    block, block_rate = link[at.BLOCK : at.BLOCK + 12], link[at.BLOCK + 12 : at.BLOCK + 24]
-    more, more_rate = link[at.POINT : at.POINT + 6], link[at.OTHER : at.OTHER + 6]
-    for i in range(12):
-        linear[i] = frame[i]
-    for i in range(6):
+        bending.twist[i], bending.twist_rate[i] = state.twist[i], state.twist_rate[i]
         more[i] = more_rate[i] = 0.0
-    coupling = vector(memory, e, at.BENDING)
-    add_rows(scratch, coupling, rates, 1.0, more)
-    add_rows(scratch, vector(memory, e, at.BENDING_RATE), rates, 1.0, more_rate)
-    if len(moved):
-        add_rows(scratch, coupling, moved, 1.0, more_rate)
-    _add_block(block, linear, more)
-    _add_block(block, linear[6:], more_rate)
-    _add_block(block_rate, linear, more_rate)
-    _add_per_mass(reals, integers[record + at.PER_MASS], more, frame)
-    _add_per_mass(reals, integers[record + at.PER_MASS], more_rate, frame[6:])
+    add_rows(bending.bending, rates, 1.0, more)
+    add_rows(bending.bending_rate, rates, 1.0, more_rate)
+    if len(moved) > 0:
+        add_rows(bending.bending, moved, 1.0, more_rate)
+    _add_block(bending.moment, bending.square, bending.twist, more)
+    _add_block(bending.moment, bending.square, bending.twist_rate, more_rate)
+    _add_block(bending.moment_rate, bending.square_rate, bending.twist, more_rate)
+    add_rows(bent.per_mass, more, 1.0, state.twist)
+    add_rows(bent.per_mass, more_rate, 1.0, state.twist_rate)
 
 
-@part
-def bent_forces(reals: Array, integers: IntArray, scratch: Array, record: int, rates: Array, forces: Array) -> None:
-    """Forces of the corrected twist in WRENCH and MOMENTUM become those of FRAME, which is put back, and of η."""
-    e, memory = len(rates), integers[record + at.MEMORY]
-    link = scratch[memory : memory + at.VECTORS]
-    frame, linear = link[at.FRAME : at.FRAME + 15], link[at.LINEAR : at.LINEAR + 12]
-    block, block_rate = link[at.BLOCK : at.BLOCK + 12], link[at.BLOCK + 12 : at.BLOCK + 24]
-    wrench, momentum = link[at.WRENCH : at.WRENCH + 6], link[at.MOMENTUM : at.MOMENTUM + 6]
-    share, share_rate = link[at.SHARE : at.SHARE + 6], link[at.SHARE + 6 : at.SHARE + 12]
-    for i in range(12):
-        frame[i], link[at.SHARE + i] = linear[i], 0.0
-    _add_per_mass(reals, integers[record + at.PER_MASS], momentum, share)
-    _add_per_mass(reals, integers[record + at.PER_MASS], wrench, share_rate)
-    _add_block_back(block, share, momentum)
-    _add_block_back(block_rate, share, wrench)
-    _add_block_back(block, share_rate, wrench)
-    # on η: d/dt (C₂ᵀ λ) less the gradient of λ·(C₂ η̇ + H ν) at fixed λ, and the weight of ½ ηᵀ S_ab η
-    pull = link[at.POINT : at.POINT + 6]
-    pull[0], pull[1], pull[2] = cross3(share[0], share[1], share[2], frame[3], frame[4], frame[5])
+@inlined
+def bent_forces(bent: BentBody, bending: BentState, state: BodyState, rates: Array, forces: Array) -> None:
+    """Wrench and momentum of the corrected twist become those of the frame's own, which is put back; forces on η."""
+    share, share_rate, pull = bending.share, bending.share_rate, bending.spare
+    for i in range(6):
+        state.twist[i], state.twist_rate[i] = bending.twist[i], bending.twist_rate[i]
+    clear(share)
+    clear(share_rate)
+    add_rows(bent.per_mass, state.momentum, 1.0, share)
+    add_rows(bent.per_mass, state.wrench, 1.0, share_rate)
+    _add_block_back(bending.moment, bending.square, share, state.momentum)
+    _add_block_back(bending.moment_rate, bending.square_rate, share, state.wrench)
+    _add_block_back(bending.moment, bending.square, share_rate, state.wrench)
+    # on η: d/dt (C₂ᵀ λ) less the gradient of λ·(C₂ η̇ + H ν) at fixed λ = M₀⁻¹ p, and the weight of ½ ηᵀ S_ab η
     for i in range(3):
-        pull[i] = share_rate[i] - pull[i] - frame[12 + i]
-        pull[3 + i] = share_rate[3 + i]
-    add_columns(scratch, vector(memory, e, at.BENDING), e, pull, 6, 1.0, forces)
-    start = vector(memory, e, at.TURNED_RATE)
-    turned = scratch[start : start + 3 * e]
-    turned[:] = 0.0
-    add_columns(reals, integers[record + at.SKEW], 3 * e, rates, e, 1.0, turned)
-    add_columns(turned, 0, e, share[3:], 3, 1.0, forces)
+        pull[i], pull[3 + i] = share_rate[i] - state.gravity[i], share_rate[3 + i]
+    add_cross(share[:3], state.twist[3:], -1.0, pull[:3])
+    add_columns(bending.bending, pull, 1.0, forces)
+    skewed = bending.skewed.reshape(bending.skewed.size)
+    clear(skewed)
+    add_columns(bent.skew, rates, 1.0, skewed)
+    add_columns(bending.skewed, share[3:], 1.0, forces)
     for i in range(3):
-        add_columns(scratch, vector(memory, e, at.SPUN + 3 * i), e, frame[3:6], 3, -share[3 + i], forces)
+        add_columns(bending.spun[3 * i : 3 * i + 3], state.twist[3:], -share[3 + i], forces)
 
 
-@part
-def bent_inertia(reals: Array, integers: IntArray, scratch: Array, record: int) -> None:
-    """OWN and COUPLED of the corrected twist become those of the frame's; with CHANGE, CHANGED and UNCHANGED."""
-    e, memory = integers[record + at.MODES], integers[record + at.MEMORY]
-    link = scratch[memory : memory + at.VECTORS]
-    own, factor, product = (
-        link[at.OWN : at.OWN + 36],
-        link[at.FACTOR : at.FACTOR + 36],
-        link[at.INERTIA : at.INERTIA + 36],
-    )
-    x, y, per_mass = link[at.POINT : at.POINT + 6], link[at.OTHER : at.OTHER + 6], integers[record + at.PER_MASS]
+@inlined
+def modal_forces(bent: BentBody, bending: BentState, rates: Array, moved: Array, forces: Array) -> None:
+    """Add d/dt ∂T₃/∂η̇ - ∂T₃/∂η; ``moved`` is η̈, empty for zero."""
+    e, lag = len(rates), bending.lag
+    warp_rate, twisted = bending.warp_rate.reshape(e * e), bending.twisted.reshape(e * e)
+    clear(warp_rate)
+    clear(twisted)
+    add_columns(bent.warp, rates, 1.0, warp_rate)
+    add_columns(bent.warp_skew, rates, 1.0, twisted)
+    for i in range(e):
+        bending.pushed[i], lag[i] = rates[i], 0.0
+        bending.pushed_rate[i] = 0.0
+    add_rows(bending.warp, rates, 1.0, lag)  # k
+    add_rows(bent.per_modal, lag, 1.0, bending.pushed)
+    clear(lag)  # of which the derivative comes next
+    add_rows(bending.warp_rate, rates, 1.0, lag)
+    if len(moved) > 0:
+        add_rows(bending.warp, moved, 1.0, lag)
+        for i in range(e):
+            bending.pushed_rate[i] = moved[i]
+    add_rows(bent.per_modal, lag, 1.0, bending.pushed_rate)
+    add_columns(bending.warp, bending.pushed_rate, 1.0, forces)
+    add_columns(bending.twisted, bending.pushed, 1.0, forces)
+    for i in range(e):
+        forces[i] += lag[i]
+
+
+@inlined
+def correct_arrival(bent: BentBody, bending: BentState, state: BodyState, floats: Any) -> None:
+    """Z and W of the corrected twist."""
+    factor, x, y = bending.factor, state.spare[:6], state.spare[6:]
     for j in range(6):
         for i in range(6):
             x[i], y[i] = (1.0 if i == j else 0.0), 0.0
-        _add_block(link[at.BLOCK : at.BLOCK + 12], x, y)
-        _add_per_mass(reals, per_mass, y, x)
+        _add_block(bending.moment, bending.square, x, y)
+        add_rows(bent.per_mass, y, 1.0, x)
         for i in range(6):
-            factor[6 * i + j] = x[i]
+            factor[i, j] = x[i]
     for i in range(6):
-        for j in range(6):
-            total = 0.0
-            for m in range(6):
-                total += own[6 * i + m] * factor[6 * m + j]
-            product[6 * i + j] = total
-    coupled, bending = vector(memory, e, at.COUPLED), vector(memory, e, at.BENDING)
-    change, changed = vector(memory, e, at.CHANGE), vector(memory, e, at.CHANGED)
-    unchanged = vector(memory, e, at.UNCHANGED)
-    for i in range(6 * e):
-        scratch[unchanged + i] = scratch[changed + i] = scratch[coupled + i]
-        scratch[coupled + i] = scratch[change + i] = 0.0
-    for i in range(6):
-        row = scratch[change + i * e : change + (i + 1) * e]
-        add_columns(scratch, bending, e, reals[per_mass + 6 * i : per_mass + 6 * i + 6], 6, 1.0, row)
-    for i in range(6):
-        row = scratch[changed + i * e : changed + (i + 1) * e]
-        add_columns(scratch, change, e, own[6 * i : 6 * i + 6], 6, 1.0, row)
-    for i in range(6):
-        row = scratch[coupled + i * e : coupled + (i + 1) * e]
-        for j in range(6):
-            x[j] = factor[6 * j + i]
-        add_columns(scratch, changed, e, x, 6, 1.0, row)
-    for i in range(6):
-        for j in range(6):
-            total = 0.0
-            for m in range(6):
-                total += factor[6 * m + i] * product[6 * m + j]
-            own[6 * i + j] = total
+        row, line = bending.carried[i], bending.arrival[i]
+        clear(row)
+        clear(line)
+        add_columns(bending.bending, bent.per_mass[i], 1.0, row)
+        add_columns(state.arrival, factor[i], 1.0, line)
+        if floats:
+            add_columns(state.carried, factor[i], 1.0, row)

@@ -10,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 
+from erls.equations.compiled_system import CompiledSystem
 from erls.equations.ffr.body_frame import elastic_basis
 from erls.equations.ffr.interface_motion import InterfaceMotion
 from erls.equations.ffr.joint_effort import JointEfforts
+from erls.equations.ffr.pack import Given, pack_frames
 from erls.equations.ffr.recursion import Recursion, Step, bracket, node_motion
 from erls.equations.ffr.second_order import SecondOrderData
 from erls.equations.ffr.standard_data import StandardData
@@ -30,9 +32,6 @@ from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link
 from erls.mechanism.loops import LoopEnd
-
-if TYPE_CHECKING:
-    from erls.equations.compiled_system import CompiledSystem
 
 
 @dataclass(frozen=True)
@@ -99,13 +98,14 @@ class Ffr:
         return len(self.free)
 
     @cached_property
-    def compiled(self) -> CompiledSystem | None:
-        """The same equations in compiled form; None with modal inertia of second order."""
-        if any(isinstance(data, SecondOrderData) and data.modal is not None for data in self.data):
-            return None
-        from erls.equations.ffr.compiled import compile_frames  # here: it imports the compiler
+    def given(self) -> Given:
+        """What is packed."""
+        return Given(self.mechanism, self.bases, self.data, self.body_frame != "tangent", self.stiffened)
 
-        return compile_frames(self)
+    @cached_property
+    def compiled(self) -> CompiledSystem:
+        """The same equations in compiled form."""
+        return pack_frames(self.given)
 
     @property
     def breakpoints(self) -> tuple[float, ...]:

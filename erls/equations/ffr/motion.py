@@ -1,155 +1,153 @@
-"""Outward: poses, twists and their rates of all floating frames."""
+"""Outward: nodes, poses, twists and their rates of all floating frames.
+
+From the floating frame of a link its displaced node follows, from that the frame behind the joint that stands on it,
+from that, displaced by its inboard node, the floating frame of the next link: three changes of frame, ν' = Ad⁻¹ν + ξ.
+"""
 
 from __future__ import annotations
 
-import math
-
-from erls.equations.compiled_system import Array, IntArray
-from erls.equations.ffr import layout as at
-from erls.equations.ffr.bending import bend, bend_rates, inner_slope, outer_slope
-from erls.equations.ffr.nodes import invert_pose, move_node, place_node
-from erls.equations.ffr.rows import vector
-from erls.equations.serial.curves import curve
-from erls.equations.serial.linear import add_bracket, carry
-from erls.maths.jit import part
-
-
-@part
-def step_pose(reals: Array, start: int, slides: int, coordinate: float, out: Array) -> None:
-    """Pose (12,) over a joint at its coordinate."""
-    if slides:
-        for i in range(12):
-            out[i] = reals[start + i] + coordinate * reals[start + 12 + i]
-    else:
-        c, s = math.cos(coordinate), math.sin(coordinate)
-        for i in range(12):
-            out[i] = reals[start + i] + c * reals[start + 12 + i] + s * reals[start + 24 + i]
-
-
-@part
-def turn_back(pose: Array, x: Array, start: int, out: Array, to: int) -> None:
-    """Rᵀ x of a vector (3,); both may be the same."""
-    x0, x1, x2 = x[start], x[start + 1], x[start + 2]
-    for i in range(3):
-        out[to + i] = pose[i] * x0 + pose[3 + i] * x1 + pose[6 + i] * x2
-
-
-@part
-def joint_motion(
-    reals: Array, integers: IntArray, record: int, t: float, y: Array, v: Array, a: Array, link: Array
-) -> None:
-    """θ, θ̇, θ̈ of a joint: from the state or, prescribed, from time; θ̈ = 0 where ``a`` is empty."""
-    place = integers[record + at.JOINT]
-    if place >= 0:
-        link[at.ANGLE] = y[place]
-        link[at.ANGLE + 1] = v[place]
-        link[at.ANGLE + 2] = a[place] if len(a) else 0.0
-    else:
-        angle, rate, acceleration = curve(integers, reals, integers[record + at.MOTION], t)
-        link[at.ANGLE], link[at.ANGLE + 1], link[at.ANGLE + 2] = angle, rate, acceleration
+from erls.equations.ffr.bent import bend, bend_rates
+from erls.equations.ffr.nodes import move_node, place_node
+from erls.equations.ffr.records import (
+    BENT_BODY,
+    BENT_STATE,
+    BODY,
+    BODY_STATE,
+    NODE,
+    NODE_STATE,
+    BodyState,
+    Frames,
+    Node,
+    NodeState,
+    read_bent_body,
+    read_bent_state,
+    read_body,
+    read_body_state,
+    read_node,
+    read_node_state,
+)
+from erls.equations.serial.joints import move_joint
+from erls.equations.serial.records import (
+    JOINT,
+    JOINT_STATE,
+    MODES,
+    Serial,
+    read_joint,
+    read_joint_state,
+    read_modes,
+)
+from erls.maths.jit import inlined, part
+from erls.maths.products import clear
+from erls.maths.so3 import Array
+from erls.maths.spatial import add_motion_cross, rotate_back, transform_motion
+from fe_import.model import IntArray
 
 
 @part
-def place_frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array) -> None:
-    """Joint coordinates and the poses of all steps and nodes."""
-    for k in range(integers[at.LINKS]):
-        record = at.HEADER + k * at.RECORD
-        e, memory, first = integers[record + at.MODES], integers[record + at.MEMORY], integers[record + at.FIRST_MODE]
-        link, q = scratch[memory : memory + at.VECTORS], y[first : first + e]
-        joint_motion(reals, integers, record, t, y, v, a, link)
-        step_pose(reals, integers[record + at.STEP], integers[record + at.SLIDES], link[at.ANGLE], link)
-        if integers[record + at.BEND] >= 0:
-            bend(reals, integers, scratch, record, q)
-        if integers[record + at.INBOARD] >= 0:
-            node, start = link[at.INNER : at.INNER + at.NODE], vector(memory, e, at.INNER_ROWS)
-            slope, length = inner_slope(integers, record, at.BENDING)
-            rows = scratch[start : start + 6 * e]
-            place_node(reals, integers[record + at.INBOARD], q, scratch[slope : slope + length], rows, node)
-            invert_pose(node, node[at.BACK : at.BACK + 12])
-        if integers[record + at.OUTBOARD] >= 0:
-            node, start = link[at.OUTER : at.OUTER + at.NODE], vector(memory, e, at.OUTER_ROWS)
-            slope, length = outer_slope(integers, record, at.BENDING)
-            rows = scratch[start : start + 6 * e]
-            place_node(reals, integers[record + at.OUTBOARD], q, scratch[slope : slope + length], rows, node)
+def place_frames(
+    serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array,
+    a: Array,
+) -> None:  # fmt: skip
+    """Joint coordinates, and the poses of all joints and nodes."""
+    for k in range(serial.links):
+        joint = read_joint(reals, integers, serial.joints + k * JOINT)
+        moved = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
+        move_joint(joint, moved, reals, integers, t, y, v, a)
+        if read_body(reals, integers, frames.bodies + k * BODY).bent:
+            modes = read_modes(reals, integers, serial.modes + k * MODES)
+            bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+            bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+            bend(bent, bending, y[modes.first : modes.first + len(modes.stiffness)])
+    for number in range(2 * serial.links):
+        node = read_node(reals, integers, frames.nodes + number * NODE)
+        if node.moves:
+            state = read_node_state(scratch, integers, frames.node_states + number * NODE_STATE)
+            modes = read_modes(reals, integers, serial.modes + node.link * MODES)
+            place_node(node, state, y[modes.first : modes.first + len(modes.stiffness)])
+
+
+@inlined
+def move_frames(
+    serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array,
+    a: Array,
+) -> None:  # fmt: skip
+    """Motion of all frames at accelerations θ̈, η̈; at zero ones of what is free where ``a`` is empty."""
+    place_frames(serial, frames, reals, integers, scratch, t, y, v, a)
+    for number in range(2 * serial.links):
+        node = read_node(reals, integers, frames.nodes + number * NODE)
+        if node.moves:
+            displaced = read_node_state(scratch, integers, frames.node_states + number * NODE_STATE)
+            modes = read_modes(reals, integers, serial.modes + node.link * MODES)
+            first, last = modes.first, modes.first + len(modes.stiffness)
+            move_node(node, displaced, v[first:last], a[first:last] if len(a) > 0 else a)
+    for k in range(serial.links):
+        body = read_body(reals, integers, frames.bodies + k * BODY)
+        state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
+        joint = read_joint(reals, integers, serial.joints + k * JOINT)
+        moved = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
+        base = read_node(reals, integers, frames.nodes + 2 * k * NODE)
+        base_state = read_node_state(scratch, integers, frames.node_states + 2 * k * NODE_STATE)
+        inner = read_node(reals, integers, frames.nodes + (2 * k + 1) * NODE)
+        inner_state = read_node_state(scratch, integers, frames.node_states + (2 * k + 1) * NODE_STATE)
+        if body.bent:
+            modes = read_modes(reals, integers, serial.modes + k * MODES)
+            bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+            bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+            bend_rates(bent, bending, v[modes.first : modes.first + len(modes.stiffness)])
+        if body.parent < 0:
+            clear(state.twist)
+            clear(state.twist_rate)
+            rotate_back(moved.pose, serial.gravity, state.gravity)
+        else:
+            before = read_body_state(scratch, integers, frames.body_states + body.parent * BODY_STATE)
+            _leave(base, base_state, before, state)
+            transform_motion(moved.pose, state.twist, state.twist)
+            transform_motion(moved.pose, state.twist_rate, state.twist_rate)
+            rotate_back(moved.pose, state.gravity, state.gravity)
+        _turn_joint(joint.screw, moved.coordinate, state.twist, state.twist_rate, state.arrived)
+        if inner.moves:
+            _arrive(inner_state, state)
 
 
 @part
-def _arrive(reals: Array, integers: IntArray, scratch: Array, k: int) -> None:
-    """FRAME of a link, from NEXT of the link before or from the ground."""
-    record = at.HEADER + k * at.RECORD
-    memory = integers[record + at.MEMORY]
-    link = scratch[memory : memory + at.VECTORS]
-    screw = reals[integers[record + at.SCREW] : integers[record + at.SCREW] + 6]
-    rate, acceleration = link[at.ANGLE + 1], link[at.ANGLE + 2]
-    frame, joint = link[at.FRAME : at.FRAME + 15], link[at.OTHER : at.OTHER + 6]
+def _turn_joint(screw: Array, coordinate: Array, twist: Array, rate: Array, arrived: Array) -> None:
+    """Over a joint: ν + S θ̇, and its rate."""
+    speed, acceleration = coordinate[1], coordinate[2]
+    add_motion_cross(twist, screw, speed, rate)
     for i in range(6):
-        joint[i] = screw[i] * rate
-    if k == 0:
-        for i in range(6):
-            frame[i], frame[6 + i] = joint[i], screw[i] * acceleration
-        turn_back(link, reals, at.GRAVITY, frame, 12)
-    else:
-        start = integers[record - at.RECORD + at.MEMORY]
-        before = scratch[start + at.NEXT : start + at.NEXT + 15]
-        carry(link, before, 0, frame, 0)
-        carry(link, before, 6, frame, 6)
-        turn_back(link, before, 12, frame, 12)
-        add_bracket(frame, 0, joint, 0, 1.0, frame, 6)
-        for i in range(6):
-            frame[i] += joint[i]
-            frame[6 + i] += screw[i] * acceleration
-    if integers[record + at.INBOARD] >= 0:  # now from the inboard node to the frame
-        node = link[at.INNER : at.INNER + at.NODE]
-        back = node[at.BACK : at.BACK + 12]
-        for i in range(6):
-            frame[6 + i] -= node[at.RATE + i]
-        add_bracket(frame, 0, node, at.TWIST, -1.0, frame, 6)
-        for i in range(6):
-            frame[i] -= node[at.TWIST + i]
-        carry(back, frame, 0, frame, 0)
-        carry(back, frame, 6, frame, 6)
-        turn_back(back, frame, 12, frame, 12)
+        twist[i] += screw[i] * speed
+        rate[i] += screw[i] * acceleration
+        arrived[i] = twist[i]
 
 
-@part
-def _leave(reals: Array, integers: IntArray, record: int, link: Array) -> None:
-    """NEXT of a link from its FRAME."""
-    frame, after = link[at.FRAME : at.FRAME + 15], link[at.NEXT : at.NEXT + 15]
-    if integers[record + at.OUTBOARD] < 0:
-        for i in range(15):
-            after[i] = frame[i]
+@inlined
+def _leave(node: Node, moved: NodeState, before: BodyState, state: BodyState) -> None:
+    """Motion of the node that a joint stands on, from the floating frame ``before``."""
+    twist, rate, gravity = state.twist, state.twist_rate, state.gravity
+    if not node.moves:
+        for i in range(6):
+            twist[i], rate[i] = before.twist[i], before.twist_rate[i]
+        for i in range(3):
+            gravity[i] = before.gravity[i]
         return
-    node = link[at.OUTER : at.OUTER + at.NODE]
-    carry(node, frame, 0, after, 0)
-    carry(node, frame, 6, after, 6)
-    turn_back(node, frame, 12, after, 12)
-    add_bracket(after, 0, node, at.TWIST, 1.0, after, 6)
+    transform_motion(moved.pose, before.twist, twist)
+    transform_motion(moved.pose, before.twist_rate, rate)
+    rotate_back(moved.pose, before.gravity, gravity)
+    add_motion_cross(twist, moved.twist, 1.0, rate)
     for i in range(6):
-        after[i] += node[at.TWIST + i]
-        after[6 + i] += node[at.RATE + i]
+        twist[i] += moved.twist[i]
+        rate[i] += moved.twist_rate[i]
 
 
-@part
-def move_frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array) -> None:
-    """Motion of all frames, with accelerations θ̈, η̈; at zero ones of what is free where ``a`` is empty."""
-    place_frames(reals, integers, scratch, t, y, v, a)
-    for k in range(integers[at.LINKS]):
-        record = at.HEADER + k * at.RECORD
-        e, memory, first = integers[record + at.MODES], integers[record + at.MEMORY], integers[record + at.FIRST_MODE]
-        link, rates = scratch[memory : memory + at.VECTORS], v[first : first + e]
-        accelerations = a[first : first + e] if len(a) else a
-        if integers[record + at.BEND] >= 0:
-            bend_rates(reals, integers, scratch, record, rates)
-        if integers[record + at.INBOARD] >= 0:
-            node, start = link[at.INNER : at.INNER + at.NODE], vector(memory, e, at.INNER_ROWS)
-            slope, length = inner_slope(integers, record, at.BENDING_RATE)
-            rows = scratch[start : start + 6 * e]
-            move_node(rows, rates, accelerations, scratch[slope : slope + length], node)
-        if integers[record + at.OUTBOARD] >= 0:
-            node, start = link[at.OUTER : at.OUTER + at.NODE], vector(memory, e, at.OUTER_ROWS)
-            slope, length = outer_slope(integers, record, at.BENDING_RATE)
-            rows = scratch[start : start + 6 * e]
-            move_node(rows, rates, accelerations, scratch[slope : slope + length], node)
-        _arrive(reals, integers, scratch, k)
-        if k + 1 < integers[at.LINKS]:
-            _leave(reals, integers, record, link)
+@inlined
+def _arrive(inner: NodeState, state: BodyState) -> None:
+    """From the inboard node to the floating frame in which it moves."""
+    twist, rate = state.twist, state.twist_rate
+    for i in range(6):
+        rate[i] -= inner.twist_rate[i]
+    add_motion_cross(twist, inner.twist, -1.0, rate)
+    for i in range(6):
+        twist[i] -= inner.twist[i]
+    transform_motion(inner.back, twist, twist)
+    transform_motion(inner.back, rate, rate)
+    rotate_back(inner.back, state.gravity, state.gravity)

@@ -1,18 +1,21 @@
-"""Displaced interface nodes: pose and motion in the floating frame, moved by u and turned by exp(φ), linear in η or of
-second order.
+"""Displaced nodes: pose and motion in the floating frame, moved by u, turned by exp(φ), linear in η or of second order.
 
-With s = φ², a = (1 - cos φ)/φ² and b = (φ - sin φ)/φ³ the turn is 1 + (1 - s b) φ̃ + a φ̃², and ω = (1 - a φ̃ + b φ̃²) φ̇ in
-the node's axes; formulas of `erls.equations.ffr.interface_motion`.
+With s = φ², a = (1 - cos φ)/φ² and b = (φ - sin φ)/φ³ the turn is 1 + (1 - s b) φ̃ + a φ̃², and ω = T(φ) φ̇ with
+T = 1 - a φ̃ + b φ̃² in the node's axes (A. Iserles, H. Munthe-Kaas, S. Nørsett, A. Zanna, Acta Numerica 2000, app. B).
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from erls.equations.compiled_system import Array
-from erls.equations.ffr import layout as at
-from erls.equations.ffr.rows import add_rows, cross3
-from erls.maths.jit import part
+import numpy as np
+
+from erls.equations.ffr.records import Node, NodeState
+from erls.maths.jit import inlined, part
+from erls.maths.products import add_columns, add_rows, clear
+from erls.maths.so3 import Array
+from erls.maths.spatial import add_cross, dot3, invert_pose
 
 _SERIES = 0.5  # rad²; below, nine terms give full precision
 _SMALL = 0.01  # rad²; below, six
@@ -21,114 +24,126 @@ _B = tuple((-1.0) ** k / math.factorial(2 * k + 3) for k in range(9))
 
 
 @part
-def turn_factors(s: float) -> tuple[float, float, float, float]:
+def turn_factors(s: Any) -> tuple[Any, Any, Any, Any]:
     """a, da/ds, b, db/ds."""
-    if s < _SERIES:
-        a = a_slope = b = b_slope = 0.0
-        for k in range(5 if s < _SMALL else 8, -1, -1):
+    if s.real < _SERIES:
+        a = a_slope = b = b_slope = 0.0 * s
+        for k in range(5 if s.real < _SMALL else 8, -1, -1):
             a_slope = a_slope * s + a
             a = a * s + _A[k]
             b_slope = b_slope * s + b
             b = b * s + _B[k]
         return a, a_slope, b, b_slope
-    angle = math.sqrt(s)
-    sine, cosine = math.sin(angle) / angle, math.cos(angle)
+    angle = np.sqrt(s)
+    sine, cosine = np.sin(angle) / angle, np.cos(angle)
     a, b = (1 - cosine) / s, (1 - sine) / s
     return a, (sine / 2 - a) / s, b, ((sine - cosine) / (2 * s) - b) / s
 
 
 @part
-def invert_pose(pose: Array, out: Array) -> None:
-    """Inverse of a pose (12,)."""
-    p0, p1, p2 = pose[9], pose[10], pose[11]
-    for i in range(3):
-        for j in range(3):
-            out[3 * i + j] = pose[3 * j + i]
-        out[9 + i] = -(pose[i] * p0 + pose[3 + i] * p1 + pose[6 + i] * p2)
-
-
-@part
-def place_node(reals: Array, start: int, q: Array, slope: Array, rows: Array, node: Array) -> None:
-    """Pose of a node whose constants begin at ``start``, and what `move_node` needs of it.
-
-    ``rows`` (6 e,) gets u and φ per η̇; ``slope`` (6 e,) is Ψ η of second-order displacements, or empty.
-    """
-    e = len(q)
-    place, phi = node[at.POSE + 9 : at.POSE + 12], node[at.PHI : at.PHI + 3]
-    for i in range(3):
-        place[i], phi[i] = reals[start + i], 0.0
-    for i in range(6 * e):
-        rows[i] = reals[start + 3 + i]
-    add_rows(rows, 0, q, 1.0, place)
-    add_rows(rows, 3 * e, q, 1.0, phi)
-    if len(slope):
-        add_rows(slope, 0, q, 0.5, place)
-        add_rows(slope, 3 * e, q, 0.5, phi)
-        for i in range(6 * e):
-            rows[i] += slope[i]
-    f0, f1, f2 = phi[0], phi[1], phi[2]
-    s = f0 * f0 + f1 * f1 + f2 * f2
+def _turn(phi: Array, pose: Array, tangent: Array, turning: Array) -> None:
+    """Rotation, T and factors of a rotation vector."""
+    s = dot3(phi, phi)
     a, a_slope, b, b_slope = turn_factors(s)
-    node[at.SLOPE_A], node[at.FACTOR_B], node[at.SLOPE_B] = a_slope, b, b_slope
-    # φ̃² = φ φᵀ - s
-    for i in range(3):
+    turning[0], turning[1], turning[2] = a_slope, b, b_slope
+    for i in range(3):  # φ̃² = φ φᵀ - s
         for j in range(3):
             square = phi[i] * phi[j]
-            node[at.POSE + 3 * i + j] = a * square
-            node[at.TANGENT + 3 * i + j] = b * square
-        node[at.POSE + 4 * i] += 1.0 - a * s
-        node[at.TANGENT + 4 * i] += 1.0 - b * s
+            pose[3 * i + j] = a * square
+            tangent[i, j] = b * square
+        pose[4 * i] += 1.0 - a * s
+        tangent[i, i] += 1.0 - b * s
     turn = 1.0 - s * b
-    for i, j, f in ((1, 0, f2), (0, 2, f1), (2, 1, f0)):
-        node[at.POSE + 3 * i + j] += turn * f
-        node[at.POSE + 3 * j + i] -= turn * f
-        node[at.TANGENT + 3 * i + j] -= a * f
-        node[at.TANGENT + 3 * j + i] += a * f
+    for i, j, k in ((1, 0, 2), (0, 2, 1), (2, 1, 0)):
+        f = phi[k]
+        pose[3 * i + j] += turn * f
+        pose[3 * j + i] -= turn * f
+        tangent[i, j] -= a * f
+        tangent[j, i] += a * f
+
+
+@inlined
+def place_node(node: Node, state: NodeState, q: Array) -> None:
+    """Pose of a node, and what `move_node` needs of it."""
+    e, place, phi = len(q), state.pose[9:12], state.phi
+    for i in range(3):
+        place[i], phi[i] = node.position[i], 0.0
+    add_rows(node.shapes[:3], q, 1.0, place)
+    add_rows(node.shapes[3:], q, 1.0, phi)
+    for i in range(6):
+        for j in range(e):
+            state.rows[i, j] = node.shapes[i, j]
+    if state.slope.shape[1] > 0:
+        slope = state.slope.reshape(6 * e)
+        clear(slope)
+        add_columns(node.second_order, q, 1.0, slope)
+        add_rows(state.slope[:3], q, 0.5, place)
+        add_rows(state.slope[3:], q, 0.5, phi)
+        for i in range(6):
+            for j in range(e):
+                state.rows[i, j] += state.slope[i, j]
+    _turn(phi, state.pose, state.tangent, state.turning)
+    invert_pose(state.pose, state.back)
 
 
 @part
-def to_node_axes(node: Array, x: Array) -> None:
+def to_node_axes(pose: Array, tangent: Array, x: Array) -> None:
     """Replace rates of (u, φ) by the twist that they make, in the node's axes."""
     u0, u1, u2, f0, f1, f2 = x[0], x[1], x[2], x[3], x[4], x[5]
     for i in range(3):
-        x[i] = node[i] * u0 + node[3 + i] * u1 + node[6 + i] * u2
-        tangent = at.TANGENT + 3 * i
-        x[3 + i] = node[tangent] * f0 + node[tangent + 1] * f1 + node[tangent + 2] * f2
+        x[i] = pose[i] * u0 + pose[3 + i] * u1 + pose[6 + i] * u2
+        x[3 + i] = tangent[i, 0] * f0 + tangent[i, 1] * f1 + tangent[i, 2] * f2
 
 
 @part
-def from_node_axes(node: Array, wrench: Array, out: Array) -> None:
+def from_node_axes(pose: Array, tangent: Array, wrench: Array, out: Array) -> None:
     """Forces on (u, φ) of a wrench in the node's axes; the transpose of `to_node_axes`."""
     for i in range(3):
-        turn, tangent = at.POSE + 3 * i, at.TANGENT + i
-        out[i] = node[turn] * wrench[0] + node[turn + 1] * wrench[1] + node[turn + 2] * wrench[2]
-        out[3 + i] = node[tangent] * wrench[3] + node[tangent + 3] * wrench[4] + node[tangent + 6] * wrench[5]
+        out[i] = pose[3 * i] * wrench[0] + pose[3 * i + 1] * wrench[1] + pose[3 * i + 2] * wrench[2]
+        out[3 + i] = tangent[0, i] * wrench[3] + tangent[1, i] * wrench[4] + tangent[2, i] * wrench[5]
 
 
 @part
-def move_node(rows: Array, rates: Array, accelerations: Array, slope_rate: Array, node: Array) -> None:
-    """TWIST and RATE of a node, at η̈ = 0 where ``accelerations`` is empty; ``slope_rate`` as in `place_node`."""
-    twist, rate = node[at.TWIST : at.TWIST + 6], node[at.RATE : at.RATE + 6]
-    for i in range(6):
-        twist[i] = rate[i] = 0.0
-    add_rows(rows, 0, rates, 1.0, twist)
-    if len(accelerations):
-        add_rows(rows, 0, accelerations, 1.0, rate)
-    if len(slope_rate):
-        add_rows(slope_rate, 0, rates, 1.0, rate)
-    f0, f1, f2 = node[at.PHI], node[at.PHI + 1], node[at.PHI + 2]
-    d0, d1, d2 = twist[3], twist[4], twist[5]
-    to_node_axes(node, twist)
-    to_node_axes(node, rate)
-    v0, v1, v2 = cross3(twist[0], twist[1], twist[2], twist[3], twist[4], twist[5])
-    rate[0] += v0
-    rate[1] += v1
-    rate[2] += v2
-    o0, o1, o2 = cross3(f0, f1, f2, d0, d1, d2)
-    t0, t1, t2 = cross3(f0, f1, f2, o0, o1, o2)
-    c0, c1, c2 = cross3(d0, d1, d2, o0, o1, o2)
+def _turning_rate(phi: Array, change: Array, turning: Array, out: Array) -> None:
+    """Add Ṫ φ̇ to the last three of ``out``; ``change`` is φ̇."""
+    f0, f1, f2, d0, d1, d2 = phi[0], phi[1], phi[2], change[0], change[1], change[2]
+    o0, o1, o2 = f1 * d2 - f2 * d1, f2 * d0 - f0 * d2, f0 * d1 - f1 * d0  # φ × φ̇
     s_rate = 2.0 * (f0 * d0 + f1 * d1 + f2 * d2)
-    once, twice, b = -node[at.SLOPE_A] * s_rate, node[at.SLOPE_B] * s_rate, node[at.FACTOR_B]
-    rate[3] += twice * t0 + once * o0 + b * c0
-    rate[4] += twice * t1 + once * o1 + b * c1
-    rate[5] += twice * t2 + once * o2 + b * c2
+    once, twice, b = -turning[0] * s_rate, turning[2] * s_rate, turning[1]
+    out[3] += twice * (f1 * o2 - f2 * o1) + once * o0 + b * (d1 * o2 - d2 * o1)
+    out[4] += twice * (f2 * o0 - f0 * o2) + once * o1 + b * (d2 * o0 - d0 * o2)
+    out[5] += twice * (f0 * o1 - f1 * o0) + once * o2 + b * (d0 * o1 - d1 * o0)
+
+
+@inlined
+def move_node(node: Node, state: NodeState, rates: Array, accelerations: Array) -> None:
+    """Twist of a node and its rate, at η̈ = 0 where ``accelerations`` is empty."""
+    e, twist, rate = len(rates), state.twist, state.twist_rate
+    clear(twist)
+    clear(rate)
+    add_rows(state.rows, rates, 1.0, twist)
+    if len(accelerations) > 0:
+        add_rows(state.rows, accelerations, 1.0, rate)
+    if state.slope.shape[1] > 0:
+        slope_rate = state.slope_rate.reshape(6 * e)
+        clear(slope_rate)
+        add_columns(node.second_order, rates, 1.0, slope_rate)
+        add_rows(state.slope_rate, rates, 1.0, rate)
+    for i in range(3):
+        state.phi_rate[i] = twist[3 + i]
+    to_node_axes(state.pose, state.tangent, twist)
+    to_node_axes(state.pose, state.tangent, rate)
+    add_cross(twist[:3], twist[3:], 1.0, rate[:3])
+    _turning_rate(state.phi, state.phi_rate, state.turning, rate)
+
+
+@inlined
+def node_moves(state: NodeState) -> None:
+    """Twist of a node per η̇."""
+    x = state.twist
+    for j in range(state.rows.shape[1]):
+        for i in range(6):
+            x[i] = state.rows[i, j]
+        to_node_axes(state.pose, state.tangent, x)
+        for i in range(6):
+            state.moves[i, j] = x[i]

@@ -1,0 +1,312 @@
+"""The records of a mechanism of floating frames, put into memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from erls.equations.compiled_system import CompiledSystem, Factoring, acceleration_in
+from erls.equations.ffr.mass import mass_matrix
+from erls.equations.ffr.records import (
+    BentBody,
+    Body,
+    Frames,
+    Node,
+    Room,
+    bent_state,
+    body_state,
+    node_state,
+)
+from erls.equations.ffr.residual import residual
+from erls.equations.ffr.standard_data import StandardData
+from erls.equations.serial import pack
+from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
+from erls.equations.serial.elimination import condensed
+from erls.equations.serial.modal_inertia import modal_inertia
+from erls.equations.serial.records import Serial
+from erls.equations.serial.segments import segment
+from erls.equations.serial.stiffness import stiffness_and_damping
+from erls.maths.records import Memory
+from erls.maths.se3 import pose, twist_transform
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import node_shape6
+from fe_import.model import InterfaceNode
+
+DENSE = 60  # coordinates up to which dense factors cost less than elimination link by link
+
+
+@dataclass(frozen=True)
+class Given:
+    """What is packed.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    bases : list of (6 + e, e) arrays
+        Of every link, see `erls.equations.ffr.body_frame.elastic_basis`.
+    data : list of StandardData
+        Of every link.
+    floats : bool
+        Whether inboard nodes move in the floating frames.
+    stiffened : bool
+        Whether links have second-order displacements.
+    every_axis : bool
+        Count all moments on frames that turn about one axis only, which no joint feels.
+    """
+
+    mechanism: Mechanism
+    bases: list[Array]
+    data: list[StandardData]
+    floats: bool
+    stiffened: bool
+    every_axis: bool = False
+
+    @property
+    def parents(self) -> list[int]:
+        """Of every link."""
+        return [k - 1 for k in range(len(self.mechanism.links))]
+
+    def bent(self, k: int) -> bool:
+        """Whether a link has second-order displacements."""
+        link = self.mechanism.links[k]
+        return self.stiffened and link.elastic_modes > 0 and link.second_order is not None
+
+
+def node_record(given: Given, k: int, node: int) -> Node:
+    """A node of link k."""
+    link, basis = given.mechanism.links[k], given.bases[k]
+    shapes = np.vstack(node_shape6(link.model, node)) @ basis
+    second, e = np.zeros((0, 0)), link.elastic_modes
+    if given.bent(k):
+        assert link.second_order is not None
+        second = (basis.T @ link.second_order.node(node) @ basis).transpose(2, 0, 1).reshape(e, 6 * e)
+    return Node(k, int(e > 0), link.model.nodes[node], shapes, second)
+
+
+_RESTING = Node(-1, 0, np.zeros(3), np.zeros((6, 0)), np.zeros((0, 0)))
+
+
+def _interface(given: Given, k: int, interface: InterfaceNode | None) -> Node:
+    return _RESTING if k < 0 or interface is None else node_record(given, k, interface.node)
+
+
+class _Nodes(NamedTuple):
+    """Nodes of a link, and the poses before and behind its joint, from node to node."""
+
+    base: Node
+    inner: Node
+    before: Array
+    after: Array
+
+
+def _nodes(given: Given, k: int) -> _Nodes:
+    mechanism, parent = given.mechanism, given.parents[k]
+    joint, link = mechanism.joints[k], mechanism.links[k]
+    outboard = mechanism.links[parent].outboard if parent >= 0 else None
+    base = _interface(given, parent, outboard)
+    inner = _interface(given, k, link.inboard if given.floats else None)
+    before, after = joint.before, joint.after
+    if base.moves:
+        before = pose(position=-base.position) @ before
+    if inner.moves:
+        after = after @ pose(position=inner.position)
+    return _Nodes(base, inner, before, after)
+
+
+def _axes(given: Given, k: int) -> Array:
+    """(axes, 3) about which the frame of a link turns: on the ground that of its joint alone; behind a link, on mean
+    axes, or with a corrected twist all three.
+    """
+    joint = given.mechanism.joints[k]
+    if given.every_axis or given.parents[k] >= 0 or given.bent(k) or (given.floats and given.data[k].size):
+        return np.eye(3)
+    return joint.screw[None, 3:] if joint.type.revolute else np.zeros((0, 3))
+
+
+def _body(given: Given, k: int) -> Body:
+    data, axes = given.data[k], _axes(given, k)
+    turned = np.einsum("ca,aij->cij", axes, data.turned)
+    square = np.einsum("ca,db,abij->cdij", axes, axes, data.square)
+    pairs = [(i, i) for i in range(len(axes))] + ([(0, 1), (0, 2), (1, 2)] if len(axes) == 3 else [])
+    symmetric = [(square[i, j] + square[j, i]) / 2 for i, j in pairs]
+    warped = "modal_inertia" in given.mechanism.effects
+    return Body(
+        parent=given.parents[k],
+        bent=int(given.bent(k)),
+        warped=int(given.bent(k) and warped),
+        mass=data.mass,
+        moment=data.first_moment,
+        rigid=data.rigid,
+        coupling=data.coupling,
+        axes=axes,
+        half=np.einsum("ca,aij->cij", axes, data.half),
+        turned=turned.transpose(0, 2, 1),
+        gyroscopic=turned.transpose(0, 2, 1) - turned,
+        square=np.array(symmetric).reshape(len(pairs), data.size, data.size),
+    )
+
+
+def _bent_body(given: Given, k: int) -> BentBody:
+    empty = np.zeros((0, 0))
+    if not given.bent(k):
+        return BentBody(empty, empty, empty, empty, empty, empty, empty)
+    link, basis, e = given.mechanism.links[k], given.bases[k], given.data[k].size
+    assert link.second_order is not None
+    bend = basis.T @ link.second_order.momentum @ basis
+    spin = (basis.T @ link.second_order.spin @ basis).reshape(9, e, e)
+    skew = bend[3:] - bend[3:].transpose(0, 2, 1)
+    warp: Array = empty
+    warp_skew: Array = empty
+    per_modal: Array = empty
+    modal = modal_inertia(link, given.mechanism.effects, basis)
+    if modal is not None:
+        per_modal = np.asarray(modal.per_mass, dtype=float)
+        warp = modal.tensor.transpose(1, 0, 2).reshape(e, e * e)
+        warp_skew = warp - modal.tensor.transpose(2, 0, 1).reshape(e, e * e)
+    return BentBody(
+        bend=bend.transpose(1, 0, 2).reshape(e, 6 * e),
+        spin=spin.transpose(2, 0, 1).reshape(e, 9 * e),
+        skew=skew.transpose(1, 0, 2).reshape(e, 3 * e),
+        per_mass=np.asarray(np.linalg.inv(given.data[k].rigid), dtype=float),
+        warp=warp,
+        warp_skew=warp_skew,
+        per_modal=per_modal,
+    )
+
+
+class _Sizes(NamedTuple):
+    """Of a link's segment: elastic coordinates, extra rows, ports on its parent."""
+
+    modes: int
+    extra: int
+    ports: int
+
+
+def _sizes(given: Given, bodies: Sequence[Body], nodes: Sequence[_Nodes]) -> list[_Sizes]:
+    result = []
+    for k, (body, found) in enumerate(zip(bodies, nodes, strict=True)):
+        e = given.data[k].size
+        extra = 6 * bool(found.inner.moves or body.bent) + e * body.warped
+        result.append(_Sizes(e, extra, 6 if found.base.moves else 0))
+    return result
+
+
+def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
+    """The compiled form of a mechanism.
+
+    Parameters
+    ----------
+    given : Given
+    dense : int
+        Coordinates up to which iteration matrices get dense factors. Beyond, they are solved link by link, with the
+        damping that couples elastic coordinates of a link left out of them where that hardly slows iterations down.
+    """
+    mechanism, parents, links = given.mechanism, given.parents, range(len(given.mechanism.links))
+    integers = [0]
+    constants, working, factors = Memory(integers), Memory(integers), Memory(integers)
+    prescribed = np.array([joint.drive.prescribed for joint in mechanism.joints], dtype=bool)
+    free = int(np.count_nonzero(~prescribed))
+    size = free + sum(data.size for data in given.data)
+    decoupled = [
+        decoupled_modes(data.elastic, link.stiffness, link.damping)
+        for data, link in zip(given.data, mechanism.links, strict=True)
+    ]
+    linked = size > dense and max(found.mixing for found in decoupled) < MIXING
+    nodes, bodies = [_nodes(given, k) for k in links], [_body(given, k) for k in links]
+    places = np.where(prescribed, -1, np.cumsum(~prescribed) - 1)
+    joints = [
+        pack.joint_record(
+            constants,
+            joint,
+            int(places[k]),
+            pack.step_parts(nodes[k].before, joint.type.revolute, nodes[k].after),
+            twist_transform(nodes[k].after) @ joint.type.screw,
+        )
+        for k, joint in enumerate(mechanism.joints)
+    ]
+    firsts = free + np.cumsum([0, *(data.size for data in given.data)])
+    modes = [
+        pack.modes_record(int(firsts[k]), given.data[k].elastic, mechanism.links[k], decoupled[k]) for k in links
+    ]
+    rigid_links, rigid_states = pack.rigid_links(mechanism, constants, working)
+    pairs = [node for found in nodes for node in (found.base, found.inner)]
+    sizes = _sizes(given, bodies, nodes)
+    none = _Sizes(0, 0, 0)
+    segments = []
+    for k in links:
+        before = sizes[parents[k]] if parents[k] >= 0 else none
+        six = 6 if parents[k] >= 0 else 0
+        segments.append(segment(parents[k], 6, sizes[k].modes, six, before.modes, sizes[k].ports, sizes[k].extra))
+    condensed_at = _put(factors, condensed(segments) if linked else [])
+    room = Room(np.zeros((size, size)), np.zeros(0))
+    if linked:
+        room = Room(np.zeros((0, 0)), np.zeros(len(factors.numbers)))
+    effects = mechanism.effects
+    frames = Frames(
+        bodies=_put(constants, bodies),
+        body_states=_put(working, [body_state(sizes[k].modes, len(bodies[k].axes)) for k in links]),
+        nodes=_put(constants, pairs),
+        node_states=_put(working, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in pairs]),
+        bent_bodies=_put(constants, [_bent_body(given, k) for k in links]),
+        bent_states=_put(
+            working, [bent_state(sizes[k].modes if b.bent else 0, bool(b.warped)) for k, b in enumerate(bodies)]
+        ),
+        segments=_put(working, segments),
+        decoupled=_put(working, segments if linked else []),
+        condensed=condensed_at,
+        room=working.put(room),
+        free=free,
+        first_order=int("inertia_first_order" in effects),
+        second_order=int("inertia_second_order" in effects),
+        coriolis=int("coriolis" in effects),
+        centrifugal=int("centrifugal_load" in effects),
+        softening=int("spin_softening" in effects),
+        weight=int(bool(np.any(mechanism.gravity))),
+    )
+    own = constants.put(frames)
+    integers[0] = constants.put(
+        Serial(
+            links=len(mechanism.links),
+            joints=_put(constants, joints),
+            joint_states=pack.joint_states(working, len(joints)),
+            modes=_put(constants, modes),
+            feeds=int(rigid_links >= 0),
+            rigid_links=rigid_links,
+            rigid_states=rigid_states,
+            own=own,
+            gravity=mechanism.gravity,
+        )
+    )
+    accelerate, factoring = "erls.equations.ffr.acceleration", None
+    if linked:
+        from erls.equations.ffr import link_by_link  # here: it is compiled on its own
+
+        accelerate = "erls.equations.ffr.link_by_link"
+        factoring = Factoring(
+            len(factors.numbers),
+            link_by_link.factor,
+            link_by_link.solve,
+            link_by_link.factor_complex,
+            link_by_link.solve_complex,
+        )
+    return CompiledSystem(
+        size=size,
+        reals=constants.numbers,
+        integers=np.array(integers, dtype=np.int64),
+        scratch=working.numbers,
+        residual=residual,
+        mass_matrix=mass_matrix,
+        stiffness_and_damping=stiffness_and_damping,
+        load_acceleration=acceleration_in(accelerate),
+        factoring=factoring,
+    )
+
+
+def _put(memory: Memory, records: Sequence[NamedTuple]) -> int:
+    """Place of the first of records of one kind."""
+    places = [memory.put(record) for record in records]
+    return places[0] if places else 0

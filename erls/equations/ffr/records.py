@@ -1,0 +1,372 @@
+"""Records of a mechanism of floating frames: the constants of its links and of their interfaces, and their memory.
+
+A link stands with its floating frame behind its joint, displaced against it by its inboard interface where that moves
+in the frame. The joint stands on an interface of the parent, which moves with the elastic coordinates of the parent.
+Both are nodes: node 2k is the one that the joint of link k stands on, node 2k + 1 the inboard one of link k. What
+belongs to the former is kept with link k, so that any number of links may stand on one. Frames, twists and wrenches are
+those of `erls.maths.spatial`; e is the number of elastic coordinates of the link in question, those of loads in N and
+N m, of lengths in m.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from erls.maths.records import Matrix, Stack, Vector, reader, table_size
+
+
+class Frames(NamedTuple):
+    """Where the records are, and which effects are on (`erls.mechanism.effects`, 0 or 1).
+
+    Attributes
+    ----------
+    bodies, body_states, nodes, node_states : int
+        Places of the first ones; of nodes two for each link, then one for each end of a loop.
+    bent_bodies, bent_states : int
+        Places of the first ones; empty records of links without second-order displacements.
+    segments, decoupled, condensed : int
+        Places of the first `Segment` in the links' coordinates and in decoupled ones, and of the first `Condensed`.
+    room : int
+        Place of the `Room`.
+    free : int
+        Number of joints that are not prescribed.
+    """
+
+    bodies: int
+    body_states: int
+    nodes: int
+    node_states: int
+    bent_bodies: int
+    bent_states: int
+    segments: int
+    decoupled: int
+    condensed: int
+    room: int
+    free: int
+    first_order: int
+    second_order: int
+    coriolis: int
+    centrifugal: int
+    softening: int
+    weight: int
+
+
+class Body(NamedTuple):
+    """A link in its floating frame: standard input data, `erls.equations.ffr.standard_data`.
+
+    Attributes
+    ----------
+    parent : int
+        Number of the link that it stands on, -1 for the ground.
+    bent, warped : int
+        Whether it has second-order displacements, and modal inertia from them.
+    mass : float
+    moment : (3,) array
+        First moment ∫ρ x of the undeformed link.
+    rigid : (6, 6) array
+        M₀.
+    coupling : (6, e) array
+        C₀.
+    axes : (c, 3) array
+        Unit vectors about which the frame turns: all three, or the one of the only joint that turns it, or none.
+    half : (c, 6, e) array
+        Half of M₁ for each axis.
+    turned, gyroscopic : (c, e, e) arrays
+        C₁ for each axis, and that less its transpose; column after column.
+    square : (pairs, e, e) array
+        M₂ for each pair of axes, symmetric: one, or of 00, 11, 22, 01, 02, 12.
+    """
+
+    parent: int
+    bent: int
+    warped: int
+    mass: float
+    moment: Vector
+    rigid: Matrix
+    coupling: Matrix
+    axes: Matrix
+    half: Stack
+    turned: Stack
+    gyroscopic: Stack
+    square: Stack
+
+
+class BentBody(NamedTuple):
+    """Second-order displacements ½ ηᵀ Ψ η of a link, `erls.equations.ffr.bent`.
+
+    Attributes
+    ----------
+    bend : (e, 6 e) array
+        S_ab and P, rows (6, e), for each coordinate that they are multiplied with.
+    spin : (e, 9 e) array
+        W, rows (9, e), likewise.
+    skew : (e, 3 e) array
+        P less its transpose, rows (3, e), likewise.
+    per_mass : (6, 6) array
+        M₀⁻¹.
+    warp : (e, e e) array
+        K of modal inertia (`erls.equations.serial.modal_inertia`), rows (e, e), likewise; (0, 0) without it, like
+        ``warp_skew`` and ``per_modal``.
+    warp_skew : (e, e e) array
+        K less the same with the coordinates exchanged that it is multiplied with.
+    per_modal : (e, e) array
+        σ⁻¹.
+    """
+
+    bend: Matrix
+    spin: Matrix
+    skew: Matrix
+    per_mass: Matrix
+    warp: Matrix
+    warp_skew: Matrix
+    per_modal: Matrix
+
+
+class Node(NamedTuple):
+    """A node of a link that its elastic coordinates move.
+
+    Attributes
+    ----------
+    link : int
+        Number of the link that it belongs to.
+    moves : int
+        Whether the elastic coordinates move it in the floating frame.
+    position : (3,) array
+        Undeformed, in the floating frame.
+    shapes : (6, e) array
+        Displacement u and rotation vector φ per elastic coordinate.
+    second_order : (e, 6 e) array
+        Ψ of u and φ, rows (6, e), for each coordinate that they are multiplied with; (0, 0) without.
+    """
+
+    link: int
+    moves: int
+    position: Vector
+    shapes: Matrix
+    second_order: Matrix
+
+
+class BodyState(NamedTuple):
+    """Motion of a link and the forces on it, in the axes of its floating frame unless said otherwise.
+
+    Attributes
+    ----------
+    arrived : (6,) array
+        Twist of the frame behind the joint, in its axes.
+    twist, twist_rate : (6,) arrays
+        ν of the floating frame, and its derivative.
+    gravity : (3,) array
+        [m/s²]
+    wrench : (6,) array
+        What moves the link and all that it bears as they move, less their weight, on the floating frame.
+    borne : (6,) array
+        The same on the frame behind the joint, in its axes.
+    momentum : (6,) array
+        ∂T/∂ν.
+    moment : (3,) array
+        First moment of the deformed link.
+    inertia : (6, 6) array
+        M(η).
+    coupling : (6, e) array
+        C(η).
+    arrival : (6, 6) array
+        Z: twist of the floating frame per twist of the frame behind the joint.
+    carried : (6, e) array
+        W: twist of the floating frame per η̇ while the frame behind the joint rests.
+    turned, turned_rate : (c, e) arrays
+        C₁ η and C₁ η̇ for each axis.
+    squared : (e,) array
+        M₂ η of a pair of axes.
+    spare : (12,) array
+    spare_coupling : (6, e) array
+    spare_inertia : (6, 6) array
+        Working memory.
+    """
+
+    arrived: Vector
+    twist: Vector
+    twist_rate: Vector
+    gravity: Vector
+    wrench: Vector
+    borne: Vector
+    momentum: Vector
+    moment: Vector
+    inertia: Matrix
+    coupling: Matrix
+    arrival: Matrix
+    carried: Matrix
+    turned: Matrix
+    turned_rate: Matrix
+    squared: Vector
+    spare: Vector
+    spare_coupling: Matrix
+    spare_inertia: Matrix
+
+
+def body_state(e: int, axes: int) -> BodyState:
+    """Memory for a link with so many elastic coordinates and axes."""
+    six, square, rows = np.zeros(6), np.zeros((6, 6)), np.zeros((6, e))
+    return BodyState(
+        arrived=six,
+        twist=six,
+        twist_rate=six,
+        gravity=np.zeros(3),
+        wrench=six,
+        borne=six,
+        momentum=six,
+        moment=np.zeros(3),
+        inertia=square,
+        coupling=rows,
+        arrival=square,
+        carried=rows,
+        turned=np.zeros((axes, e)),
+        turned_rate=np.zeros((axes, e)),
+        squared=np.zeros(e),
+        spare=np.zeros(12),
+        spare_coupling=rows,
+        spare_inertia=square,
+    )
+
+
+class BentState(NamedTuple):
+    """Memory of a link with second-order displacements.
+
+    Attributes
+    ----------
+    twist, twist_rate : (6,) arrays
+        ν and its derivative while corrected ones take their place.
+    moment, moment_rate : (3,) arrays
+        S = ½ ηᵀ S_ab η and its derivative.
+    square, square_rate : (3, 3) arrays
+        ½ ηᵀ W η and its derivative.
+    share, share_rate : (6,) arrays
+        M₀⁻¹ p and M₀⁻¹ times the force on the corrected twist.
+    factor : (6, 6) array
+        1 + M₀⁻¹ H.
+    arrival, carried : (6, 6), (6, e) arrays
+        Z and W of the corrected twist.
+    bending, bending_rate : (6, e) arrays
+        C₂: S_ab and P times η, and times η̇.
+    spun : (9, e) array
+        W η.
+    skewed : (3, e) array
+        Working memory.
+    warp, warp_rate, twisted : (e, e) arrays
+        K(η), K(η̇) and its skew companion of modal inertia; columns over η̇.
+    pushed, pushed_rate, lag : (e,) arrays
+    spare : (6,) array
+        Working memory.
+    """
+
+    twist: Vector
+    twist_rate: Vector
+    moment: Vector
+    moment_rate: Vector
+    square: Matrix
+    square_rate: Matrix
+    share: Vector
+    share_rate: Vector
+    factor: Matrix
+    arrival: Matrix
+    carried: Matrix
+    bending: Matrix
+    bending_rate: Matrix
+    spun: Matrix
+    skewed: Matrix
+    warp: Matrix
+    warp_rate: Matrix
+    twisted: Matrix
+    pushed: Vector
+    pushed_rate: Vector
+    lag: Vector
+    spare: Vector
+
+
+def bent_state(e: int, warped: bool) -> BentState:
+    """Memory for a link with so many elastic coordinates, with modal inertia or without."""
+    six, three, n = np.zeros(6), np.zeros(3), e if warped else 0
+    return BentState(
+        twist=six,
+        twist_rate=six,
+        moment=three,
+        moment_rate=three,
+        square=np.zeros((3, 3)),
+        square_rate=np.zeros((3, 3)),
+        share=six,
+        share_rate=six,
+        factor=np.zeros((6, 6)),
+        arrival=np.zeros((6, 6)),
+        carried=np.zeros((6, e)),
+        bending=np.zeros((6, e)),
+        bending_rate=np.zeros((6, e)),
+        spun=np.zeros((9, e)),
+        skewed=np.zeros((3, e)),
+        warp=np.zeros((n, n)),
+        warp_rate=np.zeros((n, n)),
+        twisted=np.zeros((n, n)),
+        pushed=np.zeros(n),
+        pushed_rate=np.zeros(n),
+        lag=np.zeros(n),
+        spare=six,
+    )
+
+
+class NodeState(NamedTuple):
+    """Motion of a node in its floating frame.
+
+    Attributes
+    ----------
+    pose, back : (12,) arrays
+        Of the node, and its inverse.
+    phi, phi_rate : (3,) arrays
+        Rotation vector and its derivative.
+    tangent : (3, 3) array
+        T(φ), which turns φ̇ into the angular velocity in the node's axes.
+    turning : (3,) array
+        da/ds, b and db/ds, see `erls.equations.ffr.nodes`.
+    twist, twist_rate : (6,) arrays
+        Against the floating frame, in the node's axes.
+    rows : (6, e) array
+        u̇ and φ̇ per η̇.
+    slope, slope_rate : (6, e) arrays
+        Ψ η and Ψ η̇.
+    moves : (6, e) array
+        Twist per η̇.
+    """
+
+    pose: Vector
+    back: Vector
+    phi: Vector
+    phi_rate: Vector
+    tangent: Matrix
+    turning: Vector
+    twist: Vector
+    twist_rate: Vector
+    rows: Matrix
+    slope: Matrix
+    slope_rate: Matrix
+    moves: Matrix
+
+
+def node_state(e: int, bent: bool) -> NodeState:
+    """Memory for a node that so many elastic coordinates move, by second-order displacements or not."""
+    rows, slope = np.zeros((6, e)), np.zeros((6, e if bent else 0))
+    rest = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
+    six, three = np.zeros(6), np.zeros(3)
+    return NodeState(rest, rest, three, three, np.eye(3), three, six, six, rows, slope, slope, rows)
+
+
+class Room(NamedTuple):
+    """Memory for accelerations: a matrix (n, n) for dense factors, or numbers (f,) for factors link by link."""
+
+    matrix: Matrix
+    factors: Vector
+
+
+read_frames, read_body, read_bent_body, read_node = reader(Frames), reader(Body), reader(BentBody), reader(Node)
+read_body_state, read_bent_state, read_node_state = reader(BodyState), reader(BentState), reader(NodeState)
+read_room = reader(Room)
+BODY, BENT_BODY, NODE = table_size(Body), table_size(BentBody), table_size(Node)
+BODY_STATE, BENT_STATE, NODE_STATE = table_size(BodyState), table_size(BentState), table_size(NodeState)
