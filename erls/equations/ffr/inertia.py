@@ -24,13 +24,13 @@ from __future__ import annotations
 from erls.equations.ffr.bent import bent_forces, correct_frame, modal_forces
 from erls.equations.ffr.records import BentBody, BentState, Body, BodyState, Frames
 from erls.equations.serial.records import Modes
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part, spliced
 from erls.maths.products import add_columns, add_rows, add_symmetric, clear, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_force_cross, dot3, dot6
 
 
-@inlined
+@spliced
 def turn_inertia(body: Body, state: BodyState, q: Array) -> None:
     """C₁ η for each axis."""
     for a in range(body.axes.shape[0]):
@@ -46,7 +46,7 @@ def square_inertia(square: Array, a: int, b: int, q: Array, squared: Array) -> N
     add_symmetric(square[a if a == b else a + b + 2], q, 0, squared)
 
 
-@inlined
+@spliced
 def _first_order(body: Body, state: BodyState, q: Array, rates: Array, moved: Array, forces: Array) -> None:
     """What M₁ η and C₁ η add to the frame's wrench and momentum and, by ω̇, to the elastic forces."""
     half, half_rate = state.spare[:6], state.spare[6:]
@@ -75,7 +75,7 @@ def _first_order(body: Body, state: BodyState, q: Array, rates: Array, moved: Ar
             forces[i] += alpha * turned[i]
 
 
-@inlined
+@spliced
 def _second_order(
     frames: Frames, body: Body, state: BodyState, q: Array, rates: Array, forces: Array
 ) -> None:
@@ -102,7 +102,7 @@ def _second_order(
                         wrench[3 + i] += about_b * other[i]
 
 
-@inlined
+@spliced
 def _spin_forces(frames: Frames, body: Body, state: BodyState, rates: Array, forces: Array) -> None:
     """Coriolis forces on η by its own rates, and centrifugal ones."""
     for a in range(body.axes.shape[0]):
@@ -113,7 +113,7 @@ def _spin_forces(frames: Frames, body: Body, state: BodyState, rates: Array, for
             add_columns(body.half[a], state.twist, -omega, forces)
 
 
-@inlined
+@spliced
 def _weigh(body: Body, bending: BentState, state: BodyState, q: Array) -> None:
     """Take the weight from the wrench."""
     moment, gravity, wrench = state.moment, state.gravity, state.wrench
@@ -127,7 +127,7 @@ def _weigh(body: Body, bending: BentState, state: BodyState, q: Array) -> None:
     add_cross(moment, gravity, -1.0, wrench[3:])
 
 
-@inlined
+@spliced
 def link_forces(
     frames: Frames, body: Body, bent: BentBody, modes: Modes, state: BodyState, bending: BentState, q: Array,
     rates: Array, moved: Array, forces: Array,
@@ -169,7 +169,7 @@ def link_forces(
         _weigh(body, bending, state, q)
 
 
-@inlined
+@spliced
 def inertia_blocks(frames: Frames, body: Body, state: BodyState, q: Array) -> None:
     """M(η) and C(η)."""
     inertia, coupling, half = state.inertia, state.coupling, state.spare[:6]

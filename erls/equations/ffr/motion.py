@@ -36,7 +36,7 @@ from erls.equations.serial.records import (
     read_joint_state,
     read_modes,
 )
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part, spliced
 from erls.maths.products import clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_motion_cross, rotate_back, transform_motion
@@ -66,7 +66,7 @@ def place_frames(
             place_node(node, state, y[modes.first : modes.first + len(modes.stiffness)])
 
 
-@inlined
+@spliced
 def move_frames(
     serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array,
     a: Array,
@@ -120,7 +120,7 @@ def _turn_joint(screw: Array, coordinate: Array, twist: Array, rate: Array, arri
         arrived[i] = twist[i]
 
 
-@inlined
+@spliced
 def _leave(node: Node, moved: NodeState, before: BodyState, state: BodyState) -> None:
     """Motion of the node that a joint stands on, from the floating frame ``before``."""
     twist, rate, gravity = state.twist, state.twist_rate, state.gravity
@@ -139,7 +139,7 @@ def _leave(node: Node, moved: NodeState, before: BodyState, state: BodyState) ->
         rate[i] += moved.twist_rate[i]
 
 
-@inlined
+@spliced
 def _arrive(inner: NodeState, state: BodyState) -> None:
     """From the inboard node to the floating frame in which it moves."""
     twist, rate = state.twist, state.twist_rate

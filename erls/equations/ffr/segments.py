@@ -46,7 +46,7 @@ from erls.equations.serial.records import (
     read_modes,
 )
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part, spliced
 from erls.maths.products import add_columns, add_product, add_transposed_product, clear, copy, copy_matrix
 from erls.maths.so3 import Array
 from erls.maths.spatial import transform_motion
@@ -77,7 +77,7 @@ def fill_segments(
         _weights(body, bent, bending, state, own, inner.moves)
 
 
-@inlined
+@spliced
 def _arrival(floats: Any, inner: NodeState, state: BodyState) -> None:
     """Z and W of the floating frame."""
     x = state.spare[:6]
@@ -97,7 +97,7 @@ def _arrival(floats: Any, inner: NodeState, state: BodyState) -> None:
                 state.carried[i, j] = x[i]
 
 
-@inlined
+@spliced
 def _reach(
     serial: Serial, frames: Frames, k: int, parent: int, state: BodyState, own: Segment, reals: Array,
     integers: IntArray, scratch: Array,
@@ -136,7 +136,7 @@ def _reach(
             own.reach[i, j] = x[i]
 
 
-@inlined
+@spliced
 def _weights(
     body: Body, bent: BentBody, bending: BentState, state: BodyState, own: Segment, floats: Any
 ) -> None:
