@@ -17,7 +17,7 @@ has decayed.
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -78,9 +78,8 @@ def lie_generalized_alpha(
 
 def _steps(system: ConstrainedSystem, options: ConstrainedOptions, recorder: ConstrainedRecorder) -> Any:
     """By kernels, unless without the compiler, where a system has none, or where velocities are projected."""
-    from erls.equations.nodal.assembly import NodalSystem  # here: they import the compiler
+    from erls.equations.stepped import Stepped  # here: they import the compiler
     from erls.equations.uncompiled import tied_steps_of
-    from erls.integrate.nodal_steps import CompiledSteps
 
     wanted = ENABLED if options.compiled is None else options.compiled
     compiled = system.compiled if wanted and not options.project_velocity else None
@@ -96,10 +95,13 @@ def _steps(system: ConstrainedSystem, options: ConstrainedOptions, recorder: Con
         fewest=2,
         over=2,
     )
-    if isinstance(system, NodalSystem) and compiled is not None:
-        return CompiledSteps(system, cast(Any, compiled), options, rules, recorder)
+    known: Any = compiled
+    if known is not None and not isinstance(known, Stepped):  # nodal systems have a loop of their own still
+        from erls.integrate.nodal_steps import CompiledSteps
+
+        return CompiledSteps(system, known, options, rules, recorder)
     words = Words(system.constraint_names, "there", "a smaller step")
-    known = compiled or tied_steps_of(system, recorder.kept, options.project_velocity)
+    known = known or tied_steps_of(system, recorder.kept, options.project_velocity)
     return Steps(known, metre_scales(system), rules, words, recorder)
 
 
