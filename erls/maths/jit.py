@@ -197,11 +197,6 @@ def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
     return compiled
 
 
-def compiled_for(function: Any, signature: Any) -> Any:
-    """A kernel compiled, when this is called, for another signature: that of complex numbers, for derivatives."""
-    return _njit(function.py_func, signature, _nrt=False) if ENABLED else function
-
-
 def _njit(function: Any, *signature: Any, **options: Any) -> Any:
     import numba
 

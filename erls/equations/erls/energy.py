@@ -31,7 +31,7 @@ from erls.equations.serial.records import (
     read_modes,
     read_serial,
 )
-from erls.maths.jit import inlined, kernel, part
+from erls.maths.jit import inlined, kernel, spliced
 from erls.maths.products import add_columns, clear, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import dot3
@@ -60,7 +60,7 @@ def _kinetic(chain: Chain, link: Link, state: LinkState, twist: Array) -> Any:
     return total
 
 
-@part
+@spliced
 def add_energies(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
 ) -> None:

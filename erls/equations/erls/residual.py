@@ -39,14 +39,14 @@ from erls.equations.serial.records import (
     read_modes,
     read_serial,
 )
-from erls.maths.jit import inlined, kernel, part
+from erls.maths.jit import inlined, kernel, part, spliced
 from erls.maths.products import add_rows, clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_force_cross, add_motion_cross, dot6, transform_force_back
 from fe_import.model import IntArray
 
 
-@part
+@spliced
 def _forces_of_links(
     serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, accelerated: bool, bends: Any
 ) -> None:
@@ -140,7 +140,7 @@ def _hand_back(
                 before.modal[6 + i - turns] += forces[i]
 
 
-@part
+@spliced
 def balance(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array, bends: Any
 ) -> None:

@@ -42,7 +42,7 @@ from erls.equations.serial.records import (
     read_serial,
 )
 from erls.equations.serial.segments import SEGMENT, Segment, fill_mass_matrix, read_segment
-from erls.maths.jit import inlined, kernel, part
+from erls.maths.jit import inlined, kernel, part, spliced
 from erls.maths.products import add_product, add_transposed_product, clear, copy_matrix
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_motion_cross, dot3, transform_motion
@@ -346,7 +346,7 @@ def set_segments(
                     _arm(bend, state, bent, motion.coordinate, own)
 
 
-@part
+@spliced
 def fill(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array, bends: Any) -> None:
     """M; ``bends`` as in `erls.equations.erls.residual`."""
     serial = read_serial(reals, integers, integers[0])

@@ -11,7 +11,7 @@ from erls.equations.erls.segments import set_segments
 from erls.equations.serial.elimination import eliminate, set_compliance, substitute
 from erls.equations.serial.feed_forward import feed_forward
 from erls.equations.serial.records import read_serial
-from erls.maths.jit import kernel, part
+from erls.maths.jit import kernel, part, spliced
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -72,7 +72,7 @@ def solve_complex(reals: Array, integers: IntArray, factors: Any, b: Any) -> Non
     solve_links(reals, integers, factors, b)
 
 
-@part
+@spliced
 def accelerate(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
 ) -> int:

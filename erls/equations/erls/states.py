@@ -9,7 +9,7 @@ from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import LINK, LINK_STATE, read_chain, read_link, read_link_state
 from erls.equations.erls.second_order import bend_frames
 from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
-from erls.maths.jit import kernel, part
+from erls.maths.jit import kernel, part, spliced
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -27,7 +27,7 @@ def _compose(before: Array, pose: Array, out: Array) -> None:
         )
 
 
-@part
+@spliced
 def put_states(
     reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array, bends: Any
 ) -> None:

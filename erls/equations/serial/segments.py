@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from erls.equations.serial.records import JOINT, MODES, Serial, read_joint, read_modes
-from erls.maths.jit import part
+from erls.maths.jit import part, spliced
 from erls.maths.products import add_product, add_transposed_product, copy_matrix, dot
 from erls.maths.records import Matrix, Vector, reader, table_size
 from erls.maths.so3 import Array
@@ -92,7 +92,7 @@ read_segment = reader(Segment)
 SEGMENT = table_size(Segment)
 
 
-@part
+@spliced
 def fill_mass_matrix(
     serial: Serial, segments: int, reals: Array, integers: IntArray, scratch: Array, out: Array
 ) -> None:
