@@ -14,15 +14,14 @@ import numpy as np
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.contract import Model, Work
 from erls.equations.nodal.joint_forces import frame_in_world, relative
+from erls.equations.nodal.rows import outer_product, push, rate_along
 from erls.maths.coefficients import angle_of
-from erls.maths.jit import inlined, part
+from erls.maths.jit import inlined
 from erls.maths.motions import bracket, pair_minus, transformed, transposed
 from erls.maths.vectors import (
     Rotation,
     Twist,
     Vector,
-    add,
-    dot,
     nine,
     plus,
     product,
@@ -72,14 +71,6 @@ def _rows(model: Model, k: int, reach: Vector, axes: Rotation) -> tuple[Twist, T
     return (scaled(-1.0, inner[0]), scaled(-1.0, inner[1])), outer
 
 
-@part
-def _along(row: Twist, values: Array, node: int) -> float:
-    if node < 0:
-        return 0.0
-    v, w = three(values, 6 * node), three(values, 6 * node + 3)
-    return dot(row[0], v) + dot(row[1], w)
-
-
 @inlined
 def _swing(model: Model, k: int, reach: Vector, axes: Rotation, twist: Array) -> float:
     """Acceleration of the coordinate at constant twists."""
@@ -120,8 +111,8 @@ def _turning(model: Model, work: Work, k: int, reach: Vector, axes: Rotation) ->
     """Rows of the coordinate's rate over the twists of both nodes, the rate and its own rate."""
     inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
     first, second = _rows(model, k, reach, axes)
-    rate = _along(first, work.twist, inner) + _along(second, work.twist, outer)
-    gain = _along(first, work.rate, inner) + _along(second, work.rate, outer)
+    rate = rate_along(first, work.twist, inner) + rate_along(second, work.twist, outer)
+    gain = rate_along(first, work.rate, inner) + rate_along(second, work.rate, outer)
     return first, second, rate, gain + _swing(model, k, reach, axes, work.twist)
 
 
@@ -136,11 +127,8 @@ def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> N
         inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
         first, second, rate, gain = _turning(model, work, k, reach, axes)
         balance = model.actuators[k, 0] * gain - _effort(model, k, sample, work.turned[k], rate)
-        if inner >= 0:
-            add(work.force, 6 * inner, scaled(balance, first[0]))
-            add(work.force, 6 * inner + 3, scaled(balance, first[1]))
-        add(work.force, 6 * outer, scaled(balance, second[0]))
-        add(work.force, 6 * outer + 3, scaled(balance, second[1]))
+        push(work.force, inner, balance, first)
+        push(work.force, outer, balance, second)
 
 
 @inlined
@@ -154,12 +142,7 @@ def actuator_derivatives(model: Model, work: Work, k: int, block: Array) -> None
     stiffness, damping = law[k, 1] + law[k, 6], law[k, 3] + law[k, 7]
     if law[k, 4] != 0.0:
         damping += law[k, 4] / law[k, 5] / np.cosh(min(abs(rate / law[k, 5]), 300.0)) ** 2
-    for i in range(12):
-        for j in range(12):
-            both = _entry(first, second, i) * _entry(first, second, j)
-            block[0, i, j] = law[k, 0] * both
-            block[1, i, j] = damping * both
-            block[2, i, j] = stiffness * both
+    outer_product(block, work.rows[0], first, second, stiffness, damping, law[k, 0])
 
 
 @inlined
@@ -179,17 +162,10 @@ def acting(model: Model, work: Work, sample: Array, k: int, out: Array) -> None:
     effort = 0.0 * rate
     if model.actuator_active[k]:
         effort = _effort(model, k, sample, work.turned[k], rate)
-    push = effort - model.actuators[k, 0] * gain
+    strength = effort - model.actuators[k, 0] * gain
     out[0], out[1], out[2], out[3] = work.turned[k], rate, gain, effort
-    put(out, 4, scaled(push, second[0]))
-    put(out, 7, scaled(push, second[1]))
-
-
-@part
-def _entry(first: Twist, second: Twist, i: int) -> float:
-    row = first if i < 6 else second
-    i %= 6
-    return row[0][i] if i < 3 else row[1][i - 3]
+    put(out, 4, scaled(strength, second[0]))
+    put(out, 7, scaled(strength, second[1]))
 
 
 @inlined

@@ -173,7 +173,7 @@ class NodalSystem:
 
     def constraint_bias(self, t: float, q: Nodes, v: Array) -> Array:
         """(m,) Φ̈ − B a."""
-        work = self._state(q, v, v)
+        work = self._state(q, v, np.zeros(self.size))
         sums.conditions(self.model, work, self._sample(t))
         return work.bias.copy()
 

@@ -10,8 +10,9 @@ from erls.equations.nodal.actuator_forces import actuator_derivatives
 from erls.equations.nodal.beam_forces import beam_derivatives
 from erls.equations.nodal.body_forces import body_derivatives, load_derivatives
 from erls.equations.nodal.contract import BLOCKS, SUMMED, Model, Work
-from erls.equations.nodal.joint_forces import joint_gradients, joint_stiffness
+from erls.equations.nodal.joint_forces import joint_stiffness
 from erls.equations.nodal.spring_forces import spring_derivatives, winding_derivatives
+from erls.equations.nodal.sums import conditions
 from erls.maths.coefficients import stumpff, tangent_coefficients
 from erls.maths.jit import inlined, kernel
 from erls.maths.motions import series
@@ -48,14 +49,14 @@ def blocks(model: Model, work: Work, sample: Array, material: int) -> None:
     at += len(model.actuator_nodes)
     for k in range(len(model.spring_nodes)):
         spring_derivatives(
-            model.spring_nodes, model.springs, work.poses, work.twist, k, table[at + k], material
+            model.spring_nodes, model.springs, work.poses, work.twist, work.rows[0], k, table[at + k], material
         )
     at += len(model.spring_nodes)
     for k in range(len(model.winding_nodes)):
         winding_derivatives(model, work, k, table[at + k], material)
     at += len(model.winding_nodes)
+    conditions(model, work, sample)
     for j in range(len(model.joint_nodes)):
-        joint_gradients(model, work, sample, j)
         joint_stiffness(model, work, sample, j, table[at + j])
 
 
@@ -114,6 +115,8 @@ def weighted(model: Model, work: Work, to_a: float, to_v: float, to_q: float) ->
                 continue
             right = work.factors[node]
             for i in range(12):
+                if model.pairs[e, i // 6] < 0:
+                    continue
                 for j in range(6):
                     at = 6 * side + j
                     total = 0.0 * out[i, at]

@@ -6,8 +6,10 @@ from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.blocks import blocks, weighted
 from erls.equations.nodal.contract import FACTOR, Model, Work
 from erls.maths import band
-from erls.maths.jit import inlined, kernel, part
-from erls.maths.vectors import nine, times
+from erls.maths.jit import kernel, part
+from erls.maths.vectors import Rotation, nine, times
+
+_ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @part
@@ -29,53 +31,50 @@ def _add_element(band: Array, place: IntArray, pairs: IntArray, e: int, whole: A
                     _enter(band, place, row + i, column + j, whole[6 * side + i, 6 * other + j])
 
 
-@inlined
-def _add_condition(model: Model, work: Work, j: int, row: int) -> None:
-    """Row B T and column Bᵀ of a condition; its scale, so that the largest derivative by a displacement is one."""
-    n = len(work.force)
+@part
+def _add_condition(
+    band: Array, place: IntArray, column: int, at: int, turn: Rotation, gradient: Array, of_q: Array
+) -> None:
+    """A node's share, its velocities from ``at`` on, of row B T and column Bᵀ of a condition."""
+    linear = times(turn, (gradient[0], gradient[1], gradient[2]))
+    for i in range(6):
+        entry = linear[i] if i < 3 else gradient[i]
+        _enter(band, place, at + i, column, entry)
+        total = 0.0 * entry
+        for k in range(6):
+            total += gradient[k] * of_q[k, i]
+        _enter(band, place, column, at + i, total)
+
+
+@part
+def _largest(turn: Rotation, gradient: Array, metres: Array, at: int) -> float:
+    """Largest derivative of a condition by a displacement of a node."""
+    linear = times(turn, (gradient[0], gradient[1], gradient[2]))
     size = 0.0
-    for side in range(2):
-        node = model.joint_nodes[j, side]
-        if node < 0:
-            continue
-        right = work.factors[node]
-        linear = (
-            work.gradient[row, 6 * side],
-            work.gradient[row, 6 * side + 1],
-            work.gradient[row, 6 * side + 2],
-        )
-        if not model.local:
-            linear = times(nine(work.poses, node, 3), linear)
-        for i in range(6):
-            entry = linear[i] if i < 3 else work.gradient[row, 6 * side + i]
-            size = max(size, abs(entry) / model.metres[6 * node + i])
-            _enter(work.band, model.place, 6 * node + i, n + row, entry)
-            total = 0.0
-            for k in range(6):
-                total += work.gradient[row, 6 * side + k] * right[2, k, i]
-            _enter(work.band, model.place, n + row, 6 * node + i, total)
-    work.left[n + row] = 1.0 / size if size > 0.0 else 1.0
+    for i in range(6):
+        size = max(size, abs(linear[i] if i < 3 else gradient[i]) / metres[at + i])
+    return size
 
 
-@inlined
-def _scale(model: Model, work: Work, period: float) -> None:
+@part
+def _scale(
+    band: Array, order: IntArray, inertia: Array, metres: Array, period: float, left: Array, right: Array
+) -> None:
     """Units of `erls.maths.saddle`: metres, and newtons per mass."""
-    n = len(work.force)
+    n = len(metres)
     mass = 0.0
     for i in range(n):
-        mass = max(mass, work.inertia[i] / model.metres[i] ** 2)
+        mass = max(mass, inertia[i] / metres[i] ** 2)
     force = period**2 / (mass if mass > 0.0 else 1.0)
     for i in range(n):
-        work.left[i], work.right[i] = force / model.metres[i], 1.0 / model.metres[i]
-    for i in range(n, len(model.place)):
-        work.right[i] = work.left[i] / force
-    table = work.band
-    width = (table.shape[1] - 1) // 3
-    size = len(table)
+        left[i], right[i] = force / metres[i], 1.0 / metres[i]
+    for i in range(n, len(order)):
+        right[i] = left[i] / force
+    width, size = (band.shape[1] - 1) // 3, len(band)
     for i in range(size):
-        left = work.left[model.order[i]]
+        scale = left[order[i]]
         for j in range(max(0, i - width), min(size, i + width + 1)):
-            table[i, j - i + width] *= left * work.right[model.order[j]]
+            band[i, j - i + width] *= scale * right[order[j]]
 
 
 @kernel(FACTOR, counted=False)
@@ -106,8 +105,20 @@ def iteration_matrix(model: Model, work: Work, sample: Array, to_a: float, to_v:
                     _enter(table, model.place, 6 * node + i, 6 * node + 3 + j, work.turning[node, i, j])
     for j in range(len(model.joint_nodes)):
         for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
-            _add_condition(model, work, j, row)
-    _scale(model, work, period)
+            size = 0.0
+            for side in range(2):
+                node = model.joint_nodes[j, side]
+                if node < 0:
+                    continue
+                turn, gradient = _ONE, work.gradient[row, 6 * side : 6 * side + 6]
+                if not model.local:
+                    turn = nine(work.poses, node, 3)
+                size = max(size, _largest(turn, gradient, model.metres, 6 * node))
+                place = model.place
+                _add_condition(table, place, len(work.force) + row, 6 * node, turn, gradient, work.factors[node, 2])
+            # so that the largest derivative by a displacement is one
+            work.left[len(work.force) + row] = 1.0 / size if size > 0.0 else 1.0
+    _scale(table, model.order, work.inertia, model.metres, period, work.left, work.right)
     found = band.factor(table, work.pivots)
     if found == 0:
         return 0

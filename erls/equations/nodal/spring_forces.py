@@ -14,6 +14,7 @@ import numpy as np
 
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.contract import Model, Work
+from erls.equations.nodal.rows import outer_product, push, rate_along
 from erls.maths.coefficients import inverse_coefficient
 from erls.maths.jit import inlined, part
 from erls.maths.rotations import first, logarithm_near, value
@@ -21,7 +22,6 @@ from erls.maths.vectors import (
     Rotation,
     Twist,
     Vector,
-    add,
     back_product,
     cross,
     dot,
@@ -30,7 +30,6 @@ from erls.maths.vectors import (
     plus,
     product,
     scaled,
-    three,
     times,
     turned,
     unit,
@@ -56,62 +55,43 @@ def _stretched(nodes: IntArray, springs: Array, poses: Array, k: int) -> tuple[f
 
 
 @part
-def _line_row(nodes: IntArray, springs: Array, poses: Array, k: int, side: int, along: Vector) -> Twist:
+def _line_row(nodes: IntArray, springs: Array, poses: Array, k: int, side: int, direction: Vector) -> Twist:
     """Rate of the length of spring k over the twist of one of its nodes; zero for the ground."""
     if nodes[k, side] < 0:
-        return scaled(0.0, along), scaled(0.0, along)
-    local = scaled(2.0 * side - 1.0, turned(nine(poses, nodes[k, side], 3), along))
+        return scaled(0.0, direction), scaled(0.0, direction)
+    local = scaled(2.0 * side - 1.0, turned(nine(poses, nodes[k, side], 3), direction))
     return local, cross(vector(springs, k, 3 * side), local)
-
-
-@part
-def _rate(rows: tuple[Twist, Twist], values: Array, nodes: IntArray, k: int) -> float:
-    """Rate along rows over the twists of both nodes."""
-    rate = 0.0 * rows[0][0][0]
-    for side in range(2):
-        at = 6 * nodes[k, side]
-        if at >= 0:
-            rate += dot(rows[side][0], three(values, at)) + dot(rows[side][1], three(values, at + 3))
-    return rate
-
-
-@part
-def _push(out: Array, nodes: IntArray, k: int, force: float, rows: tuple[Twist, Twist]) -> None:
-    """Add a force along rows over the twists of both nodes."""
-    for side in range(2):
-        at = 6 * nodes[k, side]
-        if at >= 0:
-            add(out, at, scaled(force, rows[side][0]))
-            add(out, at + 3, scaled(force, rows[side][1]))
 
 
 @part
 def _tension(
     nodes: IntArray, springs: Array, poses: Array, twist: Array, k: int
-) -> tuple[float, float, Vector, tuple[Twist, Twist]]:
+) -> tuple[float, float, Vector, Twist, Twist]:
     """Tension and length of spring k, its direction, and the rate of its length over the twists of both nodes."""
-    length, along = _stretched(nodes, springs, poses, k)
-    first_row = _line_row(nodes, springs, poses, k, 0, along)
-    rows = first_row, _line_row(nodes, springs, poses, k, 1, along)
-    rate = _rate(rows, twist, nodes, k)
-    return springs[k, 6] * (length - springs[k, 8]) + springs[k, 7] * rate, length, along, rows
+    length, direction = _stretched(nodes, springs, poses, k)
+    inner = _line_row(nodes, springs, poses, k, 0, direction)
+    outer = _line_row(nodes, springs, poses, k, 1, direction)
+    rate = rate_along(inner, twist, nodes[k, 0]) + rate_along(outer, twist, nodes[k, 1])
+    tension = springs[k, 6] * (length - springs[k, 8]) + springs[k, 7] * rate
+    return tension, length, direction, inner, outer
 
 
 @part
 def spring_forces(nodes: IntArray, springs: Array, poses: Array, twist: Array, force: Array) -> None:
     """Add tensions to ``force``."""
     for k in range(len(nodes)):
-        tension, _, _, rows = _tension(nodes, springs, poses, twist, k)
-        _push(force, nodes, k, tension, rows)
+        tension, _, _, inner, outer = _tension(nodes, springs, poses, twist, k)
+        push(force, nodes[k, 0], tension, inner)
+        push(force, nodes[k, 1], tension, outer)
 
 
 @part
 def spring_derivatives(
-    nodes: IntArray, springs: Array, poses: Array, twist: Array, k: int, block: Array, material: int
+    nodes: IntArray, springs: Array, poses: Array, twist: Array, line: Array, k: int, block: Array, material: int
 ) -> None:
-    """Damping and stiffness of spring k into a block of zeros."""
-    tension, length, along, rows = _tension(nodes, springs, poses, twist, k)
-    _outer(block, springs[k, 6], springs[k, 7], rows)
+    """Damping and stiffness of spring k into a block of zeros; ``line`` (12,) is memory."""
+    tension, length, direction, inner, outer = _tension(nodes, springs, poses, twist, k)
+    outer_product(block, line, inner, outer, springs[k, 6], springs[k, 7], 0.0)
     if material:
         return
     for j in range(12):
@@ -121,7 +101,7 @@ def spring_derivatives(
         x, y = unit(j % 6), unit(j % 6 - 3)
         sign, turn, arm = 2.0 * side - 1.0, nine(poses, nodes[k, side], 3), vector(springs, k, 3 * side)
         spread = scaled(sign, times(turn, plus(x, cross(y, arm))))  # of the distance, in the world's axes
-        swing = scaled(1.0 / length, minus(spread, scaled(dot(along, spread), along)))
+        swing = scaled(1.0 / length, minus(spread, scaled(dot(direction, spread), direction)))
         for end in range(2):
             node = nodes[k, end]
             if node < 0:
@@ -129,23 +109,12 @@ def spring_derivatives(
             back, lever = nine(poses, node, 3), vector(springs, k, 3 * end)
             change = turned(back, swing)
             if end == side:
-                change = plus(change, cross(turned(back, along), y))
+                change = plus(change, cross(turned(back, direction), y))
             change = scaled(tension * (2.0 * end - 1.0), change)
             moment = cross(lever, change)
             for i in range(3):
                 block[2, 6 * end + i, j] += change[i]
                 block[2, 6 * end + 3 + i, j] += moment[i]
-
-
-@part
-def _outer(block: Array, stiffness: float, damping: float, rows: tuple[Twist, Twist]) -> None:
-    """Stiffness and damping along rows over the twists of both nodes."""
-    for i in range(12):
-        a = rows[i // 6][i % 6 // 3][i % 3]
-        for j in range(12):
-            both = a * rows[j // 6][j % 6 // 3][j % 3]
-            block[1, i, j] = damping * both
-            block[2, i, j] = stiffness * both
 
 
 @part
@@ -177,7 +146,7 @@ def wind(nodes: IntArray, frames: Array, poses: Array, before: Array, out: Array
 @part
 def _winding(
     nodes: IntArray, frames: Array, laws: Array, poses: Array, wound: Array, twist: Array, k: int
-) -> tuple[float, Rotation, Vector, tuple[Twist, Twist]]:
+) -> tuple[float, Rotation, Vector, Twist, Twist]:
     """Moment of torsion spring k, turn of its second frame in the first, w, and the rate of the angle over the twists
     of both nodes.
     """
@@ -185,10 +154,10 @@ def _winding(
     psi, axis = vector(wound, k, 0), vector(laws, k, 0)
     w = value(-0.5, inverse_coefficient(dot(psi, psi))[0], psi, axis)
     none = scaled(0.0, w)
-    inner, outer = scaled(-1.0, times(nine(frames, k, 0), times(turn, w))), times(nine(frames, k, 9), w)
-    rows = (none, inner if nodes[k, 0] >= 0 else none), (none, outer if nodes[k, 1] >= 0 else none)
-    rate = _rate(rows, twist, nodes, k)
-    return laws[k, 3] * (dot(axis, psi) - laws[k, 5]) + laws[k, 4] * rate, turn, w, rows
+    first_w, second_w = scaled(-1.0, times(nine(frames, k, 0), times(turn, w))), times(nine(frames, k, 9), w)
+    inner, outer = (none, first_w if nodes[k, 0] >= 0 else none), (none, second_w if nodes[k, 1] >= 0 else none)
+    rate = rate_along(inner, twist, nodes[k, 0]) + rate_along(outer, twist, nodes[k, 1])
+    return laws[k, 3] * (dot(axis, psi) - laws[k, 5]) + laws[k, 4] * rate, turn, w, inner, outer
 
 
 @part
@@ -197,16 +166,17 @@ def winding_forces(
 ) -> None:
     """Add moments of torsion springs to ``force``."""
     for k in range(len(nodes)):
-        moment, _, _, rows = _winding(nodes, frames, laws, poses, wound, twist, k)
-        _push(force, nodes, k, moment, rows)
+        moment, _, _, inner, outer = _winding(nodes, frames, laws, poses, wound, twist, k)
+        push(force, nodes[k, 0], moment, inner)
+        push(force, nodes[k, 1], moment, outer)
 
 
 @inlined
 def winding_derivatives(model: Model, work: Work, k: int, block: Array, material: int) -> None:
     """Damping and stiffness of torsion spring k into a block of zeros."""
     nodes, frames, laws = model.winding_nodes, model.winding_frames, model.windings
-    moment, turn, w, rows = _winding(nodes, frames, laws, work.poses, work.wound, work.twist, k)
-    _outer(block, laws[k, 3], laws[k, 4], rows)
+    moment, turn, w, inner, outer = _winding(nodes, frames, laws, work.poses, work.wound, work.twist, k)
+    outer_product(block, work.rows[0], inner, outer, laws[k, 3], laws[k, 4], 0.0)
     if material:
         return
     first_axes, second_axes = nine(frames, k, 0), nine(frames, k, 9)
@@ -219,8 +189,7 @@ def winding_derivatives(model: Model, work: Work, k: int, block: Array, material
             turning = turned(second_axes, unit(j))  # of the second frame against the first, in its axes
             if side == 0:
                 turning = scaled(-1.0, turned(turn, turned(first_axes, unit(j))))
-            along = value(0.5, b[0], psi, turning)
-            change = first(-0.5, 0.0, b[0], b[1], psi, along, axis)
+            change = first(-0.5, 0.0, b[0], b[1], psi, value(0.5, b[0], psi, turning), axis)
             on_second = scaled(moment, times(second_axes, change))
             on_first = scaled(-moment, times(first_axes, times(turn, minus(change, cross(w, turning)))))
             for i in range(3):

@@ -131,9 +131,7 @@ def move(model: Model, work: Work, before: State) -> None:
 
 @kernel(CONDITIONS, counted=False)
 def conditions(model: Model, work: Work, sample: Array) -> None:
-    """Violation, gradient, Φ_t and Φ̈ − B a of all conditions at ``work``'s poses and velocities."""
-    for i in range(len(work.a)):
-        work.a[i] = 0.0
+    """Violation, gradient, Φ_t and, without accelerations, Φ̈ − B a of all conditions at ``work``'s poses and motion."""
     set_twists(model, work)
     for j in range(len(model.joint_nodes)):
         joint_gradients(model, work, sample, j)
