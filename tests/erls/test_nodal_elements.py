@@ -12,7 +12,7 @@ import pytest
 from nodal_tables import CASES, TIME
 
 from erls.equations.consistency import consistent_velocity
-from erls.equations.nodal import sums
+from erls.equations.nodal import outputs, sums
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.contract import Model, State
 from erls.equations.nodal.model import room
@@ -45,7 +45,7 @@ class Complex:
     """A system at a configuration with complex numbers, compiled or plain."""
 
     def __init__(self, system: NodalSystem, q: Nodes, of: Callable[[Any], Any]) -> None:
-        self._move, self._forces, self._energies = of(sums.move), of(sums.forces), of(sums.energies)
+        self._move, self._forces, self._energies = of(sums.move), of(sums.forces), of(outputs.energies)
         self.model = Model(*(_complex(x) for x in system.model))
         self._sample = system.samples(np.array([TIME]))[0]
         self._work = room(self.model, 0, complex)

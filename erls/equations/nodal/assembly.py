@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cached_property
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from erls.equations.nodal import blocks, sums
 from erls.equations.nodal.compiled import CompiledSteps
 from erls.equations.nodal.contract import Model, State, Work
 from erls.equations.nodal.elements import Elements
@@ -18,6 +17,7 @@ from erls.equations.nodal.nodes import Nodes, poses_of, rows_of
 from erls.equations.nodal.scatter import Scatter, dofs
 from erls.equations.system import metre_scales
 from erls.maths.groups import SE3, Group
+from erls.maths.jit import compiling_beside
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array
 
@@ -31,6 +31,31 @@ _STEPPED = (
     "constraint_matrix",
     "length_scales",
 )  # methods of a system that compiled steps stand for
+
+
+class Functions(NamedTuple):
+    """What computes all values, loaded with the first system: not every run is one of nodes."""
+
+    forces: Callable[..., None]
+    remember: Callable[..., None]
+    move: Callable[..., None]
+    energies: Callable[..., None]
+    knot: Callable[..., None]
+    in_joints: Callable[..., None]
+    conditions: Callable[..., None]
+    blocks: Callable[..., None]
+    weighted: Callable[..., None]
+
+
+@cache
+def functions() -> Functions:
+    """Compiled by two processes where they never were."""
+    with compiling_beside("erls.equations.nodal.matrix"):
+        from erls.equations.nodal.outputs import energies, in_joints, knot
+        from erls.equations.nodal.sums import forces, move, remember
+    from erls.equations.nodal.blocks import blocks, conditions, weighted
+
+    return Functions(forces, remember, move, energies, knot, in_joints, conditions, blocks, weighted)
 
 
 class NodalSystem:
@@ -72,6 +97,7 @@ class NodalSystem:
         self.start = built  # `length_scales` asks for it
         order, self.width = band_order(self.count, pairs, self.rows)
         self.model: Model = build_model(self.kinds, self.rows, self.local, metre_scales(self), order)
+        self._functions = functions()
         self._work: Work = room(self.model, 0)
         self._sampled: tuple[float, Array] = (np.nan, np.zeros(0))
         self._tied: tuple[float, Nodes | None, tuple[Array, ...]] = (np.nan, None, ())
@@ -119,14 +145,14 @@ class NodalSystem:
     def at(self, poses: Array, near: Nodes | None = None) -> Nodes:
         """Configuration at poses (k, 4, 4), with elements wound up as they are nearby (as built unless given)."""
         self._work.poses[:] = rows_of(poses)
-        sums.remember(self.model, self._work, self._knot(near or self.start))
+        self._functions.remember(self.model, self._work, self._knot(near or self.start))
         return Nodes(poses, self._work.bent.copy(), self._work.turned.copy(), self._work.wound.copy())
 
     def compose(self, q: Nodes, increment: Array) -> Nodes:
         """Poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
         work = self._work
         work.increment[:] = increment
-        sums.move(self.model, work, self._knot(q))
+        self._functions.move(self.model, work, self._knot(q))
         return Nodes(poses_of(work.poses), work.bent.copy(), work.turned.copy(), work.wound.copy())
 
     def tangent(self, increment: Array) -> Matrix:
@@ -141,7 +167,7 @@ class NodalSystem:
         """(n, n)"""
         rest = np.zeros(self.size)
         work = self._evaluated(t, q, rest, rest, None)
-        blocks.blocks(self.model, work, self._sample(t), 0)
+        self._functions.blocks(self.model, work, self._sample(t), 0)
         return self._mass.matrix([self._weighted(work, 0, (1.0, 0.0, 0.0))[: len(self.kinds.pairs)]])
 
     def stiffness_and_damping(
@@ -149,7 +175,7 @@ class NodalSystem:
     ) -> tuple[Matrix, Matrix]:
         """(n, n) twice; ``material`` as in `erls.equations.nodal.blocks.blocks`."""
         work = self._evaluated(t, q, v, a, multipliers)
-        blocks.blocks(self.model, work, self._sample(t), int(material))
+        self._functions.blocks(self.model, work, self._sample(t), int(material))
         stiffness = self._stiffness.matrix([self._weighted(work, 2, (0.0, 0.0, 1.0))])
         if not self.local:
             turning = np.zeros((self.count, 6, 6))
@@ -174,7 +200,7 @@ class NodalSystem:
     def constraint_bias(self, t: float, q: Nodes, v: Array) -> Array:
         """(m,) Φ̈ − B a."""
         work = self._state(q, v, np.zeros(self.size))
-        sums.conditions(self.model, work, self._sample(t))
+        self._functions.conditions(self.model, work, self._sample(t))
         return work.bias.copy()
 
     def stored(self, t: float, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
@@ -182,13 +208,13 @@ class NodalSystem:
         second derivatives.
         """
         out = np.zeros((3, 12 * self.count + len(self.model.actuators)))
-        sums.knot(self.model, self._state(q, v, a), out)
+        self._functions.knot(self.model, self._state(q, v, a), out)
         return out[0], out[1], out[2]
 
     def energies(self, q: Nodes, v: Array) -> Array:
         """(5,) kinetic, elastic of beams, gravity, springs, springs in joints [J]."""
         out = np.zeros(5)
-        sums.energies(self.model, self._state(q, v, np.zeros(self.size)), out)
+        self._functions.energies(self.model, self._state(q, v, np.zeros(self.size)), out)
         return out
 
     def energy(self, t: float, q: Nodes, v: Array) -> tuple[float, float]:
@@ -199,7 +225,7 @@ class NodalSystem:
     def in_joints(self, t: float, q: Nodes, v: Array, a: Array) -> Array:
         """(a, 10) coordinate, rate, acceleration, effort of each actuator, and its wrench on the outer node there."""
         out = np.zeros((len(self.model.actuators), 10))
-        sums.in_joints(self.model, self._state(q, v, a), self._sample(t), out)
+        self._functions.in_joints(self.model, self._state(q, v, a), self._sample(t), out)
         return out
 
     def samples(self, times: Array) -> Array:
@@ -246,14 +272,14 @@ class NodalSystem:
         """With all forces."""
         work = self._state(q, v, a)
         work.multipliers[:] = 0.0 if multipliers is None else multipliers
-        sums.forces(self.model, work, self._knot(q), self._sample(t))
+        self._functions.forces(self.model, work, self._knot(q), self._sample(t))
         return work
 
     def _weighted(self, work: Work, kind: int, weights: tuple[float, float, float]) -> Array:
         """(E, 12, 12) mass, damping or stiffness in the coordinates of the system."""
         if self.local:
             return work.blocks[:, kind]
-        blocks.weighted(self.model, work, *weights)
+        self._functions.weighted(self.model, work, *weights)
         return work.whole
 
     def _conditions(self, t: float, q: Nodes) -> tuple[Array, ...]:
@@ -262,7 +288,7 @@ class NodalSystem:
         if known_t == t and known_q is q:
             return known
         work = self._state(q, np.zeros(self.size), np.zeros(self.size))
-        sums.conditions(self.model, work, self._sample(t))
+        self._functions.conditions(self.model, work, self._sample(t))
         found = work.violation.copy(), work.gradient.copy(), work.drift.copy()
         self._tied = t, q, found
         return found

@@ -1,6 +1,6 @@
-"""Mass, damping and stiffness of all elements, and their weighted sum in the coordinates of the system.
+"""Conditions of joints; mass, damping and stiffness of elements, and their weighted sum in the system's coordinates.
 
-Velocities as in `erls.equations.nodal.sums`: on R³×SO(3) the chain rule over E v, E a + Ė v and Eᵀ f comes to them.
+Velocities as in `erls.equations.nodal.motion`: on R³×SO(3) the chain rule over E v, E a + Ė v and Eᵀ f comes to them.
 """
 
 from __future__ import annotations
@@ -9,15 +9,30 @@ from erls.equations.compiled_system import Array
 from erls.equations.nodal.actuator_forces import actuator_derivatives
 from erls.equations.nodal.beam_forces import beam_derivatives
 from erls.equations.nodal.body_forces import body_derivatives, load_derivatives
-from erls.equations.nodal.contract import BLOCKS, SUMMED, Model, Work
-from erls.equations.nodal.joint_forces import joint_stiffness
+from erls.equations.nodal.contract import BLOCKS, CONDITIONS, SUMMED, Model, Work
+from erls.equations.nodal.joint_forces import joint_gradients, joint_stiffness
+from erls.equations.nodal.motion import set_twists
 from erls.equations.nodal.spring_forces import spring_derivatives, winding_derivatives
-from erls.equations.nodal.sums import conditions
 from erls.maths.coefficients import stumpff, tangent_coefficients
 from erls.maths.jit import inlined, kernel
 from erls.maths.motions import series
 from erls.maths.rotations import value
 from erls.maths.vectors import cross, dot, minus, nine, plus, scaled, three, times, turned, unit
+
+
+@kernel(CONDITIONS, counted=False)
+def conditions(model: Model, work: Work, sample: Array) -> None:
+    """Violation, gradient, Φ_t and, without accelerations, Φ̈ − B a of all conditions at ``work``'s poses and motion."""
+    set_twists(model, work)
+    for j in range(len(model.joint_nodes)):
+        joint_gradients(model, work, sample, j)
+        for side in range(2):
+            node = model.joint_nodes[j, side]
+            if node < 0 or model.local:
+                continue
+            for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
+                for i in range(6):
+                    work.bias[row] += work.gradient[row, 6 * side + i] * work.rate[6 * node + i]
 
 
 @kernel(BLOCKS, counted=False)

@@ -8,7 +8,9 @@ from typing import TypeAlias
 
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.contract import ADVANCE, Knots, Model, Progress, Settings, State, Work
-from erls.equations.nodal.sums import compose, knot, remember, set_twists
+from erls.equations.nodal.motion import compose, set_twists
+from erls.equations.nodal.outputs import knot
+from erls.equations.nodal.sums import remember
 from erls.maths import band
 from erls.maths.jit import inlined, kernel
 
