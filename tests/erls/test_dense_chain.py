@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import chain_cases
 import frozen_values
+import numpy as np
 import pytest
 import stiffened_cases
 
+from erls.equations.compiled_system import RESIDUAL_OF_COMPLEX
 from erls.equations.erls.paper.dense_chain import DenseChain
+from erls.maths.jit import compiled_for
 from erls.mechanism.chain import Mechanism
 
 SAME = 1e-10  # relative: sums in another order
@@ -42,3 +46,68 @@ def test_equations_are_those_of_the_tables(kind: str, case: str, gauge: str, tmp
         found = {**frozen_values.functions(chain, at), **frozen_values.outputs(chain, at)}
         assert ("acceleration" in found) == ("acceleration" in frozen)
         assert not frozen_values.compare(found, frozen, SAME, len(chain.free_joints))
+
+
+STEP = 1e-30
+AGREE = 1e-6
+ROUNDING = 3e-11  # of a residual, through the square of C_r
+DERIVED = [
+    ("chains", "controllers", "minimum-norm"),
+    ("chains", "slides before a turn", "joint-angle"),
+    ("modal_inertia", "arms, mixed", "minimum-norm"),
+    ("modal_inertia", "prescribed in the middle", "joint-angle"),
+]
+
+
+class _Derivatives:
+    """Derivatives of a residual by one number, by a complex step and by central differences."""
+
+    def __init__(self, chain: DenseChain, at: chain_cases.State) -> None:
+        self.system, self.at = chain.compiled, at
+        self.values = [self.system.reals, at.y, at.v, at.a]
+        self.complexes = [x.astype(complex) for x in self.values]
+        self.residual = compiled_for(self.system.residual, RESIDUAL_OF_COMPLEX)
+        self.scratch = self.system.scratch.astype(complex)
+        self.base = self.real()
+
+    def real(self) -> np.ndarray:
+        """At ``values``."""
+        out, (reals, *state) = np.empty(self.system.size), self.values
+        self.system.residual(reals, self.system.integers, self.system.scratch, self.at.t, *state, out)
+        return out
+
+    def complex(self) -> np.ndarray:
+        """At ``complexes``."""
+        out, (reals, *state) = np.empty(self.system.size, dtype=complex), self.complexes
+        self.residual(reals, self.system.integers, self.scratch, self.at.t, *state, out)
+        return out
+
+    def agree(self, which: int, place: int, size: float) -> bool:
+        """To 1e-6, beside what rounding in the residual makes of differences (Richardson, of order 4)."""
+        numbers, whole = self.values[which], self.complexes[which]
+        whole[place] += 1j * STEP
+        found = self.complex().imag / STEP
+        whole[place] = numbers[place]
+        kept, slopes = numbers[place], []
+        for h in (size, size / 2):
+            numbers[place] = kept + h
+            above = self.real()
+            numbers[place] = kept - h
+            slopes.append((above - self.real()) / (2 * h))
+        numbers[place] = kept
+        expected = (4 * slopes[1] - slopes[0]) / 3
+        limit = AGREE * np.abs(expected).max() + ROUNDING * np.abs(self.base).max() / size
+        return bool(np.abs(found - expected).max() <= limit)
+
+
+@pytest.mark.parametrize(("kind", "case", "gauge"), DERIVED)
+def test_complex_steps_are_derivatives(kind: str, case: str, gauge: str, tmp_path: Path) -> None:
+    """Of the residual, by y, ẏ, ÿ and by every constant of the records."""
+    chain = DenseChain(_mechanism(tmp_path, kind, case), gauge)
+    cases = chain_cases if kind == "chains" else stiffened_cases
+    by = _Derivatives(chain, cases.states(chain, case)[0])
+    np.testing.assert_allclose(by.complex().real, by.base, rtol=0, atol=1e-11 * np.abs(by.base).max())
+    sizes: list[Callable[[float], float]] = [lambda x: 1e-3 * max(1e-2, abs(x)), *[lambda x: 1e-5] * 3]
+    for which, (values, size) in enumerate(zip(by.values, sizes, strict=True)):
+        wrong = [k for k, x in enumerate(values) if np.isfinite(x) and not by.agree(which, k, size(x))]
+        assert not wrong, (which, wrong[:5], len(wrong))

@@ -40,6 +40,14 @@ def move_joint(
 
 
 @part
+def _saturated(x: Any) -> Any:
+    """tanh x; that of large complex numbers overflows in compiled code."""
+    if abs(x.real) < 20.0:
+        return np.tanh(x)
+    return 0.0 * x + (1.0 if x.real > 0.0 else -1.0)
+
+
+@part
 def wanted(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any, rate: Any, feed: Any) -> Any:
     """Force that the drive of a joint asks of its motor; ``feed`` is what `feed_forward` found."""
     force = 0.0 * angle
@@ -63,7 +71,7 @@ def effort(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any,
         force = 0.0 * force - joint.limit
     force -= joint.stiffness * (angle - joint.rest) + joint.damping * rate
     if joint.friction != 0.0:
-        force -= joint.friction * np.tanh(rate / joint.transition)
+        force -= joint.friction * _saturated(rate / joint.transition)
     return force
 
 

@@ -151,12 +151,12 @@ def _bent_body(mechanism: Mechanism, link: Link, curved: bool) -> BentBody:
     turning = data.momentum[3:]
     modal = modal_inertia(link, mechanism.effects)
     return BentBody(
-        per_mass=np.linalg.pinv(link.invariants.rigid_mass_matrix, rcond=_NO_INERTIA, hermitian=True),
+        per_mass=np.asarray(np.linalg.pinv(link.invariants.rigid_mass_matrix, rcond=_NO_INERTIA, hermitian=True)),
         coupling=data.momentum.transpose(0, 2, 1),
         odd=(turning - turning.transpose(0, 2, 1)) / 2,
         spin=data.spin.reshape(9, n, n),
         warp=_NONE if modal is None else modal.tensor.transpose(0, 2, 1),
-        per_modal=empty if modal is None else modal.per_mass,
+        per_modal=empty if modal is None else np.asarray(modal.per_mass),
     )
 
 
