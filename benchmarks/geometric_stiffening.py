@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import erls
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.integrate.base import Options, Solution
 from erls.integrate.lobatto import lobatto
 from erls.scene.build import build_mechanism

@@ -11,8 +11,8 @@ import numpy as np
 import scenes
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.erls.chain import Erls
-from erls.equations.erls.compiled import compile_chain
+from erls.equations.erls.formulation import Erls
+from erls.equations.erls.pack import pack_chain
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import EFFECTS
 
@@ -183,7 +183,7 @@ def all_results(folder: Path) -> dict[str, np.ndarray]:
         for k, at in enumerate(states(chain, name)):
             for what, values in evaluate(chain.compiled, at).items():
                 result[f"{name}/{k}/{what}"] = values
-        for kind, x in solved(compile_chain(chain, dense=0), states(chain, name)[1]).items():
+        for kind, x in solved(pack_chain(chain.mechanism, dense=0), states(chain, name)[1]).items():
             result[f"{name}/solved {kind}"] = x
     return result
 

@@ -10,7 +10,7 @@ import chain_cases
 import numpy as np
 import scenes
 
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.equations.quasi_static.formulation import QuasiStatic, quasi_static
 from erls.mechanism.chain import Mechanism
 

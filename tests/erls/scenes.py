@@ -7,7 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
+from erls.equations.erls.paper.dense_chain import DenseChain
 from erls.mechanism.chain import Mechanism
 from erls.scene.build import build_mechanism
 from erls.scene.read import is_body_scene, load_scene
@@ -89,9 +90,14 @@ def mechanism(path: Path) -> Mechanism:
     return build_mechanism(load_scene(path)).mechanism
 
 
-def equations(path: Path, gauge: str = "joint-angle") -> Erls:
+def erls(mechanism: Mechanism, gauge: str = "joint-angle") -> Any:
+    """ERLS equations of a mechanism: by recursion in the joint-angle gauge, dense in the other."""
+    return Erls(mechanism) if gauge == "joint-angle" else DenseChain(mechanism, gauge)
+
+
+def equations(path: Path, gauge: str = "joint-angle") -> Any:
     """ERLS equations of a scene file."""
-    return Erls(mechanism(path), gauge)
+    return erls(mechanism(path), gauge)
 
 
 ARM = {"model": "arm.toml"}

@@ -12,7 +12,7 @@ import chain_cases
 import numpy as np
 import scenes
 
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import DEFAULT
 from erls.mechanism.without_effects import with_rigid

@@ -13,7 +13,7 @@ import scenes
 from effect_scenes import random_chain
 
 import erls
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.equations.erls.paper.link_inertia import LinkInertia
 from erls.equations.ffr.body_frame import elastic_basis
 from erls.equations.ffr.equations import Ffr

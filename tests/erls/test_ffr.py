@@ -11,7 +11,7 @@ import scenes
 import scipy.linalg as la
 
 import erls
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.body_frame import BODY_FRAMES
 from erls.equations.ffr.equations import Ffr
 from erls.equations.ffr.interface_motion import InterfaceMotion, turn_factors

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
+from erls.equations.erls.paper.dense_chain import DenseChain
 from erls.integrate.base import Options
 from erls.integrate.generalized_alpha import generalized_alpha
 
@@ -26,13 +27,13 @@ def _distance(found: np.ndarray, expected: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", chain_cases.CASES)
-def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
+def test_the_recursion_equals_the_dense_equations_of_the_paper(name: str, tmp_path: Path) -> None:
     """Residual (joints and modes apart), mass, stiffness, damping, acceleration (condition up to 1e8)."""
-    chain = chain_cases.equations(tmp_path, name)
-    assert chain.compiled is not None
+    recursion = chain_cases.equations(tmp_path, name)
+    chain = DenseChain(recursion.mechanism, "joint-angle")
     f = len(chain.free_joints)
-    for at in chain_cases.states(chain, name):
-        found = chain_cases.evaluate(chain.compiled, at)
+    for at in chain_cases.states(recursion, name):
+        found = chain_cases.evaluate(recursion.compiled, at)
         residual = chain.residual(at.t, at.y, at.v, at.a)
         assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
         assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
@@ -49,12 +50,12 @@ def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
 def test_modes_alone_feel_what_the_elastic_forces_hide(tmp_path: Path) -> None:
     """Undeformed, without the stiffness that dwarfs them, inertia forces on the modes agree too."""
     for name in ("axes that part", "parallel axes", "controllers"):
-        chain = chain_cases.equations(tmp_path, name)
-        assert chain.compiled is not None
-        at = chain_cases.states(chain, name)[0]
+        recursion = chain_cases.equations(tmp_path, name)
+        chain = DenseChain(recursion.mechanism, "joint-angle")
+        at = chain_cases.states(recursion, name)[0]
         f = len(chain.free_joints)
         y = np.concatenate([at.y[:f], 0 * at.y[f:]])
-        found = chain_cases.evaluate(chain.compiled, chain_cases.State(at.t, y, at.v, at.a))["residual"]
+        found = chain_cases.evaluate(recursion.compiled, chain_cases.State(at.t, y, at.v, at.a))["residual"]
         assert _distance(found[f:], chain.residual(at.t, y, at.v, at.a)[f:]) <= LIKE_NUMPY
 
 
@@ -73,12 +74,6 @@ def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
             # rounding counts with the condition of what is solved, up to 1e8
             limit = LIKE_NUMPY if key.endswith("acceleration") or "solved" in key else LIKE_TWIN
             assert _distance(values, twin[key]) <= limit, key
-
-
-def test_no_compiled_form_in_the_minimum_norm_gauge(tmp_path: Path) -> None:
-    """It is not recursive; the NumPy equations serve it."""
-    scenes.l_link(tmp_path)
-    assert scenes.equations(scenes.l_scene(tmp_path), "minimum-norm").compiled is None
 
 
 def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
@@ -109,9 +104,9 @@ class _Plain:
     def __init__(self, chain: Erls) -> None:
         self.chain = chain
 
+    compiled = None
+
     def __getattr__(self, name: str) -> Any:
-        if name == "compiled":
-            raise AttributeError(name)
         return getattr(self.chain, name)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.equations.ffr import interface_motion
 from erls.equations.ffr.equations import Ffr
 from erls.equations.ffr.nodes import turn_factors

@@ -11,7 +11,7 @@ import scenes
 import scipy.optimize
 
 import erls
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
 from erls.errors import Cause, SceneError, SimulationError

@@ -12,7 +12,7 @@ import scipy.linalg as la
 
 import erls
 import erls.scene.build
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.run.chain.run import ChainRun
 
 DATA = scenes.ROOT / "data"

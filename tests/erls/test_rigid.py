@@ -11,7 +11,6 @@ import scenes
 from scipy.special import ellipkinc
 
 import erls
-from erls.equations.erls.chain import Erls
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
 RIGID_L = [{"name": "l", "model": "link.toml", "flexible": False}]
@@ -79,7 +78,7 @@ def test_several_rigid_links_against_recursion(tmp_path: Path, kind: str, gauge:
                                     "gear_ratio = 50.0, mass = 0.3, inertia = [1e-4, 1e-4, 2e-4] }")  # fmt: skip
     path.write_text(text)
     chain = scenes.mechanism(path)
-    equations = Erls(chain, gauge)
+    equations = scenes.erls(chain, gauge)
     rng = np.random.default_rng(7)
     for _ in range(20):
         theta, rates, accelerations = rng.uniform(-2, 2, (3, 3))

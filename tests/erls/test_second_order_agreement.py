@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.equations import Ffr
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism

@@ -13,7 +13,8 @@ import scenes
 import scipy.linalg as la
 
 import erls
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
+from erls.equations.erls.paper.dense_chain import DenseChain
 from erls.equations.ffr.constrained import ConstrainedFfr
 from erls.equations.ffr.equations import Ffr
 from erls.errors import SimulationError
@@ -233,7 +234,7 @@ def test_one_link_in_either_formulation(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "build",
-    [Erls, lambda m: Erls(m, "minimum-norm"), Ffr, lambda m: Ffr(m, "mean-axis")],
+    [Erls, lambda m: DenseChain(m, "minimum-norm"), Ffr, lambda m: Ffr(m, "mean-axis")],
     ids=["joint-angle", "minimum-norm", "tangent", "mean-axis"],
 )
 def test_power_balance_and_mass_matrix(chain: Mechanism, build: Any) -> None:
