@@ -100,12 +100,14 @@ class Memory:
     ----------
     integers : list of int
         Where tables go.
+    numbers : (k,) array, optional
+        What is there already.
     """
 
-    def __init__(self, integers: list[int]) -> None:
+    def __init__(self, integers: list[int], numbers: Array | None = None) -> None:
         self.integers = integers
-        self._parts: list[Array] = []
-        self._size = 0
+        self._parts: list[Array] = [] if numbers is None else [numbers]
+        self._size = sum(map(len, self._parts))
 
     def put(self, record: NamedTuple) -> int:
         """Store a record; the place of its table."""

@@ -142,10 +142,14 @@ def _hand_back(
 
 @spliced
 def balance(
-    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array, bends: Any
-) -> None:
-    """M a - f; ``bends`` is None where links have no second-order displacements, which leaves them out of the code."""
-    serial = read_serial(reals, integers, integers[0])
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array, bends: Any,
+    at: int,
+) -> None:  # fmt: skip
+    """M a - f of the chain whose `Serial` stands at that place.
+
+    ``bends`` is None where links have no second-order displacements, which leaves them out of the compiled code.
+    """
+    serial = read_serial(reals, integers, at)
     chain = read_chain(reals, integers, serial.own)
     if serial.feeds:
         feed_forward(serial, reals, integers, scratch, t)
@@ -160,8 +164,8 @@ def balance(
         parent = read_link(reals, integers, chain.links + k * LINK).parent
         state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
         for i in range(len(modes.stiffness)):
-            at = modes.first + i
-            out[at] = state.modal[6 + i] + modes.stiffness[i] * y[at] + modes.damping[i] * v[at]
+            place = modes.first + i
+            out[place] = state.modal[6 + i] + modes.stiffness[i] * y[place] + modes.damping[i] * v[place]
         total = dot6(joint.screw, state.wrench) + joint.rotor * motion.coordinate[2]
         if parent >= 0:  # the joint turns the displacement along: u̇ holds -ad(S θ̇) u
             clear(state.point)
@@ -192,4 +196,4 @@ def residual(
     """M a - f, see `erls.equations.compiled_system`; an empty ``a`` stands for zeros, with which nothing is multiplied
     then.
     """
-    balance(reals, integers, scratch, t, y, v, a, out, None)
+    balance(reals, integers, scratch, t, y, v, a, out, None, integers[0])

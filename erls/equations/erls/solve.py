@@ -77,7 +77,7 @@ def accelerate(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
 ) -> int:
     """M⁻¹ f."""
-    balance(reals, integers, scratch, t, y, v, y[0:0], out, bends)
+    balance(reals, integers, scratch, t, y, v, y[0:0], out, bends, integers[0])
     serial = read_serial(reals, integers, integers[0])
     factors = scratch[read_chain(reals, integers, serial.own).factors :]
     status = factor_links(reals, integers, scratch, t, y, v, 0.0, 0.0, factors, True, bends)

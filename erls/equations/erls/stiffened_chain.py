@@ -15,7 +15,7 @@ def residual(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
 ) -> None:
     """M a - f."""
-    balance(reals, integers, scratch, t, y, v, a, out, True)
+    balance(reals, integers, scratch, t, y, v, a, out, True, integers[0])
 
 
 @kernel(contract.MASS_MATRIX, counted=False)

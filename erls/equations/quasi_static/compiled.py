@@ -1,35 +1,36 @@
-"""The constants of a chain whose fast modes follow statically, packed for `erls.equations.quasi_static`."""
+"""A chain whose fast modes follow statically, as records behind those of the chain with all modes."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from erls.equations.compiled_system import CompiledSystem
-from erls.equations.erls import compiled_functions as equations
-from erls.equations.erls import layout as flags
+from erls.equations.compiled_system import CompiledSystem, function_in
+from erls.equations.erls import residual as chain_residual
+from erls.equations.erls.records import read_chain
+from erls.equations.quasi_static.records import Reduced, reduced_state
+from erls.equations.serial.records import read_serial
+from erls.maths.records import Memory
 
-if TYPE_CHECKING:
-    from erls.equations.quasi_static.formulation import QuasiStatic
 
-
-def compile_quasi_static(inner: CompiledSystem, outer: QuasiStatic) -> CompiledSystem | None:
+def compile_quasi_static(inner: CompiledSystem, outer: Any) -> CompiledSystem | None:
     """The compiled form around that of a chain with all modes.
 
     Parameters
     ----------
     inner : CompiledSystem
     outer : QuasiStatic
+        See `erls.equations.quasi_static.formulation`.
 
     Returns
     -------
     CompiledSystem or None
-        None where ``inner`` is no chain of `erls.equations.erls`.
+        None where ``inner`` is no chain of `erls.equations.erls` without second-order displacements.
     """
-    if inner.residual is not equations.residual:
+    if inner.residual is not chain_residual.residual:
         return None
-    from erls.equations.quasi_static import chain, layout
+    from erls.equations.quasi_static import chain  # here: it is compiled
 
     slow, static = outer.modes.slow, outer.modes.static
     n, s, h = outer.inner.size, slow.shape[1], static.shape[1]
@@ -37,25 +38,35 @@ def compile_quasi_static(inner: CompiledSystem, outer: QuasiStatic) -> CompiledS
     joints = np.zeros(n - sum(link.elastic_modes for link in links))
     stiffness = np.concatenate([joints, *(link.stiffness for link in links)])
     damping = np.concatenate([joints, *(link.damping for link in links)])
-    light = inner.integers.copy()
-    light[[flags.FIRST_ORDER, flags.SECOND_ORDER, flags.CORIOLIS, flags.SOFTENING]] = 0
-    constants = [
-        slow.T,
-        static.T,
-        outer.modes.stiffness,
-        slow.T @ (stiffness[:, None] * slow),
-        slow.T @ (damping[:, None] * slow),
-        outer.squares,
-        np.array([outer.lapse, *outer.ends]),
-    ]
-    tail = [len(light), len(outer.ends), n, s, h, len(inner.reals), len(inner.scratch)]
+    integers = inner.integers.tolist()
+    constants, scratch = Memory(integers, inner.reals), Memory(integers, inner.scratch)
+    serial = read_serial(inner.reals, inner.integers, integers[0])
+    light = read_chain(inner.reals, inner.integers, serial.own)._replace(
+        first_order=0, second_order=0, coriolis=0, softening=0
+    )
+    at = constants.put(serial._replace(own=constants.put(light)))
+    state = scratch.put(reduced_state(n, s, h))
+    constants.put(
+        Reduced(
+            state=state,
+            light=at,
+            slow=slow.T,
+            static=static.T,
+            kappa=outer.modes.stiffness,
+            stiffness=slow.T @ (stiffness[:, None] * slow),
+            damping=slow.T @ (damping[:, None] * slow),
+            squares=outer.squares,
+            lapse=outer.lapse,
+            ends=np.array(outer.ends),
+        )
+    )
     return CompiledSystem(
         size=s,
-        reals=np.concatenate([inner.reals, *(block.ravel() for block in constants)]),
-        integers=np.concatenate([inner.integers, light, np.array(tail, dtype=np.int64)]),
-        scratch=np.zeros(len(inner.scratch) + layout.memory_size(n, s, h)),
+        reals=constants.numbers,
+        integers=np.array(integers, dtype=np.int64),
+        scratch=scratch.numbers,
         residual=chain.residual,
         mass_matrix=chain.mass_matrix,
         stiffness_and_damping=chain.stiffness_and_damping,
-        load_acceleration=lambda: chain.acceleration,
+        load_acceleration=function_in("erls.equations.quasi_static.chain", "acceleration"),
     )
