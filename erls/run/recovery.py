@@ -21,6 +21,7 @@ from erls.maths.so3 import Array
 from erls.mechanism.links import Link
 from erls.run.chain.run import ChainRun
 from erls.run.link_loads import link_loads
+from erls.run.record import Run
 from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
 from fe_import.modal.recovery_maps import UNITS, RecoveryMaps, spin_products
@@ -170,7 +171,7 @@ def _direction(model: ModalModel, node: int, element: int) -> Array:
     return np.asarray(along / np.linalg.norm(along))
 
 
-def _link(run: ChainRun, name: str) -> tuple[int, Link]:
+def _link(run: Run, name: str) -> tuple[int, Link]:
     if not isinstance(run, ChainRun):
         message, remedy = "stress and section forces are those of links", "ask a run of a chain"
         raise SceneError(Cause.BAD_FIELD, message, where="run", value=type(run).__name__, remedy=remedy)
