@@ -86,9 +86,18 @@ def reduced_state(n: int, s: int, h: int) -> ReducedState:
         return np.zeros(shape)
 
     return ReducedState(
-        *(room(n) for _ in range(4)),
-        *(room(h) for _ in range(4)),
-        *(room(s) for _ in range(4)),
+        place=room(n),
+        rate=room(n),
+        acceleration=room(n),
+        force=room(n),
+        eta=room(h),
+        found=room(h),
+        found_rate=room(h),
+        change=room(h),
+        near_place=room(s),
+        near_rate=room(s),
+        near_acceleration=room(s),
+        left=room(s),
         matrix=room(n, n),
         other=room(n, n),
         half=room(s, n),
