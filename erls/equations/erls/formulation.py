@@ -19,17 +19,21 @@ from erls.equations.erls.pack import pack_chain, shapes, stiffened
 from erls.equations.erls.paper.compatibility import Compatibility
 from erls.equations.erls.paper.frames import displaced_frames
 from erls.equations.erls.paper.second_order_compatibility import second_order_compatibility
-from erls.equations.erls.records import LINK_STATE, read_chain, read_link_state
+from erls.equations.erls.records import LINK_STATE, Chain, LinkState
 from erls.equations.formulation import Energy, Reaction, State
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.equations.serial.joint_frames import FrameMotion
 from erls.equations.serial.node_reach import node_reach
-from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
+from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import StateSeries
+from erls.maths.records import python_reader
 from erls.maths.so3 import Array, skew
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.loops import LoopEnd
+
+_see_serial, _see_chain = python_reader(Serial), python_reader(Chain)
+_see_link, _see_joint = python_reader(LinkState), python_reader(JointState)
 
 
 class Erls:
@@ -179,12 +183,12 @@ class Erls:
         system = self._complete
         balance = np.empty(self.size)
         system.residual(system.reals, system.integers, system.scratch, t, *map(_flat, (y, v, a)), balance)
-        serial = read_serial(system.reals, system.integers, int(system.integers[0]))
-        chain = read_chain(system.reals, system.integers, serial.own)
+        serial = _see_serial(system.reals, system.integers, int(system.integers[0]))
+        chain = _see_chain(system.reals, system.integers, serial.own)
         found = [
             (
-                read_link_state(system.scratch, system.integers, chain.states + k * LINK_STATE).wrench.copy(),
-                read_joint_state(system.scratch, system.integers, serial.joint_states + k * JOINT_STATE).forces.copy(),
+                _see_link(system.scratch, system.integers, chain.states + k * LINK_STATE).wrench.copy(),
+                _see_joint(system.scratch, system.integers, serial.joint_states + k * JOINT_STATE).forces.copy(),
             )
             for k in range(self.joints)
         ]
