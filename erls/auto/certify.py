@@ -10,9 +10,9 @@ import numpy as np
 from erls.auto.coordinates import embedded, kept_places, same_start
 from erls.auto.error_motion import Deviation, Knots, error_motion
 from erls.auto.outputs import Outputs, busiest, effort_error, largest_distance, watched_nodes
-from erls.auto.quick import quick
 from erls.auto.resolution import resolution, vibrations
 from erls.auto.static import vibrating_efforts
+from erls.equations.quick import quick
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved
 from erls.equations.system import metre_scales

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.auto.coordinates import embedded
-from erls.auto.quick import quick
 from erls.equations.compiled_system import CompiledSystem
+from erls.equations.quick import quick
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array

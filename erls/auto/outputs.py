@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from erls.auto.quick import quick
 from erls.equations.formulation import Formulation, State
 from erls.equations.quasi_static.formulation import QuasiStatic
+from erls.equations.quick import quick
 from erls.equations.registry import formulate
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism

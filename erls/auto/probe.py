@@ -14,9 +14,9 @@ import numpy as np
 
 from erls.auto.coordinates import embedded, kept_places
 from erls.auto.outputs import Outputs, busiest, effort_error, largest_distance, watched_nodes
-from erls.auto.quick import quick
 from erls.auto.resolution import Resolution, Vibrations, resolution, vibrations
 from erls.equations.formulation import Formulation
+from erls.equations.quick import quick
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved
 from erls.equations.system import metre_scales

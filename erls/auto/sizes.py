@@ -12,8 +12,8 @@ from erls.auto.coordinates import kept_places
 from erls.auto.cuts import flexible_links, partners
 from erls.auto.operations import Operations, operations
 from erls.auto.probe import Difference, coarse_run, difference, look_steps, needed, resolved
-from erls.auto.quick import quick
 from erls.equations.formulation import Formulation
+from erls.equations.quick import quick
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved
 from erls.errors import Cause, SimulationError

@@ -7,8 +7,8 @@ import numpy as np
 from erls.auto.cuts import Cut
 from erls.auto.forced import Forced, all_prescribed
 from erls.auto.outputs import driven_joints, reacting
-from erls.auto.quick import quick
 from erls.equations.formulation import Formulation
+from erls.equations.quick import quick
 from erls.equations.registry import formulate
 from erls.equations.system import metre_scales
 from erls.maths.so3 import Array

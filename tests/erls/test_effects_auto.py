@@ -24,8 +24,8 @@ from erls.auto.cuts import RIGID, Cut
 from erls.auto.error_motion import Knots, error_motion
 from erls.auto.outputs import Outputs, effort_error, largest_distance, watched_nodes
 from erls.auto.probe import coarse_run
-from erls.auto.quick import quick
 from erls.cli.main import main
+from erls.equations.quick import quick
 from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Options

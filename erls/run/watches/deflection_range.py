@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import cast
 
 import numpy as np
 
-from erls.equations.formulation import Formulation, Reaction, State
+from erls.equations.formulation import Formulation, Reaction, State, TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.quasi_static.formulation import QuasiStatic
+from erls.equations.quick import quick
 from erls.equations.registry import TREES
 from erls.equations.serial.state_series import StateSeries
 from erls.equations.substructures import Substructured, solved
@@ -20,9 +22,6 @@ from erls.mechanism.chain import Mechanism, poses
 from erls.run.chain.run import ChainRun
 from erls.run.watches.base import NOTHING, Ended, Finding, Watch
 from erls.run.watches.deflection_estimate import DeflectionError, LinkMotion, deflection_error
-
-if TYPE_CHECKING:
-    from erls.equations.compiled_system import CompiledSystem
 
 _SAMPLES, _SAMPLES_OF_LOOPS = 61, 31  # loads of loops take an acceleration of their own
 _STEP = 1e-5  # s, of central differences, as in `erls.run.link_loads`
@@ -168,16 +167,13 @@ def _loads(run: ChainRun, times: Array, seen: StateSeries) -> list[Array]:
 
 
 def _reactions(formulation: Formulation, t: float, y: Array, v: Array) -> list[Reaction]:
-    """In the joints, with the acceleration from the equations that the run has compiled, if it has."""
-    compiled: CompiledSystem | None = vars(formulation).get("compiled")
-    if compiled is None or not hasattr(formulation, "reactions_at"):
+    """In the joints, with the acceleration from the compiled equations of a tree, where it has any."""
+    if isinstance(formulation, (ClosedChain, QuasiStatic)):
         return formulation.reactions(t, y, v)
-    mass, force = np.empty((len(y), len(y))), np.empty(len(y))
-    constants = compiled.reals, compiled.integers, compiled.scratch
-    compiled.residual(*constants, t, y, v, np.zeros(len(y)), force)
-    compiled.mass_matrix(*constants, t, y, mass)
-    found: list[Reaction] = formulation.reactions_at(t, y, v, np.linalg.solve(mass, -force))
-    return found
+    tree = cast(TreeFormulation, formulation)
+    equations = quick(tree)
+    force = equations.residual(t, y, v, np.zeros(len(y)))
+    return tree.reactions_at(t, y, v, np.linalg.solve(equations.mass_matrix(t, y), -force))
 
 
 def _place(state: State, mechanism: Mechanism, link: int, node: int) -> Array:
