@@ -8,10 +8,10 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, function_in
 from erls.equations.erls import residual as chain_residual
-from erls.equations.erls.records import read_chain
+from erls.equations.erls.records import Chain
 from erls.equations.quasi_static.records import Reduced, reduced_state
-from erls.equations.serial.records import read_serial
-from erls.maths.records import Memory
+from erls.equations.serial.records import Serial
+from erls.maths.records import Memory, python_reader
 
 
 def compile_quasi_static(inner: CompiledSystem, outer: Any) -> CompiledSystem | None:
@@ -40,8 +40,8 @@ def compile_quasi_static(inner: CompiledSystem, outer: Any) -> CompiledSystem | 
     damping = np.concatenate([joints, *(link.damping for link in links)])
     integers = inner.integers.tolist()
     constants, scratch = Memory(integers, inner.reals), Memory(integers, inner.scratch)
-    serial = read_serial(inner.reals, inner.integers, integers[0])
-    light = read_chain(inner.reals, inner.integers, serial.own)._replace(
+    serial = python_reader(Serial)(inner.reals, inner.integers, integers[0])
+    light = python_reader(Chain)(inner.reals, inner.integers, serial.own)._replace(
         first_order=0, second_order=0, coriolis=0, softening=0
     )
     at = constants.put(serial._replace(own=constants.put(light)))
