@@ -62,7 +62,7 @@ class Steps:
         self._advance = loop.advance if system.compiled else plain(loop.advance)
         self._pace = Pace(recorder, system.compiled)
         self._metres, self._reach = metres, float(metres.max(initial=1.0))
-        self._progress = loop.Progress(np.zeros(6), np.zeros(7, dtype=np.int64))
+        self._progress = loop.Course(np.zeros(6), np.zeros(7, dtype=np.int64))
         self._progress.rates[loop.RATE] = SLOWEST_KNOWN
         self._progress.counts[loop.USUAL] = MAX_ITERATIONS
         self._memory: Any = None

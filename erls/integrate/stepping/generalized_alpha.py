@@ -1,7 +1,7 @@
 """The steps of generalized-α, of all systems: `erls.integrate.generalized_alpha` has the formulas.
 
 A system gives them the functions of `erls.equations.stepped`. ``advance`` makes steps to given times
-and leaves everything that the next call needs in `Progress` and `Memory`. Multipliers λ follow the accelerations in one
+and leaves everything that the next call needs in `Course` and `Memory`. Multipliers λ follow the accelerations in one
 array, conditions follow the equations of motion, and corrections solve
 
     [[M + α C + β K, Bᵀ], [B, 0]] [Δd; β Δλ] = [β r; Φ],   β = 1/β', α = γ'/β'
@@ -29,8 +29,8 @@ AUTO, UPDATE, FROZEN = range(3)  # iteration matrices, as in `erls.scene.integra
 ZERO, LAST, EXTRAPOLATED = range(3)  # what accelerations and multipliers start from
 SINGULAR, SLOW, NOT_FINITE = 1, 2, 3  # reasons of a failure
 
-RATE, SPENT, BEFORE, SIZE, GOAL, ERROR = range(6)  # of `Progress.rates`
-FACTORED, USUAL, REASON, STEPS, EVALUATIONS, ITERATIONS, FACTORIZATIONS = range(7)  # of `Progress.counts`
+RATE, SPENT, BEFORE, SIZE, GOAL, ERROR = range(6)  # of `Course.rates`
+FACTORED, USUAL, REASON, STEPS, EVALUATIONS, ITERATIONS, FACTORIZATIONS = range(7)  # of `Course.counts`
 
 
 class Settings(NamedTuple):
@@ -92,7 +92,7 @@ class Settings(NamedTuple):
     guess: int
 
 
-class Progress(NamedTuple):
+class Course(NamedTuple):  # no other record may have this name and these types: to Numba they would be one
     """What steps leave to each other and to whoever called for them.
 
     Attributes
@@ -167,7 +167,7 @@ if ENABLED:
         contract.INTEGERS,
         _reals,
         _t.NamedTuple((*(_t.float64,) * 21, *(_t.int64,) * 5), Settings),
-        _t.NamedTuple((_reals, contract.INTEGERS), Progress),
+        _t.NamedTuple((_reals, contract.INTEGERS), Course),
         _t.NamedTuple((*(_reals,) * 15, _cube, contract.INTEGERS), Memory),
         _reals,
         contract.MATRIX,
@@ -286,7 +286,7 @@ def is_balanced(settings: Settings, memory: Memory, largest: float) -> bool:
 
 
 @inlined
-def note(settings: Settings, progress: Progress, iterations: int, rate: float) -> None:
+def note(settings: Settings, progress: Course, iterations: int, rate: float) -> None:
     """How fast iteration was."""
     rates, counts = progress.rates, progress.counts
     rates[RATE] = min(rate, settings.slowest)
@@ -298,7 +298,7 @@ def note(settings: Settings, progress: Progress, iterations: int, rate: float) -
 
 
 @inlined
-def judge(settings: Settings, progress: Progress, memory: Memory) -> int:
+def judge(settings: Settings, progress: Course, memory: Memory) -> int:
     """Whether the local error of a step is too large, or so small that a larger step would do."""
     if settings.error_limit == 0.0:
         return DONE
@@ -344,7 +344,7 @@ def advance(
     integers: IntArray,
     scratch: Array,
     settings: Settings,
-    progress: Progress,
+    progress: Course,
     memory: Memory,
     times: Array,
     samples: Array,
