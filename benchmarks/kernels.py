@@ -27,7 +27,7 @@ import scenes  # noqa: E402
 
 from erls.equations.compiled_system import ACCELERATION, INTEGERS, REALS, RESIDUAL, pointer  # noqa: E402
 from erls.equations.erls.formulation import Erls  # noqa: E402
-from erls.equations.ffr.equations import Ffr  # noqa: E402
+from erls.equations.ffr.formulation import Ffr  # noqa: E402
 from erls.integrate.base import Integrator, Options  # noqa: E402
 from erls.integrate.generalized_alpha import generalized_alpha  # noqa: E402
 from erls.integrate.lobatto import lobatto  # noqa: E402

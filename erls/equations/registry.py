@@ -33,7 +33,7 @@ def _erls(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
 
 
 def _ffr(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
-    from erls.equations.ffr.equations import Ffr
+    from erls.equations.ffr.formulation import Ffr
 
     return Ffr(mechanism, settings.body_frame)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from erls.equations.ffr.constrained import ConstrainedFfr
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.system import SecondOrderSystem
 from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.constrained import ConstrainedOptions

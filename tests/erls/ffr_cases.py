@@ -10,7 +10,7 @@ import chain_cases
 import numpy as np
 import scenes
 
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.pack import pack_frames
 from erls.mechanism.chain import Mechanism
 

@@ -9,7 +9,7 @@ import numpy as np
 import scenes
 
 from erls.equations.erls.chain import Erls
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun

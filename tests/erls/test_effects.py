@@ -16,7 +16,7 @@ import erls
 from erls.equations.erls.formulation import Erls
 from erls.equations.erls.paper.link_inertia import LinkInertia
 from erls.equations.ffr.body_frame import elastic_basis
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.standard_data import StandardData
 from erls.errors import Cause, SceneError, SimulationError
 from erls.mechanism.chain import Mechanism

@@ -13,7 +13,7 @@ import scipy.linalg as la
 import erls
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.body_frame import BODY_FRAMES
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.interface_motion import InterfaceMotion, turn_factors
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.errors import Cause, SimulationError

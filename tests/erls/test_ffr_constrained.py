@@ -14,7 +14,7 @@ import erls
 from erls.equations.consistency import redundant_constraints, refuse_redundant
 from erls.equations.ffr.body_frame import BODY_FRAMES
 from erls.equations.ffr.constrained import Configuration, ConstrainedFfr
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.system import metre_scales
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha

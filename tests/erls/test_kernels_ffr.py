@@ -17,7 +17,7 @@ import scenes
 
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr import interface_motion
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.nodes import turn_factors
 from erls.equations.registry import formulate
 from erls.equations.substructures import Substructured

@@ -14,7 +14,7 @@ import scenes
 
 from erls.equations.erls.formulation import Erls
 from erls.equations.erls.pack import combined_modes, pack_chain
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.pack import pack_frames
 from erls.equations.serial.decoupled_modes import decoupled_modes
 from erls.integrate.base import Options

@@ -11,7 +11,7 @@ import pytest
 import scenes
 
 from erls.equations.erls.chain import Erls
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.equations.formulation import TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.loops.rows import LoopRows

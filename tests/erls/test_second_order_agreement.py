@@ -24,7 +24,7 @@ import pytest
 import scenes
 
 from erls.equations.erls.formulation import Erls
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import ALL

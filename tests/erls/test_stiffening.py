@@ -16,7 +16,7 @@ import erls
 from erls.equations.erls.formulation import Erls
 from erls.equations.erls.paper.dense_chain import DenseChain
 from erls.equations.ffr.constrained import ConstrainedFfr
-from erls.equations.ffr.equations import Ffr
+from erls.equations.ffr.formulation import Ffr
 from erls.errors import SimulationError
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import ALL, DEFAULT

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from erls.equations.ffr.equations import Ffr
-from erls.equations.ffr.interface_motion import InterfaceMotion
+from erls.equations.ffr.formulation import Ffr
+from erls.equations.ffr.interface_motion import InterfaceMotion, node_motion
 from erls.equations.ffr.joint_conditions import (
     FrameMotion,
     JointConditions,
@@ -23,11 +23,15 @@ from erls.equations.ffr.joint_conditions import (
     joint_motion,
     less_motion,
 )
-from erls.equations.ffr.recursion import node_motion
+from erls.equations.ffr.joint_effort import JointEfforts
+from erls.equations.ffr.second_order import SecondOrderData
+from erls.equations.ffr.standard_data import StandardData
 from erls.equations.formulation import Energy, Reaction, State
+from erls.equations.serial.modal_inertia import modal_inertia
 from erls.maths import motion_maps
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array, cross, skew
+from erls.mechanism.links import Link
 from fe_import.model import InterfaceNode
 
 
@@ -51,7 +55,9 @@ class ConstrainedFfr:
 
     def __init__(self, reduced: Ffr) -> None:
         self.reduced, self.mechanism = reduced, reduced.mechanism
-        self.modes, self.data = reduced.modes, reduced.data
+        self.modes, self.efforts = reduced.modes, JointEfforts(reduced.mechanism)
+        bodies = zip(self.mechanism.links, reduced.bases, reduced.given.data, strict=True)
+        self.data = [self._data(link, basis, linear) for link, basis, linear in bodies]
         links, joints = self.mechanism.links, self.mechanism.joints
         self.links = len(links)
         self.twists = [slice(6 * k, 6 * k + 6) for k in range(self.links)]  # within v
@@ -66,6 +72,13 @@ class ConstrainedFfr:
             parent = links[k - 1].outboard if k else None
             self._inner.append(None if parent is None else self._node(k - 1, parent, joint.before))
             self._outer.append(self._node(k, link.inboard, inverse(joint.after)))
+
+    def _data(self, link: Link, basis: Array, linear: StandardData) -> StandardData:
+        if not self.reduced.stiffened or not link.elastic_modes or link.second_order is None:
+            return linear
+        return SecondOrderData(
+            linear, link.second_order, basis, modal_inertia(link, self.mechanism.effects, basis)
+        )
 
     def _node(self, k: int, interface: InterfaceNode, frame: Array) -> tuple[InterfaceMotion, Array]:
         """Interface node of link ``k``, and the offset from it of a joint frame given in the mesh frame."""
@@ -180,9 +193,9 @@ class ConstrainedFfr:
         """Force and rotor of every joint that has any, its row over v, and the bias of its acceleration."""
         joints = [self._joint(k, q, v) for k in range(len(self.along))]
         rates = np.array([found[2].twist[at] for found, at in zip(joints, self.along, strict=True)])
-        forces = self.reduced.efforts.at(t, q.angles, rates)
+        forces = self.efforts.at(t, q.angles, rates)
         return [
-            (float(forces[k]), float(self.reduced.efforts.rotors[k]), rows[at], float(relative.bias[at]))
+            (float(forces[k]), float(self.efforts.rotors[k]), rows[at], float(relative.bias[at]))
             for k, (at, (inner, outer, relative)) in enumerate(zip(self.along, joints, strict=True))
             for rows in [self._relative_rows(k, inner, outer, relative.transform)]
         ]
@@ -197,7 +210,7 @@ class ConstrainedFfr:
             weight, elastic_weight = data.weight(world[:3, :3].T @ self.mechanism.gravity, q.eta[at])
             result[move] = wrench - weight
             elastic[at] += forces - elastic_weight
-        if self.reduced.efforts.any:
+        if self.efforts.any:
             for force, rotor, row, bias in self._efforts(t, q, v):
                 result += row * (rotor * (row @ a + bias) - force)
         return result
@@ -208,7 +221,7 @@ class ConstrainedFfr:
         for move, at, data in zip(self.twists, self.modes, self.data, strict=True):
             place = np.r_[move, self.elastic.start + at.start : self.elastic.start + at.stop]
             result[np.ix_(place, place)] = data.mass_matrix(q.eta[at])
-        if self.reduced.efforts.rotors.any():
+        if self.efforts.rotors.any():
             for _, rotor, row, _ in self._efforts(t, q, np.zeros(self.size)):
                 result += rotor * np.outer(row, row)
         return result
@@ -220,9 +233,9 @@ class ConstrainedFfr:
         stiffness, damping = np.zeros((2, self.size, self.size))
         at = np.arange(self.elastic.start, self.elastic.stop)
         stiffness[at, at], damping[at, at] = self.reduced.stiffness, self.reduced.damping
-        if self.reduced.efforts.any:
+        if self.efforts.any:
             rows = [row for _, _, row, _ in self._efforts(t, q, v)]
-            gains = self.reduced.efforts.gains(t, q.angles, np.array([r @ v for r in rows]))
+            gains = self.efforts.gains(t, q.angles, np.array([r @ v for r in rows]))
             for row, k, c in zip(rows, *gains, strict=True):
                 stiffness += k * np.outer(row, row)
                 damping += c * np.outer(row, row)

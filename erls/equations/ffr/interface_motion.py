@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.maths.so3 import Array, cross, skew
+from erls.mechanism.links import Link, node_shape6
 
 _SERIES = 0.5  # rad²; below, six to nine terms give full precision
 _A = [(-1) ** k / math.factorial(2 * k + 2) for k in range(9)]
@@ -109,3 +110,17 @@ class InterfaceMotion:
         pose[:3, :3] = turn
         pose[:3, 3] = self.position + u
         return Displaced(pose, jacobian, bias)
+
+
+def node_motion(link: Link, node: int, basis: Array, stiffened: bool) -> InterfaceMotion:
+    """Motion of a node of a link whose elastic coordinates stand for the fields ``basis`` (m, n)."""
+    translation, rotation = node_shape6(link.model, node)
+    second = None
+    if stiffened and link.second_order is not None:
+        second = basis.T @ link.second_order.node(node) @ basis
+    return InterfaceMotion(link.model.nodes[node], translation @ basis, rotation @ basis, second)
+
+
+def bracket(a: Array, b: Array) -> Array:
+    """(6,) Lie bracket of two twists [v; ω]."""
+    return np.concatenate([cross(a[3:], b[:3]) + cross(a[:3], b[3:]), cross(a[3:], b[3:])])

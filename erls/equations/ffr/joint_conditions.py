@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.equations.ffr.interface_motion import InterfaceMotion
-from erls.equations.ffr.recursion import bracket
+from erls.equations.ffr.interface_motion import InterfaceMotion, bracket
 from erls.equations.serial.joint_frames import (
     AXIS_TURNS,
     TURNS,

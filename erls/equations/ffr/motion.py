@@ -58,7 +58,7 @@ def place_frames(
             bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
             bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
             bend(bent, bending, y[modes.first : modes.first + len(modes.stiffness)])
-    for number in range(2 * serial.links):
+    for number in range(frames.node_count):
         node = read_node(reals, integers, frames.nodes + number * NODE)
         if node.moves:
             state = read_node_state(scratch, integers, frames.node_states + number * NODE_STATE)
@@ -73,7 +73,7 @@ def move_frames(
 ) -> None:  # fmt: skip
     """Motion of all frames at accelerations θ̈, η̈; at zero ones of what is free where ``a`` is empty."""
     place_frames(serial, frames, reals, integers, scratch, t, y, v, a)
-    for number in range(2 * serial.links):
+    for number in range(frames.node_count):
         node = read_node(reals, integers, frames.nodes + number * NODE)
         if node.moves:
             displaced = read_node_state(scratch, integers, frames.node_states + number * NODE_STATE)

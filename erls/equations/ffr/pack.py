@@ -56,6 +56,8 @@ class Given:
         Whether links have second-order displacements.
     every_axis : bool
         Count all moments on frames that turn about one axis only, which no joint feels.
+    others : tuple of (link, node)
+        Nodes beside the interfaces whose motion is asked for.
     """
 
     mechanism: Mechanism
@@ -64,6 +66,7 @@ class Given:
     floats: bool
     stiffened: bool
     every_axis: bool = False
+    others: tuple[tuple[int, int], ...] = ()
 
     @property
     def parents(self) -> list[int]:
@@ -234,6 +237,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
     ]
     rigid_links, rigid_states = pack.rigid_links(mechanism, constants, working)
     pairs = [node for found in nodes for node in (found.base, found.inner)]
+    pairs += [node_record(given, k, node) for k, node in given.others]
     sizes = _sizes(given, bodies, nodes)
     none = _Sizes(0, 0, 0)
     segments = []
@@ -251,6 +255,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         body_states=_put(working, [body_state(sizes[k].modes, len(bodies[k].axes)) for k in links]),
         nodes=_put(constants, pairs),
         node_states=_put(working, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in pairs]),
+        node_count=len(pairs),
         bent_bodies=_put(constants, [_bent_body(given, k) for k in links]),
         bent_states=_put(
             working, [bent_state(sizes[k].modes if b.bent else 0, bool(b.warped)) for k, b in enumerate(bodies)]

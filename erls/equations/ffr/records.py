@@ -23,7 +23,8 @@ class Frames(NamedTuple):
     Attributes
     ----------
     bodies, body_states, nodes, node_states : int
-        Places of the first ones; of nodes two for each link, then one for each end of a loop.
+        Places of the first ones; of nodes two for each link, then any others that are asked for.
+    node_count : int
     bent_bodies, bent_states : int
         Places of the first ones; empty records of links without second-order displacements.
     segments, decoupled, condensed : int
@@ -38,6 +39,7 @@ class Frames(NamedTuple):
     body_states: int
     nodes: int
     node_states: int
+    node_count: int
     bent_bodies: int
     bent_states: int
     segments: int

@@ -59,7 +59,7 @@ def fill_segments(
 ) -> None:
     """All links, at a place."""
     place_frames(serial, frames, reals, integers, scratch, t, y, y, y[0:0])
-    for number in range(2 * serial.links):
+    for number in range(frames.node_count):
         if read_node(reals, integers, frames.nodes + number * NODE).moves:
             node_moves(read_node_state(scratch, integers, frames.node_states + number * NODE_STATE))
     for k in range(serial.links):

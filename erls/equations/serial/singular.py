@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from erls.equations.formulation import TreeFormulation
@@ -9,12 +11,21 @@ from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
 
 
-def singular_mass(equations: TreeFormulation, t: float, mass: Array) -> SimulationError:
-    """The failure for a mass matrix (n, n) over independent coordinates that is not positive definite."""
+def _numbered(place: int) -> str:
+    return f"elastic coordinate {place + 1}"
+
+
+def singular_mass(
+    equations: TreeFormulation, t: float, mass: Array, name_of: Callable[[int], str] = _numbered
+) -> SimulationError:
+    """The failure for a mass matrix (n, n) over independent coordinates that is not positive definite.
+
+    ``name_of`` tells elastic coordinates by their place among them.
+    """
     values, vectors = np.linalg.eigh(mass)
     worst = int(equations.free[int(np.abs(vectors[:, 0]).argmax())])
     joints = equations.mechanism.joints
-    name = f"joint {joints[worst].name!r}" if worst < len(joints) else f"elastic coordinate {worst - len(joints) + 1}"
+    name = f"joint {joints[worst].name!r}" if worst < len(joints) else name_of(worst - len(joints))
     return SimulationError(
         Cause.SINGULAR_MASS,
         f"nothing resists the motion of {name}",

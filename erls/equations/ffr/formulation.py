@@ -1,0 +1,270 @@
+"""FFR in independent coordinates as a `TreeFormulation`: what runs ask of it, from its compiled functions.
+
+Independent coordinates y = (free joint coordinates θ_f, elastic coordinates η of all links); prescribed joint
+coordinates follow from time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.linalg as la
+
+from erls.equations.compiled_system import CompiledSystem, function_in
+from erls.equations.ffr.body_frame import elastic_basis
+from erls.equations.ffr.motion_rows import frame_rows, node_motion
+from erls.equations.ffr.pack import Given, pack_frames
+from erls.equations.ffr.records import BODY_STATE, BodyState, Frames
+from erls.equations.ffr.standard_data import StandardData
+from erls.equations.formulation import Energy, Reaction, State
+from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.serial.joint_frames import FrameMotion, attached, carried
+from erls.equations.serial.records import JOINT_STATE, JointState, Serial
+from erls.equations.serial.singular import singular_mass
+from erls.equations.serial.state_series import StateSeries
+from erls.maths.records import python_reader
+from erls.maths.so3 import Array, cross
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.loops import LoopEnd
+
+_read_serial, _read_frames = python_reader(Serial), python_reader(Frames)
+_read_body_state, _read_joint_state = python_reader(BodyState), python_reader(JointState)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Positions and velocities of all links: joint coordinates and rates, η and η̇, poses and twists of the frames."""
+
+    theta: Array
+    rates: Array
+    eta: Array
+    eta_rates: Array
+    poses: list[Array]
+    twists: list[Array]
+
+
+class Ffr:
+    """Equations of motion of a serial chain; a `TreeFormulation`.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    body_frame : str
+        ``"tangent"`` or ``"mean-axis"``, see `elastic_basis`.
+    """
+
+    def __init__(self, mechanism: Mechanism, body_frame: str = "tangent") -> None:
+        self.mechanism, self.body_frame = mechanism, body_frame
+        self.bases = [elastic_basis(link, body_frame) for link in mechanism.links]
+        self.stiffened = "geometric_stiffening" in mechanism.effects
+        self.joints = len(mechanism.joints)
+        sizes = [link.elastic_modes for link in mechanism.links]
+        self.elastic = sum(sizes)
+        ends = np.cumsum(sizes)
+        self.modes = [slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)]  # within η
+        prescribed = np.array([joint.drive.prescribed for joint in mechanism.joints], dtype=bool)
+        self.free_joints = np.flatnonzero(~prescribed)
+        self.prescribed_joints = [int(k) for k in np.flatnonzero(prescribed)]
+        self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
+        self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
+        self.damping = np.concatenate([link.damping for link in mechanism.links])
+        self._tied: dict[tuple[tuple[int, int], ...], CompiledSystem] = {}
+
+    @property
+    def size(self) -> int:
+        """Number of independent coordinates."""
+        return len(self.free)
+
+    @cached_property
+    def given(self) -> Given:
+        """What is packed."""
+        data = [
+            StandardData(link.invariants, basis, self.mechanism.effects)
+            for link, basis in zip(self.mechanism.links, self.bases, strict=True)
+        ]
+        return Given(self.mechanism, self.bases, data, self.body_frame != "tangent", self.stiffened)
+
+    @cached_property
+    def compiled(self) -> CompiledSystem:
+        """The equations."""
+        return pack_frames(self.given)
+
+    def _complete(self, *nodes: tuple[int, int]) -> CompiledSystem:
+        """The same with complete wrenches, and with the motion of more nodes, given by link and number."""
+        if nodes not in self._tied:
+            self._tied[nodes] = pack_frames(replace(self.given, every_axis=True, others=nodes), self.size)
+        return self._tied[nodes]
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Breakpoints of all drives."""
+        return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
+
+    @cached_property
+    def length_scales(self) -> Array:
+        """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
+        free = [replace(j, drive=replace(j.drive, kind="free")) for j in self.mechanism.joints]
+        start = Ffr(replace(self.mechanism, joints=tuple(free)), self.body_frame)
+        theta = np.array([joint.position for joint in self.mechanism.joints])
+        place = np.concatenate([theta, np.zeros(self.elastic)])
+        start.mass_matrix(0.0, place)
+        scales = np.zeros(self.joints + self.elastic)
+        for k, rows in enumerate(frame_rows(start.compiled, self.joints, self.modes)):
+            model, at = self.mechanism.links[k].model, self.modes[k]
+            moved = rows[:3] - np.cross(model.nodes[:, None, :], rows[3:].T).transpose(0, 2, 1)
+            moved[:, :, self.joints + at.start : self.joints + at.stop] += model.translation_shapes @ self.bases[k]
+            scales = np.maximum(scales, np.linalg.norm(moved, axis=1).max(axis=0))
+        smallest = np.full(len(scales), 1e-12)
+        smallest[: self.joints] = 1e-3
+        return np.asarray(np.maximum(scales, smallest)[self.free])
+
+    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        """(n,) forces out of balance on the independent coordinates."""
+        return _residual(self.compiled, t, y, v, a)
+
+    def mass_matrix(self, t: float, y: Array) -> Array:
+        """(n, n) mass matrix over the independent coordinates."""
+        system, out = self.compiled, np.empty((self.size, self.size))
+        system.mass_matrix(system.reals, system.integers, system.scratch, t, _flat(y), out)
+        return out
+
+    def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
+        system, both = self.compiled, np.empty((2, self.size, self.size))
+        system.stiffness_and_damping(
+            system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), both[0], both[1]
+        )
+        return both[0], both[1]
+
+    def acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """(n,) accelerations from the equations of motion.
+
+        Raises
+        ------
+        SimulationError
+            The mass matrix is not positive definite; names the coordinate.
+        """
+        force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
+        try:
+            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
+        except la.LinAlgError:
+            raise singular_mass(self, t, mass, self._name) from None
+
+    def _name(self, place: int) -> str:
+        """Of an elastic coordinate within η."""
+        number = next(k for k, at in enumerate(self.modes) if place < at.stop)
+        return f"the elastic coordinates of link {self.mechanism.links[number].name!r}"
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
+        y, v = np.zeros(self.size), np.zeros(self.size)
+        f = len(self.free_joints)
+        y[:f] = [self.mechanism.joints[k].position for k in self.free_joints]
+        v[:f] = [self.mechanism.joints[k].rate for k in self.free_joints]
+        if self.mechanism.static_start:
+            y = held_equilibrium(self, y, self.free_joints)
+        return y, v
+
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries:
+        """States at (k,) times: floating frames, modal coordinates of the fields that deform them, and joint angles.
+
+        The joint coordinate is the angle between the displaced interface frames, so that angle and coordinate agree.
+        """
+        system, links = self.compiled, len(self.mechanism.links)
+        out = np.empty((len(t), 14 * links + 12))
+        states = function_in("erls.equations.ffr.states", "states")()
+        states(system.reals, system.integers, system.scratch, _flat(t), _flat(y), _flat(v), out)
+        flat = out[:, : 12 * links].reshape(len(t), links, 12)
+        poses = np.zeros((len(t), links, 4, 4))
+        poses[..., :3, :3] = flat[..., :9].reshape(len(t), links, 3, 3)
+        poses[..., :3, 3], poses[..., 3, 3] = flat[..., 9:], 1.0
+        theta, rates = out[:, 12 * links : 14 * links].reshape(len(t), links, 2).transpose(2, 0, 1).copy()
+        eta = np.asarray(y)[:, len(self.free_joints) :]
+        modal = [eta[:, at] @ basis.T for basis, at in zip(self.bases, self.modes, strict=True)]
+        return StateSeries(np.asarray(t), [poses[:, k] for k in range(links)], modal, theta, theta, rates)
+
+    def state(self, t: float, y: Array, v: Array) -> State:
+        """The same at one time."""
+        return self.series(np.array([t]), np.array([y]), np.array([v])).states()[0]
+
+    def motion(self, t: float, y: Array, v: Array) -> Motion:
+        """Poses and twists of all floating frames at a state."""
+        state, f, system = self.state(t, y, v), len(self.free_joints), self.compiled
+        _residual(system, t, y, v, np.zeros(0))
+        twists = [found.twist.copy() for found in self._bodies(system)]
+        return Motion(state.coordinates, state.rates, y[f:], v[f:], state.poses, twists)
+
+    def energy(self, t: float, y: Array, v: Array) -> Energy:
+        """Energies of a state."""
+        system, out = self.compiled, np.empty(4)
+        energy = function_in("erls.equations.ffr.energy", "energy")()
+        energy(system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), out)
+        return Energy(*out.tolist())
+
+    def _bodies(self, system: CompiledSystem) -> list[BodyState]:
+        """What a residual left."""
+        serial = _read_serial(system.reals, system.integers, int(system.integers[0]))
+        frames = _read_frames(system.reals, system.integers, serial.own)
+        places = [frames.body_states + k * BODY_STATE for k in range(self.joints)]
+        return [_read_body_state(system.scratch, system.integers, place) for place in places]
+
+    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
+        """Frames on displaced nodes of links, with rows over (θ, η); see `TreeFormulation`."""
+        nodes = [(int(end.link or 0), end.node) for end in ends]
+        system, state = self._complete(*nodes), self.state(t, y, v)
+        system.mass_matrix(
+            system.reals, system.integers, system.scratch, t, _flat(y), np.empty((self.size, self.size))
+        )
+        _residual(system, t, y, v, np.zeros(0))
+        rows, bodies = frame_rows(system, self.joints, self.modes), self._bodies(system)
+        result: list[FrameMotion] = []
+        for number, ((k, _), end) in enumerate(zip(nodes, ends, strict=True)):
+            local = node_motion(system, 2 * self.joints + number, self.joints, self.modes[k], self.elastic)
+            link = FrameMotion(state.poses[k], rows[k], bodies[k].twist, bodies[k].twist_rate)
+            result.append(attached(carried(link, local), end.frame))
+        return result
+
+    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
+        """Joint reactions at a state: what the links from there outward need."""
+        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
+
+    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
+        """Joint reactions that give these accelerations."""
+        system, state = self._complete(), self.state(t, y, v)
+        _residual(system, t, y, v, a)
+        serial = _read_serial(system.reals, system.integers, int(system.integers[0]))
+        result: list[Reaction] = []
+        for k, (link, body) in enumerate(zip(self.mechanism.links, self._bodies(system), strict=True)):
+            place = serial.joint_states + k * JOINT_STATE
+            forces = _read_joint_state(system.scratch, system.integers, place).forces
+            shape, _ = link.model.node_shape(link.inboard.node)
+            node = link.inboard.position + shape @ state.modal[k]
+            turn, wrench = state.poses[k][:3, :3], body.wrench
+            effort = forces[0] if self.mechanism.joints[k].drive.prescribed else forces[1]
+            moment = wrench[3:] - cross(node, wrench[:3])
+            result.append(Reaction(turn @ wrench[:3], turn @ moment, float(effort)))
+        return result
+
+    def describe(self) -> dict[str, Any]:
+        """Names and sizes for reports."""
+        return {
+            "formulation": "ffr",
+            "body_frame": self.body_frame,
+            "joints": self.joints,
+            "elastic_coordinates": self.elastic,
+            "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
+        }
+
+
+def _flat(x: Array) -> Array:
+    return np.ascontiguousarray(x, dtype=float)
+
+
+def _residual(system: CompiledSystem, t: float, y: Array, v: Array, a: Array) -> Array:
+    out = np.empty(system.size)
+    system.residual(system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), _flat(a), out)
+    return out
