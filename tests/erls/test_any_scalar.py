@@ -10,17 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import chain_cases
+import ffr_cases
 import numpy as np
 import pytest
 import stiffened_cases
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.erls.pack import pack_chain
+from erls.equations.ffr.formulation import Ffr
 from erls.maths.jit import any_scalar
 
 CASES: list[tuple[Any, str]] = [
     (chain_cases, "controllers"),
     (stiffened_cases, "arms, mixed"),
+    (ffr_cases, "tangent: controllers"),
+    (ffr_cases, "mean-axis stiffened: prescribed in the middle"),
 ]
 STEP = 1e-30
 AGREE = 1e-6
@@ -43,9 +47,9 @@ def _real(system: CompiledSystem, t: float, arguments: list[np.ndarray], reals: 
 @pytest.mark.parametrize(("cases", "name"), CASES, ids=[name for _, name in CASES])
 def test_complex_steps_agree_with_differences(cases: Any, name: str, tmp_path: Path) -> None:
     chain = cases.equations(tmp_path, name)
-    system = pack_chain(chain.mechanism)
+    system = chain.compiled if isinstance(chain, Ffr) else pack_chain(chain.mechanism)
     residual = any_scalar(system.residual)
-    at = cases.states(chain, name)[0]
+    at = (chain_cases if isinstance(chain, Ffr) else cases).states(chain, name)[0]
     arguments = [at.y, at.v, at.a]
     base = _real(system, at.t, arguments, system.reals)
     plain = np.zeros(system.size, dtype=complex)

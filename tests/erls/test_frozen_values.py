@@ -56,7 +56,11 @@ def test_the_equations_are_those_of_the_table(table: str, case: str, tables: dic
         for found in ways:
             if "acceleration" not in frozen:
                 found.pop("acceleration", None)
-            assert not frozen_values.compare(found, frozen, SAME, _free(system))
+            problems = frozen_values.compare(found, frozen, SAME, _free(system))
+            if problems and isinstance(system, ClosedChain):
+                rounding = frozen_values.disturbed(system, frozen_values.closed(at, frozen))
+                problems = frozen_values.compare(found, frozen, SAME, _free(system), rounding)
+            assert not problems
 
 
 def test_a_difference_is_named() -> None:

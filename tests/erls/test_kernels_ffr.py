@@ -1,11 +1,10 @@
-"""Compiled floating frames: against the NumPy equations, against the same source uncompiled, and in runs."""
+"""Compiled floating frames: against the same source uncompiled, and in runs."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,28 +36,13 @@ def _distance(found: np.ndarray, expected: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("case", ffr_cases.CASES)
-def test_kernels_equal_the_numpy_equations(case: str, tmp_path: Path) -> None:
-    """Residual (joints, modes, and modes undeformed, where no stiffness dwarfs inertia), matrices, acceleration."""
+def test_mass_matrices_are_symmetric(case: str, tmp_path: Path) -> None:
+    """To the last digit; their values and those of all functions stand in `test_frozen_values`."""
     chain = ffr_cases.equations(tmp_path, case)
-    assert chain.compiled is not None
-    f = len(chain.free_joints)
     for at in chain_cases.states(chain, case):
-        found = chain_cases.evaluate(chain.compiled, at)
-        residual = chain.residual(at.t, at.y, at.v, at.a)
-        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
-        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
-        straight = np.concatenate([at.y[:f], 0 * at.y[f:]])
-        inertial = chain_cases.evaluate(chain.compiled, chain_cases.State(at.t, straight, at.v, at.a))["residual"]
-        assert _distance(inertial[f:], chain.residual(at.t, straight, at.v, at.a)[f:]) <= LIKE_NUMPY
         mass = chain.mass_matrix(at.t, at.y)
-        assert _distance(found["mass"], mass) <= LIKE_NUMPY
-        np.testing.assert_array_equal(found["mass"], found["mass"].T)
-        stiffness, damping = chain.stiffness_and_damping(at.t, at.y, at.v)
-        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
-        assert _distance(found["damping"], damping) <= LIKE_NUMPY
-        if np.linalg.eigvalsh(mass)[0] > 0:  # inertia linear in the deformation alone need not be positive
-            assert _distance(found["acceleration"], chain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
-        else:
+        np.testing.assert_array_equal(mass, mass.T)
+        if np.linalg.eigvalsh(mass)[0] <= 0:  # inertia linear in the deformation alone need not be positive
             assert case in ("tangent: without inertia_second_order", "tangent: only inertia_first_order")
 
 
@@ -117,12 +101,12 @@ def test_one_link_runs_as_in_erls() -> None:
 class _Plain:
     """A system without its compiled form."""
 
+    compiled = None
+
     def __init__(self, chain: Ffr) -> None:
         self.chain = chain
 
     def __getattr__(self, name: str) -> Any:
-        if name == "compiled":
-            raise AttributeError(name)
         return getattr(self.chain, name)
 
 
@@ -143,21 +127,6 @@ def test_generalized_alpha_takes_the_same_steps(case: str, tmp_path: Path) -> No
     # where an estimate meets the tolerance to rounding, one iteration more or less
     assert fast.work.rhs_calls == pytest.approx(slow.work.rhs_calls, rel=0.02)
     assert fast.work.factorizations == pytest.approx(slow.work.factorizations, abs=4)
-
-
-@pytest.mark.parametrize("case", [c for c in ffr_cases.CASES if "stiffened" in c])
-def test_modal_inertia_is_compiled(case: str, tmp_path: Path) -> None:
-    """Of second order, with the stiffening that it belongs to: residual and mass matrix, against NumPy."""
-    given = ffr_cases.equations(tmp_path, case)
-    mechanism = replace(given.mechanism, effects=given.mechanism.effects | {"modal_inertia"})
-    chain = Ffr(mechanism, given.body_frame)
-    f = len(chain.free_joints)
-    for at in chain_cases.states(chain, case):
-        found = chain_cases.evaluate(chain.compiled, at)
-        residual = chain.residual(at.t, at.y, at.v, at.a)
-        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
-        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
-        assert _distance(found["mass"], chain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
 
 
 def test_pieces_of_links_run_compiled() -> None:
