@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from erls.equations.serial.joint_frames import FrameMotion
 from erls.equations.system import SecondOrderSystem
@@ -106,6 +106,15 @@ class Formulation(Protocol):
 
     def describe(self) -> dict[str, Any]:
         """Names and sizes for reports."""
+
+
+@runtime_checkable
+class Reporting(Protocol):
+    """Equations whose answers to what runs report are compiled in modules of their own."""
+
+    @property
+    def reporting(self) -> tuple[str, ...]:
+        """These modules."""
 
 
 class TreeFormulation(Formulation, SecondOrderSystem, Protocol):

@@ -7,7 +7,7 @@ from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias
 
-from erls.equations.formulation import Formulation
+from erls.equations.formulation import Formulation, Reporting
 from erls.equations.registry import system_of
 from erls.equations.substructures import solved
 from erls.integrate.base import Observer, Options, Solution
@@ -96,10 +96,12 @@ def _compile_named(system: Any, settings: Simulation) -> None:
         if system.compiled is not None:
             system.compiled.load_acceleration()
         return
-    with compiling_beside(loop):
+    reporting = system.reporting if isinstance(system, Reporting) else ()
+    with compiling_beside(loop, *reporting):
         compiled = system.compiled
     if compiled is not None:
-        import_module(loop)
+        for module in (loop, *reporting):
+            import_module(module)
 
 
 INTEGRATIONS: dict[str, Integration] = {

@@ -87,14 +87,16 @@ def compiled_before(module: str) -> bool:
 
 
 @contextmanager
-def compiling_beside(module: str) -> Iterator[None]:
-    """While kernels are compiled here, have those of another module compiled too, by a process of their own."""
-    if compiled_before(module) or (os.cpu_count() or 1) < 2:
+def compiling_beside(*modules: str) -> Iterator[None]:
+    """While kernels are compiled here, have those of other modules compiled too, by a process of their own."""
+    waiting = [module for module in modules if not compiled_before(module)]
+    if not waiting or (os.cpu_count() or 1) < 2:
         yield
         return
-    _tell_of(module)
+    for module in waiting:
+        _tell_of(module)
     process = subprocess.Popen(
-        [sys.executable, "-c", f"import {module}"],
+        [sys.executable, "-c", f"import {', '.join(waiting)}"],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

@@ -87,6 +87,11 @@ class Erls:
         return f"erls.equations.erls.{'stiffened_states' if self.stiffened else name}"
 
     @property
+    def reporting(self) -> tuple[str, ...]:
+        """Modules of what runs report: states and energies."""
+        return tuple(dict.fromkeys(map(self._module, ("energy", "states"))))
+
+    @property
     def breakpoints(self) -> tuple[float, ...]:
         """Breakpoints of all drives."""
         return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))

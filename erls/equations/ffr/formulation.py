@@ -100,6 +100,11 @@ class Ffr:
         return self._tied[nodes]
 
     @property
+    def reporting(self) -> tuple[str, ...]:
+        """Modules of what runs report: states and energies."""
+        return "erls.equations.ffr.energy", "erls.equations.ffr.states"
+
+    @property
     def breakpoints(self) -> tuple[float, ...]:
         """Breakpoints of all drives."""
         return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
