@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -12,12 +13,45 @@ from erls.maths.so3 import Array, cross_all, skew
 from fe_import.modal.inertia import mass_properties
 from fe_import.modal.model import ModalModel
 from fe_import.modal.second_order import SecondOrder, pair_numbers
-from fe_import.model import IntArray
+from fe_import.model import IntArray, InterfaceNode
 from fe_import.second_order.composition import composed, composed_rotation, twice_turned
 from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_masses, of_modes, of_moments
 
-if TYPE_CHECKING:
-    from erls.mechanism.links import Link
+
+class Load(Protocol):
+    """A mass on a node of a link, as `erls.mechanism.links.Payload` is one."""
+
+    @property
+    def node(self) -> int:
+        """Its node."""
+
+    @property
+    def mass(self) -> float:
+        """[kg]"""
+
+    @property
+    def offset(self) -> Array:
+        """(3,) place of its centre from the node, mesh axes [m]."""
+
+    @property
+    def inertia(self) -> Array:
+        """(3, 3) about its centre, mesh axes [kg m²]."""
+
+
+class Loaded(Protocol):
+    """A reduced link with what it carries, as `erls.mechanism.links.Link` is one."""
+
+    @property
+    def model(self) -> ModalModel:
+        """In orthonormal form."""
+
+    @property
+    def inboard(self) -> InterfaceNode:
+        """Where its joint sits."""
+
+    @property
+    def payloads(self) -> Sequence[Load]:
+        """Masses on its nodes."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +127,7 @@ class LinkSecondOrder:
         return np.where(self._pairs[0] == self._pairs[1], 0.5, 1.0)
 
 
-def link_second_order(link: Link) -> LinkSecondOrder | None:
+def link_second_order(link: Loaded) -> LinkSecondOrder | None:
     """Second-order kinematics of a link; None where its modal model holds none."""
     model = link.model
     field = model.second_order or (_rigid(model) if model.elastic_modes == 0 else None)
