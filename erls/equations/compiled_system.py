@@ -10,6 +10,15 @@ memory that its functions may use within a call. Coordinates and norms are those
     acceleration(reals, integers, scratch, t, y, v, out) -> status   out (n,) = M⁻¹ f; status 0, or 1 + the number of a
                                                                      coordinate whose motion nothing resists
 
+A tree of links says how frames move that loops hold (the ends on links of `erls.mechanism.loops.Loop`, outer ones before
+inner ones, loop after loop):
+
+    frames(reals, integers, scratch, t, y, v, out)                   row of out: pose (12,) in the world, twist (6,), its
+                                                                     derivative (6,) at zero accelerations, and the rows
+                                                                     (6, n + p) of the twist over the velocities and the
+                                                                     rates of the p prescribed joints; twists are in the
+                                                                     axes of the frame
+
 A system may know better than dense factors how to solve (M + α C + β K) x = b with its mass, damping and stiffness at a
 state; α and β are real or complex, like ``factors`` and ``b``:
 
@@ -47,6 +56,7 @@ FACTOR_COMPLEX: Any
 SOLVE_COMPLEX: Any
 ENERGY: Any
 STATES: Any
+FRAMES: Any
 if ENABLED:
     from numba import types as _t
 
@@ -63,9 +73,10 @@ if ENABLED:
     SOLVE_COMPLEX = _t.void(REALS, INTEGERS, COMPLEX, COMPLEX)
     ENERGY = _t.void(*_constants, REALS, REALS, REALS)
     STATES = _t.void(REALS, INTEGERS, REALS, REALS, MATRIX, MATRIX, MATRIX)
+    FRAMES = _t.void(*_constants, REALS, REALS, MATRIX)
 else:
     REALS = INTEGERS = MATRIX = RESIDUAL = MASS_MATRIX = STIFFNESS_AND_DAMPING = ACCELERATION = None
-    COMPLEX = FACTOR = SOLVE = FACTOR_COMPLEX = SOLVE_COMPLEX = ENERGY = STATES = None
+    COMPLEX = FACTOR = SOLVE = FACTOR_COMPLEX = SOLVE_COMPLEX = ENERGY = STATES = FRAMES = None
 
 
 def pointer(signature: Any) -> Any:
@@ -101,11 +112,17 @@ class CompiledSystem:
     stiffness_and_damping: Callable[..., None]
     load_acceleration: Callable[[], Callable[..., int]]
     factoring: Factoring | None = field(default=None, kw_only=True)
+    load_frames: Callable[[], Callable[..., None]] | None = field(default=None, kw_only=True)
 
     @cached_property
     def acceleration(self) -> Callable[..., int]:
         """Compiled when it is asked for: implicit integrators do without."""
         return self.load_acceleration()
+
+    @cached_property
+    def frames(self) -> Callable[..., None] | None:
+        """Compiled when it is asked for: chains without loops do without."""
+        return None if self.load_frames is None else self.load_frames()
 
 
 def function_in(module: str, name: str) -> Callable[[], Callable[..., Any]]:

@@ -57,6 +57,19 @@ def invert_pose(pose: Array, out: Array) -> None:
 
 
 @part
+def compose_poses(first: Array, second: Array, out: Array) -> None:
+    """The second pose seen from where the first one is seen from; into another array."""
+    for i in range(3):
+        for j in range(3):
+            out[3 * i + j] = (
+                first[3 * i] * second[j] + first[3 * i + 1] * second[3 + j] + first[3 * i + 2] * second[6 + j]
+            )
+        out[9 + i] = (
+            first[9 + i] + first[3 * i] * second[9] + first[3 * i + 1] * second[10] + first[3 * i + 2] * second[11]
+        )
+
+
+@part
 def add_motion_cross(x: Array, y: Array, factor: Any, out: Array) -> None:
     """Add ``factor`` times ad(x) y, the Lie bracket of two motions."""
     v0, v1, v2, a0, a1, a2 = x[0], x[1], x[2], x[3], x[4], x[5]

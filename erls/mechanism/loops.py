@@ -5,6 +5,7 @@ A new kind is one line of `LOOP_TYPES`: what of the relative motion of its two f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from erls.maths.so3 import Array
@@ -119,3 +120,8 @@ class Loop:
     def prescribed(self) -> bool:
         """Whether its coordinate follows a motion."""
         return self.freedom is not None and self.freedom.drive.prescribed
+
+
+def loop_ends(loops: Sequence[Loop]) -> list[tuple[int, LoopEnd]]:
+    """Ends on links with the number of the link; of each loop the outer one before the inner one."""
+    return [(end.link, end) for loop in loops for end in (loop.outer, loop.inner) if end.link is not None]

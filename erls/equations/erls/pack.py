@@ -19,7 +19,8 @@ from erls.maths.se3 import inverse, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joints import Joint
-from erls.mechanism.links import Link
+from erls.mechanism.links import Link, node_shape6
+from erls.mechanism.loops import LoopEnd, loop_ends
 
 _PARALLEL = 1e-13  # sine of the angle between axes that count as one
 DENSE = 40  # coordinates up to which dense factors cost less than elimination link by link
@@ -158,6 +159,21 @@ def _bend(mechanism: Mechanism, k: int, found: list[Shapes], axes: Array) -> own
     )
 
 
+def _end(link: Link, shape: Shapes, bends: bool, end: LoopEnd) -> own.End:
+    """Constants of a frame that a loop holds."""
+    n, second = shape.modes.shape[1], link.second_order if bends else None
+    bows = np.zeros((0, n, n))
+    if second is not None:
+        bows = shape.modes.T @ second.node(end.node) @ shape.modes
+    return own.End(
+        link=end.link or 0,
+        position=link.model.nodes[end.node],
+        shapes=np.vstack(node_shape6(link.model, end.node)) @ shape.modes,
+        bows=bows,
+        offset=pack.pose_numbers(end.frame),
+    )
+
+
 def stiffened(mechanism: Mechanism) -> bool:
     """Whether second-order displacements enter the equations."""
     return "geometric_stiffening" in mechanism.effects and any(
@@ -186,6 +202,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     axes = [np.eye(3)] * count if complete else rotation_axes(mechanism.joints)
     bends = stiffened(mechanism)
     curved = [bends and link.second_order is not None for link in links]
+    ends = loop_ends(mechanism.loops)
     integers: list[int] = [0]
     constants, scratch, condensed = Memory(integers), Memory(integers), Memory(integers)
 
@@ -246,6 +263,9 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         softening=int("spin_softening" in mechanism.effects),
         weight=int(bool(np.any(mechanism.gravity))),
         complete=int(complete),
+        end_count=len(ends),
+        ends=pack.put_all(constants, [_end(links[k], found[k], bends, end) for k, end in ends]),
+        end_states=pack.put_all(scratch, [own.end_state(6 + modes[k]) for k, _ in ends]),
     )
     rigid, rigid_state = pack.rigid_links(mechanism, constants, scratch)
     serial = Serial(
@@ -290,4 +310,5 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         stiffness_and_damping=stiffness.stiffness_and_damping,
         load_acceleration=function_in(solving, "acceleration"),
         factoring=factoring,
+        load_frames=function_in(f"{own_name}.{'stiffened_ends' if bends else 'ends'}", "frames"),
     )

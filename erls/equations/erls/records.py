@@ -35,6 +35,8 @@ class Chain(NamedTuple):
         Whether gravity acts.
     complete : int
         Whether wrenches are, also where no joint feels them.
+    end_count, ends, end_states : int
+        How many frames loops hold on links, and places of the first `End` and `EndState`.
     """
 
     links: int
@@ -52,6 +54,9 @@ class Chain(NamedTuple):
     softening: int
     weight: int
     complete: int
+    end_count: int
+    ends: int
+    end_states: int
 
 
 class Link(NamedTuple):
@@ -347,6 +352,51 @@ def change(size: int, modes: int) -> Change:
     )
 
 
+class End(NamedTuple):
+    """A frame that a loop holds on a link.
+
+    Attributes
+    ----------
+    link : int
+    position : (3,) array
+        Of its node, in the link's frame.
+    shapes : (6, n) array
+        Displacement and rotation vector of the node per (u, q_d).
+    bows : (6, n, n) array
+        Ψ of ½ qᵀ Ψ q, which they gain by second order; no rows where they gain nothing.
+    offset : (12,) array
+        Pose of the frame from the node.
+    """
+
+    link: int
+    position: Vector
+    shapes: Matrix
+    bows: Stack
+    offset: Vector
+
+
+class EndState(NamedTuple):
+    """Working memory of such a frame: the node in the link's frame, pose (12,), twist and its derivative (6,), rows (6, n)
+    of its twist over the rates of (u, q_d); displacement (6,) of the node, forces (6,) on it, and a pose (12,) to spare.
+    """
+
+    pose: Vector
+    twist: Vector
+    twist_rate: Vector
+    rows: Matrix
+    displacement: Vector
+    force: Vector
+    spare: Vector
+
+
+def end_state(size: int) -> EndState:
+    """Memory for a frame on a link with n = ``size``."""
+    six = [np.zeros(6) for _ in range(4)]
+    return EndState(np.zeros(12), six[0], six[1], np.zeros((6, size)), six[2], six[3], np.zeros(12))
+
+
+read_end, read_end_state = reader(End), reader(EndState)
+END, END_STATE = table_size(End), table_size(EndState)
 read_chain, read_link, read_link_state = reader(Chain), reader(Link), reader(LinkState)
 read_bend, read_bend_state = reader(Bend), reader(BendState)
 LINK, LINK_STATE = table_size(Link), table_size(LinkState)

@@ -104,7 +104,30 @@ def _push_along(bend: Bend, state: LinkState, bent: BendState, slides: int, scre
 
 
 @part
-def _hand_back(
+def push_joint(
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int, bends: Any
+) -> Any:
+    """Force along a joint by those on its link and on all that it bears, before `hand_back`."""
+    joint = read_joint(reals, integers, serial.joints + k * JOINT)
+    state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
+    total = dot6(joint.screw, state.wrench)
+    if read_link(reals, integers, chain.links + k * LINK).parent < 0:
+        return total
+    # the joint turns the displacement along: u̇ holds -ad(S θ̇) u
+    clear(state.point)
+    add_motion_cross(state.u, joint.screw, 1.0, state.point)
+    if bends is not None:
+        coordinate = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).coordinate
+        bend = read_bend(reals, integers, chain.bends + k * BEND)
+        bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
+        if bend.armed:
+            _turn_arm_back(bend, state, bent, coordinate[0])
+        total += _push_along(bend, state, bent, joint.slides, joint.screw)
+    return total + dot6(state.point, state.force)
+
+
+@part
+def hand_back(
     serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int, bends: Any
 ) -> None:
     """Forces of a link and of all that it bears, on its parent."""
@@ -166,17 +189,7 @@ def balance(
         for i in range(len(modes.stiffness)):
             place = modes.first + i
             out[place] = state.modal[6 + i] + modes.stiffness[i] * y[place] + modes.damping[i] * v[place]
-        total = dot6(joint.screw, state.wrench) + joint.rotor * motion.coordinate[2]
-        if parent >= 0:  # the joint turns the displacement along: u̇ holds -ad(S θ̇) u
-            clear(state.point)
-            add_motion_cross(state.u, joint.screw, 1.0, state.point)
-            if bends is not None:
-                bend = read_bend(reals, integers, chain.bends + k * BEND)
-                bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
-                if bend.armed:
-                    _turn_arm_back(bend, state, bent, motion.coordinate[0])
-                total += _push_along(bend, state, bent, joint.slides, joint.screw)
-            total += dot6(state.point, state.force)
+        total = push_joint(serial, chain, reals, integers, scratch, k, bends) + joint.rotor * motion.coordinate[2]
         motion.forces[1] = 0.0
         if joint.acts:
             motion.forces[1] = effort(
@@ -186,7 +199,7 @@ def balance(
         if joint.place >= 0:
             out[joint.place] = motion.forces[0]
         if parent >= 0:
-            _hand_back(serial, chain, reals, integers, scratch, k, bends)
+            hand_back(serial, chain, reals, integers, scratch, k, bends)
 
 
 @kernel(contract.RESIDUAL, counted=False)

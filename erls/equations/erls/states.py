@@ -9,22 +9,10 @@ from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import LINK, LINK_STATE, read_chain, read_link, read_link_state
 from erls.equations.erls.second_order import bend_frames
 from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
-from erls.maths.jit import kernel, part, spliced
+from erls.maths.jit import kernel, spliced
 from erls.maths.so3 import Array
+from erls.maths.spatial import compose_poses
 from fe_import.model import IntArray
-
-
-@part
-def _compose(before: Array, pose: Array, out: Array) -> None:
-    """A pose (12,) behind another."""
-    for i in range(3):
-        for j in range(3):
-            out[3 * i + j] = (
-                before[3 * i] * pose[j] + before[3 * i + 1] * pose[3 + j] + before[3 * i + 2] * pose[6 + j]
-            )
-        out[9 + i] = (
-            before[9 + i] + before[3 * i] * pose[9] + before[3 * i + 1] * pose[10] + before[3 * i + 2] * pose[11]
-        )
 
 
 @spliced
@@ -48,7 +36,7 @@ def put_states(
                 for i in range(12):
                     pose[i] = motion.pose[i]
             else:
-                _compose(found[12 * parent : 12 * parent + 12], motion.pose, pose)
+                compose_poses(found[12 * parent : 12 * parent + 12], motion.pose, pose)
             for values in (state.q, state.q_rate, motion.coordinate[:2]):
                 for i in range(len(values)):
                     found[at + i] = values[i]

@@ -35,6 +35,11 @@ def step_parts(before: Array, revolute: bool, after: Array) -> Array:
     return np.stack(parts)
 
 
+def pose_numbers(pose: Array) -> Array:
+    """(12,) numbers of a pose (4, 4), see `erls.maths.spatial`."""
+    return np.concatenate([pose[:3, :3].ravel(), pose[:3, 3]])
+
+
 def joint_acts(joint: MechanismJoint) -> bool:
     """Whether drive, spring, damper, friction or rotor act in a joint."""
     return bool(joint.forces.active or joint.rotor_inertia or joint.drive.kind not in ("free", "motion"))
@@ -74,9 +79,9 @@ def modes_record(first: int, mass: Array, link: Link, decoupled: DecoupledModes)
 
 
 def put_all(memory: Memory, records: Sequence[Any]) -> int:
-    """Records one after the other; the place of the first."""
-    first, *_ = [memory.put(record) for record in records]
-    return first
+    """Records one after the other; the place of the first, -1 without any."""
+    places = [memory.put(record) for record in records]
+    return places[0] if places else -1
 
 
 def joint_states(scratch: Memory, count: int) -> int:

@@ -1,0 +1,162 @@
+"""Motion of frames on displaced nodes of links, which loops hold; see `erls.equations.compiled_system`.
+
+Rows of their twists over velocities are what unit forces on them do to the coordinates: these pass from link to parent
+as all forces do.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from erls.equations import compiled_system as contract
+from erls.equations.erls.frames import move_frames
+from erls.equations.erls.records import (
+    BEND_STATE,
+    END,
+    END_STATE,
+    LINK,
+    LINK_STATE,
+    Chain,
+    read_bend_state,
+    read_chain,
+    read_end,
+    read_end_state,
+    read_link,
+    read_link_state,
+)
+from erls.equations.erls.residual import hand_back, push_joint
+from erls.equations.erls.second_order import bend_frames
+from erls.equations.serial.displaced_node import move_node
+from erls.equations.serial.records import (
+    JOINT,
+    JOINT_STATE,
+    MODES,
+    Serial,
+    read_joint,
+    read_joint_state,
+    read_modes,
+    read_serial,
+)
+from erls.maths.jit import kernel, part
+from erls.maths.products import clear, copy
+from erls.maths.so3 import Array
+from erls.maths.spatial import add_motion_cross, compose_poses, transform_force_back, transform_motion
+from fe_import.model import IntArray
+
+
+@part
+def _move_end(
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, number: int, found: Array
+) -> None:
+    """Pose, twist and its derivative into the first 24 numbers of ``found``."""
+    end = read_end(reals, integers, chain.ends + number * END)
+    moved = read_end_state(scratch, integers, chain.end_states + number * END_STATE)
+    state = read_link_state(scratch, integers, chain.states + end.link * LINK_STATE)
+    twist, rate, pose = found[12:18], found[18:24], found[:12]
+    move_node(
+        end.position, end.shapes, end.bows, state.q, state.q_rate, state.q_acceleration, moved.pose, moved.twist,
+        moved.twist_rate, moved.rows, moved.displacement,
+    )  # fmt: skip
+    transform_motion(moved.pose, state.twist, twist)
+    transform_motion(moved.pose, state.twist_rate, rate)
+    add_motion_cross(twist, moved.twist, 1.0, rate)
+    for i in range(6):
+        twist[i] += moved.twist[i]
+        rate[i] += moved.twist_rate[i]
+    transform_motion(end.offset, twist, twist)
+    transform_motion(end.offset, rate, rate)
+    compose_poses(moved.pose, end.offset, pose)
+    k = end.link
+    while k >= 0:
+        copy(pose, moved.spare)
+        compose_poses(read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose, moved.spare, pose)
+        k = read_link(reals, integers, chain.links + k * LINK).parent
+
+
+@part
+def _put_row(
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, number: int, i: int, n: int,
+    row: Array, bends: Any,
+) -> None:  # fmt: skip
+    """What a unit force along component ``i`` of an end's twist does to the coordinates, prescribed ones last."""
+    end = read_end(reals, integers, chain.ends + number * END)
+    moved = read_end_state(scratch, integers, chain.end_states + number * END_STATE)
+    force = moved.force
+    clear(row)
+    clear(force)
+    force[i] = 1.0
+    transform_force_back(end.offset, force, force)
+    k = end.link
+    while k >= 0:
+        _clear_forces(chain, integers, scratch, k, bends)
+        k = read_link(reals, integers, chain.links + k * LINK).parent
+    state = read_link_state(scratch, integers, chain.states + end.link * LINK_STATE)
+    transform_force_back(moved.pose, force, state.wrench)
+    for j in range(len(state.modal)):
+        for m in range(6):
+            state.modal[j] += force[m] * moved.rows[m, j]
+    for j in range(6):
+        state.force[j] = state.modal[j]
+    if bends is not None:
+        push = read_bend_state(scratch, integers, chain.bend_states + end.link * BEND_STATE).push
+        for j in range(6):
+            push[j] = state.modal[j]
+    k = end.link
+    while k >= 0:
+        modal = read_link_state(scratch, integers, chain.states + k * LINK_STATE).modal
+        first = read_modes(reals, integers, serial.modes + k * MODES).first
+        for j in range(len(modal) - 6):
+            row[first + j] = modal[6 + j]
+        place = read_joint(reals, integers, serial.joints + k * JOINT).place
+        if place < 0:
+            place = n + _prescribed_before(serial, reals, integers, k)
+        row[place] = push_joint(serial, chain, reals, integers, scratch, k, bends)
+        parent = read_link(reals, integers, chain.links + k * LINK).parent
+        if parent >= 0:
+            hand_back(serial, chain, reals, integers, scratch, k, bends)
+        k = parent
+
+
+@part
+def _clear_forces(chain: Chain, integers: IntArray, scratch: Array, k: int, bends: Any) -> None:
+    state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
+    clear(state.wrench)
+    clear(state.force)
+    clear(state.modal)
+    if bends is not None:
+        clear(read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).push)
+
+
+@part
+def _prescribed_before(serial: Serial, reals: Array, integers: IntArray, k: int) -> int:
+    """How many prescribed joints have smaller numbers."""
+    count = 0
+    for j in range(k):
+        if read_joint(reals, integers, serial.joints + j * JOINT).place < 0:
+            count += 1
+    return count
+
+
+@part
+def put_frames(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
+) -> None:
+    """Of all ends; ``bends`` as in `erls.equations.erls.residual`."""
+    serial = read_serial(reals, integers, integers[0])
+    chain = read_chain(reals, integers, serial.own)
+    move_frames(serial, chain, reals, integers, scratch, t, y, v, y[0:0])
+    if bends is not None:
+        bend_frames(serial, chain, reals, integers, scratch, True)
+    for number in range(chain.end_count):
+        found = out[number]
+        _move_end(serial, chain, reals, integers, scratch, number, found)
+        size = (len(found) - 24) // 6
+        for i in range(6):
+            row = found[24 + i * size : 24 + (i + 1) * size]
+            _put_row(serial, chain, reals, integers, scratch, number, i, len(y), row, bends)
+
+
+@kernel(contract.FRAMES, counted=False)
+def frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> None:
+    """Motion of the frames that loops hold."""
+    put_frames(reals, integers, scratch, t, y, v, out, None)

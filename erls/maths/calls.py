@@ -1,0 +1,55 @@
+"""Calls of compiled functions whose addresses lie among the integers of a system.
+
+A system that is built upon another one, known only by its functions, keeps their addresses beside its constants: then it
+is compiled once for all of them, and what it calls is not compiled within it again. In plain Python an address is the
+place of a function in a list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from erls.maths.jit import ENABLED
+
+_known: list[Callable[..., Any]] = []
+
+
+def address_of(function: Any, signature: Any) -> int:
+    """Where a kernel of this signature (`erls.equations.compiled_system`) is found, as long as it is referred to."""
+    if not ENABLED:
+        if function not in _known:
+            _known.append(function)
+        return _known.index(function)
+    found = function.get_compile_result(signature)
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
+
+
+def _plain(address: int, *arguments: Any) -> Any:
+    return _known[address](*arguments)
+
+
+def caller(signature: Any) -> Callable[..., Any]:
+    """``call(address, *arguments)`` in compiled functions and, with ``ERLS_JIT=0``, in plain Python."""
+    if not ENABLED:
+        return _plain
+    from llvmlite import ir
+    from numba.core import types
+    from numba.core.extending import intrinsic
+
+    def generate(context: Any, builder: Any, typed: Any, given: Any) -> Any:
+        convention, kind, kinds = context.call_conv, signature.return_type, signature.args
+        pointer = ir.PointerType(convention.get_function_type(kind, kinds))
+        arguments = [builder.extract_value(given[1], i) for i in range(len(kinds))]
+        status, result = convention.call_function(
+            builder, builder.inttoptr(given[0], pointer), kind, kinds, arguments
+        )
+        with builder.if_then(status.is_error, likely=False):
+            convention.return_status_propagate(builder, status)
+        return result
+
+    def call(typing_context: Any, address: Any, *arguments: Any) -> Any:
+        return signature.return_type(types.int64, types.StarArgTuple(signature.args)), generate
+
+    found: Callable[..., Any] = intrinsic(call)
+    return found
