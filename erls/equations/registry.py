@@ -23,13 +23,9 @@ def _erls(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
         from erls.equations.erls.paper.dense_chain import DenseChain  # here: a run imports what it needs
 
         return DenseChain(mechanism, settings.gauge)
-    if not mechanism.loops:
-        from erls.equations.erls.formulation import Erls
+    from erls.equations.erls.formulation import Erls
 
-        return Erls(mechanism)
-    from erls.equations.erls.chain import Erls as Dense
-
-    return Dense(mechanism, settings.gauge)
+    return Erls(mechanism)
 
 
 def _ffr(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:

@@ -11,7 +11,7 @@ import numpy as np
 import scenes
 from chain_cases import PD, QUINTIC, SINE, SPRING, TORQUE
 
-from erls.equations.erls.chain import Erls
+from erls.equations.erls.formulation import Erls
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.integrate.closed_loops import TiedCoordinates
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution

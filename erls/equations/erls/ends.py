@@ -37,7 +37,7 @@ from erls.equations.serial.records import (
     read_modes,
     read_serial,
 )
-from erls.maths.jit import kernel, part
+from erls.maths.jit import kernel, part, spliced
 from erls.maths.products import clear, copy
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_motion_cross, compose_poses, transform_force_back, transform_motion
@@ -137,7 +137,7 @@ def _prescribed_before(serial: Serial, reals: Array, integers: IntArray, k: int)
     return count
 
 
-@part
+@spliced
 def put_frames(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
 ) -> None:

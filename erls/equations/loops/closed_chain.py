@@ -87,17 +87,13 @@ class ClosedChain:
 
     @cached_property
     def compiled(self) -> CompiledLoops | None:
-        """The same equations in compiled form; None unless the chain is one of ERLS that has a compiled form, without
-        second-order displacements of nodes.
-        """
-        from erls.equations.erls.chain import Erls  # here: a run imports the formulation it needs
-
-        chain = self.bare.compiled if self.size else None
-        if chain is None or not isinstance(self.bare, Erls) or self.bare.stiffened:
+        """The same equations in compiled form; None where the tree has none, or does not move frames in it."""
+        tree = self.bare.compiled if self.size else None
+        if tree is None or tree.frames is None:
             return None
         from erls.equations.loops.compiled import compile_loops  # here: it imports the compiler
 
-        return compile_loops(self, self.bare, chain, (DECAY, OPEN * self.reach))
+        return compile_loops(self, tree, (DECAY, OPEN * self.reach))
 
     @property
     def redundant(self) -> tuple[str, ...]:

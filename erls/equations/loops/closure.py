@@ -2,184 +2,203 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from erls.equations import compiled_system as contract
+import numpy as np
+
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.erls import layout as chain
-from erls.equations.erls.motion import move_frames
-from erls.equations.loops import layout as at
-from erls.equations.loops.ends import move_end, place_links, pull_end
-from erls.equations.serial.curves import curve
-from erls.equations.serial.drives import effort, wanted
-from erls.equations.serial.linear import add_bracket, carry, carry_back
-from erls.maths.jit import ENABLED, kernel, part
-
-CLOSURE: Any = None
-if ENABLED:
-    from numba import types as _t
-
-    CLOSURE = _t.void(contract.REALS, contract.INTEGERS, contract.REALS, _t.float64, contract.REALS, contract.REALS)
+from erls.equations.loops.records import (
+    CLOSING_JOINT,
+    CLOSURE,
+    COORDINATE,
+    LOOP_STATE,
+    PUSH,
+    RATE,
+    TURNING,
+    WANTED,
+    ClosingJoint,
+    Loops,
+    LoopState,
+    Room,
+    call_frames,
+    read_closing_joint,
+    read_loop_state,
+    read_loops,
+    read_room,
+)
+from erls.equations.serial.joints import effort, wanted
+from erls.equations.serial.records import read_joint
+from erls.equations.serial.time_curves import curve
+from erls.maths.coefficients import angle_of
+from erls.maths.jit import kernel, part, spliced
+from erls.maths.products import clear, copy
+from erls.maths.so3 import Array as AnyArray
+from erls.maths.spatial import add_motion_cross, dot3, dot6, transform_motion
 
 
 @part
-def _between(motion: Array) -> None:
-    """Pose, twist and its derivative of the outer frame in the inner one."""
-    outer, inner = motion[at.OUTER_END : at.OUTER_END + at.END], motion[at.INNER_END : at.INNER_END + at.END]
-    found, carried = motion[at.BETWEEN : at.BETWEEN + at.LOCAL], motion[at.SPARE : at.SPARE + 6]
+def relative_pose(inner: AnyArray, outer: AnyArray, out: AnyArray) -> None:
+    """Pose of the outer frame in the inner one."""
     for i in range(3):
         for j in range(3):
-            found[3 * i + j] = inner[i] * outer[j] + inner[3 + i] * outer[3 + j] + inner[6 + i] * outer[6 + j]
-        found[9 + i] = 0.0
+            out[3 * i + j] = inner[i] * outer[j] + inner[3 + i] * outer[3 + j] + inner[6 + i] * outer[6 + j]
+        out[9 + i] = 0.0
         for j in range(3):
-            found[9 + i] += inner[3 * j + i] * (outer[9 + j] - inner[9 + j])
-    carry(found, inner, at.BIAS, carried, 0)
-    for i in range(6):
-        found[at.BIAS + i] = outer[at.BIAS + i] - carried[i]
-    carry(found, inner, at.TWIST, carried, 0)
-    for i in range(6):
-        found[at.TWIST + i] = outer[at.TWIST + i] - carried[i]
-    add_bracket(found, at.TWIST, carried, 0, 1.0, found, at.BIAS)
+            out[9 + i] += inner[3 * j + i] * (outer[9 + j] - inner[9 + j])
 
 
-@part
-def _less_prescribed(reals: Array, integers: IntArray, record: int, t: float, motion: Array) -> None:
-    """LEFT: what is between the frames beside the prescribed coordinate, or all of it."""
-    found, left = motion[at.BETWEEN : at.BETWEEN + at.LOCAL], motion[at.LEFT : at.LEFT + at.LOCAL]
-    for i in range(at.LOCAL):
-        left[i] = found[i]
-    if integers[record + at.PRESCRIBED] < 0:
+@spliced
+def _between(joint: ClosingJoint, frames: Array, state: LoopState) -> None:
+    """Pose, twist, its derivative and rows of the outer frame in the inner one."""
+    moves, carried = state.moves, state.spare
+    outer = frames[joint.outer, :12] if joint.outer >= 0 else joint.ground[0]
+    inner = frames[joint.inner, :12] if joint.inner >= 0 else joint.ground[1]
+    relative_pose(inner, outer, state.pose)
+    n = moves.shape[1]
+    clear(state.twist)
+    clear(state.twist_rate)
+    moves[:, :] = 0.0
+    if joint.outer >= 0:
+        found = frames[joint.outer]
+        for i in range(6):
+            state.twist[i], state.twist_rate[i] = found[12 + i], found[18 + i]
+            for j in range(n):
+                moves[i, j] = found[24 + i * n + j]
+    if joint.inner >= 0:
+        found = frames[joint.inner]
+        transform_motion(state.pose, found[18:24], carried)
+        for i in range(6):
+            state.twist_rate[i] -= carried[i]
+        transform_motion(state.pose, found[12:18], carried)
+        for i in range(6):
+            state.twist[i] -= carried[i]
+        add_motion_cross(state.twist, carried, 1.0, state.twist_rate)
+        for j in range(n):
+            for i in range(6):
+                carried[i] = found[24 + i * n + j]
+            transform_motion(state.pose, carried, carried)
+            for i in range(6):
+                moves[i, j] -= carried[i]
+
+
+@spliced
+def _less_prescribed(reals: Array, integers: IntArray, joint: ClosingJoint, t: float, state: LoopState) -> None:
+    """What is between the frames beside the prescribed coordinate, or all of it."""
+    left, screw = state.left, state.spare
+    copy(state.pose, left)
+    copy(state.twist, state.left_twist)
+    copy(state.twist_rate, state.left_rate)
+    if joint.motion < 0:
         return
-    value, rate, acceleration = curve(integers, reals, integers[record + at.PRESCRIBED], t)
-    value -= reals[integers[record + at.FREEDOM]]
-    screw = motion[at.SPARE : at.SPARE + 6]
-    for i in range(6):
-        screw[i] = 0.0
-    screw[integers[record + at.ALONG]] = 1.0
-    if integers[record + at.ALONG] == 5:
-        c, s = math.cos(value), math.sin(value)
+    value, rate, acceleration = curve(reals, integers, joint.motion, t)
+    value -= joint.zero
+    clear(screw)
+    screw[joint.along] = 1.0
+    if joint.along == 5:
+        c, s = np.cos(value), np.sin(value)
         for j in range(3):
-            left[j], left[3 + j] = c * found[j] + s * found[3 + j], c * found[3 + j] - s * found[j]
-        left[9], left[10] = c * found[9] + s * found[10], c * found[10] - s * found[9]
+            p, q = left[j], left[3 + j]
+            left[j], left[3 + j] = c * p + s * q, c * q - s * p
+        p, q = left[9], left[10]
+        left[9], left[10] = c * p + s * q, c * q - s * p
     else:
         left[11] -= value
-    carry(left, screw, 0, screw, 0)
+    transform_motion(left, screw, screw)
     for i in range(6):
-        left[at.TWIST + i] -= screw[i] * rate
-        left[at.BIAS + i] -= screw[i] * acceleration
-    add_bracket(left, at.TWIST, screw, 0, rate, left, at.BIAS)
+        state.left_twist[i] -= screw[i] * rate
+        state.left_rate[i] -= screw[i] * acceleration
+    add_motion_cross(state.left_twist, screw, rate, state.left_rate)
 
 
 @part
-def _measure(reals: Array, integers: IntArray, scratch: Array, number: int, motion: Array) -> None:
-    """Φ, Φ̇ and Φ̈ of a condition; FORCE gets its derivatives by the twist."""
-    row = at.place(integers, at.ROWS) + at.ROW * number
-    factors = at.place(integers, at.FACTORS) + 3 * number
-    left, force = motion[at.LEFT : at.LEFT + at.LOCAL], motion[at.FORCE : at.FORCE + 6]
-    twist = left[at.TWIST : at.TWIST + 6]
-    w0, w1, w2 = twist[3], twist[4], twist[5]
-    for i in range(6):
-        force[i] = 0.0
-    value = bend = 0.0
-    line = integers[row + at.LINE]
-    if line >= 0:
-        r0, r1, r2 = left[3 * line], left[3 * line + 1], left[3 * line + 2]
-        value = left[9 + line]
-        force[0], force[1], force[2] = r0, r1, r2
-        bend = r0 * (w1 * twist[2] - w2 * twist[1])
-        bend += r1 * (w2 * twist[0] - w0 * twist[2]) + r2 * (w0 * twist[1] - w1 * twist[0])
-    else:
-        speed = w0 * w0 + w1 * w1 + w2 * w2
-        for term in range(2):
-            factor = reals[factors + term]
-            i, j = integers[row + at.ENTRIES + 2 * term], integers[row + at.ENTRIES + 2 * term + 1]
-            along = left[3 * i] * w0 + left[3 * i + 1] * w1 + left[3 * i + 2] * w2
-            value += factor * left[3 * i + j]
-            bend += factor * (along * twist[3 + j] - left[3 * i + j] * speed)
-            # - r × e_j
-            after, last = (j + 1) % 3, (j + 2) % 3
-            force[3 + after] -= factor * left[3 * i + last]
-            force[3 + last] += factor * left[3 * i + after]
-    rate = 0.0
-    for i in range(6):
-        rate += force[i] * twist[i]
-        bend += force[i] * left[at.BIAS + i]
-    place, count = at.place(integers, at.VIOLATION) + number, at.place(integers, at.CONDITIONS)
-    scratch[place], scratch[place + count], scratch[place + 2 * count] = value, rate, bend
+def measure(line: Array, entries: Array, pose: Array, twist: Array, twist_rate: Array, gradient: Array) -> Any:
+    """c · p + ⟨C, Q⟩ with its first derivative, and the second one at this derivative of the twist.
+
+    ``gradient`` (6,) gets its derivatives over the twist: with G = Qᵀ C they are Qᵀ c and the axial vector of G - Gᵀ.
+    """
+    g = gradient
+    v0, v1, v2, w0, w1, w2 = twist[0], twist[1], twist[2], twist[3], twist[4], twist[5]
+    value = dot3(line, pose[9:])
+    for j in range(3):
+        g[j] = pose[j] * line[0] + pose[3 + j] * line[1] + pose[6 + j] * line[2]
+        g[3 + j] = 0.0 * value
+    bend = g[0] * (w1 * v2 - w2 * v1) + g[1] * (w2 * v0 - w0 * v2) + g[2] * (w0 * v1 - w1 * v0)
+    speed = w0 * w0 + w1 * w1 + w2 * w2
+    for i in range(3):
+        along = pose[3 * i] * w0 + pose[3 * i + 1] * w1 + pose[3 * i + 2] * w2
+        for j in range(3):
+            factor = entries[i, j]
+            if factor != 0.0:
+                value += factor * pose[3 * i + j]
+                bend += factor * (along * twist[3 + j] - pose[3 * i + j] * speed)
+                # - r × e_j
+                after, last = (j + 1) % 3, (j + 2) % 3
+                g[3 + after] -= factor * pose[3 * i + last]
+                g[3 + last] += factor * pose[3 * i + after]
+    return value, dot6(g, twist), bend + dot6(g, twist_rate)
 
 
 @part
-def _pull(reals: Array, integers: IntArray, scratch: Array, record: int, motion: Array, row: Array) -> None:
-    """The force FORCE on the relative twist as one on the coordinates."""
-    force, spare = motion[at.FORCE : at.FORCE + 6], motion[at.SPARE : at.SPARE + 18]
-    for i in range(len(row)):
-        row[i] = 0.0
+def pull_back(force: Array, moves: Array, out: Array) -> None:
+    """``out`` (n,) is what a force (6,) on the relative twist does to the coordinates."""
+    clear(out)
     for i in range(6):
-        spare[i] = force[i]
-    outer = motion[at.OUTER_END : at.OUTER_END + at.END]
-    link, place = integers[record + at.OUTER], integers[record + at.OUTER_AT]
-    pull_end(reals, integers, scratch, link, place, outer, spare, row)
-    carry_back(motion[at.BETWEEN : at.BETWEEN + 12], force, 0, spare, 0)
-    for i in range(6):
-        spare[i] = -spare[i]
-    inner = motion[at.INNER_END : at.INNER_END + at.END]
-    link, place = integers[record + at.INNER], integers[record + at.INNER_AT]
-    pull_end(reals, integers, scratch, link, place, inner, spare, row)
+        weight, row = force[i], moves[i]
+        if weight != 0.0:
+            for j in range(len(out)):
+                out[j] += weight * row[j]
 
 
-@part
-def _act(reals: Array, integers: IntArray, scratch: Array, number: int, t: float, motion: Array, n: int) -> None:
+@spliced
+def _act(
+    loops: Loops, reals: Array, integers: IntArray, joint: ClosingJoint, t: float, y: Array, state: LoopState
+) -> None:
     """Coordinate of a closing joint, and what acts along it."""
-    record = at.place(integers, at.RECORDS) + at.RECORD * number
-    freedom, along = integers[record + at.FREEDOM], integers[record + at.ALONG]
-    place = at.place(integers, at.EFFORTS) + number * (n + at.EFFORT)
-    row, found = scratch[place : place + n], scratch[place + n : place + n + at.EFFORT]
-    between = motion[at.BETWEEN : at.BETWEEN + at.LOCAL]
-    value = between[11]
-    if along == 5:
-        angle = math.atan2(between[3] - between[1], between[0] + between[4])
-        turned = -reals[freedom + 1]
-        for k in range(integers[chain.LINKS]):
-            memory = integers[chain.HEADER + k * chain.RECORD + chain.MEMORY]
-            turned += reals[freedom + 2 + k] * scratch[memory + chain.ANGLE]
-        value = angle + 2 * math.pi * math.floor((turned - angle) / (2 * math.pi) + 0.5)
-    found[at.COORDINATE], found[at.RATE] = reals[freedom] + value, between[at.TWIST + along]
-    found[at.TURNING] = between[at.BIAS + along]
-    link = motion[at.SPARE - chain.ANGLE : at.MOTION]  # as if it were a joint of the chain
-    link[chain.ANGLE], link[chain.ANGLE + 1] = found[at.COORDINATE], found[at.RATE]
-    found[at.PUSH] = effort(reals, integers, integers[record + at.ACTS], t, link)
-    found[at.WANTED] = wanted(reals, integers, integers[record + at.ACTS], t, link)
-    for i in range(6):
-        motion[at.FORCE + i] = 1.0 if i == along else 0.0
-    _pull(reals, integers, scratch, record, motion, row)
+    pose, found = state.pose, state.effort
+    value = pose[11]
+    if joint.along == 5:
+        angle = angle_of(pose[3] - pose[1], pose[0] + pose[4])
+        turned = -joint.turned
+        for k in range(len(loops.joints)):
+            if joint.signs[k] != 0.0:
+                if loops.joints[k] >= 0:
+                    turned += joint.signs[k] * y[loops.joints[k]]
+                else:
+                    turned += joint.signs[k] * curve(reals, integers, loops.motions[k], t)[0]
+        value = angle + 2 * np.pi * np.floor((turned - angle).real / (2 * np.pi) + 0.5)
+    found[COORDINATE], found[RATE] = joint.zero + value, state.twist[joint.along]
+    found[TURNING] = state.twist_rate[joint.along]
+    found[PUSH] = found[WANTED] = 0.0
+    if joint.joint >= 0:
+        forces = read_joint(reals, integers, joint.joint)
+        found[PUSH] = effort(forces, reals, integers, t, found[COORDINATE], found[RATE], 0.0 * value)
+        found[WANTED] = wanted(forces, reals, integers, t, found[COORDINATE], found[RATE], 0.0 * value)
+
+
+@spliced
+def _close(
+    loops: Loops, room: Room, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, y: Array
+) -> None:
+    joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
+    state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
+    _between(joint, room.frames, state)
+    _less_prescribed(reals, integers, joint, t, state)
+    for k in range(len(joint.lines)):
+        at, gradient = joint.first + k, state.gradients[k]
+        room.violation[at], room.rate[at], room.bias[at] = measure(
+            joint.lines[k], joint.entries[k], state.left, state.left_twist, state.left_rate, gradient
+        )
+        if loops.used[at] >= 0:
+            pull_back(gradient, state.moves, room.gradient[loops.used[at]])
+    if joint.along >= 0:
+        _act(loops, reals, integers, joint, t, y, state)
 
 
 @kernel(CLOSURE, counted=False)
 def closure(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array) -> None:
-    """Conditions and efforts of all loops into ``scratch``, where `layout` says."""
-    move_frames(reals, integers, scratch, t, y, v, scratch[0:0])
-    place_links(integers, scratch)
-    n = len(y)
-    for number in range(at.place(integers, at.LOOPS)):
-        record = at.place(integers, at.RECORDS) + at.RECORD * number
-        place = at.place(integers, at.MOTIONS) + at.MOTION * number
-        motion = scratch[place : place + at.MOTION]
-        spare = motion[at.SPARE : at.SPARE + 18]
-        outer = motion[at.OUTER_END : at.OUTER_END + at.END]
-        inner = motion[at.INNER_END : at.INNER_END + at.END]
-        link, constants = integers[record + at.OUTER], integers[record + at.OUTER_AT]
-        move_end(reals, integers, scratch, link, constants, outer, spare)
-        link, constants = integers[record + at.INNER], integers[record + at.INNER_AT]
-        move_end(reals, integers, scratch, link, constants, inner, spare)
-        _between(motion)
-        _less_prescribed(reals, integers, record, t, motion)
-        first = integers[record + at.FIRST]
-        for condition in range(first, first + integers[record + at.COUNT]):
-            _measure(reals, integers, scratch, condition, motion)
-            used = integers[at.place(integers, at.ROWS) + at.ROW * condition + at.PLACE]
-            if used >= 0:
-                row = at.place(integers, at.GRADIENT) + used * n
-                _pull(reals, integers, scratch, record, motion, scratch[row : row + n])
-        if integers[record + at.ACTS] >= 0:
-            _act(reals, integers, scratch, number, t, motion, n)
+    """Conditions and efforts of all loops into `Room` and `LoopState`."""
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
+    call_frames(loops.frames, reals, integers, scratch, t, y, v, room.frames)
+    for number in range(loops.count):
+        _close(loops, room, reals, integers, scratch, number, t, y)

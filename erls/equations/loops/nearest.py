@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.loops import layout as at
-from erls.equations.loops.closure import CLOSURE
+from erls.equations.loops.records import Loops, Room, call_closure, read_loops, read_room
 from erls.maths.dense import backward, cholesky, dot, forward
 from erls.maths.jit import ENABLED, kernel, part
 
@@ -20,28 +18,23 @@ WATCH: Any = None
 if ENABLED:
     from numba import types as _t
 
-    _constants = (contract.pointer(CLOSURE), contract.REALS, contract.INTEGERS, contract.REALS)
+    _constants = (contract.REALS, contract.INTEGERS, contract.REALS)
     CLOSE = _t.int64(*_constants, _t.float64, contract.REALS, contract.REALS)
     WATCH = _t.void(*_constants, contract.REALS, contract.MATRIX, contract.REALS, _t.float64[:, :, ::1])
 
 
 @part
-def _move(reals: Array, integers: IntArray, scratch: Array, place: int, out: Array) -> int:
-    """Take from ``out`` the smallest change in metres that makes up for what starts at ``place`` (m,)."""
-    n = len(out)
-    r = at.place(integers, at.KEPT)
-    gradient = scratch[at.span(integers, at.GRADIENT, r * n)].reshape(r, n)
-    scaled = scratch[at.span(integers, at.SPREAD, r * n)].reshape(r, n)
-    flexible = scratch[at.span(integers, at.FLEXIBLE, r * r)].reshape(r, r)
-    wrong = scratch[at.span(integers, at.REDUCED, r)]
-    metres = reals[at.place(integers, at.METRES) : at.place(integers, at.METRES) + n]
-    for condition in range(at.place(integers, at.CONDITIONS)):
-        k = at.place_of(integers, condition)
+def _move(loops: Loops, room: Room, given: Array, out: Array) -> int:
+    """Take from ``out`` the smallest change in metres that makes up for what is ``given`` (m,)."""
+    scaled, flexible, wrong, metres = room.spread, room.flexible, room.wrong, loops.metres
+    r, n = scaled.shape
+    for condition in range(loops.conditions):
+        k = loops.used[condition]
         if k >= 0:
-            scale = at.row_scale(reals, integers, condition)
-            wrong[k] = scale * scratch[place + condition]
+            scale = loops.scales[condition]
+            wrong[k] = scale * given[condition]
             for j in range(n):
-                scaled[k, j] = scale * gradient[k, j] / metres[j]
+                scaled[k, j] = scale * room.gradient[k, j] / metres[j]
     for i in range(r):
         for j in range(i + 1):
             flexible[j, i] = dot(scaled[i], scaled[j])
@@ -55,56 +48,48 @@ def _move(reals: Array, integers: IntArray, scratch: Array, place: int, out: Arr
     return 0
 
 
+@part
+def largest_gap(scales: Array, used: IntArray, violation: Array, every: bool) -> Any:
+    """Largest opening [m], of ``every`` condition or of those in use."""
+    worst = 0.0
+    for condition in range(len(scales)):
+        if every or used[condition] >= 0:
+            worst = max(worst, abs(violation[condition]) * scales[condition].real)
+    return worst
+
+
 @kernel(CLOSE, counted=False)
-def close(
-    closure: Callable[..., None], reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array
-) -> int:
+def close(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array) -> int:
     """Move a state to the nearest one, in metres, that closes the loops; 1 where there is none nearby."""
-    m = at.place(integers, at.CONDITIONS)
-    limit = _CLOSED * reals[at.place(integers, at.NUMBERS) + at.REACH]
-    place = at.place(integers, at.VIOLATION)
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
     for _ in range(_POLISH):
-        closure(reals, integers, scratch, t, y, v)
-        worst = 0.0
-        for condition in range(m):
-            if at.place_of(integers, condition) >= 0:
-                gap = abs(scratch[place + condition]) * at.row_scale(reals, integers, condition)
-                worst = max(worst, gap)
-        if worst <= limit:
+        call_closure(loops.closure, reals, integers, scratch, t, y, v)
+        if largest_gap(loops.scales, loops.used, room.violation, False) <= _CLOSED * loops.reach.real:
             break
-        if _move(reals, integers, scratch, place, y):
+        if _move(loops, room, room.violation, y):
             return 1
     else:
-        closure(reals, integers, scratch, t, y, v)
-    return _move(reals, integers, scratch, place + m, v)
+        call_closure(loops.closure, reals, integers, scratch, t, y, v)
+    return int(_move(loops, room, room.rate, v))
 
 
 @kernel(WATCH, counted=False)
 def watch(
-    closure: Callable[..., None],
-    reals: Array,
-    integers: IntArray,
-    scratch: Array,
-    times: Array,
-    places: Array,
-    gaps: Array,
-    squares: Array,
+    reals: Array, integers: IntArray, scratch: Array, times: Array, places: Array, gaps: Array, squares: Array
 ) -> None:
     """At each of ``places`` (k, n) the largest opening [m], and the products (k, r, r) of the rows in metres."""
-    n = places.shape[1]
-    r, m = at.place(integers, at.KEPT), at.place(integers, at.CONDITIONS)
-    gradient = scratch[at.span(integers, at.GRADIENT, r * n)].reshape(r, n)
-    metres = reals[at.place(integers, at.METRES) : at.place(integers, at.METRES) + n]
-    violation = at.place(integers, at.VIOLATION)
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
+    gradient, n = room.gradient, places.shape[1]
     for k in range(len(times)):
-        closure(reals, integers, scratch, times[k], places[k], places[k])
-        gaps[k] = 0.0
-        for condition in range(m):
-            scale, used = at.row_scale(reals, integers, condition), at.place_of(integers, condition)
-            gaps[k] = max(gaps[k], scale * abs(scratch[violation + condition]))
+        call_closure(loops.closure, reals, integers, scratch, times[k], places[k], places[k])
+        gaps[k] = largest_gap(loops.scales, loops.used, room.violation, True)
+        for condition in range(loops.conditions):
+            used = loops.used[condition]
             if used >= 0:
                 for j in range(n):
-                    gradient[used, j] *= scale / metres[j]
-        for i in range(r):
-            for j in range(r):
+                    gradient[used, j] *= loops.scales[condition] / loops.metres[j]
+        for i in range(loops.kept):
+            for j in range(loops.kept):
                 squares[k, i, j] = dot(gradient[i], gradient[j])

@@ -4,15 +4,21 @@ the conditions in use.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, Factoring, IntArray
-from erls.equations.loops import layout as at
 from erls.equations.loops.compiled import CompiledLoops
-from erls.equations.loops.tree import forces, matrices
+from erls.equations.loops.nearest import largest_gap
+from erls.equations.loops.records import (
+    call_residual,
+    call_stiffness_and_damping,
+    read_loops,
+    read_room,
+)
 from erls.equations.stepped import COMPOSE, SETTLE, Stepped
 from erls.maths import dense
 from erls.maths.jit import kernel
@@ -35,10 +41,11 @@ def residual(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
 ) -> None:
     """[M a - f + Φ_yᵀ λ; Φ], and the norms of both terms; ``a`` holds [a; λ]."""
-    n, r = len(y), at.place(integers, at.KEPT)
-    forces(reals, integers, scratch, t, y, v, a[:n], out[:n])
-    gradient = scratch[at.span(integers, at.GRADIENT, r * n)].reshape(r, n)
-    reaction, metres = scratch[at.span(integers, at.REDUCED, n)], reals[at.span(integers, at.METRES, n)]
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
+    n, r = len(y), loops.kept
+    call_residual(loops.forces, reals, integers, scratch, t, y, v, a[:n], out[:n])
+    gradient, reaction, metres = room.gradient, room.reduced, loops.metres
     for i in range(n):
         reaction[i] = 0.0
     for k in range(r):
@@ -51,12 +58,11 @@ def residual(
         force += x * x
         back += y_back * y_back
         out[i] += reaction[i]
-    start = at.place(integers, at.VIOLATION)
-    for condition in range(at.place(integers, at.CONDITIONS)):
-        k = at.place_of(integers, condition)
+    for condition in range(loops.conditions):
+        k = loops.used[condition]
         if k >= 0:
-            out[n + k] = scratch[start + condition]
-    out[n + r], out[n + r + 1] = math.sqrt(force), math.sqrt(back)
+            out[n + k] = room.violation[condition]
+    out[n + r], out[n + r + 1] = np.sqrt(force), np.sqrt(back)
 
 
 @kernel(contract.FACTOR, counted=False)
@@ -75,13 +81,11 @@ def factor(
 
     ``factors`` holds the scales of multipliers and of conditions, the unit of mass, row exchanges, and the matrix.
     """
-    n, r = len(y), at.place(integers, at.KEPT)
-    metres = reals[at.span(integers, at.METRES, n)]
-    gradient = scratch[at.span(integers, at.GRADIENT, r * n)].reshape(r, n)
-    mass = scratch[at.span(integers, at.MASS, n * n)].reshape(n, n)
-    stiffness = scratch[at.span(integers, at.FACTOR, n * n)].reshape(n, n)
-    damping = scratch[at.span(integers, at.DAMPING, n * n)].reshape(n, n)
-    matrices(reals, integers, scratch, t, y, v, stiffness, damping)
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
+    n, r = len(y), loops.kept
+    metres, gradient, mass, stiffness, damping = loops.metres, room.gradient, room.mass, room.factor, room.damping
+    call_stiffness_and_damping(loops.matrices, reals, integers, scratch, t, y, v, stiffness, damping)
     heaviest = 0.0
     for i in range(n):
         heaviest = max(heaviest, mass[i, i] / (metres[i] * metres[i]))
@@ -109,9 +113,10 @@ def factor(
 @kernel(contract.SOLVE, counted=False)
 def solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
     """Replace [b; Φ] by [x; β λ]."""
-    r = at.place(integers, at.KEPT)
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    r = loops.kept
     n, first = len(b) - r, 2 * r + 1
-    metres, heaviest = reals[at.span(integers, at.METRES, n)], factors[2 * r]
+    metres, heaviest = loops.metres, factors[2 * r]
     whole = factors[first + n + r : first + (n + r) * (n + r + 1)].reshape(n + r, n + r)
     for i in range(n):
         b[i] /= heaviest * metres[i]
@@ -129,10 +134,10 @@ def settle(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, knot: Array
 ) -> int:
     """A knot; 1 where a condition, in use or left out, was violated too much when it was looked at last."""
-    limit, start = reals[at.place(integers, at.NUMBERS) + at.OPEN], at.place(integers, at.VIOLATION)
-    for condition in range(at.place(integers, at.CONDITIONS)):
-        if abs(scratch[start + condition]) * at.row_scale(reals, integers, condition) > limit:
-            return 1
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
+    if largest_gap(loops.scales, loops.used, room.violation, True) > loops.open:
+        return 1
     for i in range(len(y)):
         knot[0, i], knot[1, i], knot[2, i] = y[i], v[i], a[i]
     return 0

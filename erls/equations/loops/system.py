@@ -1,15 +1,20 @@
-"""A chain with closed loops as the functions of `erls.equations.compiled_system`."""
+"""A tree with closed loops as the functions of `erls.equations.compiled_system`."""
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.loops import layout as at
-from erls.equations.loops.closure import closure
+from erls.equations.loops.records import (
+    call_closure,
+    call_mass_matrix,
+    call_residual,
+    call_stiffness_and_damping,
+    read_loops,
+    read_room,
+)
 from erls.equations.loops.solve import let_along, multipliers_of, spread_rows
-from erls.equations.loops.tree import forces, masses, matrices
 from erls.maths.dense import backward, dot, forward
 from erls.maths.jit import kernel
 
@@ -19,61 +24,59 @@ def residual(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
 ) -> None:
     """M (a - ÿ) with the accelerations ÿ of the closed chain; NaN where it locks or has no mass."""
-    forces(reals, integers, scratch, t, y, v, scratch[0:0], out)
-    n, r = len(y), at.place(integers, at.KEPT)
-    mass = scratch[at.span(integers, at.MASS, n * n)].reshape(n, n)
-    masses(reals, integers, scratch, t, y, mass)
-    if spread_rows(integers, scratch, n) != 0:
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
+    call_residual(loops.forces, reals, integers, scratch, t, y, v, scratch[0:0], out)
+    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, room.mass)
+    n = len(y)
+    if spread_rows(room.mass, room.factor, room.gradient, room.spread, room.flexible) != 0:
         for i in range(n):
-            out[i] = math.nan
+            out[i] = np.nan
         return
-    reduced = scratch[at.span(integers, at.REDUCED, n)]
-    multipliers = scratch[at.span(integers, at.MULTIPLIERS, r)]
-    factor = scratch[at.span(integers, at.FACTOR, n * n)].reshape(n, n)
-    gradient = scratch[at.span(integers, at.GRADIENT, r * n)].reshape(r, n)
+    reduced, multipliers = room.reduced, room.multipliers
     for i in range(n):
         reduced[i] = -out[i]
-    forward(factor, reduced)
-    multipliers_of(reals, integers, scratch, reduced, multipliers)
+    forward(room.factor, reduced)
+    multipliers_of(loops, room, reduced, multipliers)
     for i in range(n):
-        out[i] += dot(mass[i], a)
-    for k in range(r):
+        out[i] += dot(room.mass[i], a)
+    for k in range(loops.kept):
         for i in range(n):
-            out[i] += gradient[k, i] * multipliers[k]
+            out[i] += room.gradient[k, i] * multipliers[k]
 
 
 @kernel(contract.MASS_MATRIX, counted=False)
 def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
     """M of the chain and of rotors in closing joints."""
-    if at.place(integers, at.ROTORS):
-        closure(reals, integers, scratch, t, y, y)  # the rates do not matter
-    masses(reals, integers, scratch, t, y, out)
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    if loops.rotors:
+        call_closure(loops.closure, reals, integers, scratch, t, y, y)  # the rates do not matter
+    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, out)
 
 
 @kernel(contract.ACCELERATION, counted=False)
 def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> int:
     """Accelerations with decay of what loops are open by; NaN where they lock."""
-    forces(reals, integers, scratch, t, y, v, scratch[0:0], out)
-    n, r = len(y), at.place(integers, at.KEPT)
-    masses(reals, integers, scratch, t, y, scratch[at.span(integers, at.MASS, n * n)].reshape(n, n))
-    status = spread_rows(integers, scratch, n)
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
+    call_residual(loops.forces, reals, integers, scratch, t, y, v, scratch[0:0], out)
+    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, room.mass)
+    n = len(y)
+    status = spread_rows(room.mass, room.factor, room.gradient, room.spread, room.flexible)
     if status > 0:
-        return status
+        return int(status)
     if status < 0:
         for i in range(n):
-            out[i] = math.nan
+            out[i] = np.nan
         return 0
-    multipliers = scratch[at.span(integers, at.MULTIPLIERS, r)]
-    factor = scratch[at.span(integers, at.FACTOR, n * n)].reshape(n, n)
-    spread = scratch[at.span(integers, at.SPREAD, r * n)].reshape(r, n)
     for i in range(n):
         out[i] = -out[i]
-    forward(factor, out)
-    multipliers_of(reals, integers, scratch, out, multipliers)
-    for k in range(r):
+    forward(room.factor, out)
+    multipliers_of(loops, room, out, room.multipliers)
+    for k in range(loops.kept):
         for i in range(n):
-            out[i] -= spread[k, i] * multipliers[k]
-    backward(factor, out)
+            out[i] -= room.spread[k, i] * room.multipliers[k]
+    backward(room.factor, out)
     return 0
 
 
@@ -82,30 +85,25 @@ def stiffness_and_damping(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, k: Array, c: Array
 ) -> None:
     """Of the chain, less what the loops' forces take of them, and the decay; not symmetric."""
-    closure(reals, integers, scratch, t, y, v)
-    matrices(reals, integers, scratch, t, y, v, k, c)
-    n = len(y)
-    r, decay = at.place(integers, at.KEPT), reals[at.place(integers, at.NUMBERS) + at.DECAY]
-    if spread_rows(integers, scratch, n) != 0:
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    room = read_room(scratch, integers, loops.room)
+    call_closure(loops.closure, reals, integers, scratch, t, y, v)
+    call_stiffness_and_damping(loops.matrices, reals, integers, scratch, t, y, v, k, c)
+    n, r, decay = len(y), loops.kept, loops.decay
+    if spread_rows(room.mass, room.factor, room.gradient, room.spread, room.flexible) != 0:
         for i in range(n):
-            k[i, i] = c[i, i] = math.nan
+            k[i, i] = c[i, i] = np.nan
         return
-    factor = scratch[at.span(integers, at.FACTOR, n * n)].reshape(n, n)
-    spread = scratch[at.span(integers, at.SPREAD, r * n)].reshape(r, n)
-    flexible = scratch[at.span(integers, at.FLEXIBLE, r * r)].reshape(r, r)
-    gradient = scratch[at.span(integers, at.GRADIENT, r * n)].reshape(r, n)
-    # loads (r, n) = (ZᵀZ)⁻¹ Φ_y into MASS, rows of M⁻¹ Φ_yᵀ into SPREAD
-    loads = scratch[at.span(integers, at.MASS, n * n)].reshape(n, n)
-    column = scratch[at.span(integers, at.REDUCED, r)]
+    # loads (r, n) = (ZᵀZ)⁻¹ Φ_y, and rows of M⁻¹ Φ_yᵀ in place of Zᵀ
+    column = room.wrong
     for j in range(n):
         for i in range(r):
-            column[i] = gradient[i, j]
-        forward(flexible, column)
-        backward(flexible, column)
+            column[i] = room.gradient[i, j]
+        forward(room.flexible, column)
+        backward(room.flexible, column)
         for i in range(r):
-            loads[i, j] = column[i]
+            room.loads[i, j] = column[i]
     for i in range(r):
-        backward(factor, spread[i])
-    carried = scratch[at.span(integers, at.FACTOR, r * n)].reshape(r, n)
-    let_along(spread, loads, gradient, decay * decay, k, carried)
-    let_along(spread, loads, gradient, 2 * decay, c, carried)
+        backward(room.factor, room.spread[i])
+    let_along(room.spread, room.loads, room.gradient, decay * decay, k, room.carried)
+    let_along(room.spread, room.loads, room.gradient, 2 * decay, c, room.carried)

@@ -90,11 +90,19 @@ class Conditions:
         Direction of each row, in the axes of the inner joint frame.
     entries : list of (int, Turn or None)
         Axis and turn of each row.
+    lines, turns : (m, 3), (m, 3, 3) arrays
+        c and C: the rows are c · p + ⟨C, R⟩.
     """
 
     def __init__(self, rows: Mapping[tuple[str, int], Turn | None]) -> None:
         self.names = tuple(f"{kind} {_AXES[k]}" for kind, k in rows)
         self.entries = [(k, turns) for (_, k), turns in rows.items()]
+        self.lines, self.turns = np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 3))
+        for number, (axis, turn) in enumerate(self.entries):
+            if turn is None:
+                self.lines[number, axis] = 1.0
+            for factor, i, j in turn or ():
+                self.turns[number, i, j] = factor
 
     def violation(self, pose: Array) -> Array:
         """(m,) Φ."""

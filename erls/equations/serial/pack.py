@@ -13,7 +13,10 @@ from erls.equations.serial.time_curves import put_curve
 from erls.maths.records import Memory
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.curves import Curve
+from erls.mechanism.drives import Drive
 from erls.mechanism.joints import Joint as MechanismJoint
+from erls.mechanism.joints import JointForces
 from erls.mechanism.links import Link
 
 
@@ -45,26 +48,43 @@ def joint_acts(joint: MechanismJoint) -> bool:
     return bool(joint.forces.active or joint.rotor_inertia or joint.drive.kind not in ("free", "motion"))
 
 
-def joint_record(memory: Memory, joint: MechanismJoint, place: int, step: Array, screw: Array) -> Joint:
-    """A joint whose coordinate stands at ``place``; its curves are put into memory."""
-    forces, drive = joint.forces, joint.drive
+def force_record(
+    memory: Memory, forces: JointForces, drive: Drive, rotor_inertia: float, motion: Curve | None
+) -> Joint:
+    """What acts along a coordinate, of a joint that moves nothing; its curves, ``motion`` the one of the coordinate, are
+    put into memory.
+    """
     gain, rate_gain = drive.gains
     return Joint(
-        place=place,
-        slides=int(not joint.type.revolute),
-        motion=put_curve(memory, drive.motion),
+        place=-1,
+        slides=0,
+        motion=put_curve(memory, motion),
         load=put_curve(memory, drive.load),
-        feeds=int(drive.feed_forward),
-        acts=int(joint_acts(joint)),
+        feeds=0,
+        acts=1,
         stiffness=forces.stiffness,
         rest=forces.rest,
         damping=forces.damping,
         friction=forces.friction,
         transition=forces.transition_rate,
-        rotor=joint.rotor_inertia,
+        rotor=rotor_inertia,
         gain=gain,
         rate_gain=rate_gain,
         limit=drive.torque_limit,
+        held=0.0,
+        step=np.zeros((3, 12)),
+        screw=np.zeros(6),
+    )
+
+
+def joint_record(memory: Memory, joint: MechanismJoint, place: int, step: Array, screw: Array) -> Joint:
+    """A joint whose coordinate stands at ``place``; its curves are put into memory."""
+    drive = joint.drive
+    return force_record(memory, joint.forces, drive, joint.rotor_inertia, drive.motion)._replace(
+        place=place,
+        slides=int(not joint.type.revolute),
+        feeds=int(drive.feed_forward),
+        acts=int(joint_acts(joint)),
         held=joint.position,
         step=step,
         screw=screw,

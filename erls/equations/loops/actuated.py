@@ -1,0 +1,93 @@
+"""The tree with forces and rotors along the coordinates of closing joints; first of all comes `closure` at the state."""
+
+from __future__ import annotations
+
+from erls.equations import compiled_system as contract
+from erls.equations.compiled_system import Array, IntArray
+from erls.equations.loops.records import (
+    CLOSING_JOINT,
+    COORDINATE,
+    LOOP_STATE,
+    PUSH,
+    RATE,
+    TURNING,
+    call_closure,
+    call_mass_matrix,
+    call_residual,
+    call_stiffness_and_damping,
+    read_closing_joint,
+    read_loop_state,
+    read_loops,
+    read_room,
+)
+from erls.equations.serial.joints import gains
+from erls.equations.serial.records import read_joint
+from erls.maths.dense import dot
+from erls.maths.jit import kernel, part
+
+
+@kernel(contract.RESIDUAL, counted=False)
+def forces(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
+) -> None:
+    """`closure`, and M a - f of the tree with what acts along closing joints; an empty ``a`` stands for zeros."""
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    call_closure(loops.closure, reals, integers, scratch, t, y, v)
+    call_residual(loops.residual, reals, integers, scratch, t, y, v, a, out)
+    if not loops.active:
+        return
+    n = len(y)
+    for number in range(loops.count):
+        joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
+        if joint.joint >= 0:
+            state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
+            row, turning = state.moves[joint.along, :n], state.effort[TURNING]
+            if len(a) > 0:
+                turning += dot(row, a)
+            push = read_joint(reals, integers, joint.joint).rotor * turning - state.effort[PUSH]
+            for i in range(n):
+                out[i] += row[i] * push
+
+
+@part
+def add_outer(row: Array, factor: float, out: Array) -> None:
+    """Add the factor times the row's product with itself."""
+    for i in range(len(row)):
+        weight, line = factor * row[i], out[i]
+        for j in range(len(row)):
+            line[j] += weight * row[j]
+
+
+@kernel(contract.MASS_MATRIX, counted=False)
+def masses(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
+    """Mass matrix with the rotors in closing joints; `closure` at this place comes first."""
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    call_mass_matrix(loops.mass_matrix, reals, integers, scratch, t, y, out)
+    if not loops.rotors:
+        return
+    for number in range(loops.count):
+        joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
+        if joint.joint >= 0:
+            moves = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE).moves
+            add_outer(moves[joint.along, : len(y)], read_joint(reals, integers, joint.joint).rotor, out)
+
+
+@kernel(contract.STIFFNESS_AND_DAMPING, counted=False)
+def matrices(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, k: Array, c: Array
+) -> None:
+    """M into the room, stiffness and damping of the tree, with what acts along closing joints; `closure` comes first."""
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, read_room(scratch, integers, loops.room).mass)
+    call_stiffness_and_damping(loops.stiffness_and_damping, reals, integers, scratch, t, y, v, k, c)
+    if not loops.active:
+        return
+    for number in range(loops.count):
+        joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
+        if joint.joint >= 0:
+            state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
+            row, found = state.moves[joint.along, : len(y)], state.effort
+            acting = read_joint(reals, integers, joint.joint)
+            stiffness, damping = gains(acting, reals, integers, t, found[COORDINATE], found[RATE], 0.0 * found[RATE])
+            add_outer(row, stiffness, k)
+            add_outer(row, damping, c)
