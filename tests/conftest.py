@@ -50,7 +50,8 @@ KERNELS = (
         "equations.loops.system",
         "equations.loops.steps",
         "equations.loops.nearest",
-        "equations.erls.compiled_functions",
+        "equations.erls.ends",
+        "equations.erls.stiffened_ends",
     ),
 )
 """Modules with compiled code, shared out to two processes."""

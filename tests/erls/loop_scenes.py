@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import scenes
 
-from erls.equations.erls.chain import Erls
-from erls.equations.ffr.formulation import Ffr
+from erls.equations.formulation import TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.registry import TREES
 from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
+from erls.scene.chain import Simulation
 from erls.simulation.simulate import simulate
 
 LENGTHS, GROUND = (0.15, 0.45, 0.35), 0.5
@@ -98,10 +100,13 @@ def run(folder: Path, data: dict[str, Any], name: str = "erls", **simulation: An
 def chain(folder: Path, data: dict[str, Any], name: str = "erls") -> ClosedChain:
     """Equations of motion in one of `FORMULATIONS`."""
     mechanism = scenes.mechanism(scenes.write_toml(folder / "loop.toml", data))
+    return ClosedChain(tree(mechanism, name))
+
+
+def tree(mechanism: Mechanism, name: str) -> TreeFormulation:
+    """Equations of motion of a chain in one of `FORMULATIONS`."""
     settings = FORMULATIONS[name]
-    if settings["formulation"] == "ffr":
-        return ClosedChain(Ffr(mechanism, settings.get("body_frame", "tangent")))
-    return ClosedChain(Erls(mechanism, settings.get("gauge", "joint-angle")))
+    return TREES[settings["formulation"]](mechanism, Simulation(duration=1.0, **settings))
 
 
 def work(run: ChainRun, *joints: str) -> float:

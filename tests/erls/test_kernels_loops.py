@@ -73,7 +73,8 @@ def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     with np.load(output) as twin:
         assert set(twin) == set(found)
         for key, values in found.items():
-            assert _distance(values, twin[key]) <= (LIKE_NUMPY if key == "steps" else LIKE_TWIN), key
+            limit = LIKE_NUMPY if key == "steps" or key.endswith("acceleration") else LIKE_TWIN  # as of open chains
+            assert _distance(values, twin[key]) <= limit, key
 
 
 @pytest.mark.parametrize("name", ["torque on a slide", "controlled turn", "two loops"])

@@ -10,28 +10,18 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.equations.erls.chain import Erls
-from erls.equations.ffr.formulation import Ffr
 from erls.equations.formulation import TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.loops.rows import LoopRows
 from erls.errors import Cause, SimulationError
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, fixed_axes, skew
-from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import link_mass_properties
 from erls.mechanism.loops import LOOP_TYPES, Loop, LoopEnd
 from erls.run.link_loads import link_loads
 
 STEP = 1e-6
 OFFSET = pose(fixed_axes(0.3, -0.5, 0.8), np.array([0.02, -0.01, 0.03]))
-
-
-def _tree(mechanism: Mechanism, name: str) -> TreeFormulation:
-    settings = loop_scenes.FORMULATIONS[name]
-    if settings["formulation"] == "ffr":
-        return Ffr(mechanism, settings.get("body_frame", "tangent"))
-    return Erls(mechanism, settings.get("gauge", "joint-angle"))
 
 
 def _random(tree: TreeFormulation) -> tuple[Array, Array]:
@@ -50,7 +40,7 @@ def _ends(tree: TreeFormulation) -> list[LoopEnd]:
 @pytest.mark.parametrize("name", loop_scenes.FORMULATIONS)
 def test_frames_move_with_their_twists(tmp_path: Path, name: str) -> None:
     """Twist = derivative of the pose, rows · rates beside prescribed joints, bias = derivative of the twist; 1e-7."""
-    tree = _tree(scenes.mechanism(scenes.three_links(tmp_path, "prescribed")), name)
+    tree = loop_scenes.tree(scenes.mechanism(scenes.three_links(tmp_path, "prescribed")), name)
     y, v = _random(tree)
     t, still = 0.2, np.zeros(tree.size)
     found = tree.frames(t, y, v, _ends(tree))
@@ -69,7 +59,7 @@ def test_frames_move_with_their_twists(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", loop_scenes.FORMULATIONS)
 def test_frames_sit_where_runs_draw_the_nodes(tmp_path: Path, name: str) -> None:
     """Origin = drawn node plus the arm turned by its rotation, to second order in that rotation."""
-    tree = _tree(scenes.mechanism(scenes.three_links(tmp_path)), name)
+    tree = loop_scenes.tree(scenes.mechanism(scenes.three_links(tmp_path)), name)
     y, v = _random(tree)
     state = tree.state(0.0, y, v)
     for k, frame in enumerate(tree.frames(0.0, y, v, _ends(tree))):
@@ -86,7 +76,7 @@ def test_frames_sit_where_runs_draw_the_nodes(tmp_path: Path, name: str) -> None
 @pytest.mark.parametrize("kind", LOOP_TYPES)
 def test_conditions_against_differences(tmp_path: Path, kind: str) -> None:
     """Φ̇ and Φ̈ of each kind of closing joint, between two links and to the ground; names for every row. 1e-6."""
-    tree = _tree(scenes.mechanism(scenes.three_links(tmp_path, "mixed")), "ffr")
+    tree = loop_scenes.tree(scenes.mechanism(scenes.three_links(tmp_path, "mixed")), "ffr")
     ends = _ends(tree)
     ground = LoopEnd(None, 0, OFFSET)
     loops = [Loop("a", LOOP_TYPES[kind], ends[0], ends[2]), Loop("b", LOOP_TYPES[kind], ground, ends[1])]

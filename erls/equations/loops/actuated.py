@@ -18,7 +18,7 @@ from erls.equations.loops.records import (
     read_closing_joint,
     read_loop_state,
     read_loops,
-    read_room,
+    read_loop_room,
 )
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import read_joint
@@ -78,7 +78,7 @@ def matrices(
 ) -> None:
     """M into the room, stiffness and damping of the tree, with what acts along closing joints; `closure` comes first."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, read_room(scratch, integers, loops.room).mass)
+    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, read_loop_room(scratch, integers, loops.room).mass)
     call_stiffness_and_damping(loops.stiffness_and_damping, reals, integers, scratch, t, y, v, k, c)
     if not loops.active:
         return

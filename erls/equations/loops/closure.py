@@ -19,12 +19,12 @@ from erls.equations.loops.records import (
     ClosingJoint,
     Loops,
     LoopState,
-    Room,
+    LoopRoom,
     call_frames,
     read_closing_joint,
     read_loop_state,
     read_loops,
-    read_room,
+    read_loop_room,
 )
 from erls.equations.serial.joints import effort, wanted
 from erls.equations.serial.records import read_joint
@@ -177,7 +177,7 @@ def _act(
 
 @spliced
 def _close(
-    loops: Loops, room: Room, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, y: Array
+    loops: Loops, room: LoopRoom, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, y: Array
 ) -> None:
     joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
     state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
@@ -196,9 +196,9 @@ def _close(
 
 @kernel(CLOSURE, counted=False)
 def closure(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array) -> None:
-    """Conditions and efforts of all loops into `Room` and `LoopState`."""
+    """Conditions and efforts of all loops into `LoopRoom` and `LoopState`."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     call_frames(loops.frames, reals, integers, scratch, t, y, v, room.frames)
     for number in range(loops.count):
         _close(loops, room, reals, integers, scratch, number, t, y)

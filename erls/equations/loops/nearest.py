@@ -6,7 +6,7 @@ from typing import Any
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.loops.records import Loops, Room, call_closure, read_loops, read_room
+from erls.equations.loops.records import Loops, LoopRoom, call_closure, read_loops, read_loop_room
 from erls.maths.dense import backward, cholesky, dot, forward
 from erls.maths.jit import ENABLED, kernel, part
 
@@ -24,7 +24,7 @@ if ENABLED:
 
 
 @part
-def _move(loops: Loops, room: Room, given: Array, out: Array) -> int:
+def _move(loops: Loops, room: LoopRoom, given: Array, out: Array) -> int:
     """Take from ``out`` the smallest change in metres that makes up for what is ``given`` (m,)."""
     scaled, flexible, wrong, metres = room.spread, room.flexible, room.wrong, loops.metres
     r, n = scaled.shape
@@ -62,7 +62,7 @@ def largest_gap(scales: Array, used: IntArray, violation: Array, every: bool) ->
 def close(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array) -> int:
     """Move a state to the nearest one, in metres, that closes the loops; 1 where there is none nearby."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     for _ in range(_POLISH):
         call_closure(loops.closure, reals, integers, scratch, t, y, v)
         if largest_gap(loops.scales, loops.used, room.violation, False) <= _CLOSED * loops.reach.real:
@@ -80,7 +80,7 @@ def watch(
 ) -> None:
     """At each of ``places`` (k, n) the largest opening [m], and the products (k, r, r) of the rows in metres."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     gradient, n = room.gradient, places.shape[1]
     for k in range(len(times)):
         call_closure(loops.closure, reals, integers, scratch, times[k], places[k], places[k])

@@ -40,7 +40,7 @@ class Loops(NamedTuple):
     active, rotors : int
         Whether forces or rotors, and whether rotors act along closing joints.
     first, states, room : int
-        Places of the first `ClosingJoint` and `LoopState`, and of the `Room`.
+        Places of the first `ClosingJoint` and `LoopState`, and of the `LoopRoom`.
     frames, residual, mass_matrix, stiffness_and_damping : int
         Addresses of the functions of the tree.
     closure, forces, masses, matrices : int
@@ -156,7 +156,7 @@ class LoopState(NamedTuple):
     spare: Vector
 
 
-class Room(NamedTuple):
+class LoopRoom(NamedTuple):
     """Working memory.
 
     Attributes
@@ -176,7 +176,7 @@ class Room(NamedTuple):
     reduced, multipliers : (n,), (r,) arrays
         z = U⁻ᵀ f, and λ.
     wrong : (r,) array
-        Room.
+        LoopRoom.
     """
 
     frames: Matrix
@@ -204,7 +204,7 @@ def loop_state(columns: int, conditions: int) -> LoopState:
     return LoopState(pose, six[0], six[1], left, six[2], six[3], moves, gradients, np.zeros(5), six[4])
 
 
-def room(ends: int, columns: int, n: int, m: int, r: int) -> Room:
+def room(ends: int, columns: int, n: int, m: int, r: int) -> LoopRoom:
     """Memory for all."""
 
     def square() -> Array:
@@ -213,7 +213,7 @@ def room(ends: int, columns: int, n: int, m: int, r: int) -> Room:
     def rows() -> Array:
         return np.zeros((r, n))
 
-    return Room(
+    return LoopRoom(
         frames=np.zeros((ends, 24 + 6 * columns)),
         violation=np.zeros(m),
         rate=np.zeros(m),
@@ -232,7 +232,7 @@ def room(ends: int, columns: int, n: int, m: int, r: int) -> Room:
     )
 
 
-read_loops, read_room = reader(Loops), reader(Room)
+read_loops, read_loop_room = reader(Loops), reader(LoopRoom)
 read_closing_joint, read_loop_state = reader(ClosingJoint), reader(LoopState)
 see_loops = python_reader(Loops)
 CLOSING_JOINT, LOOP_STATE = table_size(ClosingJoint), table_size(LoopState)

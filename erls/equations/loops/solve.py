@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array
-from erls.equations.loops.records import Loops, Room
+from erls.equations.loops.records import Loops, LoopRoom
 from erls.maths.dense import backward, cholesky, dot, forward
 from erls.maths.jit import inlined, part
 from erls.maths.products import copy_matrix
@@ -30,7 +30,7 @@ def spread_rows(mass: Array, factor: Array, gradient: Array, spread: Array, flex
 
 
 @inlined
-def multipliers_of(loops: Loops, room: Room, reduced: Array, out: Array) -> None:
+def multipliers_of(loops: Loops, room: LoopRoom, reduced: Array, out: Array) -> None:
     """λ of the conditions in use, from z = U⁻ᵀ f."""
     for condition in range(loops.conditions):
         k = loops.used[condition]

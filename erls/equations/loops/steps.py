@@ -17,7 +17,7 @@ from erls.equations.loops.records import (
     call_residual,
     call_stiffness_and_damping,
     read_loops,
-    read_room,
+    read_loop_room,
 )
 from erls.equations.stepped import COMPOSE, SETTLE, Stepped
 from erls.maths import dense
@@ -42,7 +42,7 @@ def residual(
 ) -> None:
     """[M a - f + Φ_yᵀ λ; Φ], and the norms of both terms; ``a`` holds [a; λ]."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     n, r = len(y), loops.kept
     call_residual(loops.forces, reals, integers, scratch, t, y, v, a[:n], out[:n])
     gradient, reaction, metres = room.gradient, room.reduced, loops.metres
@@ -82,7 +82,7 @@ def factor(
     ``factors`` holds the scales of multipliers and of conditions, the unit of mass, row exchanges, and the matrix.
     """
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     n, r = len(y), loops.kept
     metres, gradient, mass, stiffness, damping = loops.metres, room.gradient, room.mass, room.factor, room.damping
     call_stiffness_and_damping(loops.matrices, reals, integers, scratch, t, y, v, stiffness, damping)
@@ -135,7 +135,7 @@ def settle(
 ) -> int:
     """A knot; 1 where a condition, in use or left out, was violated too much when it was looked at last."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     if largest_gap(loops.scales, loops.used, room.violation, True) > loops.open:
         return 1
     for i in range(len(y)):

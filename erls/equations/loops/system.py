@@ -12,7 +12,7 @@ from erls.equations.loops.records import (
     call_residual,
     call_stiffness_and_damping,
     read_loops,
-    read_room,
+    read_loop_room,
 )
 from erls.equations.loops.solve import let_along, multipliers_of, spread_rows
 from erls.maths.dense import backward, dot, forward
@@ -25,7 +25,7 @@ def residual(
 ) -> None:
     """M (a - ÿ) with the accelerations ÿ of the closed chain; NaN where it locks or has no mass."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     call_residual(loops.forces, reals, integers, scratch, t, y, v, scratch[0:0], out)
     call_mass_matrix(loops.masses, reals, integers, scratch, t, y, room.mass)
     n = len(y)
@@ -58,7 +58,7 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
 def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> int:
     """Accelerations with decay of what loops are open by; NaN where they lock."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     call_residual(loops.forces, reals, integers, scratch, t, y, v, scratch[0:0], out)
     call_mass_matrix(loops.masses, reals, integers, scratch, t, y, room.mass)
     n = len(y)
@@ -86,7 +86,7 @@ def stiffness_and_damping(
 ) -> None:
     """Of the chain, less what the loops' forces take of them, and the decay; not symmetric."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    room = read_room(scratch, integers, loops.room)
+    room = read_loop_room(scratch, integers, loops.room)
     call_closure(loops.closure, reals, integers, scratch, t, y, v)
     call_stiffness_and_damping(loops.matrices, reals, integers, scratch, t, y, v, k, c)
     n, r, decay = len(y), loops.kept, loops.decay
