@@ -10,14 +10,12 @@ memory that its functions may use within a call. Coordinates and norms are those
     acceleration(reals, integers, scratch, t, y, v, out) -> status   out (n,) = M⁻¹ f; status 0, or 1 + the number of a
                                                                      coordinate whose motion nothing resists
 
-A tree of links says how frames move that loops hold (the ends on links of `erls.mechanism.loops.Loop`, outer ones before
-inner ones, loop after loop):
+A tree of links says how frames move that loops hold (`erls.mechanism.loops.loop_ends`):
 
-    frames(reals, integers, scratch, t, y, v, out)                   row of out: pose (12,) in the world, twist (6,), its
-                                                                     derivative (6,) at zero accelerations, and the rows
-                                                                     (6, n + p) of the twist over the velocities and the
-                                                                     rates of the p prescribed joints; twists are in the
-                                                                     axes of the frame
+    frames(reals, integers, scratch, t, y, v, out)                   row of out: pose (12,) in the world, twist (6,) and
+                                                                     its rate (6,) at zero accelerations, rows of the
+                                                                     twist (6, n + p) over the velocities and the rates
+                                                                     of the p prescribed joints, in the frame's axes
 
 A system may know better than dense factors how to solve (M + α C + β K) x = b with its mass, damping and stiffness at a
 state; α and β are real or complex, like ``factors`` and ``b``:

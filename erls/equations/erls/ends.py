@@ -69,7 +69,8 @@ def _move_end(
     k = end.link
     while k >= 0:
         copy(pose, moved.spare)
-        compose_poses(read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose, moved.spare, pose)
+        motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
+        compose_poses(motion.pose, moved.spare, pose)
         k = read_link(reals, integers, chain.links + k * LINK).parent
 
 

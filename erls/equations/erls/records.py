@@ -376,8 +376,8 @@ class End(NamedTuple):
 
 
 class EndState(NamedTuple):
-    """Working memory of such a frame: the node in the link's frame, pose (12,), twist and its derivative (6,), rows (6, n)
-    of its twist over the rates of (u, q_d); displacement (6,) of the node, forces (6,) on it, and a pose (12,) to spare.
+    """Working memory of such a frame: its node in the link's frame, by pose (12,), twist and its derivative (6,), rows
+    (6, n) of the twist over the rates of (u, q_d); displacement (6,) of the node, forces (6,) on it; a spare pose.
     """
 
     pose: Vector

@@ -1,4 +1,4 @@
-"""The tree with forces and rotors along the coordinates of closing joints; first of all comes `closure` at the state."""
+"""The tree with forces and rotors along the coordinates of closing joints; `closure` at the state comes before all."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from erls.equations.loops.records import (
     call_residual,
     call_stiffness_and_damping,
     read_closing_joint,
+    read_loop_room,
     read_loop_state,
     read_loops,
-    read_loop_room,
 )
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import read_joint
@@ -76,7 +76,7 @@ def masses(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array,
 def matrices(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, k: Array, c: Array
 ) -> None:
-    """M into the room, stiffness and damping of the tree, with what acts along closing joints; `closure` comes first."""
+    """M into the room, stiffness and damping of the tree, with what acts along closing joints."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     call_mass_matrix(loops.masses, reals, integers, scratch, t, y, read_loop_room(scratch, integers, loops.room).mass)
     call_stiffness_and_damping(loops.stiffness_and_damping, reals, integers, scratch, t, y, v, k, c)

@@ -17,14 +17,14 @@ from erls.equations.loops.records import (
     TURNING,
     WANTED,
     ClosingJoint,
+    LoopRoom,
     Loops,
     LoopState,
-    LoopRoom,
     call_frames,
     read_closing_joint,
+    read_loop_room,
     read_loop_state,
     read_loops,
-    read_loop_room,
 )
 from erls.equations.serial.joints import effort, wanted
 from erls.equations.serial.records import read_joint

@@ -122,7 +122,8 @@ def _joint(memory: Memory, closed: ClosedChain, number: int, loop: Loop) -> own.
     """Record of a loop, whose curves and forces are put into memory."""
     ends = loop.outer, loop.inner
     before = len(loop_ends(closed.mechanism.loops[:number]))
-    places = [-1 if end.link is None else before + int(k > 0 and ends[0].link is not None) for k, end in enumerate(ends)]
+    second = before + int(loop.outer.link is not None)
+    places = [-1 if end.link is None else place for end, place in zip(ends, (before, second), strict=True)]
     signs, free = closed.efforts.signs[number], loop.freedom
     found = conditions(closed.rows.kinds[number])
     joint = -1

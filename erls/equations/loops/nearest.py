@@ -6,7 +6,7 @@ from typing import Any
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.loops.records import Loops, LoopRoom, call_closure, read_loops, read_loop_room
+from erls.equations.loops.records import LoopRoom, Loops, call_closure, read_loop_room, read_loops
 from erls.maths.dense import backward, cholesky, dot, forward
 from erls.maths.jit import ENABLED, kernel, part
 

@@ -1,8 +1,8 @@
 """Closed loops over any tree of links, as records behind those of the tree.
 
-The last entry of ``integers`` is the place of a `Loops`. The tree is known by its functions alone, whose addresses stand
-there (`erls.maths.calls`). n independent coordinates; N of them and of prescribed joints, which come last; m conditions,
-of which r are in use.
+The last entry of ``integers`` is the place of a `Loops`. The tree is known by its functions alone, whose addresses
+stand there (`erls.maths.calls`). n independent coordinates; N of them and of prescribed joints, which come last; m
+conditions, of which r are in use.
 """
 
 from __future__ import annotations

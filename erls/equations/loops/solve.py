@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array
-from erls.equations.loops.records import Loops, LoopRoom
+from erls.equations.loops.records import LoopRoom, Loops
 from erls.maths.dense import backward, cholesky, dot, forward
 from erls.maths.jit import inlined, part
 from erls.maths.products import copy_matrix

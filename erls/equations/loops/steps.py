@@ -16,8 +16,8 @@ from erls.equations.loops.nearest import largest_gap
 from erls.equations.loops.records import (
     call_residual,
     call_stiffness_and_damping,
-    read_loops,
     read_loop_room,
+    read_loops,
 )
 from erls.equations.stepped import COMPOSE, SETTLE, Stepped
 from erls.maths import dense

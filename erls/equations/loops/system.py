@@ -11,8 +11,8 @@ from erls.equations.loops.records import (
     call_mass_matrix,
     call_residual,
     call_stiffness_and_damping,
-    read_loops,
     read_loop_room,
+    read_loops,
 )
 from erls.equations.loops.solve import let_along, multipliers_of, spread_rows
 from erls.maths.dense import backward, dot, forward

@@ -51,7 +51,7 @@ def joint_acts(joint: MechanismJoint) -> bool:
 def force_record(
     memory: Memory, forces: JointForces, drive: Drive, rotor_inertia: float, motion: Curve | None
 ) -> Joint:
-    """What acts along a coordinate, of a joint that moves nothing; its curves, ``motion`` the one of the coordinate, are
+    """What acts along a coordinate, of a joint that moves nothing; its curves, ``motion`` that of the coordinate, are
     put into memory.
     """
     gain, rate_gain = drive.gains
