@@ -33,13 +33,14 @@ def caller(signature: Any) -> Callable[..., Any]:
     """``call(address, *arguments)`` in compiled functions and, with ``ERLS_JIT=0``, in plain Python."""
     if not ENABLED:
         return _plain
-    from llvmlite import ir
     from numba.core import types
     from numba.core.extending import intrinsic
 
+    every: Any = types
+
     def generate(context: Any, builder: Any, typed: Any, given: Any) -> Any:
         convention, kind, kinds = context.call_conv, signature.return_type, signature.args
-        pointer = ir.PointerType(convention.get_function_type(kind, kinds))
+        pointer = convention.get_function_type(kind, kinds).as_pointer()
         arguments = [builder.extract_value(given[1], i) for i in range(len(kinds))]
         status, result = convention.call_function(
             builder, builder.inttoptr(given[0], pointer), kind, kinds, arguments
@@ -49,7 +50,7 @@ def caller(signature: Any) -> Callable[..., Any]:
         return result
 
     def call(typing_context: Any, address: Any, *arguments: Any) -> Any:
-        return signature.return_type(types.int64, types.StarArgTuple(signature.args)), generate
+        return signature.return_type(every.int64, every.StarArgTuple(signature.args)), generate
 
     found: Callable[..., Any] = intrinsic(call)
     return found

@@ -37,7 +37,7 @@ def forces(
     if not loops.active:
         return
     n = len(y)
-    for number in range(loops.count):
+    for number in range(loops.loops):
         joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
         if joint.joint >= 0:
             state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
@@ -65,7 +65,7 @@ def masses(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array,
     call_mass_matrix(loops.mass_matrix, reals, integers, scratch, t, y, out)
     if not loops.rotors:
         return
-    for number in range(loops.count):
+    for number in range(loops.loops):
         joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
         if joint.joint >= 0:
             moves = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE).moves
@@ -82,7 +82,7 @@ def matrices(
     call_stiffness_and_damping(loops.stiffness_and_damping, reals, integers, scratch, t, y, v, k, c)
     if not loops.active:
         return
-    for number in range(loops.count):
+    for number in range(loops.loops):
         joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
         if joint.joint >= 0:
             state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)

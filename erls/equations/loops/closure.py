@@ -200,5 +200,5 @@ def closure(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     room = read_loop_room(scratch, integers, loops.room)
     call_frames(loops.frames, reals, integers, scratch, t, y, v, room.frames)
-    for number in range(loops.count):
+    for number in range(loops.loops):
         _close(loops, room, reals, integers, scratch, number, t, y)

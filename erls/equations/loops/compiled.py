@@ -74,7 +74,7 @@ def compile_loops(closed: ClosedChain, tree: CompiledSystem, numbers: tuple[floa
     used = np.full(m, -1)
     used[closed.kept] = np.arange(r)
     whole = own.Loops(
-        count=len(loops),
+        loops=len(loops),
         conditions=m,
         kept=r,
         active=int(closed.efforts.any),

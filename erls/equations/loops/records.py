@@ -35,8 +35,8 @@ class Loops(NamedTuple):
 
     Attributes
     ----------
-    count, conditions, kept : int
-        Loops; m; r.
+    loops, conditions, kept : int
+        How many; m; r.
     active, rotors : int
         Whether forces or rotors, and whether rotors act along closing joints.
     first, states, room : int
@@ -58,7 +58,7 @@ class Loops(NamedTuple):
         Place of each joint's coordinate in y, -1 where it is prescribed: then place of its curve.
     """
 
-    count: int
+    loops: int
     conditions: int
     kept: int
     active: int
