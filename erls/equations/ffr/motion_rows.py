@@ -17,7 +17,7 @@ from erls.maths.so3 import Array
 
 read_serial, read_modes, read_segment = python_reader(Serial), python_reader(Modes), python_reader(Segment)
 read_frames, read_body_state = python_reader(records.Frames), python_reader(records.BodyState)
-read_node_state = python_reader(records.NodeState)
+read_node, read_node_state = python_reader(records.Node), python_reader(records.NodeState)
 
 
 def frame_rows(system: CompiledSystem, joints: int, modes: list[slice]) -> list[Array]:
@@ -56,7 +56,11 @@ def node_motion(system: CompiledSystem, number: int, joints: int, at: slice, ela
     serial = read_serial(system.reals, system.integers, int(system.integers[0]))
     frames = read_frames(system.reals, system.integers, serial.own)
     state = read_node_state(system.scratch, system.integers, frames.node_states + number * records.NODE_STATE)
+    node = read_node(system.reals, system.integers, frames.nodes + number * records.NODE)
     pose, rows = np.eye(4), np.zeros((6, joints + elastic))
+    if not node.moves:
+        pose[:3, 3] = node.position
+        return FrameMotion(pose, rows, np.zeros(6), np.zeros(6))
     pose[:3, :3], pose[:3, 3] = state.pose[:9].reshape(3, 3), state.pose[9:]
     rows[:, joints + at.start : joints + at.stop] = state.moves
     return FrameMotion(pose, rows, state.twist.copy(), state.twist_rate.copy())
