@@ -333,7 +333,7 @@ def test_out_of_memory(folder: Path, capsys: pytest.CaptureFixture[str], monkeyp
     def full(*_: Any, **__: Any) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("erls.simulation.simulate.build_mechanism", full)
+    monkeypatch.setattr("erls.simulation.chains.build_mechanism", full)
     _, err = run(capsys, "simulate", "scene.toml", "-o", "r.h5", code=3)
     assert err.startswith("error: out of memory; ")
     found, _ = run_json(capsys, "simulate", "scene.toml", code=3)
@@ -349,7 +349,7 @@ def test_interrupted_before_the_run(
     def interrupt(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("erls.simulation.simulate.build_mechanism", interrupt)
+    monkeypatch.setattr("erls.simulation.chains.build_mechanism", interrupt)
     assert run(capsys, "simulate", "scene.toml", code=130) == ("", "error: interrupted; start again\n")
     found, _ = run_json(capsys, "simulate", "scene.toml", code=130)
     assert found["error"]["cause"] == str(Cause.INTERRUPTED)

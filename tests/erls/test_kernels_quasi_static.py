@@ -13,7 +13,7 @@ import pytest
 import quasi_static_cases as cases
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
-LIKE_TWIN = 1e-12
+LIKE_TWIN = 1e-11  # relative: sums in another order, through matrices of a condition of about 1e3
 
 
 def _distance(found: np.ndarray, expected: np.ndarray) -> float:

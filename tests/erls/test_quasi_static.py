@@ -256,7 +256,7 @@ def test_states_solve_the_algebraic_equations(tmp_path: Path) -> None:
         force = whole.residual(t, modes.slow @ z + modes.static @ (x[n:] / scale), rates, modes.slow @ x[:n])
         return np.concatenate([modes.slow.T @ force, modes.static.T @ force / scale])
 
-    found = scipy.optimize.root(balance, np.concatenate([0 * a, 0 * eta]), tol=1e-14)
+    found = scipy.optimize.root(balance, np.concatenate([0 * a, 0 * eta]), tol=1e-11)
     assert found.success
     assert np.abs(modes.metres * (eta - found.x[n:] / scale)).max() <= 1e-6 * np.abs(modes.metres * eta).max()
     np.testing.assert_allclose(a, found.x[:n], atol=1e-6 * np.abs(found.x[:n]).max())

@@ -23,11 +23,12 @@ import numpy as np
 import pytest
 import scenes
 
-from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.formulation import Ffr
+from erls.equations.registry import TREES
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import ALL
+from erls.scene.settings import Simulation
 
 SIZES = 1e-3 * 2.0 ** -np.arange(5)
 
@@ -47,7 +48,7 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
 def _apart(chain: Mechanism, effects: frozenset[str], turning: float) -> Array:
     """(2, sizes) elastic forces of ERLS, and of FFR along mean axes, less those of FFR at the interfaces."""
     chain = replace(chain, effects=effects)
-    systems = [Erls(chain), Ffr(chain, "mean-axis"), Ffr(chain)]
+    systems = [TREES["erls"](chain, Simulation(duration=1.0)), Ffr(chain, "mean-axis"), Ffr(chain)]
     rng = np.random.default_rng(5)
     n, f = systems[0].size, len(systems[0].free_joints)
     omega = np.sqrt(systems[0].stiffness)

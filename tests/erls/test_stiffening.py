@@ -197,7 +197,7 @@ def test_formulations_agree_to_third_order(chain: Mechanism) -> None:
     """Place of the end, kinetic energy and weight of ERLS and of FFR with either frame at the same joint and elastic
     coordinates: differences fall with the third power of the deflection, to a seventh at half of it.
     """
-    equations = [Erls(chain), Ffr(chain, "mean-axis"), Ffr(chain)]
+    equations = [DenseChain(chain, "joint-angle"), Ffr(chain, "mean-axis"), Ffr(chain)]
     rng = np.random.default_rng(1)
     n, f = equations[0].size, len(equations[0].free_joints)
     elastic = np.concatenate([np.zeros(f), 0.5 * rng.normal(size=n - f) / np.sqrt(equations[0].stiffness)])
@@ -220,7 +220,7 @@ def test_formulations_agree_to_third_order(chain: Mechanism) -> None:
 def test_one_link_in_either_formulation(tmp_path: Path) -> None:
     """For one link in its tangent frame ERLS and FFR are the same equations, to rounding; absolute coordinates, too."""
     mechanism = replace(scenes.mechanism(scenes.l_scene(scenes.l_link(tmp_path, 3).parent)), effects=ALL)
-    one, other = Erls(mechanism), Ffr(mechanism)
+    one, other = DenseChain(mechanism, "joint-angle"), Ffr(mechanism)
     rng = np.random.default_rng(0)
     y, v, a = rng.normal(size=(3, one.size)) * np.concatenate([[1.0], 0.3 / np.sqrt(one.stiffness)])
     expected = one.residual(0.0, y, v, a)

@@ -256,6 +256,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         changes=pack.put_all(scratch, [own.change(sizes[k], modes[k]) for k in range(count)]) if bends else -1,
         condensed=pack.put_all(condensed, elimination.condensed(rooms)),
         factors=0,
+        left=0,
         first_order=int("inertia_first_order" in mechanism.effects),
         second_order=int("inertia_second_order" in mechanism.effects),
         coriolis=int("coriolis" in mechanism.effects),
@@ -285,10 +286,10 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         own=0,
         gravity=mechanism.gravity,
     )
-    chain = chain._replace(factors=len(scratch.numbers))
+    size, room = len(free) + sum(modes), len(condensed.numbers)
+    chain = chain._replace(factors=len(scratch.numbers), left=len(scratch.numbers) + room)
     serial = serial._replace(own=constants.put(chain))
     integers[0] = constants.put(serial)
-    size, room = len(free) + sum(modes), len(condensed.numbers)
     own_name = "erls.equations.erls"
     balance, inertia, solving = (
         (f"{own_name}.stiffened_chain", f"{own_name}.stiffened_chain", f"{own_name}.stiffened_solve")
@@ -304,7 +305,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         size=size,
         reals=constants.numbers,
         integers=np.array(integers, dtype=np.int64),
-        scratch=np.concatenate([scratch.numbers, np.zeros(room)]),
+        scratch=np.concatenate([scratch.numbers, np.zeros(room + (size if bends else 0))]),
         residual=function_in(balance, "residual")(),
         mass_matrix=function_in(inertia, "mass_matrix")(),
         stiffness_and_damping=stiffness.stiffness_and_damping,

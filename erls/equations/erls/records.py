@@ -27,8 +27,8 @@ class Chain(NamedTuple):
     segments, changes, condensed : int
         Places of the first records of `erls.equations.serial.segments`, of `erls.equations.erls.segments.Change` and of
         `erls.equations.serial.elimination`.
-    factors : int
-        Where in working memory those of an acceleration lie.
+    factors, left : int
+        Where in working memory the factors of an acceleration lie, and what it leaves of the forces.
     first_order, second_order, coriolis, centrifugal, softening : int
         Effects of `erls.mechanism.effects`, 0 or 1.
     weight : int
@@ -47,6 +47,7 @@ class Chain(NamedTuple):
     changes: int
     condensed: int
     factors: int
+    left: int
     first_order: int
     second_order: int
     coriolis: int
