@@ -21,6 +21,11 @@ def factor_links(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, alpha: Any, beta: Any,
     factors: Any, definite: bool, bends: Any,
 ) -> int:  # fmt: skip
+    """Factors of M + α C + β K; 0, or 1 + the number of a coordinate that nothing resists.
+
+    ``definite`` where the matrix should be positive definite; ``bends`` is None where links have no second-order
+    displacements.
+    """
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     if serial.feeds:
@@ -38,6 +43,7 @@ def factor_links(
 
 @part
 def solve_links(reals: Array, integers: IntArray, factors: Any, b: Any) -> None:
+    """Replace ``b`` by the solution, after `factor_links`."""
     serial = read_serial(reals, integers, integers[0])
     substitute(serial, read_chain(reals, integers, serial.own).condensed, reals, integers, factors, b)
 
