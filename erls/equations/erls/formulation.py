@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem, function_in
 from erls.equations.erls.pack import pack_chain, shapes, stiffened
@@ -21,11 +20,10 @@ from erls.equations.erls.paper.frames import displaced_frames
 from erls.equations.erls.paper.second_order_compatibility import second_order_compatibility
 from erls.equations.erls.records import LINK_STATE, Chain, LinkState
 from erls.equations.formulation import Energy, Reaction, State
-from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
 from erls.equations.serial.joint_frames import FrameMotion
 from erls.equations.serial.node_reach import node_reach
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
-from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import StateSeries
 from erls.maths.records import python_reader
 from erls.maths.so3 import Array, skew
@@ -36,7 +34,7 @@ _see_serial, _see_chain = python_reader(Serial), python_reader(Chain)
 _see_link, _see_joint = python_reader(LinkState), python_reader(JointState)
 
 
-class Erls:
+class Erls(SerialFormulation):
     """Equations of motion of a serial chain in the joint-angle gauge; a `TreeFormulation`.
 
     Parameters
@@ -47,19 +45,8 @@ class Erls:
     gauge = "joint-angle"
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
+        super().__init__(mechanism)
         self.stiffened = stiffened(mechanism)
-        self.joints = len(mechanism.joints)
-        self.elastic = sum(link.elastic_modes for link in mechanism.links)
-        prescribed = np.array([joint.drive.prescribed for joint in mechanism.joints], dtype=bool)
-        self.free_joints = np.flatnonzero(~prescribed)
-        self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
-        self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
-
-    @property
-    def size(self) -> int:
-        """Number of independent coordinates."""
-        return len(self.free)
 
     @cached_property
     def compiled(self) -> CompiledSystem:
@@ -92,59 +79,9 @@ class Erls:
         return tuple(dict.fromkeys(map(self._module, ("energy", "states"))))
 
     @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Breakpoints of all drives."""
-        return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
-
-    @property
     def length_scales(self) -> Array:
         """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
         return np.asarray(node_reach(self.mechanism, self.compatibility)[self.free])
-
-    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
-        """(n,) forces out of balance on the independent coordinates."""
-        system, out = self.compiled, np.empty(self.size)
-        system.residual(system.reals, system.integers, system.scratch, t, *map(_flat, (y, v, a)), out)
-        return out
-
-    def mass_matrix(self, t: float, y: Array) -> Array:
-        """(n, n) mass matrix over the independent coordinates."""
-        system, out = self.compiled, np.empty((self.size, self.size))
-        system.mass_matrix(system.reals, system.integers, system.scratch, t, _flat(y), out)
-        return out
-
-    def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
-        """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
-        system, both = self.compiled, np.empty((2, self.size, self.size))
-        system.stiffness_and_damping(
-            system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), both[0], both[1]
-        )
-        return both[0], both[1]
-
-    def acceleration(self, t: float, y: Array, v: Array) -> Array:
-        """(n,) accelerations from the equations of motion.
-
-        Raises
-        ------
-        SimulationError
-            The mass matrix is not positive definite; names the coordinate.
-        """
-        force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
-        try:
-            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
-        except la.LinAlgError:
-            raise singular_mass(self, t, mass) from None
-
-    def initial_state(self) -> tuple[Array, Array]:
-        """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
-        joints = self.mechanism.joints
-        y, v = np.zeros(self.size), np.zeros(self.size)
-        f = len(self.free_joints)
-        y[:f] = [joints[k].position for k in self.free_joints]
-        v[:f] = [joints[k].rate for k in self.free_joints]
-        if self.mechanism.static_start:
-            y = held_equilibrium(self, y, self.free_joints)
-        return y, v
 
     def series(self, t: Array, y: Array, v: Array) -> StateSeries:
         """States at (k,) times."""
@@ -152,7 +89,7 @@ class Erls:
         sizes = [6 + link.elastic_modes for link in links]
         out = np.empty((len(t), sum(14 + 2 * n for n in sizes)))
         states = function_in(self._module("states"), "states")()
-        states(system.reals, system.integers, system.scratch, _flat(t), _flat(y), _flat(v), out)
+        states(system.reals, system.integers, system.scratch, contiguous(t), contiguous(y), contiguous(v), out)
         poses = np.zeros((len(t), len(links), 4, 4))
         flat = out[:, : 12 * len(links)].reshape(len(t), len(links), 12)
         poses[..., :3, :3] = flat[..., :9].reshape(*flat.shape[:2], 3, 3)
@@ -172,22 +109,17 @@ class Erls:
         """Energies of a state."""
         system, out = self.compiled, np.empty(4)
         energy = function_in(self._module("energy"), "energy")()
-        energy(system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), out)
+        energy(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), out)
         return Energy(*out.tolist())
 
     def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
         """Frames on displaced nodes of links, with rows over (θ, q_d); see `TreeFormulation`."""
         return displaced_frames(self, t, y, v, ends)
 
-    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
-        """Joint reactions at a state."""
-        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
-
     def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
         """Joint reactions that give these accelerations."""
         system = self._complete
-        balance = np.empty(self.size)
-        system.residual(system.reals, system.integers, system.scratch, t, *map(_flat, (y, v, a)), balance)
+        residual(system, t, y, v, a)
         serial = _see_serial(system.reals, system.integers, int(system.integers[0]))
         chain = _see_chain(system.reals, system.integers, serial.own)
         found = [
@@ -217,7 +149,3 @@ class Erls:
             "elastic_coordinates": self.elastic,
             "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
         }
-
-
-def _flat(x: Array) -> Array:
-    return np.ascontiguousarray(x, dtype=float)

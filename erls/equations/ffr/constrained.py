@@ -260,7 +260,7 @@ class ConstrainedFfr:
     def constraint_rate(self, t: float, q: Configuration) -> Array:
         """(m,) Φ_t."""
         still, result = np.zeros(self.size), np.zeros(self.constraints)
-        for k in self.reduced.prescribed_joints:
+        for k in self.reduced.prescribed_joints.tolist():
             left, timed = self._condition(k, t, self._joint(k, q, still)[2])
             result[self.rows[k]] = self.conditions[k].gradient(left.pose) @ timed
         return result

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem, function_in
 from erls.equations.ffr.body_frame import elastic_basis
@@ -21,10 +20,9 @@ from erls.equations.ffr.pack import Given, pack_frames
 from erls.equations.ffr.records import BODY_STATE, BodyState, Frames
 from erls.equations.ffr.standard_data import StandardData
 from erls.equations.formulation import Energy, Reaction, State
-from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
 from erls.equations.serial.joint_frames import FrameMotion, attached, carried
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
-from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import StateSeries
 from erls.maths.records import python_reader
 from erls.maths.so3 import Array, cross
@@ -47,7 +45,7 @@ class Motion:
     twists: list[Array]
 
 
-class Ffr:
+class Ffr(SerialFormulation):
     """Equations of motion of a serial chain; a `TreeFormulation`.
 
     Parameters
@@ -58,26 +56,14 @@ class Ffr:
     """
 
     def __init__(self, mechanism: Mechanism, body_frame: str = "tangent") -> None:
-        self.mechanism, self.body_frame = mechanism, body_frame
+        super().__init__(mechanism)
+        self.body_frame = body_frame
         self.bases = [elastic_basis(link, body_frame) for link in mechanism.links]
         self.stiffened = "geometric_stiffening" in mechanism.effects
-        self.joints = len(mechanism.joints)
         sizes = [link.elastic_modes for link in mechanism.links]
-        self.elastic = sum(sizes)
         ends = np.cumsum(sizes)
         self.modes = [slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)]  # within η
-        prescribed = np.array([joint.drive.prescribed for joint in mechanism.joints], dtype=bool)
-        self.free_joints = np.flatnonzero(~prescribed)
-        self.prescribed_joints = [int(k) for k in np.flatnonzero(prescribed)]
-        self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
-        self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
-        self.damping = np.concatenate([link.damping for link in mechanism.links])
         self._tied: dict[tuple[tuple[int, int], ...], CompiledSystem] = {}
-
-    @property
-    def size(self) -> int:
-        """Number of independent coordinates."""
-        return len(self.free)
 
     @cached_property
     def given(self) -> Given:
@@ -104,11 +90,6 @@ class Ffr:
         """Modules of what runs report: states and energies."""
         return "erls.equations.ffr.energy", "erls.equations.ffr.states"
 
-    @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Breakpoints of all drives."""
-        return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
-
     @cached_property
     def length_scales(self) -> Array:
         """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
@@ -127,52 +108,10 @@ class Ffr:
         smallest[: self.joints] = 1e-3
         return np.asarray(np.maximum(scales, smallest)[self.free])
 
-    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
-        """(n,) forces out of balance on the independent coordinates."""
-        return _residual(self.compiled, t, y, v, a)
-
-    def mass_matrix(self, t: float, y: Array) -> Array:
-        """(n, n) mass matrix over the independent coordinates."""
-        system, out = self.compiled, np.empty((self.size, self.size))
-        system.mass_matrix(system.reals, system.integers, system.scratch, t, _flat(y), out)
-        return out
-
-    def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
-        """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
-        system, both = self.compiled, np.empty((2, self.size, self.size))
-        system.stiffness_and_damping(
-            system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), both[0], both[1]
-        )
-        return both[0], both[1]
-
-    def acceleration(self, t: float, y: Array, v: Array) -> Array:
-        """(n,) accelerations from the equations of motion.
-
-        Raises
-        ------
-        SimulationError
-            The mass matrix is not positive definite; names the coordinate.
-        """
-        force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
-        try:
-            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
-        except la.LinAlgError:
-            raise singular_mass(self, t, mass, self._name) from None
-
-    def _name(self, place: int) -> str:
+    def elastic_name(self, place: int) -> str:
         """Of an elastic coordinate within η."""
         number = next(k for k, at in enumerate(self.modes) if place < at.stop)
         return f"the elastic coordinates of link {self.mechanism.links[number].name!r}"
-
-    def initial_state(self) -> tuple[Array, Array]:
-        """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
-        y, v = np.zeros(self.size), np.zeros(self.size)
-        f = len(self.free_joints)
-        y[:f] = [self.mechanism.joints[k].position for k in self.free_joints]
-        v[:f] = [self.mechanism.joints[k].rate for k in self.free_joints]
-        if self.mechanism.static_start:
-            y = held_equilibrium(self, y, self.free_joints)
-        return y, v
 
     def series(self, t: Array, y: Array, v: Array) -> StateSeries:
         """States at (k,) times: floating frames, modal coordinates of the fields that deform them, and joint angles.
@@ -182,7 +121,7 @@ class Ffr:
         system, links = self.compiled, len(self.mechanism.links)
         out = np.empty((len(t), 14 * links + 12))
         states = function_in("erls.equations.ffr.states", "states")()
-        states(system.reals, system.integers, system.scratch, _flat(t), _flat(y), _flat(v), out)
+        states(system.reals, system.integers, system.scratch, contiguous(t), contiguous(y), contiguous(v), out)
         flat = out[:, : 12 * links].reshape(len(t), links, 12)
         poses = np.zeros((len(t), links, 4, 4))
         poses[..., :3, :3] = flat[..., :9].reshape(len(t), links, 3, 3)
@@ -199,7 +138,7 @@ class Ffr:
     def motion(self, t: float, y: Array, v: Array) -> Motion:
         """Poses and twists of all floating frames at a state."""
         state, f, system = self.state(t, y, v), len(self.free_joints), self.compiled
-        _residual(system, t, y, v, np.zeros(0))
+        residual(system, t, y, v, np.zeros(0))
         twists = [found.twist.copy() for found in self._bodies(system)]
         return Motion(state.coordinates, state.rates, y[f:], v[f:], state.poses, twists)
 
@@ -207,7 +146,7 @@ class Ffr:
         """Energies of a state."""
         system, out = self.compiled, np.empty(4)
         energy = function_in("erls.equations.ffr.energy", "energy")()
-        energy(system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), out)
+        energy(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), out)
         return Energy(*out.tolist())
 
     def _bodies(self, system: CompiledSystem) -> list[BodyState]:
@@ -222,9 +161,9 @@ class Ffr:
         nodes = [(int(end.link or 0), end.node) for end in ends]
         system, state = self._complete(*nodes), self.state(t, y, v)
         system.mass_matrix(
-            system.reals, system.integers, system.scratch, t, _flat(y), np.empty((self.size, self.size))
+            system.reals, system.integers, system.scratch, t, contiguous(y), np.empty((self.size, self.size))
         )
-        _residual(system, t, y, v, np.zeros(0))
+        residual(system, t, y, v, np.zeros(0))
         rows, bodies = frame_rows(system, self.joints, self.modes), self._bodies(system)
         result: list[FrameMotion] = []
         for number, ((k, _), end) in enumerate(zip(nodes, ends, strict=True)):
@@ -233,14 +172,10 @@ class Ffr:
             result.append(attached(carried(link, local), end.frame))
         return result
 
-    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
-        """Joint reactions at a state: what the links from there outward need."""
-        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
-
     def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
         """Joint reactions that give these accelerations."""
         system, state = self._complete(), self.state(t, y, v)
-        _residual(system, t, y, v, a)
+        residual(system, t, y, v, a)
         serial = _read_serial(system.reals, system.integers, int(system.integers[0]))
         result: list[Reaction] = []
         for k, (link, body) in enumerate(zip(self.mechanism.links, self._bodies(system), strict=True)):
@@ -263,13 +198,3 @@ class Ffr:
             "elastic_coordinates": self.elastic,
             "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
         }
-
-
-def _flat(x: Array) -> Array:
-    return np.ascontiguousarray(x, dtype=float)
-
-
-def _residual(system: CompiledSystem, t: float, y: Array, v: Array, a: Array) -> Array:
-    out = np.empty(system.size)
-    system.residual(system.reals, system.integers, system.scratch, t, _flat(y), _flat(v), _flat(a), out)
-    return out

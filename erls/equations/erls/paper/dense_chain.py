@@ -33,12 +33,11 @@ from erls.equations.erls.paper.records import (
 )
 from erls.equations.formulation import Energy, Reaction, State
 from erls.equations.serial.displaced_frame import displaced_frame
-from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.serial.formulation import SerialFormulation
 from erls.equations.serial.joint_frames import FrameMotion, attached, carried
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import Serial
 from erls.equations.serial.state_series import StateSeries
-from erls.errors import Cause, SimulationError
 from erls.maths.records import python_reader
 from erls.maths.so3 import Array, skew
 from erls.mechanism.chain import Mechanism
@@ -49,7 +48,7 @@ _see_serial, _see_paper, _see_balance = python_reader(Serial), python_reader(Pap
 _see_elimination, _see_link, _see_joint = python_reader(Elimination), python_reader(BodyState), python_reader(RowState)
 
 
-class DenseChain:
+class DenseChain(SerialFormulation):
     """Equations of motion of a serial chain; a `Formulation`.
 
     Parameters
@@ -60,15 +59,8 @@ class DenseChain:
     """
 
     def __init__(self, mechanism: Mechanism, gauge: str = "minimum-norm") -> None:
-        self.mechanism, self.gauge = mechanism, gauge
-        self.stiffened = is_stiffened(mechanism)
-        self.joints = len(mechanism.joints)
-        self.elastic = sum(link.elastic_modes for link in mechanism.links)
-        prescribed = np.array([joint.drive.prescribed for joint in mechanism.joints], dtype=bool)
-        self.free_joints, self.prescribed_joints = np.flatnonzero(~prescribed), np.flatnonzero(prescribed)
-        self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
-        self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
-        self.damping = np.concatenate([link.damping for link in mechanism.links])
+        super().__init__(mechanism)
+        self.gauge, self.stiffened = gauge, is_stiffened(mechanism)
 
     @cached_property
     def compiled(self) -> CompiledSystem:
@@ -76,19 +68,9 @@ class DenseChain:
         return pack_chain(self.mechanism, self.gauge)
 
     @property
-    def size(self) -> int:
-        """Number of independent coordinates."""
-        return len(self.free)
-
-    @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Breakpoints of all drives."""
-        return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
-
-    @property
     def length_scales(self) -> Array:
         """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
-        y, v = self._start()
+        y, v = self.undeformed_start()
         self.residual(0.0, y, v, v)
         return np.asarray(reach_of_nodes(self.mechanism, self.elimination.d)[self.free])
 
@@ -118,68 +100,11 @@ class DenseChain:
         _, integers, scratch = self._memory
         return _see_joint(scratch, integers, self._places.row_states + k * ROW_STATE)
 
-    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
-        """(n,) forces out of balance on the independent coordinates."""
-        out = np.empty(self.size)
-        self.compiled.residual(*self._memory, t, *map(_numbers, (y, v, a)), out)
-        return out
-
-    def mass_matrix(self, t: float, y: Array) -> Array:
-        """(n, n) mass matrix over the independent coordinates."""
-        out = np.empty((self.size, self.size))
-        self.compiled.mass_matrix(*self._memory, t, _numbers(y), out)
-        return out
-
     def full_mass_matrix(self, t: float, y: Array) -> Array:
         """(joints + elastic)² mass matrix over (θ, q_d), prescribed joints included."""
         self.mass_matrix(t, y)
         _, integers, scratch = self._memory
         return np.array(_see_balance(scratch, integers, self._places.balance).mass)
-
-    def acceleration(self, t: float, y: Array, v: Array) -> Array:
-        """(n,) accelerations from the equations of motion.
-
-        Raises
-        ------
-        SimulationError
-            The mass matrix is not positive definite; names the coordinate.
-        """
-        out = np.empty(self.size)
-        if self.compiled.acceleration(*self._memory, t, _numbers(y), _numbers(v), out) != 0:
-            raise self._singular(t, self.mass_matrix(t, y))
-        return out
-
-    def _singular(self, t: float, mass: Array) -> SimulationError:
-        values, vectors = np.linalg.eigh(mass)
-        worst = self.free[int(np.abs(vectors[:, 0]).argmax())]
-        elastic = f"elastic coordinate {worst - self.joints + 1}"
-        name = f"joint {self.mechanism.joints[worst].name!r}" if worst < self.joints else elastic
-        return SimulationError(
-            Cause.SINGULAR_MASS,
-            f"nothing resists the motion of {name}",
-            where=f"t = {t:.6g} s",
-            value=float(values[0]),
-            limit="above 0",
-            remedy="give the link mass and inertia, or the joint rotor inertia",
-        )
-
-    def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
-        """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
-        stiffness, damping = np.empty((2, self.size, self.size))
-        self.compiled.stiffness_and_damping(*self._memory, t, _numbers(y), _numbers(v), stiffness, damping)
-        return stiffness, damping
-
-    def _start(self) -> tuple[Array, Array]:
-        """(y, v) at time 0 with undeformed links."""
-        y, v = np.zeros((2, self.size))
-        for place, k in enumerate(self.free_joints):
-            y[place], v[place] = self.mechanism.joints[k].position, self.mechanism.joints[k].rate
-        return y, v
-
-    def initial_state(self) -> tuple[Array, Array]:
-        """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
-        y, v = self._start()
-        return (held_equilibrium(self, y, self.free_joints) if self.mechanism.static_start else y), v
 
     def state(self, t: float, y: Array, v: Array) -> State:
         """Poses, modal coordinates and joint angles at a state."""
@@ -236,10 +161,6 @@ class DenseChain:
             result.append(attached(carried(rigid, local), offset))
         return result
 
-    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
-        """Joint reactions at a state."""
-        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
-
     def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
         """Joint reactions that give these accelerations."""
         self.residual(t, y, v, a)
@@ -265,10 +186,6 @@ class DenseChain:
             "elastic_coordinates": self.elastic,
             "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
         }
-
-
-def _numbers(x: Array) -> Array:
-    return np.ascontiguousarray(x, dtype=float)
 
 
 def _pose(world: Array) -> Array:

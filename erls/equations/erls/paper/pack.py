@@ -20,16 +20,16 @@ from erls.equations.erls.paper.records import (
     elimination,
     row_state,
 )
+from erls.equations.erls.paper.second_order_compatibility import frame_second_order
 from erls.equations.serial.modal_inertia import modal_inertia
 from erls.equations.serial.pack import joint_record, joint_states, rigid_links, step_parts
 from erls.equations.serial.records import Joint, Modes, Serial
 from erls.maths.records import Memory
-from erls.maths.se3 import inverse, pose, twist_cross
-from erls.maths.so3 import Array, skew
+from erls.maths.se3 import inverse, twist_cross
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.links import Link, node_shape6
+from erls.mechanism.links import Link
 from fe_import.model import InterfaceNode
-from fe_import.second_order.composition import twice_turned
 
 GAUGES = ("joint-angle", "minimum-norm")
 _NO_INERTIA = 1e-12  # of the largest: a massless link has no direction to divide by
@@ -43,26 +43,10 @@ def is_stiffened(mechanism: Mechanism) -> bool:
     )
 
 
-def frame_second_order(link: Link, interface: InterfaceNode, frame: Array) -> Array:
-    """(6, n, n) second-order displacement and rotation vector of a frame that moves rigidly with an interface, in its
-    axes; of no entries where it has none.
-
-    Parameters
-    ----------
-    link : Link
-    interface : InterfaceNode
-    frame : (4, 4) array
-        Undeformed pose of that frame in the mesh frame.
-    """
-    if link.second_order is None:
-        return _NONE
-    arm = pose(position=-interface.position) @ frame
-    offset, back = arm[:3, 3], arm[:3, :3].T
-    moved = link.second_order.node(interface.node)
-    _, phi = node_shape6(link.model, interface.node)
-    u = moved[:3] - np.einsum("ij,jab->iab", skew(offset), moved[3:]) + twice_turned(phi, offset)
-    result = np.concatenate([np.einsum("ij,jab->iab", back, part) for part in (u, moved[3:])])
-    return result if np.abs(result).max(initial=0.0) > 0 else _NONE
+def _frame_second_order(link: Link, interface: InterfaceNode, frame: Array) -> Array:
+    """See `frame_second_order`; of no entries where there is none."""
+    found = frame_second_order(link, interface, frame)
+    return _NONE if found is None else found
 
 
 def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows]:
@@ -80,13 +64,13 @@ def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows
     first = 0
     for k, (joint, link) in enumerate(zip(mechanism.joints, mechanism.links, strict=True)):
         own = link.interface_shape(link.inboard, inverse(joint.after))
-        own_second = frame_second_order(link, link.inboard, inverse(joint.after)) if curved else _NONE
+        own_second = _frame_second_order(link, link.inboard, inverse(joint.after)) if curved else _NONE
         previous, previous_second = np.zeros((6, 0)), _NONE
         if k > 0:
             before = mechanism.links[k - 1]
             assert before.outboard is not None
             previous = before.interface_shape(before.outboard, joint.before)
-            previous_second = frame_second_order(before, before.outboard, joint.before) if curved else _NONE
+            previous_second = _frame_second_order(before, before.outboard, joint.before) if curved else _NONE
         all_rows = gauge == "joint-angle" or joint.drive.prescribed
         free_row = -1 if all_rows else joint.type.free_row
         count = 6 if all_rows else 5

@@ -1,0 +1,124 @@
+"""What formulations of a serial chain in independent coordinates share: coordinates, and calls of what is compiled.
+
+Independent coordinates y = (free joint coordinates, elastic coordinates of all links); prescribed joint coordinates
+follow from time.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+import scipy.linalg as la
+
+from erls.equations.compiled_system import CompiledSystem
+from erls.equations.formulation import Reaction, TreeFormulation
+from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.serial.singular import singular_mass
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+
+
+class SerialFormulation(TreeFormulation):
+    """A `TreeFormulation` whose equations are compiled.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+
+    Attributes
+    ----------
+    elastic : int
+        Elastic coordinates of all links.
+    stiffness, damping : (elastic,) arrays
+        Of the elastic coordinates.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.joints = len(mechanism.joints)
+        self.elastic = sum(link.elastic_modes for link in mechanism.links)
+        prescribed = np.array([joint.drive.prescribed for joint in mechanism.joints], dtype=bool)
+        self.free_joints, self.prescribed_joints = np.flatnonzero(~prescribed), np.flatnonzero(prescribed)
+        self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
+        self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
+        self.damping = np.concatenate([link.damping for link in mechanism.links])
+
+    @property
+    @abstractmethod
+    def compiled(self) -> CompiledSystem:
+        """The equations."""
+
+    @property
+    def size(self) -> int:
+        """Number of independent coordinates."""
+        return len(self.free)
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Breakpoints of all drives."""
+        return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
+
+    def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        """(n,) forces out of balance on the independent coordinates."""
+        return residual(self.compiled, t, y, v, a)
+
+    def mass_matrix(self, t: float, y: Array) -> Array:
+        """(n, n) mass matrix over the independent coordinates."""
+        system, out = self.compiled, np.empty((self.size, self.size))
+        system.mass_matrix(system.reals, system.integers, system.scratch, t, contiguous(y), out)
+        return out
+
+    def stiffness_and_damping(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
+        system, both = self.compiled, np.empty((2, self.size, self.size))
+        system.stiffness_and_damping(
+            system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), both[0], both[1]
+        )
+        return both[0], both[1]
+
+    def acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """(n,) accelerations from the equations of motion.
+
+        Raises
+        ------
+        SimulationError
+            The mass matrix is not positive definite; names the coordinate.
+        """
+        force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
+        try:
+            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
+        except la.LinAlgError:
+            raise singular_mass(self, t, mass, self.elastic_name) from None
+
+    def elastic_name(self, place: int) -> str:
+        """What messages call an elastic coordinate, by its place among them."""
+        return f"elastic coordinate {place + 1}"
+
+    def undeformed_start(self) -> tuple[Array, Array]:
+        """(y, v) at time 0: the joints' initial angles and rates, links undeformed."""
+        y, v = np.zeros((2, self.size))
+        for place, k in enumerate(self.free_joints):
+            y[place], v[place] = self.mechanism.joints[k].position, self.mechanism.joints[k].rate
+        return y, v
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
+        y, v = self.undeformed_start()
+        return (held_equilibrium(self, y, self.free_joints) if self.mechanism.static_start else y), v
+
+    def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
+        """Joint reactions at a state."""
+        return self.reactions_at(t, y, v, self.acceleration(t, y, v))
+
+
+def contiguous(x: Array) -> Array:
+    """As compiled functions take it."""
+    return np.ascontiguousarray(x, dtype=float)
+
+
+def residual(system: CompiledSystem, t: float, y: Array, v: Array, a: Array) -> Array:
+    """(n,) forces out of balance; its records stay in the system's working memory."""
+    out = np.empty(system.size)
+    system.residual(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), contiguous(a), out)
+    return out
