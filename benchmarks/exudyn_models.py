@@ -152,7 +152,7 @@ def build(mechanism: Mechanism, sections: Sequence[Section], point: int, duratio
             other_frame = np.eye(3)
         else:
             before, number_before, frame_before = previous
-            nodes = before.around[mechanism.links[k - 1].outboard.node][:4]
+            nodes = before.around[mechanism.joints[k].seat.node][:4]
             other = mbs.AddMarker(
                 items.MarkerSuperElementRigid(
                     bodyNumber=number_before, meshNodeNumbers=nodes, weightingFactors=[0.25] * 4

@@ -128,7 +128,7 @@ def _evaluation(mechanism: Mechanism, number: int, r: int) -> float:
     link, effects = mechanism.links[number], mechanism.effects
     e = link.elastic_modes
     products = 1 + 3 * r * (not FIRST.isdisjoint(effects)) + r * (r + 1) // 2 * (not SECOND.isdisjoint(effects))
-    tensors, carries = 0, number + 1 < len(mechanism.links)
+    tensors, carries = 0, len(mechanism.standing_on(number))
     if link.second_order is not None and not {"geometric_stiffening", "foreshortening"}.isdisjoint(effects):
         tensors = 6 + 3 * r + 6 * carries
     return _CARRIED + 48 * e * carries + 2 * products * (6 + e) ** 2 + 2 * tensors * e**2
@@ -137,12 +137,13 @@ def _evaluation(mechanism: Mechanism, number: int, r: int) -> float:
 def axes_of(mechanism: Mechanism) -> list[int]:
     """Axes about which each link can turn: 0, 1, or 3 as soon as two joints before it are not parallel."""
     frames = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
-    result: list[int] = []
-    seen: list[np.ndarray] = []
-    for k, joint in enumerate(mechanism.joints):
-        if joint.type.revolute:
-            before = frames[k - 1] if k else np.eye(4)
-            seen.append((before @ joint.before)[:3, 2])
-        parallel = all(math.isclose(abs(float(axis @ seen[0])), 1.0, abs_tol=1e-9) for axis in seen)
-        result.append((1 if parallel else 3) if seen else 0)
-    return result
+    found: list[list[np.ndarray]] = []
+    for joint in mechanism.joints:
+        below, frame = ([], np.eye(4)) if joint.parent < 0 else (found[joint.parent], frames[joint.parent])
+        found.append([*below, (frame @ joint.before)[:3, joint.freedom.axis]] if joint.freedom.turns else below)
+    return [_spread(axes) for axes in found]
+
+
+def _spread(axes: list[np.ndarray]) -> int:
+    parallel = all(math.isclose(abs(float(axis @ axes[0])), 1.0, abs_tol=1e-9) for axis in axes)
+    return (1 if parallel else 3) if axes else 0

@@ -23,13 +23,14 @@ Watched = tuple[tuple[int, int], ...]
 
 
 def watched_nodes(mechanism: Mechanism) -> Watched:
-    """(link, node) of the named points; without any, of every link's outboard interface, or else its farthest node."""
+    """(link, node) of the named points; without any, of every link where joints stand on it, or its farthest node."""
     if mechanism.points:
         return tuple((p.link, p.node) for p in mechanism.points)
     result = []
     for k, link in enumerate(mechanism.links):
         far = np.linalg.norm(link.model.nodes - link.inboard.position, axis=1).argmax()
-        result.append((k, int(far) if link.outboard is None else link.outboard.node))
+        seats = [mechanism.joints[outer].seat for outer in mechanism.standing_on(k)]
+        result += [(k, seat.node) for seat in seats if seat is not None] or [(k, int(far))]
     return tuple(result)
 
 

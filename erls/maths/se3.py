@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.maths.so3 import Array, rotation_z, skew
+from erls.maths.so3 import Array, skew
 
 
 def pose(rotation: Array | None = None, position: Array | None = None) -> Array:
@@ -47,23 +47,4 @@ def twist_cross(twist: Array) -> Array:
     result = np.zeros((6, 6))
     result[:3, :3] = result[3:, 3:] = skew(twist[3:])
     result[:3, 3:] = skew(twist[:3])
-    return result
-
-
-def joint_pose(revolute: bool, coordinate: float) -> Array:
-    """(4, 4) motion about (revolute) or along (prismatic) the z axis."""
-    if revolute:
-        return pose(rotation_z(coordinate))
-    return pose(position=np.array([0.0, 0.0, coordinate]))
-
-
-def joint_poses(revolute: bool, coordinates: Array) -> Array:
-    """(k, 4, 4) `joint_pose` of (k,) coordinates."""
-    result = np.tile(np.eye(4), (len(coordinates), 1, 1))
-    if revolute:
-        c, s = np.cos(coordinates), np.sin(coordinates)
-        result[:, 0, 0] = result[:, 1, 1] = c
-        result[:, 0, 1], result[:, 1, 0] = -s, s
-    else:
-        result[:, 2, 3] = coordinates
     return result

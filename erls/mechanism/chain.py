@@ -1,4 +1,4 @@
-"""Serial chains: the mechanism as data, and the rigid kinematics of its Equivalent Rigid Link System.
+"""Trees of links: the mechanism as data, and the rigid kinematics of its Equivalent Rigid Link System.
 
 Frames: link k's mesh frame is its body frame; twists and wrenches are [linear; angular] about its origin, in its
 axes. θ is the vector of joint coordinates.
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.maths.se3 import joint_pose, twist_cross, twist_transform
+from erls.maths.se3 import twist_cross, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.effects import DEFAULT
 from erls.mechanism.joints import Joint
@@ -29,7 +29,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """A serial chain: joint k connects link k-1 (or the ground) to link k.
+    """A tree of links: joint k carries link k, and stands on a link with a smaller number, or on the ground.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Mechanism:
     static_start : bool
         Whether the motion starts from static equilibrium with the joints held, instead of undeformed.
     loops : tuple of Loop
-        Joints that close the chain.
+        Joints that close it.
     effects : frozenset of str
         Names from `erls.mechanism.effects` that the equations of motion take into account.
     bandwidth : float or None
@@ -59,6 +59,28 @@ class Mechanism:
     effects: frozenset[str] = DEFAULT
     bandwidth: float | None = None
 
+    @property
+    def parents(self) -> tuple[int, ...]:
+        """Of every link the one that its joint stands on, -1 for the ground."""
+        return tuple(joint.parent for joint in self.joints)
+
+    def carried(self, number: int) -> list[int]:
+        """A link and all that it bears, by their numbers."""
+        found = [number]
+        for k in range(number + 1, len(self.links)):
+            if self.joints[k].parent in found:
+                found.append(k)
+        return found
+
+    def standing_on(self, number: int) -> list[int]:
+        """Joints that stand on a link, by their numbers."""
+        return [k for k, joint in enumerate(self.joints) if joint.parent == number]
+
+    @property
+    def outermost(self) -> list[int]:
+        """Links that bear no other."""
+        return [k for k in range(len(self.links)) if k not in self.parents]
+
 
 @dataclass(frozen=True)
 class Kinematics:
@@ -69,7 +91,7 @@ class Kinematics:
     poses : list of (4, 4) arrays
         Link frames in the world.
     transforms : list of (6, 6) arrays
-        Twist of link k-1 to link k (for the first link: of the ground).
+        Twist of the link below, or of the ground, to that of the link.
     twists, biases : list of (6,) arrays
         Twist of each link, and its derivative at zero joint acceleration.
     """
@@ -83,10 +105,9 @@ class Kinematics:
 def poses(mechanism: Mechanism, theta: Array) -> list[Array]:
     """World poses of the link frames, (4, 4) each."""
     result: list[Array] = []
-    current = np.eye(4)
     for joint, coordinate in zip(mechanism.joints, theta, strict=True):
-        current = current @ joint.before @ joint_pose(joint.type.revolute, coordinate) @ joint.after
-        result.append(current)
+        step = joint.before @ joint.freedom.pose(coordinate) @ joint.after
+        result.append(step if joint.parent < 0 else result[joint.parent] @ step)
     return result
 
 
@@ -101,27 +122,26 @@ def kinematics(mechanism: Mechanism, screws: list[Array], theta: Array, rates: A
     theta, rates : (n,) arrays
     """
     result = Kinematics([], [], [], [])
-    world, twist, bias = np.eye(4), np.zeros(6), np.zeros(6)
     for joint, screw, coordinate, rate in zip(mechanism.joints, screws, theta, rates, strict=True):
-        step = joint.before @ joint_pose(joint.type.revolute, coordinate) @ joint.after
-        world = world @ step
+        world, twist, bias = np.eye(4), np.zeros(6), np.zeros(6)
+        if joint.parent >= 0:
+            world, twist, bias = (x[joint.parent] for x in (result.poses, result.twists, result.biases))
+        step = joint.before @ joint.freedom.pose(coordinate) @ joint.after
         transform = twist_transform(step)
         twist = transform @ twist + screw * rate
-        bias = transform @ bias - twist_cross(screw * rate) @ twist
-        result.poses.append(world)
+        result.poses.append(world @ step)
         result.transforms.append(transform)
         result.twists.append(twist)
-        result.biases.append(bias)
+        result.biases.append(transform @ bias - twist_cross(screw * rate) @ twist)
     return result
 
 
-def jacobians(transforms: list[Array], screws: list[Array]) -> list[Array]:
+def jacobians(mechanism: Mechanism, transforms: list[Array], screws: list[Array]) -> list[Array]:
     """(6, n) Jacobian of every link's twist with respect to the joint rates."""
     count = len(screws)
     result: list[Array] = []
-    current = np.zeros((6, count))
-    for k in range(count):
-        current = transforms[k] @ current
+    for k, joint in enumerate(mechanism.joints):
+        current = np.zeros((6, count)) if joint.parent < 0 else transforms[k] @ result[joint.parent]
         current[:, k] = screws[k]
         result.append(current)
     return result

@@ -1,4 +1,4 @@
-"""Joints: one-parameter motions about or along z, with the forces that act in them."""
+"""Joints of one coordinate, with the forces that act along it."""
 
 from __future__ import annotations
 
@@ -10,31 +10,8 @@ import numpy as np
 from erls.maths.se3 import twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.drives import Drive
-
-
-@dataclass(frozen=True)
-class JointType:
-    """A kind of joint.
-
-    Attributes
-    ----------
-    revolute : bool
-        Turns about z; otherwise slides along z.
-    screw : (6,) array
-        Twist [v; ω] of unit joint velocity in the joint frame.
-    free_row : int
-        Row of the relative displacement (u, φ) in the joint frame that the joint leaves free.
-    """
-
-    revolute: bool
-    screw: Array
-    free_row: int
-
-
-JOINT_TYPES = {
-    "revolute": JointType(True, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), 5),
-    "prismatic": JointType(False, np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), 2),
-}
+from erls.mechanism.joint_types import Freedom
+from fe_import.model import InterfaceNode
 
 
 @dataclass(frozen=True)
@@ -70,11 +47,7 @@ class JointForces:
         """-∂force/∂angle and -∂force/∂rate."""
         slope = 0.0
         if self.friction:
-            slope = (
-                self.friction
-                / self.transition_rate
-                / math.cosh(min(abs(rate) / self.transition_rate, 300)) ** 2
-            )
+            slope = self.friction / self.transition_rate / math.cosh(min(abs(rate) / self.transition_rate, 300)) ** 2
         return self.stiffness, self.damping + slope
 
     @property
@@ -85,27 +58,31 @@ class JointForces:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint between link k-1 (or the base) and link k.
+    """A joint between two links, or the ground and a link.
 
     Attributes
     ----------
     name : str
-    type : JointType
+    freedom : Freedom
     before : (4, 4) array
-        Pose of the joint frame that is fixed to link k-1, in that link's mesh frame (or in the world, base pose
-        included, for the first joint).
+        Pose of the joint frame that is fixed to the link it stands on, in that link's mesh frame (in the world, base
+        pose included, on the ground).
     after : (4, 4) array
-        Pose of link k's mesh frame in the joint frame that is fixed to link k.
+        Pose of the mesh frame of the link that it carries, in the joint frame that is fixed to that link.
     forces : JointForces
     rotor_inertia : float
         Inertia reflected to the joint (rotor inertia times squared gear ratio) [kg m² or kg].
     drive : Drive
     position, rate : float
         Initial coordinate and rate [rad, rad/s or m, m/s].
+    parent : int
+        Number of the link that it stands on, -1 for the ground.
+    seat : InterfaceNode or None
+        Where it stands on that link; None on the ground.
     """
 
     name: str
-    type: JointType
+    freedom: Freedom
     before: Array
     after: Array
     forces: JointForces
@@ -113,8 +90,10 @@ class Joint:
     drive: Drive
     position: float
     rate: float
+    parent: int = -1
+    seat: InterfaceNode | None = None
 
     @property
     def screw(self) -> Array:
-        """(6,) twist of unit joint velocity in link k's mesh frame."""
-        return np.asarray(twist_transform(self.after) @ self.type.screw)
+        """(6,) twist of unit joint velocity in the mesh frame of the link that it carries."""
+        return np.asarray(twist_transform(self.after) @ self.freedom.screw)

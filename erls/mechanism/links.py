@@ -42,8 +42,8 @@ class Link:
         In orthonormal form, truncated to the modes in use.
     invariants : InertiaInvariants
         Payloads included.
-    inboard, outboard : InterfaceNode
-        Where the joints sit; ``outboard`` is None on the last link.
+    inboard : InterfaceNode
+        Where its own joint sits.
     stiffness : (n,) array
         Squared frequencies of the elastic modes [1/s²].
     damping : (n,) array
@@ -60,7 +60,6 @@ class Link:
     model: ModalModel
     invariants: InertiaInvariants
     inboard: InterfaceNode
-    outboard: InterfaceNode | None
     stiffness: Array
     damping: Array
     payloads: tuple[Payload, ...] = ()
@@ -116,9 +115,7 @@ def truncated(model: ModalModel, elastic_modes: int) -> ModalModel:
     )
 
 
-def payload_invariants(
-    model: ModalModel, node: int, offset: Array, mass: float, inertia: Array
-) -> InertiaInvariants:
+def payload_invariants(model: ModalModel, node: int, offset: Array, mass: float, inertia: Array) -> InertiaInvariants:
     """Invariants of a rigid body on a node.
 
     Parameters

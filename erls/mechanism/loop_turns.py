@@ -1,4 +1,4 @@
-"""How far a closing joint has turned, counted in the joints of the chain between its links."""
+"""How far a closing joint has turned, counted in the joints of the tree between its links."""
 
 from __future__ import annotations
 
@@ -30,16 +30,24 @@ def turning_signs(mechanism: Mechanism, loop: Loop) -> tuple[Array, bool]:
     """
     frames = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
     outer, inner = (-1 if end.link is None else end.link for end in (loop.outer, loop.inner))
-    first, last = min(outer, inner) + 1, max(outer, inner)
     axis = loop.inner.frame[:3, 2] if loop.inner.link is None else frames[inner][:3, :3] @ loop.inner.frame[:3, 2]
     signs, complete = np.zeros(len(mechanism.joints)), True
-    for k in range(first, last + 1):
+    for k in sorted(set(_below(mechanism, outer)) ^ set(_below(mechanism, inner))):
         joint = mechanism.joints[k]
-        if not joint.type.revolute:
+        if not joint.freedom.turns:
             continue
-        along = float((frames[k] @ inverse(joint.after))[:3, 2] @ axis)
+        along = float((frames[k] @ inverse(joint.after))[:3, joint.freedom.axis] @ axis)
         if abs(abs(along) - 1) < _PARALLEL:
-            signs[k] = np.sign(along) * (1.0 if outer > inner else -1.0)
+            signs[k] = np.sign(along) * (1.0 if k in _below(mechanism, outer) else -1.0)
         else:
             complete = False
     return signs, complete
+
+
+def _below(mechanism: Mechanism, number: int) -> list[int]:
+    """A link and those that bear it, -1 being the ground."""
+    found = []
+    while number >= 0:
+        found.append(number)
+        number = mechanism.joints[number].parent
+    return found

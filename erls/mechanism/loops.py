@@ -1,7 +1,4 @@
-"""Loops: joints between two links of a chain, or a link and the ground, that close it.
-
-A new kind is one line of `LOOP_TYPES`: what of the relative motion of its two frames stays zero, z being its axis.
-"""
+"""Loops: joints between two links of a tree, or a link and the ground, that close it."""
 
 from __future__ import annotations
 
@@ -10,46 +7,8 @@ from dataclasses import dataclass
 
 from erls.maths.so3 import Array
 from erls.mechanism.drives import Drive
-from erls.mechanism.joints import JointForces, JointType
-
-FREE, PARALLEL, HELD = "free", "parallel", "held"
-
-
-@dataclass(frozen=True)
-class LoopType:
-    """A kind of closing joint.
-
-    Attributes
-    ----------
-    sliding : tuple of int
-        Axes of the inner frame along which the outer origin does not move.
-    turning : str
-        ``free``: it turns at will; ``parallel``: its z axis stays parallel to the inner one; ``held``: not at all.
-    """
-
-    sliding: tuple[int, ...]
-    turning: str
-
-    @property
-    def has_axis(self) -> bool:
-        """Whether the direction of z matters."""
-        return self.turning == PARALLEL or len(self.sliding) < 3
-
-    @property
-    def slides(self) -> bool:
-        """Whether the outer origin moves in the inner frame."""
-        return len(self.sliding) < 3
-
-
-LOOP_TYPES: dict[str, LoopType] = {
-    "revolute": LoopType((0, 1, 2), PARALLEL),
-    "prismatic": LoopType((0, 1), HELD),
-    "cylindrical": LoopType((0, 1), PARALLEL),
-    "spherical": LoopType((0, 1, 2), FREE),
-    "fixed": LoopType((0, 1, 2), HELD),
-    "line": LoopType((0, 1), FREE),  # a point on a straight line
-    "planar": LoopType((2,), PARALLEL),
-}
+from erls.mechanism.joint_types import Freedom, JointType
+from erls.mechanism.joints import JointForces
 
 
 @dataclass(frozen=True)
@@ -77,7 +36,7 @@ class LoopFreedom:
 
     Attributes
     ----------
-    type : JointType
+    freedom : Freedom
     zero : float
         Coordinate where the frames coincide [rad or m].
     forces : JointForces
@@ -86,7 +45,7 @@ class LoopFreedom:
     drive : Drive
     """
 
-    type: JointType
+    freedom: Freedom
     zero: float
     forces: JointForces
     rotor_inertia: float
@@ -100,7 +59,7 @@ class LoopFreedom:
     @property
     def counts_turns(self) -> bool:
         """Whether forces depend on how often it has turned."""
-        return self.type.revolute and bool(self.forces.stiffness or self.drive.kind == "pd")
+        return self.freedom.turns and bool(self.forces.stiffness or self.drive.kind == "pd")
 
 
 @dataclass(frozen=True)
@@ -111,7 +70,7 @@ class Loop:
     """
 
     name: str
-    type: LoopType
+    type: JointType
     inner: LoopEnd
     outer: LoopEnd
     freedom: LoopFreedom | None = None

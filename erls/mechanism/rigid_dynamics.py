@@ -1,13 +1,14 @@
-"""Inverse dynamics of the rigid chain, by the recursive Newton-Euler method (Luh, Walker & Paul 1980).
+"""Inverse dynamics of the rigid links, by the recursive Newton-Euler method (Luh, Walker & Paul 1980).
 
 Independent of the flexible formulations: it works on mass, centre of mass and inertia of each link.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from erls.maths.se3 import joint_pose
 from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import link_mass_properties
@@ -29,45 +30,50 @@ def inverse_dynamics(mechanism: Mechanism, theta: Array, rates: Array, accelerat
     (n,) array
         Torque [N m] or force [N] of each joint.
     """
-    axes: list[Array] = []
-    origins: list[Array] = []
-    forces: list[Array] = []
-    moments: list[Array] = []
-    world = np.eye(4)
-    # motion of the current link: angular velocity, angular acceleration, and acceleration of a material point
-    omega, alpha = np.zeros(3), np.zeros(3)
-    point, acceleration = np.zeros(3), -mechanism.gravity
-    for joint, link, q, qd, qdd in zip(
-        mechanism.joints, mechanism.links, theta, rates, accelerations, strict=True
-    ):
-        world = world @ joint.before
-        axis = world[:3, 2].copy()
-        world = world @ joint_pose(joint.type.revolute, q)
+    moving: list[_Moving] = []
+    screws: list[Array] = []  # in the world
+    loads: list[Array] = []  # moment about the world's origin, force
+    for joint, link, q, qd, qdd in zip(mechanism.joints, mechanism.links, theta, rates, accelerations, strict=True):
+        below = moving[joint.parent] if joint.parent >= 0 else _resting(mechanism.gravity)
+        world = below.world @ joint.before
+        axis, advance = world[:3, :3] @ joint.freedom.direction * joint.freedom.turns, joint.freedom.advance
+        world = world @ joint.freedom.pose(q)
+        advance = world[:3, :3] @ advance
         origin = world[:3, 3].copy()
-        arm = origin - point
-        acceleration = acceleration + cross(alpha, arm) + cross(omega, cross(omega, arm))
-        if joint.type.revolute:
-            alpha = alpha + axis * qdd + cross(omega, axis * qd)
-            omega = omega + axis * qd
-        else:
-            acceleration = acceleration + axis * qdd + 2 * cross(omega, axis * qd)
-        point = origin
+        arm = origin - below.point
+        # of the point of the link below that is there, and then of the link's own
+        acceleration = below.acceleration + cross(below.alpha, arm) + cross(below.omega, cross(below.omega, arm))
+        acceleration = acceleration + advance * qdd + 2 * cross(below.omega, advance * qd)
+        alpha = below.alpha + axis * qdd + cross(below.omega, axis * qd)
+        omega = below.omega + axis * qd
         world = world @ joint.after
+        moving.append(_Moving(world, omega, alpha, origin, acceleration))
         body = link_mass_properties(link)
         centre = world[:3, :3] @ body.centre_of_mass + world[:3, 3]
         inertia = world[:3, :3] @ body.inertia @ world[:3, :3].T
-        arm = centre - point
+        arm = centre - origin
         force = body.mass * (acceleration + cross(alpha, arm) + cross(omega, cross(omega, arm)))
         spin = inertia @ alpha + cross(omega, inertia @ omega)
-        axes.append(axis)
-        origins.append(origin)
-        forces.append(force)
-        moments.append(spin + cross(centre, force))  # about the world's origin
-    result = np.zeros(len(axes))
-    force, moment = np.zeros(3), np.zeros(3)
-    for k in reversed(range(len(axes))):
-        force, moment = force + forces[k], moment + moments[k]
-        revolute = mechanism.joints[k].type.revolute
-        load = moment - cross(origins[k], force) if revolute else force
-        result[k] = axes[k] @ load + mechanism.joints[k].rotor_inertia * accelerations[k]
+        screws.append(np.concatenate([axis, advance + cross(origin, axis)]))
+        loads.append(np.concatenate([spin + cross(centre, force), force]))
+    result = np.zeros(len(screws))
+    for k in reversed(range(len(screws))):
+        joint = mechanism.joints[k]
+        result[k] = screws[k] @ loads[k] + joint.rotor_inertia * accelerations[k]
+        if joint.parent >= 0:
+            loads[joint.parent] = loads[joint.parent] + loads[k]
     return result
+
+
+class _Moving(NamedTuple):
+    """Pose of a link, its angular velocity and acceleration, and a material point with its acceleration."""
+
+    world: Array
+    omega: Array
+    alpha: Array
+    point: Array
+    acceleration: Array
+
+
+def _resting(gravity: Array) -> _Moving:
+    return _Moving(np.eye(4), np.zeros(3), np.zeros(3), np.zeros(3), -gravity)

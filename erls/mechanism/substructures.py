@@ -8,7 +8,9 @@ formulation keeps all six conditions, so that a weld needs nothing of its own.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +19,8 @@ from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.curves import piecewise
 from erls.mechanism.drives import Drive
-from erls.mechanism.joints import JOINT_TYPES, Joint, JointForces
+from erls.mechanism.joint_types import REVOLUTE
+from erls.mechanism.joints import Joint, JointForces
 from erls.mechanism.links import Link, payload_invariants
 from erls.mechanism.loops import LoopEnd
 from fe_import.model import IntArray
@@ -66,12 +69,12 @@ def split(mechanism: Mechanism) -> Split:
     joints: list[Joint] = []
     links: list[Link] = []
     for joint, link, where in zip(mechanism.joints, mechanism.links, places, strict=True):
-        joints.append(joint)
+        first = len(links)
+        joints.append(replace(joint, **_seat(mechanism, joint, ranges, places)))
         if not link.pieces:
             links.append(link)
             continue
-        first = len(links)
-        joints += [_weld(link.name, k, piece.inboard.position) for k, piece in enumerate(link.pieces) if k]
+        joints += [_weld(link, k, first + k - 1) for k in range(1, len(link.pieces))]
         links += [_loaded(piece, link, where, first + k) for k, piece in enumerate(link.pieces)]
 
     def moved(end: LoopEnd) -> LoopEnd:
@@ -104,18 +107,38 @@ def _places(link: Link, own: range) -> IntArray:
     return result
 
 
-def _weld(link: str, number: int, position: Array) -> Joint:
+def _seat(mechanism: Mechanism, joint: Joint, ranges: Sequence[range], places: Sequence[IntArray]) -> dict[str, Any]:
+    """Piece and interface on which a joint stands."""
+    if joint.seat is None:
+        return {}
+    whole = mechanism.links[joint.parent]
+    if not whole.pieces:
+        return {"parent": ranges[joint.parent].start}
+    piece = int(places[joint.parent][joint.seat.node, 0])
+    return {"parent": piece, "seat": whole.pieces[piece - ranges[joint.parent].start].model.interface(joint.seat.name)}
+
+
+def _weld(link: Link, number: int, parent: int) -> Joint:
     """Joint that holds piece ``number`` on the one before."""
-    held = Drive("motion", motion=piecewise([], [0.0]))
-    frame, back = pose(position=position), pose(position=-position)
-    return Joint(f"{link}: weld {number}", JOINT_TYPES["revolute"], frame, back, JointForces(), 0.0, held, 0.0, 0.0)
+    held, position = Drive("motion", motion=piecewise([], [0.0])), link.pieces[number].inboard.position
+    return Joint(
+        name=f"{link.name}: weld {number}",
+        freedom=REVOLUTE,
+        before=pose(position=position),
+        after=pose(position=-position),
+        forces=JointForces(),
+        rotor_inertia=0.0,
+        drive=held,
+        position=0.0,
+        rate=0.0,
+        parent=parent,
+        seat=link.pieces[number - 1].model.interface_nodes[1],
+    )
 
 
 def _loaded(piece: Link, whole: Link, places: IntArray, number: int) -> Link:
     """A piece with those payloads of the whole link that sit on it."""
-    payloads = tuple(
-        replace(p, node=int(places[p.node, 1])) for p in whole.payloads if places[p.node, 0] == number
-    )
+    payloads = tuple(replace(p, node=int(places[p.node, 1])) for p in whole.payloads if places[p.node, 0] == number)
     invariants = piece.invariants
     for p in payloads:
         invariants = invariants + payload_invariants(piece.model, p.node, p.offset, p.mass, p.inertia)

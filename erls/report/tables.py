@@ -116,7 +116,7 @@ def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
     rows = []
     for sample in s["samples"]:
         for name, joint in sample["joints"].items():
-            revolute = run.formulation.mechanism.joints[run.joint_names.index(name)].type.revolute
+            revolute = run.formulation.mechanism.joints[run.joint_names.index(name)].freedom.turns
 
             def show(value: float, revolute: bool = revolute) -> str:
                 return f"{np.degrees(value):.4f} deg" if revolute else f"{value:.6f} m"

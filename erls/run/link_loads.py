@@ -78,14 +78,16 @@ def _joint_loads(run: ChainRun, number: int, times: Array, states: list[State]) 
     for k, state in enumerate(states):
         turn = state.poses[number][:3, :3].T
         result[k, names.index(link.inboard.name)] += np.concatenate([turn @ force[k], turn @ moment[k]])
-    if number + 1 < len(mechanism.links) and link.outboard is not None:
-        force, moment = run.reaction(mechanism.joints[number + 1].name, times)
+    for outer in mechanism.standing_on(number):
+        seat = mechanism.joints[outer].seat
+        assert seat is not None
+        force, moment = run.reaction(mechanism.joints[outer].name, times)
         for k, state in enumerate(states):
             turn = state.poses[number][:3, :3].T
-            arm = _place(run, state, number + 1, mechanism.links[number + 1].inboard.node)
-            arm = arm - _place(run, state, number, link.outboard.node)
+            arm = _place(run, state, outer, mechanism.links[outer].inboard.node)
+            arm = arm - _place(run, state, number, seat.node)
             about = moment[k] + cross(arm, force[k])
-            result[k, names.index(link.outboard.name)] -= np.concatenate([turn @ force[k], turn @ about])
+            result[k, names.index(seat.name)] -= np.concatenate([turn @ force[k], turn @ about])
     for loop in mechanism.loops:
         for end, sign in ((loop.outer, 1.0), (loop.inner, -1.0)):
             nodes = [i.node for i in link.model.interface_nodes]
@@ -113,12 +115,10 @@ def _place(run: ChainRun, state: State, number: int, node: int) -> Array:
 
 
 def _carried(run: ChainRun, number: int) -> list[_Carried]:
-    """Payloads on interface nodes of a link, and the motor of the joint after it."""
+    """Payloads on interface nodes of a link, and the motors of the joints on it."""
     link = run.formulation.mechanism.links[number]
     nodes = [i.node for i in link.model.interface_nodes]
-    return [
-        _Carried(nodes.index(p.node), p.mass, p.offset, p.inertia) for p in link.payloads if p.node in nodes
-    ]
+    return [_Carried(nodes.index(p.node), p.mass, p.offset, p.inertia) for p in link.payloads if p.node in nodes]
 
 
 def _omega(three: tuple[State, State, State], number: int, step: float) -> Array:

@@ -12,21 +12,18 @@ import numpy as np
 import platformdirs
 
 from erls.errors import Cause, SceneError
-from erls.maths.se3 import inverse, pose
-from erls.maths.so3 import Array, fixed_axes
+from erls.maths.se3 import inverse
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, Point
-from erls.mechanism.dh import DHRow, split
-from erls.mechanism.drives import build_drive
 from erls.mechanism.effects import ALL, inconsistencies, named_effects
-from erls.mechanism.joints import JOINT_TYPES, Joint
+from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model, truncated
 from erls.mechanism.place import Place
 from erls.mechanism.without_effects import without
-from erls.scene.build_joints import angle, joint_forces, reflected_inertia
+from erls.scene.build_joints import build_joints, stands_on
 from erls.scene.build_loops import build_loops
 from erls.scene.build_substructures import piece_links, piece_models, piece_warnings
 from erls.scene.chain import Scene
-from erls.scene.joints import Joint as JointRecord
 from erls.scene.links import Link as LinkRecord
 from fe_import.description.link import load_link
 from fe_import.description.records import LinkDescription
@@ -87,16 +84,17 @@ def build_mechanism(
         Naming file, field, value and remedy.
     """
     record, file = scene.record, str(scene.path)
-    joints = _joints(scene)  # first: a faulty one is found before time goes into reductions
+    joints = build_joints(scene)  # first: a faulty one is found before time goes into reductions
     if models is None:
         models, descriptions = link_models(scene, tell), _beam_descriptions(scene)
         pieces = _pieces(scene, models, tell)
     links = [
-        replace(_link(link, model, k, len(models), file), description=description)
+        replace(_link(link, model, k, file), description=description)
         for k, (link, model, description) in enumerate(
             zip(record.links, models, descriptions or [None] * len(models), strict=True)
         )
     ]
+    joints = [replace(joint, seat=_seat(scene, k, links)) for k, joint in enumerate(joints)]
     links = [
         replace(link, pieces=piece_links(given, link, own, f"{file}: links[{k}]")) if own else link
         for k, (link, given, own) in enumerate(zip(links, record.links, pieces or [()] * len(links), strict=True))
@@ -104,7 +102,7 @@ def build_mechanism(
     warnings = [w for joint, link in zip(joints, links, strict=True) for w in _arm_warnings(joint, link)]
     warnings += [w for link in links for w in piece_warnings(link)]
     points = [_point(scene, k, links) for k in range(len(record.points))]
-    links = _with_payloads(scene, links, points)
+    links = _with_payloads(scene, joints, links, points)
     chain = Mechanism(
         name=scene.name,
         joints=tuple(joints),
@@ -117,22 +115,6 @@ def build_mechanism(
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
     chain = without(replace(chain, loops=build_loops(scene, chain), effects=effects), ALL - effects)
     return Built(chain, (*warnings, *inconsistencies(effects, record.simulation.formulation)))
-
-
-def _joints(scene: Scene) -> list[Joint]:
-    """The joints, on their Denavit-Hartenberg rows and mesh poses."""
-    record = scene.record
-    before = pose(fixed_axes(*np.radians(record.base.rotation_deg)), np.array(record.base.position))
-    result: list[Joint] = []
-    for k, (joint, link) in enumerate(zip(record.joints, record.links, strict=True)):
-        place = f"{scene.path}: joints[{k}]"
-        first, second = split(_dh_row(joint, place))
-        mesh = link.mesh_pose
-        mesh_pose = pose(fixed_axes(*np.radians(mesh.rotation_deg)), np.array(mesh.position))
-        after = second @ mesh_pose if mesh.frame == "dh" else mesh_pose
-        result.append(_joint(joint, before @ first, after, Place(scene.folder, place)))
-        before = inverse(mesh_pose) if mesh.frame == "dh" else inverse(mesh_pose) @ second
-    return result
 
 
 def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
@@ -229,53 +211,8 @@ def _within(place: str, read: Callable[[], T]) -> T:
         raise
 
 
-def _dh_row(joint: JointRecord, place: str) -> DHRow:
-    at = Place(Path(), f"{place}.dh")
-    dh = joint.dh
-    return DHRow(
-        dh.convention,
-        at.number("a", dh.a),
-        angle(at, "alpha", dh.alpha, dh.alpha_deg),
-        at.number("d", dh.d),
-        angle(at, "theta", dh.theta, dh.theta_deg),
-    )
-
-
-def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joint:
-    kind = JOINT_TYPES[joint.type]
-    place = replace(place, revolute=kind.revolute)
-    drive = build_drive(joint.drive, place.folder, place.field("drive"), kind.revolute)
-    start = place.at("initial")
-    position = angle(start, "position", joint.initial.position, joint.initial.position_deg)
-    rate = angle(start, "rate", joint.initial.rate, joint.initial.rate_deg)
-    if drive.prescribed:
-        if any(getattr(joint.initial, f) is not None for f in joint.initial.__struct_fields__):
-            raise place.error(
-                "initial",
-                "a prescribed motion fixes its own start",
-                remedy="remove 'initial', or change the motion",
-            )
-        position, rate, _ = drive.reference(0.0)  # type: ignore[misc]
-    forces, rotor = joint_forces(joint, place), reflected_inertia(joint, place)
-    return Joint(joint.name, kind, before, after, forces, rotor, drive, position, rate)
-
-
-def _link(link: LinkRecord, model: ModalModel, k: int, count: int, file: str) -> Link:
+def _link(link: LinkRecord, model: ModalModel, k: int, file: str) -> Link:
     place = f"{file}: links[{k}]"
-    names = [i.name for i in model.interface_nodes]
-    inboard = _interface(model, link.inboard or names[0], f"{place}.inboard")
-    others = [n for n in names if n != inboard.name]
-    outboard: InterfaceNode | None = None
-    if k < count - 1 or link.outboard:
-        if not link.outboard and not others:
-            raise SceneError(
-                Cause.BAD_REFERENCE,
-                "this link has no second interface for the next joint",
-                where=f"{place}.outboard",
-                value=link.name,
-                remedy="add an interface to the link description",
-            )
-        outboard = _interface(model, link.outboard or others[0], f"{place}.outboard")
     if model.thermal is not None and model.thermal.change and model.elastic_modes:  # until every formulation has it
         raise SceneError(
             Cause.BAD_FIELD,
@@ -284,6 +221,8 @@ def _link(link: LinkRecord, model: ModalModel, k: int, count: int, file: str) ->
             value=f"{model.thermal.change:g} K",
             remedy="remove temperature_change from the link description",
         )
+    if link.outboard:
+        _interface(model, link.outboard, f"{place}.outboard")
     omega = 2 * np.pi * model.frequencies_hz
     ratios = model.damping_ratios
     if link.damping is not None:
@@ -292,11 +231,30 @@ def _link(link: LinkRecord, model: ModalModel, k: int, count: int, file: str) ->
         name=link.name,
         model=model,
         invariants=model.invariants,
-        inboard=inboard,
-        outboard=outboard,
+        inboard=_interface(model, link.inboard or model.interface_nodes[0].name, f"{place}.inboard"),
         stiffness=np.diag(model.stiffness)[6:].copy(),
         damping=(2 * ratios * omega)[6:],
     )
+
+
+def _seat(scene: Scene, k: int, links: Sequence[Link]) -> InterfaceNode | None:
+    """Where joint k stands on its link: the interface that it names, or that link's outboard one."""
+    joint, parent = scene.record.joints[k], stands_on(scene.record, k)
+    if parent < 0:
+        return None
+    record, link, file = scene.record.links[parent], links[parent], str(scene.path)
+    if joint.at:
+        return _interface(link.model, joint.at, f"{file}: joints[{k}].at")
+    others = [i.name for i in link.model.interface_nodes if i.name != link.inboard.name]
+    if not record.outboard and not others:
+        raise SceneError(
+            Cause.BAD_REFERENCE,
+            "this link has no second interface for the next joint",
+            where=f"{file}: links[{parent}].outboard",
+            value=link.name,
+            remedy="add an interface to the link description",
+        )
+    return _interface(link.model, record.outboard or others[0], f"{file}: links[{parent}].outboard")
 
 
 def _interface(model: ModalModel, name: str, where: str) -> InterfaceNode:
@@ -345,8 +303,8 @@ def _point(scene: Scene, k: int, links: list[Link]) -> Point:
     return Point(point.name, number, known[point.node])
 
 
-def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list[Link]:
-    """Payloads on points, and motors on the outboard interface before their joint."""
+def _with_payloads(scene: Scene, joints: list[Joint], links: list[Link], points: list[Point]) -> list[Link]:
+    """Payloads on points, and motors where their joint stands."""
     result = list(links)
     names = {p.name: p for p in points}
 
@@ -377,7 +335,7 @@ def _with_payloads(scene: Scene, links: list[Link], points: list[Point]) -> list
         place = f"{scene.path}: joints[{k}].motor"
         mass = Place(scene.folder, place).not_negative("mass", joint.motor.mass)
         inertia = inertia_matrix(joint.motor.inertia, f"{place}.inertia", SceneError)
-        outboard = links[k - 1].outboard if k else None
-        if outboard is not None and (mass or inertia.any()):  # the first motor stands on the ground
-            add(k - 1, outboard.node, np.zeros(3), mass, inertia, place, motor=True)
+        seat = joints[k].seat
+        if seat is not None and (mass or inertia.any()):  # others stand on the ground
+            add(joints[k].parent, seat.node, np.zeros(3), mass, inertia, place, motor=True)
     return result

@@ -11,9 +11,9 @@ from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, poses
 from erls.mechanism.drives import build_drive
-from erls.mechanism.joints import JOINT_TYPES
+from erls.mechanism.joint_types import JOINT_TYPES, Freedom
 from erls.mechanism.loop_turns import turning_signs
-from erls.mechanism.loops import LOOP_TYPES, Loop, LoopEnd, LoopFreedom
+from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
 from erls.mechanism.place import Place
 from erls.scene.build_joints import angle, joint_forces, reflected_inertia
 from erls.scene.chain import Scene
@@ -65,30 +65,32 @@ def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Pla
     base = inner.frame
     if inner.link is not None:
         base = frames[inner.link] @ pose(position=mechanism.links[inner.link].model.nodes[inner.node]) @ inner.frame
-    loop = Loop(record.name, LOOP_TYPES[record.type], inner, outer)
-    if record.type not in JOINT_TYPES:
+    kind = JOINT_TYPES[record.type]
+    loop = Loop(record.name, kind, inner, outer)
+    if kind.one is None:
         return loop
     slide = float((inverse(base) @ start)[2, 3])
-    return replace(loop, freedom=_freedom(record, mechanism, loop, slide, at))
+    return replace(loop, freedom=_freedom(record, kind.one, mechanism, loop, slide, at))
 
 
-def _freedom(record: LoopRecord, mechanism: Mechanism, loop: Loop, slide: float, place: Place) -> LoopFreedom:
+def _freedom(
+    record: LoopRecord, freedom: Freedom, mechanism: Mechanism, loop: Loop, slide: float, place: Place
+) -> LoopFreedom:
     """``slide``: how far along its axis the outer frame is at the initial joint coordinates."""
-    kind = JOINT_TYPES[record.type]
-    place = replace(place, revolute=kind.revolute)
+    place = replace(place, revolute=freedom.turns)
     zero = 0.0
     if record.coordinate is not None or record.coordinate_deg is not None:
         zero = angle(place, "coordinate", record.coordinate, record.coordinate_deg)
-        zero -= 0.0 if kind.revolute else slide
-    drive = build_drive(record.drive, place.folder, place.field("drive"), kind.revolute)
-    freedom = LoopFreedom(kind, zero, joint_forces(record, place), reflected_inertia(record, place), drive)
-    if freedom.counts_turns and not turning_signs(mechanism, loop)[1]:
+        zero -= 0.0 if freedom.turns else slide
+    drive = build_drive(record.drive, place.folder, place.field("drive"), freedom.turns)
+    found = LoopFreedom(freedom, zero, joint_forces(record, place), reflected_inertia(record, place), drive)
+    if found.counts_turns and not turning_signs(mechanism, loop)[1]:
         raise place.error(
             "drive" if drive.kind == "pd" else "stiffness",
             "turns of this joint cannot be counted: joints of the chain between its links turn about other axes",
             remedy="put the spring or controller on a joint of the chain, or drive this one by a torque or a motion",
         )
-    return freedom
+    return found
 
 
 def _node(mechanism: Mechanism, number: int, name: str, where: str) -> int:

@@ -67,9 +67,6 @@ def piece_links(record: LinkRecord, whole: Link, models: Sequence[ModalModel], w
         ends = model.interface_nodes
         if len(ends) < (1 if number == len(models) - 1 else 2):
             raise _unfit(whole, f"substructure {number + 1} has too few interfaces", where)
-        outboard = ends[1] if number < len(models) - 1 else None
-        if outboard is None and whole.outboard is not None:
-            outboard = model.interface(whole.outboard.name)
         omega = 2 * np.pi * model.frequencies_hz
         ratios = model.damping_ratios
         if record.damping is not None:
@@ -81,7 +78,6 @@ def piece_links(record: LinkRecord, whole: Link, models: Sequence[ModalModel], w
                 model=model,
                 invariants=model.invariants,
                 inboard=ends[0],
-                outboard=outboard,
                 stiffness=np.diag(model.stiffness)[6:].copy(),
                 damping=(2 * ratios * omega)[6:],
                 payloads=(),

@@ -112,22 +112,22 @@ class Initial(Record, frozen=True):
 
 
 class SceneRecord(SceneTables, frozen=True, kw_only=True):
-    """A scene: a serial chain of joints and links, what closes and drives it, and how it is simulated.
+    """A scene: a tree of links on joints, what closes and drives it, and how it is simulated.
 
     Attributes
     ----------
     simulation : Simulation
         How the motion is computed.
     joints : list of Joint
-        From the ground outward, ``[[joints]]``.
+        From the ground outward, ``[[joints]]``; each stands on the link before unless it says otherwise.
     links : list of Link
-        Joint k carries link k, ``[[links]]``.
+        Joint k carries link k unless it says otherwise, ``[[links]]``.
     name : str
         Of the scene; that of the file unless given.
     gravity : (3,) floats
         In the world [m/s²].
     base : Base
-        Where the chain stands.
+        Where it stands.
     points : list of Point
         What is reported and drawn, ``[[points]]``.
     payloads : list of Payload

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from erls.errors import SceneError
 from erls.mechanism.dh import CONVENTIONS
-from erls.mechanism.joints import JOINT_TYPES
-from erls.mechanism.loops import LOOP_TYPES
+from erls.mechanism.joint_types import CHAIN_TYPES, JOINT_TYPES
+from erls.scene.build_joints import GROUND
 from erls.scene.chain import Event, SceneRecord
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_names, check_tables, directed, not_negative
@@ -48,8 +48,9 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         named = [(f"{file}: {kind}[{k}].name", item.name) for k, item in enumerate(getattr(scene, kind))]
         check_names(named)
     for k, joint in enumerate(scene.joints):
-        choose(joint.type, JOINT_TYPES, f"{file}: joints[{k}].type", SceneError)
+        choose(joint.type, CHAIN_TYPES, f"{file}: joints[{k}].type", SceneError)
         choose(joint.dh.convention, CONVENTIONS, f"{file}: joints[{k}].dh.convention", SceneError)
+        _check_place(scene, k, f"{file}: joints[{k}]")
     for k, link in enumerate(scene.links):
         _check_link(link, f"{file}: links[{k}]")
         _check_substructures(link, scene.simulation.formulation, f"{file}: links[{k}].substructures")
@@ -75,6 +76,29 @@ def check_scene(scene: SceneRecord, file: str) -> None:
                 if getattr(item.drive, "feed_forward", False):
                     message = "the inverse dynamics of the chain does not know its loops"
                     raise bad(f"{file}: {kind}[{k}].drive.feed_forward", message, True, "set it to false")
+
+
+def _check_place(scene: SceneRecord, k: int, place: str) -> None:
+    """Where a joint stands, and what it carries."""
+    joint, links = scene.joints[k], [link.name for link in scene.links]
+    if joint.carries:
+        choose(joint.carries, links, f"{place}.carries", SceneError)
+    if joint.on:
+        choose(joint.on, [GROUND, *links], f"{place}.on", SceneError)
+    carried = [other.carries or links[number] for number, other in enumerate(scene.joints)]
+    if carried.count(carried[k]) > 1:
+        message, remedy = "a link is carried by one joint; others close loops", "use [[loops]], or name another link"
+        raise bad(f"{place}.carries", message, carried[k], remedy)
+    if joint.on and joint.on != GROUND and joint.on not in carried[:k]:
+        remedy = "list joints from the ground outward, so that the joint which carries that link comes first"
+        raise bad(f"{place}.on", "stands on a link that no joint before it carries", joint.on, remedy)
+    if joint.at and (joint.on == GROUND or (k == 0 and not joint.on)):
+        raise bad(f"{place}.at", "the ground has no interfaces", joint.at, "remove it, and give the place by 'branch'")
+    bearing = joint.on or (carried[k - 1] if k else GROUND)
+    before = [other.on or (carried[j - 1] if j else GROUND) for j, other in enumerate(scene.joints[:k])]
+    if bearing != GROUND and bearing in before and joint.branch is None:
+        remedy = "give the pose at which its Denavit-Hartenberg row starts, in the mesh frame of that link"
+        raise bad(f"{place}.branch", "missing, since another joint stands on the same link", bearing, remedy)
 
 
 def _check_event(event: Event, scene: SceneRecord, place: str) -> None:
@@ -148,7 +172,7 @@ def _check_bandwidth(scene: SceneRecord, place: str) -> None:
 
 def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
     links = [link.name for link in scene.links]
-    choose(loop.type, LOOP_TYPES, f"{place}.type", SceneError)
+    choose(loop.type, JOINT_TYPES, f"{place}.type", SceneError)
     choose(loop.link, links, f"{place}.link", SceneError)
     if loop.to_link:
         choose(loop.to_link, links, f"{place}.to_link", SceneError)
@@ -161,15 +185,15 @@ def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
     if loop.to_link and loop.position is not None:
         message = "between two links the nodes say where the joint is"
         raise bad(f"{place}.position", message, loop.position, "remove it")
-    kind = LOOP_TYPES[loop.type]
+    kind = JOINT_TYPES[loop.type]
     if loop.axis is None and kind.slides:
         raise bad(f"{place}.axis", f"a {loop.type} joint needs its axis", None, "give its direction in the world")
-    if loop.axis is not None and not kind.has_axis:
+    if loop.axis is not None and not kind.axes:
         raise bad(f"{place}.axis", f"a {loop.type} joint has no axis", loop.axis, "remove it")
     directed(f"{place}.axis", loop.axis)
-    if loop.type not in JOINT_TYPES:
+    if kind.one is None:
         plain = type(loop)(name=loop.name, link=loop.link, node=loop.node)
         for field in _ACTING:
             if getattr(loop, field) != getattr(plain, field):
                 message = f"a {loop.type} joint has no single coordinate that this could act along"
-                raise bad(f"{place}.{field}", message, loop.type, "remove it, or use " + " or ".join(JOINT_TYPES))
+                raise bad(f"{place}.{field}", message, loop.type, "remove it, or use revolute or prismatic")

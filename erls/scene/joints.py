@@ -112,8 +112,24 @@ class Acting(Record, frozen=True, kw_only=True):
     friction: Friction | None = None
 
 
+class Branch(Record, frozen=True):
+    """Pose of the frame from which the Denavit-Hartenberg row of a joint starts, in the mesh frame of the link that it
+    stands on; on the ground, in the base frame.
+
+    Attributes
+    ----------
+    position : (3,) floats
+        Of its origin [m].
+    rotation_deg : (3,) floats
+        About fixed x, then y, then z [deg].
+    """
+
+    position: Vector = (0.0, 0.0, 0.0)
+    rotation_deg: Vector = (0.0, 0.0, 0.0)
+
+
 class Joint(Acting, frozen=True):
-    """A joint between the link before it (or the ground) and its own link; it moves about or along its z axis.
+    """A joint between a link (or the ground) and the link that it carries; it moves about or along its z axis.
 
     Attributes
     ----------
@@ -123,6 +139,15 @@ class Joint(Acting, frozen=True):
         Its Denavit-Hartenberg row.
     type : str
         ``revolute`` turns about z, ``prismatic`` slides along z.
+    on : str
+        The link that it stands on, or ``ground``; the link before unless given.
+    at : str
+        Interface of that link; its outboard one unless given.
+    branch : Branch, optional
+        Where its row starts, where several joints stand on one link; the Denavit-Hartenberg frame of that link, or the
+        base, unless given.
+    carries : str
+        The link that it carries; that of the same number unless given.
     initial : JointInitial
         Coordinate and rate at time 0.
     drive : DriveRecord
@@ -142,6 +167,10 @@ class Joint(Acting, frozen=True):
     name: str
     dh: DH
     type: str = "revolute"
+    on: str = ""
+    at: str = ""
+    branch: Branch | None = None
+    carries: str = ""
     initial: JointInitial = JointInitial()
     motor: Motor = Motor()
 

@@ -73,7 +73,7 @@ class Link(Record, frozen=True):
     inboard : str
         Interface of the link's own joint; the first unless given.
     outboard : str
-        Interface of the next joint; the second unless given.
+        Interface of the joints on it that name none; the second unless given.
     mesh_pose : MeshPose
         Where the mesh frame sits.
     damping : Damping, optional

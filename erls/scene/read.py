@@ -93,7 +93,15 @@ def checked(data: dict[str, Any], path: Path, where: str) -> AnyScene:
         return BodyScene(path, bodies)
     chain = _with_integrator(convert(data, SceneRecord, where, SceneError))
     check_scene(chain, where)
-    return Scene(path, chain)
+    return Scene(path, _in_order(chain))
+
+
+def _in_order(record: SceneRecord) -> SceneRecord:
+    """The record with links in the order of the joints that carry them."""
+    links = {link.name: link for link in record.links}
+    order = [joint.carries or link.name for joint, link in zip(record.joints, record.links, strict=True)]
+    joints = [msgspec.structs.replace(joint, carries="") for joint in record.joints]
+    return msgspec.structs.replace(record, links=[links[name] for name in order], joints=joints)
 
 
 def is_body_scene(data: dict[str, Any]) -> bool:

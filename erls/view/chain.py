@@ -13,6 +13,7 @@ from erls.equations.formulation import State
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
 from erls.run.chain.places import node_positions
 from erls.run.chain.run import ChainRun
@@ -39,12 +40,17 @@ class ChainFigure(Figure):
         return max(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in links)
 
     def fixed(self) -> Array:
-        """(1, 3) the first joint."""
-        return np.array([self.run.formulation.mechanism.joints[0].before[:3, 3]])
+        """(n, 3) joints on the ground."""
+        return np.array([joint.before[:3, 3] for joint in self._standing])
 
     def ground(self, towards: Array, unit: float) -> list[Any]:
-        """A plate behind the first joint."""
-        return [ground_surface(self.run.formulation.mechanism.joints[0].before, towards, unit)]
+        """A plate behind each joint on it."""
+        return [ground_surface(joint.before, towards, unit) for joint in self._standing]
+
+    @property
+    def _standing(self) -> list[Joint]:
+        """Joints on the ground."""
+        return [joint for joint in self.run.formulation.mechanism.joints if joint.parent < 0]
 
     def poses(self, times: Sequence[float] | Array) -> list[ChainPose]:
         """The chain at each time."""
@@ -132,15 +138,14 @@ def joint_places(mechanism: Mechanism, state: State, magnification: float) -> li
     result = []
     for k, joint in enumerate(mechanism.joints):
         inner, inner_node = joint.before, None
-        if k:
-            before, interface = mechanism.links[k - 1], mechanism.links[k - 1].outboard
-            if interface is not None:
-                inner = _displaced(before, interface, joint.before, state, k - 1, magnification)
-                inner_node = node_positions(mechanism, state, k - 1, [interface.node], magnification)[0]
+        if joint.seat is not None:
+            below = joint.parent
+            inner = _displaced(mechanism.links[below], joint.seat, joint.before, state, below, magnification)
+            inner_node = node_positions(mechanism, state, below, [joint.seat.node], magnification)[0]
         after = mechanism.links[k]
         outer = _displaced(after, after.inboard, inverse(joint.after), state, k, magnification)
         outer_node = node_positions(mechanism, state, k, [after.inboard.node], magnification)[0]
-        kind = "revolute" if joint.type.revolute else "prismatic"
+        kind = "revolute" if joint.freedom.turns else "prismatic"
         result.append(JointPlace(kind, inner, outer, inner_node, outer_node))
     return result
 

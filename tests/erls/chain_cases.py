@@ -70,6 +70,17 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
         set(),
         True,
     ),
+    "branches": (
+        [
+            _joint("a", alpha=35.0),
+            _joint("b", alpha=-20.0, **SPRING),
+            _joint("c", "prismatic", 15.0, on="a", branch={"position": [0.3, 0.0, 0.1], "rotation_deg": [10, 20, 30]}),
+            _joint("d", alpha=50.0, on="ground", branch={"position": [0.0, 0.5, 0.1]}, **_driven(SINE)),
+            _joint("e", drive={**PD, "feed_forward": True}),
+        ],
+        set(),
+        True,
+    ),
     **{
         f"without {name}": ([_joint("a", alpha=35.0), _joint("b", **_driven(SINE)), _joint("c")], {name}, True)
         for name in INERTIAL
@@ -77,6 +88,9 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
     **{f"only {name}": ([_joint("a"), _joint("b")], set(INERTIAL) - {name}, False) for name in INERTIAL},
     "no effects": ([_joint("a", alpha=35.0), _joint("b")], set(INERTIAL), True),
 }
+
+SERIAL = [name for name in CASES if name != "branches"]
+"""Chains in which every link stands on the one before."""
 
 
 @dataclass(frozen=True)

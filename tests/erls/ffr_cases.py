@@ -14,9 +14,9 @@ from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.pack import pack_frames
 from erls.mechanism.chain import Mechanism
 
-ON_MEAN_AXES = ("one link, payload, spring", "parallel axes with a slide", "axes that part", "controllers")
+ON_MEAN_AXES = ("branches", "one link, payload, spring", "parallel axes with a slide", "axes that part", "controllers")
 PARTLY_RIGID = {"rigid in the middle": (1,), "rigid at the ends": (0, 2), "all rigid": (0, 1, 2)}
-STIFFENED = ("one link, payload, spring", "axes that part", "prescribed in the middle", "no effects", *PARTLY_RIGID)
+STIFFENED = ("branches", "one link, payload, spring", "axes that part", "prescribed in the middle", "no effects", *PARTLY_RIGID)
 CASES = [
     *(f"tangent: {name}" for name in (*chain_cases.CASES, *PARTLY_RIGID)),
     *(f"mean-axis: {name}" for name in (*ON_MEAN_AXES, *PARTLY_RIGID)),

@@ -109,12 +109,12 @@ _FEEL_MODAL = tuple(n for n in ffr_cases.CASES if "stiffened" in n and "all rigi
 _SOME_LOOPS = ("controlled turn", "driven slide", "spherical", "two loops")
 TABLES = {
     "chains": _chains(chain_cases, chain_cases.CASES, BOTH),
-    "chains_minimum_norm": _chains(chain_cases, chain_cases.CASES, LAST, gauge="minimum-norm"),
+    "chains_minimum_norm": _chains(chain_cases, chain_cases.SERIAL, LAST, gauge="minimum-norm"),
     "stiffened": _chains(stiffened_cases, stiffened_cases.CASES, BENT),
-    "stiffened_minimum_norm": _chains(stiffened_cases, stiffened_cases.CASES, BENT, gauge="minimum-norm"),
-    "modal_inertia": _chains(stiffened_cases, stiffened_cases.CASES, BENT, MODAL_INERTIA),
+    "stiffened_minimum_norm": _chains(stiffened_cases, stiffened_cases.SERIAL, BENT, gauge="minimum-norm"),
+    "modal_inertia": _chains(stiffened_cases, stiffened_cases.SERIAL, BENT, MODAL_INERTIA),
     "modal_inertia_minimum_norm": _chains(
-        stiffened_cases, stiffened_cases.CASES, BENT, MODAL_INERTIA, gauge="minimum-norm"
+        stiffened_cases, stiffened_cases.SERIAL, BENT, MODAL_INERTIA, gauge="minimum-norm"
     ),
     "ffr": _chains(ffr_cases, ffr_cases.CASES, LAST, formulation="ffr"),
     "ffr_modal_inertia": _chains(ffr_cases, _FEEL_MODAL, LAST, MODAL_INERTIA, formulation="ffr"),

@@ -31,8 +31,9 @@ from erls.maths.saddle import dense
 from erls.maths.so3 import Array
 from erls.mechanism.curves import Curve
 from erls.mechanism.drives import Drive
-from erls.mechanism.joints import JOINT_TYPES, JointForces
+from erls.mechanism.joint_types import JOINT_TYPES
 from erls.mechanism.joints import Joint as ChainJoint
+from erls.mechanism.joints import JointForces
 
 FILE = Path(__file__).parents[1] / "data" / "frozen" / "nodal.npz"
 TIME = 0.7
@@ -109,7 +110,7 @@ def acting(limit: float) -> ChainSystem:
     for k, (drive, kind, rotor) in enumerate(zip(drives, kinds, rotors, strict=True)):
         own = forces if k != 3 else JointForces()
         ends = motions.exp(0.5 * rng.standard_normal((2, 6)))
-        one = ChainJoint(f"j{k}", JOINT_TYPES[kind], np.eye(4), np.eye(4), own, rotor, drive, 0.1, 0.0)
+        one = ChainJoint(f"j{k}", JOINT_TYPES[kind].freedoms[0], np.eye(4), np.eye(4), own, rotor, drive, 0.1, 0.0)
         nodes = (0,) if k == 0 else (k - 1, k)
         acting.append(Actuator(one, nodes, *ends, lambda t, k=k: 0.1 * k * t))
         motion = drive.reference if drive.prescribed else None

@@ -28,6 +28,7 @@ MIXED: dict[str, set[int]] = {  # links without second-order data
 }
 RIGID = {"rigid first link": {"a"}, "rigid middle link": {"b"}, "rigid last link": {"c"}}
 CASES = (*chain_cases.CASES, *ARMS, *MIXED, *RIGID)
+SERIAL = tuple(name for name in CASES if name != "branches")
 
 
 def _bare(mechanism: Mechanism, which: set[int]) -> Mechanism:

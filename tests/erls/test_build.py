@@ -252,14 +252,16 @@ def test_damping_of_the_scene_goes_before_that_of_the_link(tmp_path: Path) -> No
 
 
 def test_interfaces_by_name(tmp_path: Path) -> None:
-    """The first and the second one unless named; the last link needs no second one."""
-    path = robot(tmp_path)
-    first, last = built(path).mechanism.links
-    assert (first.inboard.name, first.outboard and first.outboard.name) == ("root", "tip")
-    assert (last.inboard.name, last.outboard) == ("root", None)
-    first, last = built(path, "links.0.inboard=tip", "links.1.outboard=tip").mechanism.links
-    assert (first.inboard.name, first.outboard and first.outboard.name) == ("tip", "root")
-    assert last.outboard is not None
+    """The first and the second one unless named; the first joint stands on the ground."""
+
+    def seats(*changes: str) -> list[tuple[str, str | None]]:
+        found = built(robot(tmp_path), *changes).mechanism
+        ends = [None if joint.seat is None else joint.seat.name for joint in found.joints]
+        return list(zip([link.inboard.name for link in found.links], ends, strict=True))
+
+    assert seats() == [("root", None), ("root", "tip")]
+    assert seats("links.0.inboard=tip", "links.1.outboard=tip") == [("tip", None), ("root", "root")]
+    assert seats("joints.1.at=root") == [("root", None), ("root", "root")]
 
 
 def test_points_by_name_and_place(tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def test_links_stay_together(chain: Mechanism) -> None:
         joint = frames[k] @ inverse(chain.joints[k].after)
         moved = []
         for link, node, frame, modes in (
-            (inner, inner.outboard, frames[k - 1], compatibility.layout.modes[k - 1]),
+            (inner, chain.joints[k].seat, frames[k - 1], compatibility.layout.modes[k - 1]),
             (outer, outer.inboard, frames[k], compatibility.layout.modes[k]),
         ):
             shift, turn = (frame[:3, :3] @ (s @ q[modes]) for s in link.model.node_shape(node.node))

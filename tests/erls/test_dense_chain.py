@@ -19,7 +19,7 @@ from erls.mechanism.chain import Mechanism
 
 SAME = 1e-10  # relative: sums in another order
 GAUGES = ("joint-angle", "minimum-norm")
-PLAIN, STIFFENED = ("chains", chain_cases.CASES), ("stiffened", stiffened_cases.CASES)
+PLAIN, STIFFENED = ("chains", chain_cases.SERIAL), ("stiffened", stiffened_cases.SERIAL)
 MODAL = ("modal_inertia", stiffened_cases.CASES)
 
 

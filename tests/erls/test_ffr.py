@@ -135,7 +135,7 @@ def test_joints_hold_the_displaced_interfaces_together(tmp_path: Path, body_fram
     motion = equations.motion(0.0, y, v)
     links, joints = equations.mechanism.links, equations.mechanism.joints
     for k in (1, 2):
-        outboard, inboard = links[k - 1].outboard, links[k].inboard
+        outboard, inboard = joints[k].seat, links[k].inboard
         assert outboard is not None
         first = _displaced(equations, motion, k - 1, outboard)
         second = _displaced(equations, motion, k, inboard)
@@ -143,7 +143,7 @@ def test_joints_hold_the_displaced_interfaces_together(tmp_path: Path, body_fram
         shift_out[:3, 3], shift_in[:3, 3] = -outboard.position, -inboard.position
         relative = la.inv(first @ shift_out @ joints[k].before) @ second @ shift_in @ la.inv(joints[k].after)
         expected = np.eye(4)
-        if joints[k].type.revolute:
+        if joints[k].freedom.turns:
             expected[:2, :2] = [[np.cos(y[k]), -np.sin(y[k])], [np.sin(y[k]), np.cos(y[k])]]
         else:
             expected[2, 3] = y[k]

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-from erls.maths.se3 import inverse, joint_pose, pose, twist_cross, twist_transform
+from erls.maths.se3 import inverse, pose, twist_cross, twist_transform
 from erls.maths.so3 import cross, fixed_axes, skew
+from erls.mechanism.joint_types import JOINT_TYPES
 
 RNG = np.random.default_rng(11)
 
@@ -53,11 +54,13 @@ def test_bracket() -> None:
 
 
 def test_joint_motion_is_the_exponential_of_its_screw() -> None:
-    """Both joint types against the matrix exponential, and X(θ) = exp(-θ ad ξ)."""
-    for revolute, screw in ((True, [0, 0, 0, 0, 0, 1.0]), (False, [0, 0, 1.0, 0, 0, 0])):
-        t = joint_pose(revolute, 0.7)
-        np.testing.assert_allclose(t, la.expm(0.7 * _hat(np.array(screw))), atol=1e-14)
-        np.testing.assert_allclose(twist_transform(t), la.expm(-0.7 * twist_cross(np.array(screw))), atol=1e-14)
+    """All motions of the table of joints against the matrix exponential, and X(θ) = exp(-θ ad ξ)."""
+    freedoms = {freedom for kind in JOINT_TYPES.values() for freedom in kind.freedoms or ()}
+    assert {(freedom.axis, freedom.turns) for freedom in freedoms} >= {(0, True), (1, True), (2, True), (2, False)}
+    for freedom in freedoms:
+        t = freedom.pose(0.7)
+        np.testing.assert_allclose(t, la.expm(0.7 * _hat(freedom.screw)), atol=1e-14)
+        np.testing.assert_allclose(twist_transform(t), la.expm(-0.7 * twist_cross(freedom.screw)), atol=1e-14)
 
 
 def test_cross_equals_numpy() -> None:

@@ -16,8 +16,9 @@ from erls.equations.loops.rows import LoopRows
 from erls.errors import Cause, SimulationError
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, fixed_axes, skew
+from erls.mechanism.joint_types import JOINT_TYPES
 from erls.mechanism.links import link_mass_properties
-from erls.mechanism.loops import LOOP_TYPES, Loop, LoopEnd
+from erls.mechanism.loops import Loop, LoopEnd
 from erls.run.link_loads import link_loads
 
 STEP = 1e-6
@@ -73,13 +74,13 @@ def test_frames_sit_where_runs_draw_the_nodes(tmp_path: Path, name: str) -> None
         assert distance < float(phi @ phi) * float(np.linalg.norm(OFFSET[:3, 3])) + 1e-14
 
 
-@pytest.mark.parametrize("kind", LOOP_TYPES)
+@pytest.mark.parametrize("kind", JOINT_TYPES)
 def test_conditions_against_differences(tmp_path: Path, kind: str) -> None:
     """Φ̇ and Φ̈ of each kind of closing joint, between two links and to the ground; names for every row. 1e-6."""
     tree = loop_scenes.tree(scenes.mechanism(scenes.three_links(tmp_path, "mixed")), "ffr")
     ends = _ends(tree)
     ground = LoopEnd(None, 0, OFFSET)
-    loops = [Loop("a", LOOP_TYPES[kind], ends[0], ends[2]), Loop("b", LOOP_TYPES[kind], ground, ends[1])]
+    loops = [Loop("a", JOINT_TYPES[kind], ends[0], ends[2]), Loop("b", JOINT_TYPES[kind], ground, ends[1])]
     rows = LoopRows(tree, loops)
     y, v = _random(tree)
     found = rows.closure(0.0, y, v)
@@ -87,7 +88,8 @@ def test_conditions_against_differences(tmp_path: Path, kind: str) -> None:
     np.testing.assert_allclose((ahead.violation - behind.violation) / (2 * STEP), found.rate, atol=1e-7)
     np.testing.assert_allclose((ahead.rate - behind.rate) / (2 * STEP), found.bias, atol=1e-6)
     np.testing.assert_allclose(found.rows[:, tree.free] @ v, found.rate, atol=1e-12)
-    freedoms = {"revolute": 1, "prismatic": 1, "cylindrical": 2, "spherical": 3, "fixed": 0, "line": 4, "planar": 3}
+    freedoms = {"revolute": 1, "prismatic": 1, "cylindrical": 2, "spherical": 3, "fixed": 0, "line": 4}
+    freedoms |= {"planar": 3, "universal": 2}
     assert len(found.violation) == len(rows.names) == 2 * (6 - freedoms[kind])
 
 

@@ -32,10 +32,10 @@ def rotation_axes(joints: Sequence[Joint]) -> list[Array]:
     only slides.
     """
     result: list[Array] = []
-    axes = np.zeros((0, 3))
     for joint in joints:
-        if joint.type.revolute:
-            along = joint.before[:3, 2]
+        axes = result[joint.parent] if joint.parent >= 0 else np.zeros((0, 3))
+        if joint.freedom.turns:
+            along = joint.before[:3, joint.freedom.axis]
             if len(axes) == 1 and np.linalg.norm(np.cross(axes[0], along)) > _PARALLEL:
                 axes = np.eye(3)
             elif len(axes) < 3:
@@ -72,18 +72,20 @@ def combined_modes(link: Link, joint: Joint) -> Array:
 def shapes(mechanism: Mechanism) -> list[Shapes]:
     """Of all links."""
     result: list[Shapes] = []
-    for k, (link, joint) in enumerate(zip(mechanism.links, mechanism.joints, strict=True)):
+    for link, joint in zip(mechanism.links, mechanism.joints, strict=True):
         out = np.zeros((6, 0))
-        if k:
-            before = mechanism.links[k - 1]
-            moved_frame = before.interface_shape(before.outboard, joint.before)  # type: ignore[arg-type]
-            out = twist_transform(inverse(joint.before)) @ moved_frame @ result[k - 1].modes[:, 6:]
+        if joint.seat is not None:
+            moved_frame = mechanism.links[joint.parent].interface_shape(joint.seat, joint.before)
+            out = twist_transform(inverse(joint.before)) @ moved_frame @ result[joint.parent].modes[:, 6:]
         result.append(Shapes(combined_modes(link, joint), out))
     return result
 
 
-def _link(link: Link, modes: Array, axes: Array, out: Array, vectors: Array, before: Array, parent: int) -> own.Link:
-    """Constants of a link; ``vectors`` and ``before`` are decoupled coordinates of it and of its parent."""
+def _link(
+    link: Link, modes: Array, axes: Array, out: Array, vectors: Sequence[Array], number: int, parent: int
+) -> own.Link:
+    """Constants of link ``number``; ``vectors`` are the decoupled coordinates of all."""
+    before = vectors[parent] if parent >= 0 else np.zeros((0, 0))
     mass = modes.T @ link.invariants.m @ modes
     x = modes.T @ np.einsum("ca,aij->cij", axes, link.invariants.X) @ modes
     z = np.einsum("ca,db,abij->cdij", axes, axes, link.invariants.Z)
@@ -96,7 +98,7 @@ def _link(link: Link, modes: Array, axes: Array, out: Array, vectors: Array, bef
         x=x.transpose(0, 2, 1),
         z=np.array([modes.T @ ((z[i, j] + z[j, i]) / 2) @ modes for i, j in pairs]).reshape(len(pairs), n, n),
         out=out.T,
-        rigid_decoupled=mass[:6, 6:] @ vectors,
+        rigid_decoupled=mass[:6, 6:] @ vectors[number],
         out_decoupled=(out @ before).T,
     )
 
@@ -121,7 +123,7 @@ def _momenta(link: Link, modes: Array, axes: Array, turning: slice) -> tuple[Arr
 def _bow(before: Link, joint: Joint, modes: Array, turning: slice) -> Array:
     """(6, m, m) second-order displacement of the parent's interface, as motions of the parent's frame."""
     m = modes[:, turning].shape[1]
-    found = None if before.outboard is None else frame_second_order(before, before.outboard, joint.before)
+    found = None if joint.seat is None else frame_second_order(before, joint.seat, joint.before)
     if found is None:
         return np.zeros((6, m, m))
     whole = np.einsum("ij,jab->iab", twist_transform(inverse(joint.before)), modes.T @ found @ modes)
@@ -134,14 +136,16 @@ def _turning(parent: int) -> slice:
 
 
 def _bend(mechanism: Mechanism, k: int, found: list[Shapes], axes: Array) -> own.Bend:
-    link, joint, ground = mechanism.links[k], mechanism.joints[k], k == 0
-    rows, odd = _momenta(link, found[k].modes, axes, _turning(k - 1))
+    link, joint, parent = mechanism.links[k], mechanism.joints[k], mechanism.joints[k].parent
+    ground = parent < 0
+    rows, odd = _momenta(link, found[k].modes, axes, _turning(parent))
     bow = np.zeros((6, 0, 0))
     if not ground:
-        bow = _bow(mechanism.links[k - 1], joint, found[k - 1].modes, _turning(k - 2))
+        turning = _turning(mechanism.joints[parent].parent)
+        bow = _bow(mechanism.links[parent], joint, found[parent].modes, turning)
     slide, arm = np.zeros(3), np.zeros(3)
-    if not ground and not joint.type.revolute:
-        slide = joint.screw[:3]
+    if not ground:
+        slide = joint.after[:3, :3].T @ joint.freedom.advance
     if not ground and link.second_order is not None:
         arm = inverse(joint.after)[:3, 3] - link.inboard.position
     return own.Bend(
@@ -215,40 +219,44 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
             constants,
             joint,
             free.index(k) if k in free else -1,
-            pack.step_parts(joint.before, joint.type.revolute, joint.after),
+            pack.step_parts(joint.before, joint.freedom, joint.after),
             joint.screw,
         )
         for k, joint in enumerate(mechanism.joints)
     ]
     inertial = [np.eye(3) if curved[k] else axes[k] for k in range(count)]
-    vectors = [np.zeros((0, 0)), *(each.vectors for each in decoupled)]
+    vectors = [each.vectors for each in decoupled]
+    parents = mechanism.parents
     sizes = [6 + (3 if bends else 0) + len(each) for each in axes]
-    kept = [e + (3 if k else 0) for k, e in enumerate(modes)]
+    kept = [e + (3 if parents[k] >= 0 else 0) for k, e in enumerate(modes)]
     rooms = [
         segments.segment(
-            k - 1,
+            parent,
             sizes[k],
             modes[k],
-            sizes[k - 1] if k else 0,
-            modes[k - 1] if k else 0,
-            (9 if bends else 6) if k and modes[k - 1] else 0,
+            sizes[parent] if parent >= 0 else 0,
+            modes[parent] if parent >= 0 else 0,
+            (9 if bends else 6) if parent >= 0 and modes[parent] else 0,
             6 if curved[k] and modes[k] else 0,
         )
-        for k in range(count)
+        for k, parent in enumerate(parents)
     ]
     chain = own.Chain(
         links=pack.put_all(
             constants,
             [
-                _link(links[k], found[k].modes, inertial[k], found[k].out, vectors[k + 1], vectors[k], k - 1)
-                for k in range(count)
+                _link(links[k], found[k].modes, inertial[k], found[k].out, vectors, k, parent)
+                for k, parent in enumerate(parents)
             ],
         ),
         states=pack.put_all(scratch, [own.link_state(modes[k], len(inertial[k])) for k in range(count)]),
         bends=pack.put_all(constants, [_bend(mechanism, k, found, axes[k]) for k in range(count)]) if bends else -1,
         bend_states=pack.put_all(
             scratch,
-            [own.bend_state(kept[k], kept[k - 1] if k else 0, len(axes[k])) for k in range(count)],
+            [
+                own.bend_state(kept[k], kept[parent] if parent >= 0 else 0, len(axes[k]))
+                for k, parent in enumerate(parents)
+            ],
         )
         if bends
         else -1,
@@ -275,10 +283,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         joint_states=pack.joint_states(scratch, count),
         modes=pack.put_all(
             constants,
-            [
-                pack.modes_record(int(firsts[k]), masses[k][6:, 6:], links[k], decoupled[k])
-                for k in range(count)
-            ],
+            [pack.modes_record(int(firsts[k]), masses[k][6:, 6:], links[k], decoupled[k]) for k in range(count)],
         ),
         feeds=int(rigid >= 0),
         rigid_links=rigid,

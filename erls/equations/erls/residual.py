@@ -91,12 +91,12 @@ def _turn_arm_back(bend: Bend, state: LinkState, bent: BendState, coordinate: An
 
 
 @inlined
-def _push_along(bend: Bend, state: LinkState, bent: BendState, slides: int, screw: Array) -> Any:
+def _push_along(bend: Bend, state: LinkState, bent: BendState, screw: Array) -> Any:
     """Force of ``push`` along a joint, which turns second-order displacements along."""
     path, turned = bent.share, bent.share_rate[:3]
     clear(path)
     add_motion_cross(bent.carried, screw, 1.0, path)
-    if bend.armed and slides:
+    if bend.armed:
         clear(turned)
         add_cross(state.u[3:], bend.slide, 1.0, turned)
         add_cross(state.u[3:], turned, 0.5, path)
@@ -122,7 +122,7 @@ def push_joint(
         bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
         if bend.armed:
             _turn_arm_back(bend, state, bent, coordinate[0])
-        total += _push_along(bend, state, bent, joint.slides, joint.screw)
+        total += _push_along(bend, state, bent, joint.screw)
     return total + dot6(state.point, state.force)
 
 

@@ -5,8 +5,8 @@ With x = (φ, q_d), φ the turn in u, the frame of a link is displaced by u + e,
     e_k = T_k (e_p + ½ xᵀ P x) + ½ φ × (φ × d),   d = θ s - d₀,
 
 where P is what the parent's interface moves to second order, seen as a motion of its frame, d₀ the arm from the inboard
-interface to its joint and s the axis of a slide; what is left out is of third order. Forces on virtual u and those on
-virtual e go inward apart.
+interface to its joint and s how far the joint advances per unit of its coordinate; what is left out is of third order.
+Forces on virtual u and those on virtual e go inward apart.
 
 Of the velocity of ½ qᵀ Ψ q the kinetic energy needs, to second order in q, what it has in common with rigid-body
 motions: the momenta, with the tensors of `fe_import.second_order.data`,
@@ -59,9 +59,7 @@ def add_stack(stack: Array, x: Array, out: Array) -> None:
 
 
 @part
-def bend_frames(
-    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, moving: bool
-) -> None:
+def bend_frames(serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, moving: bool) -> None:
     """e of all links, added to the coordinates that `erls.equations.erls.frames` left.
 
     ``moving``: with first and second derivatives, at the given accelerations.

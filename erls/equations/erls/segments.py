@@ -196,9 +196,7 @@ def _turned_back(pose: Array, x: Array, out: Array) -> None:
 
 
 @inlined
-def _lead(
-    pose: Array, axes: Array, axes_before: Array, out: Array, state: LinkState, own: Segment, bends: Any
-) -> None:
+def _lead(pose: Array, axes: Array, axes_before: Array, out: Array, state: LinkState, own: Segment, bends: Any) -> None:
     """L and N as far as they are of first order."""
     p, before, x = len(own.pull), own.lead.shape[1], state.point
     own.lead[:, :] = 0.0
@@ -290,10 +288,10 @@ def _subspace(screw: Array, axes: Array, attached: bool, state: LinkState, own: 
 
 
 @inlined
-def _turn_along(bend: Bend, state: LinkState, bent: BendState, slides: int, screw: Array, own: Segment) -> None:
+def _turn_along(bend: Bend, state: LinkState, bent: BendState, screw: Array, own: Segment) -> None:
     """What S has of second order: the joint turns the displacement along, and a slide the arm."""
     add_motion_cross(bent.carried, screw, 1.0, own.subspace)
-    if bend.armed and slides:
+    if bend.armed:
         clear(bent.b)
         add_cross(state.u[3:], bend.slide, 1.0, bent.b)
         add_cross(state.u[3:], bent.b, 0.5, own.subspace)
@@ -339,7 +337,7 @@ def set_segments(
                 bend = read_bend(reals, integers, chain.bends + k * BEND)
                 bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
                 before = read_modes(reals, integers, serial.modes + link.parent * MODES).decoupled
-                _turn_along(bend, state, bent, joint.slides, joint.screw, own)
+                _turn_along(bend, state, bent, joint.screw, own)
                 if bend.bows:
                     _bow(motion.pose, bent, state, own, before, turns)
                 if bend.armed:

@@ -17,9 +17,9 @@ from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.interface_motion import InterfaceMotion, node_motion
 from erls.equations.ffr.joint_conditions import (
     FrameMotion,
-    JointConditions,
     JointMotion,
     carried_frame,
+    joint_conditions,
     joint_motion,
     less_motion,
 )
@@ -62,29 +62,25 @@ class ConstrainedFfr:
         self.links = len(links)
         self.twists = [slice(6 * k, 6 * k + 6) for k in range(self.links)]  # within v
         self.elastic = slice(6 * self.links, 6 * self.links + reduced.elastic)
-        self.conditions = [JointConditions(joint) for joint in joints]
+        self.conditions = [joint_conditions(joint) for joint in joints]
         ends = np.cumsum([len(c.names) for c in self.conditions])
         self.rows = [slice(int(e) - len(c.names), int(e)) for e, c in zip(ends, self.conditions, strict=True)]
-        self.along = [5 if joint.type.revolute else 2 for joint in joints]
+        self.along = [5 if joint.freedom.turns else 2 for joint in joints]
         self._inner: list[tuple[InterfaceMotion, Array] | None] = []
         self._outer: list[tuple[InterfaceMotion, Array]] = []
         for k, (joint, link) in enumerate(zip(joints, links, strict=True)):
-            parent = links[k - 1].outboard if k else None
-            self._inner.append(None if parent is None else self._node(k - 1, parent, joint.before))
+            parent = joint.seat
+            self._inner.append(None if parent is None else self._node(joint.parent, parent, joint.before))
             self._outer.append(self._node(k, link.inboard, inverse(joint.after)))
 
     def _data(self, link: Link, basis: Array, linear: StandardData) -> StandardData:
         if not self.reduced.stiffened or not link.elastic_modes or link.second_order is None:
             return linear
-        return SecondOrderData(
-            linear, link.second_order, basis, modal_inertia(link, self.mechanism.effects, basis)
-        )
+        return SecondOrderData(linear, link.second_order, basis, modal_inertia(link, self.mechanism.effects, basis))
 
     def _node(self, k: int, interface: InterfaceNode, frame: Array) -> tuple[InterfaceMotion, Array]:
         """Interface node of link ``k``, and the offset from it of a joint frame given in the mesh frame."""
-        motion = node_motion(
-            self.mechanism.links[k], interface.node, self.reduced.bases[k], self.reduced.stiffened
-        )
+        motion = node_motion(self.mechanism.links[k], interface.node, self.reduced.bases[k], self.reduced.stiffened)
         return motion, pose(position=-interface.position) @ frame
 
     @property
@@ -143,7 +139,7 @@ class ConstrainedFfr:
 
     def _angle(self, k: int, relative: Array, near: float) -> float:
         """Joint coordinate at a relative pose, on the turn next to ``near``."""
-        if not self.mechanism.joints[k].type.revolute:
+        if not self.mechanism.joints[k].freedom.turns:
             return float(relative[2, 3])
         angle = float(np.arctan2(relative[1, 0] - relative[0, 1], relative[0, 0] + relative[1, 1]))
         return angle + 2 * np.pi * round((near - angle) / (2 * np.pi))
@@ -166,7 +162,7 @@ class ConstrainedFfr:
 
         carrier = self._inner[k]
         ground = FrameMotion(self.mechanism.joints[k].before, np.zeros((6, 0)), np.zeros(6), np.zeros(6))
-        inner = ground if carrier is None else frame(k - 1, carrier)
+        inner = ground if carrier is None else frame(self.mechanism.joints[k].parent, carrier)
         outer = frame(k, self._outer[k])
         return inner, outer, joint_motion(inner, outer)
 
@@ -175,7 +171,7 @@ class ConstrainedFfr:
         joint = self.mechanism.joints[k]
         if not joint.drive.prescribed:
             return found, np.zeros(6)
-        return less_motion(joint.type, found, joint.drive.reference(t))  # type: ignore[arg-type]
+        return less_motion(joint.freedom, found, joint.drive.reference(t))  # type: ignore[arg-type]
 
     def _relative_rows(self, k: int, inner: FrameMotion, outer: FrameMotion, transform: Array) -> Array:
         """(6, n) relative twist of joint ``k`` over all velocities."""
@@ -183,10 +179,11 @@ class ConstrainedFfr:
         elastic = result[:, self.elastic]
         result[:, self.twists[k]] = outer.rows[:, :6]
         elastic[:, self.modes[k]] = outer.rows[:, 6:]
-        if k:
+        parent = self.mechanism.joints[k].parent
+        if parent >= 0:
             rows = transform @ inner.rows
-            result[:, self.twists[k - 1]] = -rows[:, :6]
-            elastic[:, self.modes[k - 1]] = -rows[:, 6:]
+            result[:, self.twists[parent]] = -rows[:, :6]
+            elastic[:, self.modes[parent]] = -rows[:, 6:]
         return result
 
     def _efforts(self, t: float, q: Configuration, v: Array) -> list[tuple[float, float, Array, float]]:

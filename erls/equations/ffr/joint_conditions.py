@@ -8,17 +8,15 @@ import numpy as np
 
 from erls.equations.ffr.interface_motion import InterfaceMotion, bracket
 from erls.equations.serial.joint_frames import (
-    AXIS_TURNS,
-    TURNS,
     Conditions,
     FrameMotion,
     JointMotion,
-    Turn,
     joint_motion,
     less_motion,
 )
 from erls.maths.se3 import twist_transform
 from erls.maths.so3 import Array
+from erls.mechanism.joint_types import JOINT_TYPES, single
 from erls.mechanism.joints import Joint
 
 
@@ -34,17 +32,9 @@ def carried_frame(
     return FrameMotion(world @ local, rows, carried + relative, shift @ moved.bias + bracket(carried, relative))
 
 
-class JointConditions(Conditions):
-    """The rows of one joint."""
-
-    def __init__(self, joint: Joint) -> None:
-        every: dict[tuple[str, int], Turn | None] = {("translation along", k): None for k in range(3)}
-        every.update({("rotation about", k): TURNS[k] for k in range(3)})
-        if not joint.drive.prescribed:
-            del every[("rotation about" if joint.type.revolute else "translation along", 2)]
-            if joint.type.revolute:
-                every.update({("rotation about", k): AXIS_TURNS[k] for k in range(2)})
-        super().__init__(every)
+def joint_conditions(joint: Joint) -> Conditions:
+    """The rows of a joint."""
+    return Conditions(JOINT_TYPES["fixed"] if joint.drive.prescribed else single(joint.freedom))
 
 
-__all__ = ["FrameMotion", "JointConditions", "JointMotion", "carried_frame", "joint_motion", "less_motion"]
+__all__ = ["FrameMotion", "JointMotion", "carried_frame", "joint_conditions", "joint_motion", "less_motion"]

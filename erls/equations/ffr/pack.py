@@ -71,7 +71,7 @@ class Given:
     @property
     def parents(self) -> list[int]:
         """Of every link."""
-        return [k - 1 for k in range(len(self.mechanism.links))]
+        return list(self.mechanism.parents)
 
     def bent(self, k: int) -> bool:
         """Whether a link has second-order displacements."""
@@ -109,8 +109,7 @@ class _Nodes(NamedTuple):
 def _nodes(given: Given, k: int) -> _Nodes:
     mechanism, parent = given.mechanism, given.parents[k]
     joint, link = mechanism.joints[k], mechanism.links[k]
-    outboard = mechanism.links[parent].outboard if parent >= 0 else None
-    base = _interface(given, parent, outboard)
+    base = _interface(given, parent, joint.seat)
     inner = _interface(given, k, link.inboard if given.floats else None)
     before, after = joint.before, joint.after
     if base.moves:
@@ -127,7 +126,7 @@ def _axes(given: Given, k: int) -> Array:
     joint = given.mechanism.joints[k]
     if given.every_axis or given.parents[k] >= 0 or given.bent(k) or (given.floats and given.data[k].size):
         return np.eye(3)
-    return joint.screw[None, 3:] if joint.type.revolute else np.zeros((0, 3))
+    return joint.screw[None, 3:] if joint.freedom.turns else np.zeros((0, 3))
 
 
 def _body(given: Given, k: int) -> Body:
@@ -226,15 +225,13 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
             constants,
             joint,
             int(places[k]),
-            pack.step_parts(nodes[k].before, joint.type.revolute, nodes[k].after),
-            twist_transform(nodes[k].after) @ joint.type.screw,
+            pack.step_parts(nodes[k].before, joint.freedom, nodes[k].after),
+            twist_transform(nodes[k].after) @ joint.freedom.screw,
         )
         for k, joint in enumerate(mechanism.joints)
     ]
     firsts = free + np.cumsum([0, *(data.size for data in given.data)])
-    modes = [
-        pack.modes_record(int(firsts[k]), given.data[k].elastic, mechanism.links[k], decoupled[k]) for k in links
-    ]
+    modes = [pack.modes_record(int(firsts[k]), given.data[k].elastic, mechanism.links[k], decoupled[k]) for k in links]
     rigid_links, rigid_states = pack.rigid_links(mechanism, constants, working)
     pairs = [node for found in nodes for node in (found.base, found.inner)]
     pairs += [node_record(given, k, node) for k, node in given.others]

@@ -12,7 +12,7 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.loops import actuated, nearest, system
 from erls.equations.loops import records as own
 from erls.equations.loops.closure import closure
-from erls.equations.loops.rows import conditions
+from erls.equations.serial.joint_frames import Conditions
 from erls.equations.serial.pack import force_record, pose_numbers, put_all
 from erls.equations.serial.time_curves import put_curve
 from erls.maths.calls import address_of
@@ -125,7 +125,7 @@ def _joint(memory: Memory, closed: ClosedChain, number: int, loop: Loop) -> own.
     second = before + int(loop.outer.link is not None)
     places = [-1 if end.link is None else place for end, place in zip(ends, (before, second), strict=True)]
     signs, free = closed.efforts.signs[number], loop.freedom
-    found = conditions(closed.rows.kinds[number])
+    found = Conditions(closed.rows.kinds[number])
     joint = -1
     if free is not None and free.active:
         motion = None if loop.prescribed else free.drive.motion
@@ -135,12 +135,12 @@ def _joint(memory: Memory, closed: ClosedChain, number: int, loop: Loop) -> own.
         inner=places[1],
         first=int(np.flatnonzero(closed.rows.owner == number)[0]),
         motion=-1 if free is None or not loop.prescribed else put_curve(memory, free.drive.motion),
-        along=-1 if free is None else free.type.free_row,
+        along=-1 if free is None else free.freedom.row,
         joint=joint,
         zero=0.0 if free is None else free.zero,
         turned=float(signs @ closed.efforts.start),
         signs=signs,
         ground=np.stack([pose_numbers(end.frame) for end in ends]),
         lines=found.lines,
-        entries=found.turns,
+        entries=found.entries,
     )

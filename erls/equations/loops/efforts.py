@@ -76,7 +76,7 @@ class LoopEfforts:
         for k, loop in enumerate(self.loops):
             if (free := loop.freedom) is None:
                 continue
-            along, motion = free.type.free_row, found.relative[k]
+            along, motion = free.freedom.row, found.relative[k]
             value, rate = self._coordinate(k, free, motion.pose, t, y), float(motion.twist[along])
             wanted = free.drive.torque(t, value, rate)
             force = free.drive.limited(wanted) + free.forces.force(value, rate)
@@ -85,7 +85,7 @@ class LoopEfforts:
 
     def _coordinate(self, k: int, free: LoopFreedom, relative: Array, t: float, y: Array) -> float:
         """Coordinate of a loop, on the turn that the joints between its links say."""
-        if not free.type.revolute:
+        if not free.freedom.turns:
             return free.zero + float(relative[2, 3])
         angle = float(np.arctan2(relative[1, 0] - relative[0, 1], relative[0, 0] + relative[1, 1]))
         turned = float(self.signs[k] @ (self._joints(t, y) - self.start))
@@ -111,7 +111,7 @@ class LoopEfforts:
 
     def along(self, number: int) -> int:
         """Component of a twist in the outer frame that the coordinate of a loop moves."""
-        return self._freedom(number).type.free_row
+        return self._freedom(number).freedom.row
 
     def stored(self, effort: Effort) -> float:
         """Energy of the spring [J]."""

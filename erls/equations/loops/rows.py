@@ -9,17 +9,15 @@ import numpy as np
 
 from erls.equations.formulation import TreeFormulation
 from erls.equations.serial.joint_frames import (
-    AXIS_TURNS,
-    TURNS,
     Conditions,
     FrameMotion,
     JointMotion,
-    Turn,
     joint_motion,
     less_motion,
 )
 from erls.maths.so3 import Array, cross
-from erls.mechanism.loops import FREE, HELD, PARALLEL, Loop, LoopEnd, LoopType
+from erls.mechanism.joint_types import JOINT_TYPES
+from erls.mechanism.loops import Loop, LoopEnd
 
 
 @dataclass(frozen=True)
@@ -66,19 +64,6 @@ class LoopForce:
     place: Array
 
 
-def conditions(kind: LoopType) -> Conditions:
-    """Rows of a kind of closing joint, or of one whose motion is prescribed (`_HELD`)."""
-    rows: dict[tuple[str, int], Turn | None] = {("translation along", k): None for k in kind.sliding}
-    if kind.turning == PARALLEL:
-        rows.update({("rotation about", k): AXIS_TURNS[k] for k in range(2)})
-    if kind.turning == HELD:
-        rows.update({("rotation about", k): TURNS[k] for k in range(3)})
-    return Conditions(rows)
-
-
-_HELD = LoopType((0, 1, 2), HELD)  # beside a prescribed motion nothing moves
-
-
 class LoopRows:
     """The rows of all loops, one after another.
 
@@ -94,11 +79,11 @@ class LoopRows:
 
     def __init__(self, tree: TreeFormulation, loops: Sequence[Loop]) -> None:
         self.tree, self.loops = tree, tuple(loops)
-        self.kinds = [_HELD if loop.prescribed else loop.type for loop in loops]
-        self._conditions = [conditions(kind) for kind in self.kinds]
+        self.kinds = [JOINT_TYPES["fixed"] if loop.prescribed else loop.type for loop in loops]  # nothing else moves
+        self._conditions = [Conditions(kind) for kind in self.kinds]
         pairs = [(k, name) for k, found in enumerate(self._conditions) for name in found.names]
         self.names = tuple(f"loop {loops[k].name!r}, {name}" for k, name in pairs)
-        self.turns = np.array([name.startswith("rotation") for _, name in pairs])
+        self.turns = np.array([not line.any() for found in self._conditions for line in found.lines], dtype=bool)
         self.owner = np.array([k for k, _ in pairs])
         self.ends = np.cumsum([len(found.names) for found in self._conditions])
         self._ends = [end for loop in loops for end in (loop.outer, loop.inner) if end.link is not None]
@@ -153,9 +138,7 @@ class LoopRows:
         """Loops whose frames meet back to front, which their rows cannot tell from right."""
         result: list[str] = []
         for loop, kind, left in zip(self.loops, self.kinds, found.left, strict=True):
-            along = np.diag(left[:3, :3])
-            wrong = along[2] < 0 or (kind.turning == HELD and along[0] < 0)
-            if kind.turning != FREE and wrong:
+            if any(left[axis, axis] < 0 for axis in kind.aligned):
                 result.append(loop.name)
         return result
 
@@ -164,7 +147,7 @@ def _less_prescribed(loop: Loop, found: JointMotion, t: float) -> JointMotion:
     """The motion beside the prescribed one."""
     assert loop.freedom is not None
     value, rate, acceleration = loop.freedom.drive.reference(t)  # type: ignore[misc]
-    return less_motion(loop.freedom.type, found, (value - loop.freedom.zero, rate, acceleration))[0]
+    return less_motion(loop.freedom.freedom, found, (value - loop.freedom.zero, rate, acceleration))[0]
 
 
 def applied(outer: FrameMotion, wrench: Array) -> LoopForce:

@@ -95,7 +95,7 @@ def start_velocity(chain: ClosedChain, y: Array) -> Array:
 
 def _nudges(chain: ClosedChain, size: float) -> Array:
     joints = [chain.mechanism.joints[k] for k in chain.tree.free_joints]
-    unit = np.array([1.0 if joint.type.revolute else chain.reach for joint in joints])
+    unit = np.array([1.0 if joint.freedom.turns else chain.reach for joint in joints])
     return np.asarray(size * unit * np.cos(2 * np.pi * _ALTERNATE * np.arange(len(unit))))
 
 

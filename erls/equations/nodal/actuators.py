@@ -45,7 +45,7 @@ class Actuators:
         self.inner_frames = np.array([a.inner_frame for a in actuators]).reshape(-1, 4, 4)
         self.outer_frames = np.array([a.outer_frame for a in actuators]).reshape(-1, 4, 4)
         self.start = np.array([j.position for j in self.joints], dtype=float)
-        self.along = np.array([5 if j.type.revolute else 2 for j in self.joints], dtype=np.int64)
+        self.along = np.array([j.freedom.row for j in self.joints], dtype=np.int64)
         self.acting = tuple(j.forces.active or j.drive.kind not in ("free", "motion") for j in self.joints)
         active = [acts or j.rotor_inertia != 0 for acts, j in zip(self.acting, self.joints, strict=True)]
         self.active = np.array(active, dtype=np.int64)

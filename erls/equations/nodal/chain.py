@@ -137,10 +137,10 @@ def _seats(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[in
         outer = node_at(links[k], link.inboard.node, f"link {link.name!r}")
         place = links[k].nodes[outer]
         inner, before = GROUND, joint.before
-        carrier = mechanism.links[k - 1].outboard if k else None
-        if carrier is not None:
-            node = node_at(links[k - 1], carrier.node, f"link {mechanism.links[k - 1].name!r}")
-            inner, before = firsts[k - 1] + node, pose(position=-links[k - 1].nodes[node]) @ joint.before
+        if joint.seat is not None:
+            below = links[joint.parent]
+            node = node_at(below, joint.seat.node, f"link {mechanism.links[joint.parent].name!r}")
+            inner, before = firsts[joint.parent] + node, pose(position=-below.nodes[node]) @ joint.before
         after = pose(position=-place) @ inverse(joint.after)
         result.append(Seat(inner, firsts[k] + outer, before, after))
     return tuple(result)
@@ -152,7 +152,7 @@ def _joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
         motion: Motion | None = None
         if joint.drive.prescribed:
             motion = joint.drive.reference  # type: ignore[assignment]
-        kind = "revolute" if joint.type.revolute else "prismatic"
+        kind = "revolute" if joint.freedom.turns else "prismatic"
         ends = seat.inner, seat.outer, seat.inner_frame, seat.outer_frame
         result.append(Joint(joint.name, kind, *ends, motion, joint.drive.breakpoints if motion else ()))
     return result

@@ -91,7 +91,7 @@ class Nodal:
         moving = np.zeros(6)  # of the link in the world's axes, about its origin
         for joint, seat, nodes in zip(self.mechanism.joints, self.chain.seats, self.chain.nodes, strict=True):
             carrier = np.eye(4) if seat.inner == GROUND else q.poses[seat.inner]
-            moving = moving + motions.adjoint(carrier @ seat.inner_frame) @ joint.type.screw * joint.rate
+            moving = moving + motions.adjoint(carrier @ seat.inner_frame) @ joint.freedom.screw * joint.rate
             v[nodes] = motions.adjoint_inverse(q.poses[nodes]) @ moving
         a, multipliers = consistent_acceleration(self.system, 0.0, q, v.ravel())
         y, rates, _ = self.system.stored(0.0, q, v.ravel(), a)
@@ -145,7 +145,7 @@ class Nodal:
             wrench = -np.asarray(rows[own][:, place].T @ multipliers[own]).ravel()
             effort, push = float(along[k, 3]), along[k, 4:]
             if joint.drive.prescribed:
-                axis = motions.adjoint(seat.outer_frame) @ joint.type.screw
+                axis = motions.adjoint(seat.outer_frame) @ joint.freedom.screw
                 effort = float(axis @ wrench)
             wrench = wrench + push
             turn = q.poses[seat.outer, :3, :3]

@@ -15,12 +15,10 @@ import numpy as np
 from erls.equations.nodal.scatter import IntArray
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.mechanism.joint_conditions import CONDITIONS, Condition
+from erls.mechanism.joint_types import JOINT_TYPES, Condition
 
 GROUND = -1
 Motion = Callable[[float], tuple[float, float, float]]  # coordinate, rate, acceleration at a time
-
-_DRIVEN = {"revolute": 5, "prismatic": 2}
 
 
 @dataclass(frozen=True)
@@ -30,7 +28,7 @@ class Joint:
     Attributes
     ----------
     name, type : str
-        Type: a key of `CONDITIONS`.
+        Type: a key of `JOINT_TYPES`.
     inner, outer : int
         Nodes.
     inner_frame, outer_frame : (4, 4) array
@@ -60,11 +58,11 @@ class Joint:
 
     def __post_init__(self) -> None:
         where = f"joint {self.name!r}"
-        if self.type not in CONDITIONS:
-            remedy = f"must be one of {', '.join(CONDITIONS)}"
+        if self.type not in JOINT_TYPES:
+            remedy = f"must be one of {', '.join(JOINT_TYPES)}"
             message = "there is no such joint"
             raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: type", value=self.type, remedy=remedy)
-        if self.motion is not None and self.type not in _DRIVEN:
+        if self.motion is not None and JOINT_TYPES[self.type].one is None:
             message, remedy = "its motion cannot be prescribed", "let the joint be revolute or prismatic"
             raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: motion", value=self.type, remedy=remedy)
         if self.inner == self.outer:
@@ -74,8 +72,8 @@ class Joint:
     @property
     def conditions(self) -> list[Condition]:
         """Conditions of the type; all of them when the last freedom is prescribed; those left out aside."""
-        every = CONDITIONS["fixed" if self.motion else self.type]
-        return [c for c in every if c[0] not in self.left_out]
+        every = JOINT_TYPES["fixed" if self.motion else self.type].conditions
+        return [c for c in every if c.name not in self.left_out]
 
 
 class JointRows:
@@ -117,4 +115,5 @@ class JointRows:
     @staticmethod
     def driven_along(joint: Joint) -> int:
         """Row of the relative twist that is prescribed, or -1."""
-        return -1 if joint.motion is None else _DRIVEN[joint.type]
+        freedom = JOINT_TYPES[joint.type].one
+        return -1 if joint.motion is None or freedom is None else freedom.row

@@ -142,7 +142,7 @@ def _masses(equations: TreeFormulation, y: Array, duration: float) -> list[Array
             wanted = joint.drive.reference(t)
             if number and wanted is not None:
                 place[k] = wanted[0]
-            elif number and joint.type.revolute:
+            elif number and joint.freedom.turns:
                 place[k] += random.uniform(0.0, 2 * np.pi)
         result.append(equations.mass_matrix(t, place))
     return result

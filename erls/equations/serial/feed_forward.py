@@ -33,7 +33,7 @@ def feed_forward(serial: Serial, reals: Array, integers: IntArray, scratch: Arra
         coordinate, speed, acceleration = joint.held, 0.0 * joint.held, 0.0 * joint.held
         if joint.motion >= 0:
             coordinate, speed, acceleration = curve(reals, integers, joint.motion, t)
-        step_pose(link.step, joint.slides, coordinate, state.pose)
+        step_pose(link.step, coordinate, state.pose)
         if link.parent < 0:
             clear(twist)
             clear(rate)

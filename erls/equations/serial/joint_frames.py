@@ -1,26 +1,18 @@
 """Relative motion of two joint frames that are carried along, and rows that keep parts of it at zero.
 
-With D = (p, R) the pose of the outer joint frame in the inner one, and d its twist, a row is a component of p or a
-small turn, a sum of entries of R.
+With D = (Q, p) the pose of the outer joint frame in the inner one, and d its twist, a row is linear in the entries of p
+and Q (`erls.mechanism.joint_types`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from erls.maths.se3 import inverse, joint_pose, twist_cross, twist_transform
+from erls.maths.se3 import inverse, twist_cross, twist_transform
 from erls.maths.so3 import Array, cross, skew
-from erls.mechanism.joints import JointType
-
-Turn = tuple[tuple[float, int, int], ...]  # factor, row and column of entries of R
-_AXES = "xyz"
-AXIS_TURNS: dict[int, Turn] = {0: ((-1.0, 1, 2),), 1: ((1.0, 0, 2),)}  # of the z axis, at any angle about it
-TURNS: dict[int, Turn] = {
-    k: ((0.5, (k + 2) % 3, (k + 1) % 3), (-0.5, (k + 1) % 3, (k + 2) % 3)) for k in range(3)
-}
+from erls.mechanism.joint_types import Freedom, JointType
 
 
 @dataclass(frozen=True)
@@ -65,68 +57,50 @@ def joint_motion(inner: FrameMotion, outer: FrameMotion) -> JointMotion:
 
 
 def less_motion(
-    kind: JointType, found: JointMotion, reference: tuple[float, float, float]
+    freedom: Freedom, found: JointMotion, reference: tuple[float, float, float]
 ) -> tuple[JointMotion, Array]:
     """What is left beside a prescribed coordinate, rate and acceleration; and the twist (6,) that time alone gives."""
     value, rate, acceleration = reference
-    pose = inverse(joint_pose(kind.revolute, value)) @ found.pose
-    screw = twist_transform(pose) @ kind.screw
+    pose = inverse(freedom.pose(value)) @ found.pose
+    screw = twist_transform(pose) @ freedom.screw
     twist = found.twist - screw * rate
     bias = found.bias - screw * acceleration + twist_cross(twist) @ (screw * rate)
     return JointMotion(pose, found.transform, twist, bias), -screw * rate
 
 
 class Conditions:
-    """Rows that keep parts of a relative motion at zero.
+    """What a joint keeps at zero.
 
     Parameters
     ----------
-    rows : mapping
-        (kind, axis) of a row to the turn that it measures; None for a translation.
+    kind : JointType
 
     Attributes
     ----------
     names : tuple of str
-        Direction of each row, in the axes of the inner joint frame.
-    entries : list of (int, Turn or None)
-        Axis and turn of each row.
-    lines, turns : (m, 3), (m, 3, 3) arrays
-        c and C: the rows are c · p + ⟨C, R⟩.
+    lines, entries : (m, 3), (m, 3, 3) arrays
+        c and C of c · p + ⟨C, Q⟩.
     """
 
-    def __init__(self, rows: Mapping[tuple[str, int], Turn | None]) -> None:
-        self.names = tuple(f"{kind} {_AXES[k]}" for kind, k in rows)
-        self.entries = [(k, turns) for (_, k), turns in rows.items()]
-        self.lines, self.turns = np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 3))
-        for number, (axis, turn) in enumerate(self.entries):
-            if turn is None:
-                self.lines[number, axis] = 1.0
-            for factor, i, j in turn or ():
-                self.turns[number, i, j] = factor
+    def __init__(self, kind: JointType) -> None:
+        self.names = tuple(condition.name for condition in kind.conditions)
+        self.lines = np.array([condition.line for condition in kind.conditions])
+        self.entries = np.array([condition.entries for condition in kind.conditions])
 
     def violation(self, pose: Array) -> Array:
         """(m,) Φ."""
-        return np.array(
-            [pose[k, 3] if turns is None else sum(c * pose[i, j] for c, i, j in turns) for k, turns in self.entries]
-        )
+        return np.asarray(self.lines @ pose[:3, 3] + np.einsum("mij,ij->m", self.entries, pose[:3, :3]))
 
     def gradient(self, pose: Array) -> Array:
         """(m, 6) Φ̇ = gradient · d."""
-        result = np.zeros((len(self.entries), 6))
-        for row, (k, turns) in zip(result, self.entries, strict=True):
-            if turns is None:
-                row[:3] = pose[k, :3]
-            else:
-                row[3:] = -sum(c * (pose[i, :3] @ skew(np.eye(3)[j])) for c, i, j in turns)
-        return result
+        pulled = np.einsum("ji,mjk->mik", pose[:3, :3], self.entries)
+        return np.hstack([self.lines @ pose[:3, :3], pulled[:, (2, 0, 1), (1, 2, 0)] - pulled[:, (1, 2, 0), (2, 0, 1)]])
 
     def curvature(self, pose: Array, twist: Array) -> Array:
         """(m,) Φ̈ at ḋ = 0."""
         turning, sliding = skew(twist[3:]), pose[:3, :3] @ cross(twist[3:], twist[:3])
         turned = pose[:3, :3] @ turning @ turning
-        return np.array(
-            [sliding[k] if turns is None else sum(c * turned[i, j] for c, i, j in turns) for k, turns in self.entries]
-        )
+        return np.asarray(self.lines @ sliding + np.einsum("mij,ij->m", self.entries, turned))
 
 
 def carried(link: FrameMotion, local: FrameMotion) -> FrameMotion:

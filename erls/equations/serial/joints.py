@@ -14,15 +14,11 @@ from fe_import.model import IntArray
 
 
 @part
-def step_pose(step: Array, slides: int, coordinate: Any, pose: Array) -> None:
+def step_pose(step: Array, coordinate: Any, pose: Array) -> None:
     """Pose (12,) over a joint at its coordinate; ``step`` as of `Joint`."""
-    if slides:
-        for i in range(12):
-            pose[i] = step[0, i] + coordinate * step[1, i]
-    else:
-        c, s = np.cos(coordinate), np.sin(coordinate)
-        for i in range(12):
-            pose[i] = step[0, i] + c * step[1, i] + s * step[2, i]
+    c, s = np.cos(coordinate), np.sin(coordinate)
+    for i in range(12):
+        pose[i] = step[0, i] + c * step[1, i] + s * step[2, i] + coordinate * step[3, i]
 
 
 @part
@@ -36,7 +32,7 @@ def move_joint(
         coordinate[2] = a[joint.place] if len(a) else 0.0
     else:
         coordinate[0], coordinate[1], coordinate[2] = curve(reals, integers, joint.motion, t)
-    step_pose(joint.step, joint.slides, coordinate[0], state.pose)
+    step_pose(joint.step, coordinate[0], state.pose)
 
 
 @part

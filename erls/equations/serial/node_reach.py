@@ -38,10 +38,10 @@ def reach_of_nodes(mechanism: Mechanism, d: Array) -> Array:
     ]
     scales = np.empty(joints + elastic)
     for k, joint in enumerate(mechanism.joints):
-        axis_frame = (frames[k - 1] if k else np.eye(4)) @ joint.before
-        arms = np.vstack(world[k:]) - axis_frame[:3, 3]
-        reach = np.linalg.norm(np.cross(axis_frame[:3, 2], arms), axis=1).max()
-        scales[k] = max(reach, 1e-3) if joint.type.revolute else 1.0
+        axis_frame = (frames[joint.parent] if joint.parent >= 0 else np.eye(4)) @ joint.before
+        arms = np.vstack([world[outer] for outer in mechanism.carried(k)]) - axis_frame[:3, 3]
+        reach = np.linalg.norm(np.cross(axis_frame[:3, joint.freedom.axis], arms), axis=1).max()
+        scales[k] = max(reach, 1e-3) if joint.freedom.turns else 1.0
     scales[joints:] = 0.0
     first = 0
     for k, link in enumerate(mechanism.links):

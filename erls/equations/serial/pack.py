@@ -15,27 +15,18 @@ from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.curves import Curve
 from erls.mechanism.drives import Drive
+from erls.mechanism.joint_types import Freedom
 from erls.mechanism.joints import Joint as MechanismJoint
 from erls.mechanism.joints import JointForces
 from erls.mechanism.links import Link
 
 
-def step_parts(before: Array, revolute: bool, after: Array) -> Array:
-    """(3, 12) constant, cosine and sine part of the pose before · joint · after; constant and rising at a slide."""
-
-    def part(middle: Array, shift: Array) -> Array:
-        rotation = before[:3, :3] @ middle
-        place = rotation @ after[:3, 3] + before[:3, :3] @ shift
-        return np.concatenate([(rotation @ after[:3, :3]).ravel(), place])
-
-    axis, none = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    if revolute:
-        parts = [part(np.outer(axis, axis), none), part(-turn @ turn, none), part(turn, none)]
-    else:
-        parts = [part(np.eye(3), none), part(np.zeros((3, 3)), axis), np.zeros(12)]
-    parts[0][9:] += before[:3, 3]
-    return np.stack(parts)
+def step_parts(before: Array, freedom: Freedom, after: Array) -> Array:
+    """(4, 12) parts of the pose before · joint · after: constant, with cosine and sine of the coordinate, and with the
+    coordinate itself.
+    """
+    parts = before @ freedom.parts() @ after
+    return np.concatenate([parts[:, :3, :3].reshape(4, 9), parts[:, :3, 3]], axis=1)
 
 
 def pose_numbers(pose: Array) -> Array:
@@ -57,7 +48,6 @@ def force_record(
     gain, rate_gain = drive.gains
     return Joint(
         place=-1,
-        slides=0,
         motion=put_curve(memory, motion),
         load=put_curve(memory, drive.load),
         feeds=0,
@@ -72,7 +62,7 @@ def force_record(
         rate_gain=rate_gain,
         limit=drive.torque_limit,
         held=0.0,
-        step=np.zeros((3, 12)),
+        step=np.zeros((4, 12)),
         screw=np.zeros(6),
     )
 
@@ -82,7 +72,6 @@ def joint_record(memory: Memory, joint: MechanismJoint, place: int, step: Array,
     drive = joint.drive
     return force_record(memory, joint.forces, drive, joint.rotor_inertia, drive.motion)._replace(
         place=place,
-        slides=int(not joint.type.revolute),
         feeds=int(drive.feed_forward),
         acts=int(joint_acts(joint)),
         held=joint.position,
@@ -93,9 +82,7 @@ def joint_record(memory: Memory, joint: MechanismJoint, place: int, step: Array,
 
 def modes_record(first: int, mass: Array, link: Link, decoupled: DecoupledModes) -> Modes:
     """Elastic coordinates of a link that begin at ``first``; ``mass`` (e, e)."""
-    return Modes(
-        first, mass, link.stiffness, link.damping, decoupled.vectors, decoupled.stiffness, decoupled.damping
-    )
+    return Modes(first, mass, link.stiffness, link.damping, decoupled.vectors, decoupled.stiffness, decoupled.damping)
 
 
 def put_all(memory: Memory, records: Sequence[Any]) -> int:
@@ -115,12 +102,12 @@ def rigid_links(mechanism: Mechanism, constants: Memory, scratch: Memory) -> tup
         return -1, -1
     links = [
         RigidLink(
-            k - 1,
-            step_parts(joint.before, joint.type.revolute, joint.after),
+            joint.parent,
+            step_parts(joint.before, joint.freedom, joint.after),
             joint.screw,
             link.invariants.rigid_mass_matrix,
         )
-        for k, (joint, link) in enumerate(zip(mechanism.joints, mechanism.links, strict=True))
+        for joint, link in zip(mechanism.joints, mechanism.links, strict=True)
     ]
     states = [RigidState(np.zeros(12), *(np.zeros(6) for _ in range(4))) for _ in links]
     return put_all(constants, links), put_all(scratch, states)

@@ -46,8 +46,6 @@ class Joint(NamedTuple):
     ----------
     place : int
         Of its coordinate among the independent ones; -1 where it is prescribed.
-    slides : int
-        1 for a slide, 0 for a turn.
     motion, load : int
         Places of the curves of the prescribed or wanted coordinate and of the given force; -1 without.
     feeds, acts : int
@@ -60,15 +58,14 @@ class Joint(NamedTuple):
         Of the controller, and the most that the motor gives.
     held : float
         Coordinate where feed-forward holds a joint without wanted motion.
-    step : (3, 12) array
-        Pose of the frame behind the joint in the frame before it: constant, cosine and sine part; of a slide constant
-        and rising part.
+    step : (4, 12) array
+        Pose of the frame behind the joint in the frame before it: constant part, those with cosine and sine of the
+        coordinate, and that with the coordinate itself.
     screw : (6,) array
         Motion subspace S: twist of unit rate, in the frame behind the joint.
     """
 
     place: int
-    slides: int
     motion: int
     load: int
     feeds: int

@@ -81,9 +81,7 @@ class ChainRun(ChainMotion):
         """
         found = self._reactions(joint, t)
         shape = (*np.shape(t), 3)
-        return np.array([r.force for r in found]).reshape(shape), np.array([r.moment for r in found]).reshape(
-            shape
-        )
+        return np.array([r.force for r in found]).reshape(shape), np.array([r.moment for r in found]).reshape(shape)
 
     def joint_effort(self, joint: str, t: ArrayLike) -> Array:
         """(...) torque [N m] or force [N] of drive, spring, damper and friction; for a prescribed motion, what its
@@ -173,7 +171,7 @@ class ChainRun(ChainMotion):
             vector(columns, plain(name), "m", [self.point_position(s, k) for s in states])
         reactions = self._all_reactions(times)
         for k, joint in enumerate(self.formulation.mechanism.joints):
-            name, unit, effort = plain(joint.name), *(("rad", "N m") if joint.type.revolute else ("m", "N"))
+            name, unit, effort = plain(joint.name), *(("rad", "N m") if joint.freedom.turns else ("m", "N"))
             columns[f"{name}.coordinate [{unit}]"] = np.array([s.coordinates[k] for s in states])
             columns[f"{name}.angle [{unit}]"] = np.array([s.angles[k] for s in states])
             columns[f"{name}.rate [{unit}/s]"] = np.array([s.rates[k] for s in states])

@@ -77,7 +77,7 @@ def deflection_errors(run: ChainRun) -> dict[str, DeflectionError]:
         except (SimulationError, np.linalg.LinAlgError):
             return {}
         for k in links:
-            closed = any(end.link is not None and end.link >= k for end in ends)
+            closed = any(end.link in mechanism.carried(k) for end in ends)
             error = deflection_error(mechanism.links[k], motions[k], closed, _reach(mechanism, places, k))
             if error is not None and np.isfinite(error.error):
                 found[k] = error
@@ -132,13 +132,13 @@ def _axial(matrices: Array) -> Array:
 
 
 def _loads(run: ChainRun, times: Array, seen: StateSeries) -> list[Array]:
-    """(k, 6 i) of every link: what the next joint and closing joints do to its interfaces, in its axes; the middle
+    """(k, 6 i) of every link: what the joints on them and closing joints do to its interfaces, in its axes; the middle
     third of the states is at these times.
     """
     formulation, mechanism = run.formulation, run.formulation.mechanism
     nodes = [[i.node for i in link.model.interface_nodes] for link in mechanism.links]
     result = [np.zeros((len(times), len(own), 6)) for own in nodes]
-    carriers = any(link.outboard is not None for link in mechanism.links[:-1])
+    carriers = any(joint.seat is not None for joint in mechanism.joints)
     if not (carriers or isinstance(formulation, ClosedChain)):
         return [loads.reshape(len(times), -1) for loads in result]
     states = seen.states()[len(times) : 2 * len(times)]
@@ -154,10 +154,10 @@ def _loads(run: ChainRun, times: Array, seen: StateSeries) -> list[Array]:
     for sample, (t, y, v) in enumerate(zip(times.tolist(), y_all, v_all, strict=True)):
         if carriers:
             for k, reaction in enumerate(_reactions(formulation, t, y, v)):
-                outboard = mechanism.links[k - 1].outboard if k else None
-                if outboard is not None:
+                joint = mechanism.joints[k]
+                if joint.seat is not None:
                     place = _place(states[sample], mechanism, k, mechanism.links[k].inboard.node)
-                    add(sample, k - 1, outboard.node, -reaction.force, -reaction.moment, place)
+                    add(sample, joint.parent, joint.seat.node, -reaction.force, -reaction.moment, place)
         if isinstance(formulation, ClosedChain):
             for loop, given in zip(mechanism.loops, formulation.loop_forces(t, y, v), strict=True):
                 for end, sign in ((loop.outer, 1.0), (loop.inner, -1.0)):
@@ -189,7 +189,7 @@ def _reach(mechanism: Mechanism, places: list[Array], number: int) -> float:
     start = frame[:3, :3] @ mechanism.links[number].inboard.position + frame[:3, 3]
     return max(
         float(np.linalg.norm(link.model.nodes @ at[:3, :3].T + at[:3, 3] - start, axis=1).max())
-        for link, at in zip(mechanism.links[number:], places[number:], strict=True)
+        for link, at in ((mechanism.links[k], places[k]) for k in mechanism.carried(number))
     )
 
 

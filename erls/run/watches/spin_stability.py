@@ -88,7 +88,7 @@ def spin_warnings(mechanism: Mechanism, motion: Iterable[tuple[float, Array, Arr
     bounds = {k: float(np.linalg.eigvalsh(np.einsum("aaij->ij", parts))[-1]) for k, parts in softened.items()}
     worst: dict[int, tuple[float, float]] = {}  # largest share lost, and its speed
     lost: dict[int, tuple[float, float]] = {}  # time and speed at which all of it is
-    turning = np.array([joint.type.revolute for joint in mechanism.joints])
+    turning = np.array([joint.freedom.turns for joint in mechanism.joints])
     largest = max(bounds.values(), default=0.0)
     for t, theta, rates in motion if softened else ():
         with np.errstate(over="ignore", invalid="ignore"):  # a run that failed may hold anything

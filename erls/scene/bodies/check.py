@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.errors import SceneError
-from erls.mechanism.joint_conditions import CONDITIONS
+from erls.mechanism.joint_types import JOINT_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
 from erls.scene.checks import bad, check_names, check_stepping, check_tables, directed, not_negative
@@ -12,7 +12,6 @@ from fe_import.elements.sections import check_section
 from fe_import.files.toml import choose
 
 FORMULATIONS = ("nodal",)
-AXES = {"revolute": 1, "prismatic": 1, "cylindrical": 1, "universal": 2}
 MOST_ELEMENTS = 100_000
 
 
@@ -115,12 +114,12 @@ def _check_beam(beam: Beam, scene: BodySceneRecord, nodes: list[str], place: str
 
 
 def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
-    choose(joint.type, CONDITIONS, f"{place}.type", SceneError)
+    choose(joint.type, JOINT_TYPES, f"{place}.type", SceneError)
     choose(joint.node, nodes, f"{place}.node", SceneError)
     choose(joint.to, [GROUND, *nodes], f"{place}.to", SceneError)
     if joint.node == joint.to:
         raise bad(f"{place}.to", "a connection needs two nodes", joint.to, "name another node, or the ground")
-    wanted = AXES.get(joint.type, 0)
+    wanted = JOINT_TYPES[joint.type].axes
     for k, name in enumerate(("axis", "second_axis")):
         axis = getattr(joint, name)
         if axis is None and k < wanted:
@@ -128,7 +127,7 @@ def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
         if axis is not None and k >= wanted:
             raise bad(f"{place}.{name}", f"a {joint.type} joint has none", axis, "remove it")
         directed(f"{place}.{name}", axis)
-    if joint.motion is not None and joint.type not in ("revolute", "prismatic"):
+    if joint.motion is not None and JOINT_TYPES[joint.type].one is None:
         message = "its motion cannot be prescribed"
         raise bad(f"{place}.motion", message, joint.type, "let the joint be revolute or prismatic")
 

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.maths.se3 import inverse, joint_pose, twist_cross, twist_transform
+from erls.maths.se3 import inverse, twist_cross, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.joint_types import PRISMATIC, REVOLUTE
 from fe_import.model import IntArray
 
 GAUGES = ("joint-angle", "minimum-norm")
@@ -51,7 +52,7 @@ class JointRows:
 
     def transform(self, coordinate: float) -> Array:
         """(6, 6) X(θ)."""
-        return twist_transform(joint_pose(self.revolute, coordinate))
+        return twist_transform((REVOLUTE if self.revolute else PRISMATIC).pose(coordinate))
 
 
 @dataclass(frozen=True)
@@ -101,13 +102,11 @@ def joint_rows(mechanism: Mechanism, gauge: str) -> tuple[JointRows, ...]:
         previous = None
         if k > 0:
             before = mechanism.links[k - 1]
-            previous = before.interface_shape(before.outboard, joint.before)  # type: ignore[arg-type]
+            previous = before.interface_shape(joint.seat, joint.before)  # type: ignore[arg-type]
         all_rows = gauge == "joint-angle" or joint.drive.prescribed
-        kept = np.arange(6) if all_rows else np.delete(np.arange(6), joint.type.free_row)
+        kept = np.arange(6) if all_rows else np.delete(np.arange(6), joint.freedom.row)
         result.append(
-            JointRows(
-                joint.type.revolute, twist_cross(joint.type.screw), own, previous, kept, joint.type.free_row
-            )
+            JointRows(joint.freedom.turns, twist_cross(joint.freedom.screw), own, previous, kept, joint.freedom.row)
         )
     return tuple(result)
 
@@ -221,9 +220,7 @@ class Compatibility:
         _, right, d = self.elimination(theta)
         return self._velocity(theta, q_d, right, d)[:3]
 
-    def _velocity(
-        self, theta: Array, q_d: Array, right: RightInverse, d: Array
-    ) -> tuple[Array, Array, Array, Array]:
+    def _velocity(self, theta: Array, q_d: Array, right: RightInverse, d: Array) -> tuple[Array, Array, Array, Array]:
         """q, D, G and ∂C/∂θ."""
         q = self.stack(d @ q_d, q_d)
         if self.constant:

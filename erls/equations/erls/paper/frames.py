@@ -43,7 +43,7 @@ def displaced_frames(chain: Chain, t: float, y: Array, v: Array, ends: Sequence[
     q, qd, d, g, n = chain.compatibility.acceleration(theta, rates, y[f:], v[f:])
     screws = [joint.screw for joint in mechanism.joints]
     rigid = kinematics(mechanism, screws, theta, rates)
-    turning = jacobians(rigid.transforms, screws)
+    turning = jacobians(mechanism, rigid.transforms, screws)
     bias = chain.compatibility.stack(g @ driven + n, np.zeros(elastic))
     result: list[FrameMotion] = []
     for k, node, offset in ((int(end.link or 0), end.node, end.frame) for end in ends):

@@ -68,13 +68,13 @@ def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows
         previous, previous_second = np.zeros((6, 0)), _NONE
         if k > 0:
             before = mechanism.links[k - 1]
-            assert before.outboard is not None
-            previous = before.interface_shape(before.outboard, joint.before)
-            previous_second = _frame_second_order(before, before.outboard, joint.before) if curved else _NONE
+            assert joint.seat is not None
+            previous = before.interface_shape(joint.seat, joint.before)
+            previous_second = _frame_second_order(before, joint.seat, joint.before) if curved else _NONE
         all_rows = gauge == "joint-angle" or joint.drive.prescribed
-        free_row = -1 if all_rows else joint.type.free_row
+        free_row = -1 if all_rows else joint.freedom.row
         count = 6 if all_rows else 5
-        bracket, slides = twist_cross(joint.type.screw), int(not joint.type.revolute)
+        bracket, slides = twist_cross(joint.freedom.screw), int(not joint.freedom.turns)
         rows = JointRows(k - 1, first, free_row, slides, count, bracket, own, previous, own_second, previous_second)
         result.append(rows)
         first += count
@@ -84,7 +84,7 @@ def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows
 def _joints(mechanism: Mechanism, constants: Memory) -> list[Joint]:
     result, place = [], 0
     for joint in mechanism.joints:
-        step = step_parts(joint.before, joint.type.revolute, joint.after)
+        step = step_parts(joint.before, joint.freedom, joint.after)
         prescribed = joint.drive.prescribed
         result.append(joint_record(constants, joint, -1 if prescribed else place, step, joint.screw))
         place += not prescribed

@@ -111,7 +111,7 @@ class SecondOrderCompatibility(Compatibility):
         for k, (joint, link) in enumerate(zip(mechanism.joints, mechanism.links, strict=True)):
             self.own.append(frame_second_order(link, link.inboard, inverse(joint.after)))
             before = mechanism.links[k - 1]
-            outboard = before.outboard if k else None
+            outboard = joint.seat
             found = None if outboard is None else frame_second_order(before, outboard, joint.before)
             self.previous.append(found)
 

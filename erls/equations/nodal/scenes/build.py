@@ -23,10 +23,10 @@ from erls.maths.groups import R3_SO3, SE3
 from erls.maths.motion_maps import inverse
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, fixed_axes
+from erls.mechanism.joint_types import JOINT_TYPES
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import build_loads
 from erls.scene.bodies.analyses import Dynamics
-from erls.scene.bodies.check import AXES
 from erls.scene.bodies.schema import GROUND as GROUND_NAME
 from erls.scene.bodies.schema import Beam as BeamRecord
 from erls.scene.bodies.schema import BodyScene, BodySceneRecord, Connection, Load
@@ -181,7 +181,7 @@ def _joint_axes(record: Connection, place: str) -> Array:
     if record.axis is None:
         return np.eye(3)
     first = np.array(record.axis) / np.linalg.norm(record.axis)
-    if AXES[record.type] == 2:
+    if JOINT_TYPES[record.type].axes == 2:
         second = np.array(record.second_axis) / np.linalg.norm(np.array(record.second_axis))
         if abs(first @ second) > 1e-9:
             raise SceneError(
