@@ -1,7 +1,7 @@
 """What independent coordinates y are to the steps of generalized-α: configurations that add, knots of y, v and a.
 
-With them stand-ins, never called, for a system without `erls.equations.compiled_system.Factoring`: its matrices get
-dense factors.
+With them stand-ins, never called: for a system without `erls.equations.compiled_system.Factoring`, whose matrices get
+dense factors, and for one that has its own and no matrices.
 """
 
 from __future__ import annotations
@@ -58,6 +58,18 @@ def _factor_complex(
 @kernel(contract.SOLVE_COMPLEX, counted=False)
 def _solve_complex(reals: Array, integers: IntArray, factors: Any, b: Any) -> None:
     pass
+
+
+@kernel(contract.MASS_MATRIX, counted=False)
+def no_mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
+    """Never called."""
+
+
+@kernel(contract.STIFFNESS_AND_DAMPING, counted=False)
+def no_stiffness_and_damping(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, k: Array, c: Array
+) -> None:
+    """Never called."""
 
 
 ABSENT = contract.Factoring(0, _factor, _solve, _factor_complex, _solve_complex)

@@ -16,7 +16,9 @@ The functions go by the signatures of `erls.equations.compiled_system`, with q (
 3. With m conditions, ``factor`` puts metres per unit of β λ of each into the first m of its numbers, and metres per
    unit of Φ into the next m; ``solve`` then takes [b; Φ] to [x; β λ] with (M + α C + β K) x + Bᵀ β λ = b and
    B x = Φ. These stay well conditioned as the step, and β with it, tends to zero.
-4. The first numbers of ``scratch`` are the system's samples at the time of the step.
+4. Of a configuration that is tried, ``compose`` may leave out what only the next step needs: ``settle``, which comes
+   last, puts it into ``q``.
+5. The first numbers of ``scratch`` are the system's samples at the time of the step.
 """
 
 from __future__ import annotations
@@ -57,6 +59,8 @@ class Stepped:
         n, m and s.
     compiled : bool
         Whether all functions are.
+    mass_matrix, stiffness_and_damping : callable or None
+        None where factors are its own.
     factoring : Factoring or None
         None where there are no conditions and dense factors will do.
     pack, unpack : callable
@@ -77,8 +81,8 @@ class Stepped:
     compose: Callable[..., float]
     residual: Callable[..., None]
     settle: Callable[..., int]
-    mass_matrix: Callable[..., None]
-    stiffness_and_damping: Callable[..., None]
+    mass_matrix: Callable[..., None] | None
+    stiffness_and_damping: Callable[..., None] | None
     factoring: Factoring | None
     pack: Callable[[Any], Any]
     unpack: Callable[[Any], Any]

@@ -180,8 +180,8 @@ def tied_steps_of(system: ConstrainedSystem, kept: int, project: bool) -> Steppe
         tied.compose,
         tied.residual,
         tied.settle,
-        tied.residual,  # never asked for: factors are its own
-        tied.residual,
+        None,
+        None,
         Factoring(max(1, 2 * tied.m), tied.factor, tied.solve, tied.factor, tied.solve),
         pack,
         lambda array: array[0],

@@ -17,8 +17,6 @@ has decayed.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from erls.equations.consistency import consistent_acceleration, consistent_start, refuse_redundant
@@ -76,10 +74,9 @@ def lie_generalized_alpha(
     return found
 
 
-def _steps(system: ConstrainedSystem, options: ConstrainedOptions, recorder: ConstrainedRecorder) -> Any:
-    """By kernels, unless without the compiler, where a system has none, or where velocities are projected."""
-    from erls.equations.stepped import Stepped  # here: they import the compiler
-    from erls.equations.uncompiled import tied_steps_of
+def _steps(system: ConstrainedSystem, options: ConstrainedOptions, recorder: ConstrainedRecorder) -> Steps:
+    """By compiled functions, where there is a compiler, a system has them, and velocities are not projected."""
+    from erls.equations.uncompiled import tied_steps_of  # here: it imports the linear algebra of plain systems
 
     wanted = ENABLED if options.compiled is None else options.compiled
     compiled = system.compiled if wanted and not options.project_velocity else None
@@ -95,13 +92,8 @@ def _steps(system: ConstrainedSystem, options: ConstrainedOptions, recorder: Con
         fewest=2,
         over=2,
     )
-    known: Any = compiled
-    if known is not None and not isinstance(known, Stepped):  # nodal systems have a loop of their own still
-        from erls.integrate.nodal_steps import CompiledSteps
-
-        return CompiledSteps(system, known, options, rules, recorder)
     words = Words(system.constraint_names, "there", "a smaller step")
-    known = known or tied_steps_of(system, recorder.kept, options.project_velocity)
+    known = compiled or tied_steps_of(system, recorder.kept, options.project_velocity)
     return Steps(known, metre_scales(system), rules, words, recorder)
 
 

@@ -6,14 +6,15 @@ w make room for what row exchanges fill. (G. H. Golub, C. F. Van Loan, Matrix Co
 
 from __future__ import annotations
 
+from typing import Any
+
 from erls.maths.jit import part
 from erls.maths.so3 import Array
-from fe_import.model import IntArray
 
 
 @part
-def factor(band: Array, pivots: IntArray) -> int:
-    """Factor; 0, or 1 + the number of the unknown at which it broke down."""
+def factor(band: Array, pivots: Any) -> int:
+    """Factor, with row exchanges (n,) as numbers of any kind; 0, or 1 + the unknown at which it broke down."""
     n, width = len(band), (band.shape[1] - 1) // 3
     for k in range(n):
         last = min(k + width, n - 1)
@@ -43,11 +44,11 @@ def factor(band: Array, pivots: IntArray) -> int:
 
 
 @part
-def solve(band: Array, pivots: IntArray, values: Array) -> None:
+def solve(band: Array, pivots: Any, values: Array) -> None:
     """Solution in place of the right-hand side."""
     n, width = len(band), (band.shape[1] - 1) // 3
     for k in range(n):
-        best = pivots[k]
+        best = int(pivots[k])
         here = values[best]
         values[best] = values[k]
         values[k] = here

@@ -1,10 +1,10 @@
 """Typed records in flat memory: constants and working memory of equations, with named fields instead of offsets.
 
-A record is a NamedTuple whose fields are annotated `int`, `float`, `Vector`, `Matrix` or `Stack` (arrays of one, two,
-three axes). Compiled functions are handed flat arrays, since those alone fit every system behind one function pointer;
-where they begin they make records of them, which are views: nothing is copied. A table in ``integers`` says where in
-the flat numbers each array lies and what its shape is; it is made here from the record's declaration, as is the
-function that reads it.
+A record is a NamedTuple whose fields are annotated `int`, `float`, `Vector`, `Matrix`, `Stack` or `Pile` (arrays of
+one to four axes), `Indices` or `Pairs` (whole numbers, of one and two axes). Compiled functions are handed flat arrays,
+since those alone fit every system behind one function pointer; where they begin they make records of them, which are
+views: nothing is copied. A table in ``integers`` says where in the flat numbers each array lies and what its shape is;
+it is made here from the record's declaration, as is the function that reads it.
 
 1. Declare the record, with shapes and units of its fields.
 2. ``read = reader(Record)`` beside it.
@@ -23,13 +23,15 @@ import numpy as np
 
 from erls.maths.jit import generated
 from erls.maths.so3 import Array
-from erls.maths.views import matrix_at, plain_at, stack_at, vector_at
+from erls.maths.views import matrix_at, pile_at, plain_at, stack_at, vector_at
 from fe_import.model import IntArray
 
 Vector = Annotated[Array, 1]
 Matrix = Annotated[Array, 2]
 Stack = Annotated[Array, 3]
+Pile = Annotated[Array, 4]
 Indices = Annotated[IntArray, 1]
+Pairs = Annotated[IntArray, 2]
 
 R = TypeVar("R", bound=NamedTuple)
 
@@ -42,7 +44,7 @@ def _axes(kind: Any) -> int | None:
 def _fields(record: type[Any]) -> list[tuple[str, int | None, bool]]:
     """Name, axes, and whether it lies in the integers, of each field."""
     hints = get_type_hints(record, include_extras=True)
-    return [(name, _axes(kind), kind is Indices) for name, kind in hints.items()]
+    return [(name, _axes(kind), kind in (Indices, Pairs)) for name, kind in hints.items()]
 
 
 def table_size(record: type[Any]) -> int:
@@ -62,12 +64,12 @@ def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
     callable
         ``read(numbers, integers, at)`` with the place of the table.
     """
-    return generated(_reader(record, {"view1": vector_at, "view2": matrix_at, "view3": stack_at}))
+    return generated(_reader(record, {"view1": vector_at, "view2": matrix_at, "view3": stack_at, "view4": pile_at}))
 
 
 def python_reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
     """The same for Python: what compiled functions left in working memory is seen through it."""
-    return _reader(record, {"view1": plain_at, "view2": plain_at, "view3": plain_at})
+    return _reader(record, dict.fromkeys(("view1", "view2", "view3", "view4"), plain_at))
 
 
 def _reader(record: type[R], views: dict[str, Any]) -> Callable[[Any, IntArray, int], R]:
@@ -132,7 +134,7 @@ class Memory:
         self.integers += table
         for place, array in whole:
             self.integers[at + place] = len(self.integers)
-            self.integers += [int(i) for i in array]
+            self.integers += [int(i) for i in array.ravel()]
         return at
 
     @property

@@ -25,6 +25,8 @@ matrix_at: Any = plain_at
 """``matrix_at(array, start, m, n)``: (m, n)."""
 stack_at: Any = plain_at
 """``stack_at(array, start, k, m, n)``: (k, m, n)."""
+pile_at: Any = plain_at
+"""``pile_at(array, start, l, k, m, n)``: (l, k, m, n)."""
 
 if ENABLED:
     from numba.core import cgutils, types
@@ -78,4 +80,11 @@ if ENABLED:
 
         return _signature(array, 3), generate
 
-    vector_at, matrix_at, stack_at = _vector, _matrix, _stack
+    @intrinsic
+    def _pile(typing_context: Any, array: Any, start: Any, l: Any, k: Any, m: Any, n: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return _view(context, builder, signature.args[0], args[0], args[1], list(args[2:6]))
+
+        return _signature(array, 4), generate
+
+    vector_at, matrix_at, stack_at, pile_at = _vector, _matrix, _stack, _pile

@@ -7,10 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from erls.equations.constrained_system import ConstrainedState
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.beam import Beam, Beams
-from erls.equations.nodal.compiled import CompiledSteps
 from erls.equations.nodal.joints import GROUND, Joint
 from erls.equations.nodal.loads import NodalLoad, NodalLoads
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
@@ -22,7 +20,7 @@ from erls.maths.groups import R3_SO3, SE3, Group
 from erls.maths.so3 import Array
 
 GROUPS: dict[str, Group] = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
-TIME, TO_A, TO_V, PERIOD = 0.7, 30.0, 4.0, 0.1
+TIME, ALPHA, BETA = 0.7, 4.0 / 30.0, 1.0 / 30.0
 WEIGHT = np.array([0.3, -0.5, -9.0])
 
 
@@ -65,51 +63,35 @@ def state(known: NodalSystem) -> tuple[Array, Array, Array, Array]:
 
 
 def evaluate(known: NodalSystem) -> dict[str, Array]:
-    """By kernels at `state`: forces (n,), reactions (n,), violations (m,), and the factored iteration matrix with
-    its scales, in the order of the unknowns.
+    """By the functions of `erls.equations.stepped` at `state`: residual with violations and norms (n + m + 2,), metres
+    per unit of conditions, and the unknowns for `right` with the factored iteration matrix.
     """
-    from erls.equations.nodal import matrix, sums
+    from erls.equations.nodal.step import stepped
 
-    compiled = CompiledSteps(known)
-    work = compiled.work()
+    steps = stepped(known)
+    constants, n, m = (steps.reals, steps.integers), known.size, known.constraints
     increment, v, a, multipliers = state(known)
-    start = compiled.state(ConstrainedState(known.start, v, a, multipliers), a)
-    moved = known.compose(known.start, increment).poses
-    work.poses[:, :3], work.poses[:, 3:] = moved[:, :3, 3], moved[:, :3, :3].reshape(-1, 9)
-    work.increment[:], work.v[:], work.a[:], work.multipliers[:] = increment, v, a, multipliers
+    start = steps.pack(known.start)
+    moved, residual = np.zeros_like(start), np.zeros(n + m + 2)
     sample = known.samples(np.array([TIME]))[0]
-    sums.forces(compiled.model, work, start, sample)
-    found = {"force": work.force.copy(), "reaction": work.reaction.copy(), "violation": work.violation.copy()}
-    broken = matrix.iteration_matrix(compiled.model, work, sample, TO_A, TO_V, PERIOD)
+    steps.scratch[: len(sample)] = sample
+    steps.compose(*constants, steps.scratch, np.ones(n), start, increment, moved)
+    steps.residual(*constants, steps.scratch, TIME, moved, v, np.concatenate([a, multipliers]), residual)
+    assert steps.factoring is not None
+    factors, unknowns = np.zeros(steps.factoring.size), right(known)
+    broken = steps.factoring.factor(*constants, steps.scratch, TIME, moved, v, ALPHA, BETA, factors)
+    steps.factoring.solve(*constants, factors, unknowns)
     return {
-        **found,
+        "residual": residual,
         "status": np.array([float(broken)]),
-        "band": work.band,
-        "pivots": work.pivots.astype(float),
-        "left": work.left,
-        "right": work.right,
-        "order": compiled.model.order.astype(float),
-        "inertia": work.inertia,
+        "scales": factors[: 2 * m].copy(),
+        "unknowns": unknowns,
     }
 
 
-def solved(found: dict[str, Array], right: Array) -> Array:
-    """Unknowns (N,) of the factored system for a right-hand side, in NumPy."""
-    order, band = found["order"].astype(int), found["band"]
-    n, width = len(band), (band.shape[1] - 1) // 3
-    x = (found["left"] * right)[order]
-    for k in range(n):
-        best = int(found["pivots"][k])
-        x[[k, best]] = x[[best, k]]
-        for i in range(k + 1, min(k + width, n - 1) + 1):
-            x[i] -= band[i, k - i + width] * x[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, min(k + 2 * width, n - 1) + 1):
-            x[k] -= band[k, j - k + width] * x[j]
-        x[k] /= band[k, width]
-    result = np.empty(n)
-    result[order] = x
-    return result * found["right"]
+def right(known: NodalSystem) -> Array:
+    """(n + m,) a right-hand side."""
+    return np.random.default_rng(5).standard_normal(known.size + known.constraints)
 
 
 def twin(path: Path) -> None:

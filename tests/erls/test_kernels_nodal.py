@@ -18,10 +18,11 @@ from test_nodal_scene import _rigid_chain
 
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.equations import Nodal
+from erls.equations.system import metre_scales
 from erls.errors import Cause
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
-from erls.maths.saddle import dense
+from erls.maths.saddle import Scales, dense
 from erls.maths.so3 import Array
 from erls.scene.build import build_mechanism
 from erls.scene.read import load_scene
@@ -45,15 +46,22 @@ def test_the_band_solves_with_the_matrices(group: str) -> None:
     found = nodal_cases.evaluate(system)
     q, t = system.compose(system.start, increment), nodal_cases.TIME
     rows = dense(system.constraint_matrix(t, q))
-    _same(found["reaction"], rows.T @ multipliers, LIKE_NUMPY)
+    force = system.residual(t, q, v, a)
+    reaction = rows.T @ multipliers
+    norms = [np.linalg.norm(part / system.length_scales) for part in (force, reaction)]
+    _same(found["residual"], np.concatenate([force + reaction, system.constraint(t, q), norms]), LIKE_NUMPY)
     stiffness, damping = (dense(x) for x in system.stiffness_and_damping(t, q, v, a, multipliers))
     tangent = dense(system.tangent(increment))
-    block = nodal_cases.TO_A * dense(system.mass_matrix(t, q)) + nodal_cases.TO_V * damping + stiffness @ tangent
+    mass = dense(system.mass_matrix(t, q))
+    block = mass + nodal_cases.ALPHA * damping + nodal_cases.BETA * stiffness @ tangent
     none = np.zeros((len(rows), len(rows)))
-    right = np.random.default_rng(5).standard_normal(len(block) + len(rows))
-    expected = np.linalg.solve(np.block([[block, rows.T], [rows @ tangent, none]]), right)
+    expected = np.linalg.solve(np.block([[block, rows.T], [rows @ tangent, none]]), nodal_cases.right(system))
     assert found["status"][0] == 0
-    _same(nodal_cases.solved(found, right), expected, LIKE_NUMPY)
+    _same(found["unknowns"], expected, LIKE_NUMPY)
+    scales = Scales(metre_scales(system), mass, rows)
+    of_forces, of_gaps = np.split(found["scales"], 2)
+    _same(of_gaps, scales.constraint, LIKE_NUMPY)
+    _same(of_forces * of_gaps, np.full(len(rows), of_forces[0] * of_gaps[0]), LIKE_NUMPY)  # one mass
 
 
 def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:

@@ -48,8 +48,8 @@ class Complex:
         self._move, self._forces, self._energies = of(sums.move), of(sums.forces), of(outputs.energies)
         self.model = Model(*(_complex(x) for x in system.model))
         self._sample = system.samples(np.array([TIME]))[0]
-        self._work = room(self.model, 0, complex)
-        known = rows_of(q.poses), q.bent, q.turned, q.wound, *np.zeros((3, system.size)), np.zeros(system.constraints)
+        self._work = room(self.model, complex)
+        known = rows_of(q.poses), q.bent, q.turned, q.wound
         self._start = State(*(_complex(x) for x in known))
 
     def _at(self, model: Model, increment: Array, v: Array, a: Array, multipliers: Array) -> Any:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from erls.equations.nodal.compiled import CompiledSteps
 from erls.equations.nodal.contract import Model, State, Work
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import Joint, JointRows
@@ -20,6 +19,9 @@ from erls.maths.groups import SE3, Group
 from erls.maths.jit import compiling_beside
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array
+
+if TYPE_CHECKING:  # it imports the compiler
+    from erls.equations.stepped import Stepped
 
 _STEPPED = (
     "compose",
@@ -98,7 +100,7 @@ class NodalSystem:
         order, self.width = band_order(self.count, pairs, self.rows)
         self.model: Model = build_model(self.kinds, self.rows, self.local, metre_scales(self), order)
         self._functions = functions()
-        self._work: Work = room(self.model, 0)
+        self._work: Work = room(self.model)
         self._sampled: tuple[float, Array] = (np.nan, np.zeros(0))
         self._tied: tuple[float, Nodes | None, tuple[Array, ...]] = (np.nan, None, ())
         self.start = self.at(poses, built)
@@ -245,11 +247,13 @@ class NodalSystem:
         return result
 
     @property
-    def compiled(self) -> Any:
-        """Memory for compiled steps; None where a method was changed that they stand for."""
+    def compiled(self) -> Stepped | None:
+        """In compiled form, for one run; None where a method was changed that it stands for."""
         if any(getattr(type(self), name) is not getattr(NodalSystem, name) for name in _STEPPED):
             return None
-        return CompiledSteps(self)
+        from erls.equations.nodal.step import stepped  # here: it imports the compiler
+
+        return stepped(self)
 
     def _sample(self, t: float) -> Array:
         if self._sampled[0] != t:
@@ -257,9 +261,8 @@ class NodalSystem:
         return self._sampled[1]
 
     def _knot(self, q: Nodes) -> State:
-        """A configuration as arrays; at rest."""
-        rest, none = np.zeros(self.size), np.zeros(self.constraints)
-        return State(rows_of(q.poses), q.bent, q.turned, q.wound, rest, rest, rest, none)
+        """A configuration as arrays."""
+        return State(rows_of(q.poses), q.bent, q.turned, q.wound)
 
     def _state(self, q: Nodes, v: Array, a: Array) -> Work:
         """The configuration and the motion in memory."""

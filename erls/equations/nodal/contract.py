@@ -12,8 +12,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from erls.equations.compiled_system import Array, IntArray, pointer
+from erls.maths.calls import caller
 from erls.maths.jit import ENABLED
+from erls.maths.records import Indices, Matrix, Pairs, Pile, Stack, Vector, reader
 
 
 class Model(NamedTuple):
@@ -47,64 +48,62 @@ class Model(NamedTuple):
     """
 
     local: int
-    gravity: Array
-    pairs: IntArray
-    beam_nodes: IntArray
-    beam_frames: Array
-    beam_built: Array
-    beam_stiffness: Array
-    beam_inertia: Array
-    beam_moving: IntArray
-    body_nodes: IntArray
-    bodies: Array
-    load_nodes: IntArray
-    loads: Array
-    load_dead: IntArray
-    actuator_nodes: IntArray
-    actuator_frames: Array
-    actuator_along: IntArray
-    actuator_active: IntArray
-    actuators: Array
-    spring_nodes: IntArray
-    springs: Array
-    winding_nodes: IntArray
-    winding_frames: Array
-    windings: Array
-    joint_nodes: IntArray
-    joint_frames: Array
-    joint_driven: IntArray
-    joint_sign: Array
-    joint_rows: IntArray
-    conditions: Array
-    metres: Array
-    place: IntArray
-    order: IntArray
+    gravity: Matrix
+    pairs: Pairs
+    beam_nodes: Pairs
+    beam_frames: Matrix
+    beam_built: Matrix
+    beam_stiffness: Stack
+    beam_inertia: Stack
+    beam_moving: Indices
+    body_nodes: Indices
+    bodies: Stack
+    load_nodes: Indices
+    loads: Matrix
+    load_dead: Indices
+    actuator_nodes: Pairs
+    actuator_frames: Matrix
+    actuator_along: Indices
+    actuator_active: Indices
+    actuators: Matrix
+    spring_nodes: Pairs
+    springs: Matrix
+    winding_nodes: Pairs
+    winding_frames: Matrix
+    windings: Matrix
+    joint_nodes: Pairs
+    joint_frames: Matrix
+    joint_driven: Indices
+    joint_sign: Vector
+    joint_rows: Indices
+    conditions: Matrix
+    metres: Vector
+    place: Indices
+    order: Indices
 
 
 class State(NamedTuple):
-    """A knot: poses (k, 12), twists of beams (e, 6), coordinates of actuators (a,), rotation vectors of torsion springs
-    (w, 3), v, a and the algorithmic a (n,), multipliers (m,).
+    """A configuration: poses (k, 12), twists of beams (e, 6), coordinates of actuators (a,), rotation vectors of
+    torsion springs (w, 3).
     """
 
-    poses: Array
-    bent: Array
-    turned: Array
-    wound: Array
-    v: Array
-    a: Array
-    algorithmic: Array
-    multipliers: Array
+    poses: Matrix
+    bent: Matrix
+    turned: Vector
+    wound: Matrix
 
 
 class Work(NamedTuple):
-    """Memory of an evaluation: the state that is tried, sums over elements, and the factored iteration matrix.
+    """Memory of an evaluation: the state that is tried, and sums over elements.
 
     Attributes
     ----------
-    poses, bent, turned, wound, v, a, multipliers, increment : arrays
-        As in `State`; increment (n,).
-    twist, rate, force, reaction, violation, correction, ordered : arrays
-        (n,) in node axes twice, (n,) twice, (m,), (N,) twice.
+    poses, bent, turned, wound : arrays
+        As in `State`.
+    v, a, multipliers, increment : arrays
+        (n,) twice, (m,), (n,).
+    twist, rate, force, reaction, violation : arrays
+        (n,) in node axes twice, (n,) twice, (m,).
     blocks : (E, 3, 12, 12) array
         Mass, damping and stiffness of each element.
     whole : (E, 12, 12) array
@@ -119,123 +118,96 @@ class Work(NamedTuple):
         What a turn of a node does to the force on it in the world's axes.
     inertia : (n,) array
         Diagonal of the mass matrix.
-    band, pivots, left, right : arrays
-        (N, 3 w + 1) row by row, (N,), (N,) scales of equations and of unknowns.
     """
 
-    poses: Array
-    bent: Array
-    turned: Array
-    wound: Array
-    v: Array
-    a: Array
-    multipliers: Array
-    increment: Array
-    twist: Array
-    rate: Array
-    force: Array
-    reaction: Array
-    violation: Array
-    correction: Array
-    ordered: Array
-    blocks: Array
-    whole: Array
-    rows: Array
-    shape: Array
-    gradient: Array
-    drift: Array
-    bias: Array
-    factors: Array
-    turning: Array
-    inertia: Array
-    band: Array
-    pivots: IntArray
-    left: Array
-    right: Array
+    poses: Matrix
+    bent: Matrix
+    turned: Vector
+    wound: Matrix
+    v: Vector
+    a: Vector
+    multipliers: Vector
+    increment: Vector
+    twist: Vector
+    rate: Vector
+    force: Vector
+    reaction: Vector
+    violation: Vector
+    blocks: Pile
+    whole: Stack
+    rows: Matrix
+    shape: Matrix
+    gradient: Matrix
+    drift: Vector
+    bias: Vector
+    factors: Pile
+    turning: Stack
+    inertia: Vector
 
 
-class Knots(NamedTuple):
-    """Where accepted steps are written: what a run stores (s, 3, 12 k + a) with two derivatives, accelerations (s, n),
-    multipliers (s, m).
-    """
-
-    states: Array
-    accelerations: Array
-    multipliers: Array
-
-
-class Settings(NamedTuple):
-    """Formulas and limits of steps of one size.
+class Factors(NamedTuple):
+    """The factored iteration matrix; N unknowns in a band of width w.
 
     Attributes
     ----------
-    h, beta, gamma : float
-        Step [s] and coefficients of Newmark's formulas.
-    share, pull, keep : float
-        Weights of v̇₁, v̇₀ and a₀ in a₁.
-    to_v, to_a, period : float
-        γ', β', and h √(β · share).
-    tolerance, rounding, reach, balance : float
-        Newton iterations end with an error below these [m] or a residual below ``balance`` times its terms.
-    slowest, fastest, patience, tolerated : float
-        Bounds on a rate of convergence carried over from earlier steps; cost of a fresh matrix in iterations;
-        iterations beyond the fewest that do not call for one.
-    error_limit, error_factor, growth : float
-        Largest local error [m], 0 for no limit; what turns |v̇₁ − v̇₀| into it; ratio of steps worth a change.
-    mode, iterations : int
-        0 auto, 1 update, 2 frozen; largest number of iterations.
-    predict : int
-        1: steps start from the last acceleration and multipliers, 0: from zero.
+    force, gap : (m,) arrays
+        Metres per unit of β λ, and of Φ, of each condition.
+    left, right, ordered : (N,) arrays
+        Scales of equations and of unknowns, and memory.
+    band, pivots : arrays
+        (N, 3 w + 1) row by row, (N,).
     """
 
-    h: float
-    beta: float
-    gamma: float
-    share: float
-    pull: float
-    keep: float
-    to_v: float
-    to_a: float
-    period: float
-    tolerance: float
-    rounding: float
+    force: Vector
+    gap: Vector
+    left: Vector
+    right: Vector
+    ordered: Vector
+    band: Matrix
+    pivots: Vector
+
+
+class Stepping(NamedTuple):
+    """What steps know of a system, at the place that the last of the integers says.
+
+    Attributes
+    ----------
+    model, work, before, state, factors : int
+        Places of `Model`, of `Work` and `Before` in working memory, of `State` in a configuration, of `Factors`.
+    forces, remember, knot, blocks, weighted : int
+        Addresses of the functions of `erls.equations.nodal.sums`, `outputs` and `blocks`.
+    samples : int
+        Numbers that depend on time alone, with which working memory begins.
+    reach : float
+        Size of the mechanism [m].
+    """
+
+    model: int
+    work: int
+    before: int
+    state: int
+    factors: int
+    forces: int
+    remember: int
+    knot: int
+    blocks: int
+    weighted: int
+    samples: int
     reach: float
-    balance: float
-    slowest: float
-    fastest: float
-    patience: float
-    tolerated: float
-    error_limit: float
-    error_factor: float
-    growth: float
-    mode: int
-    iterations: int
-    predict: int
 
 
-class Progress(NamedTuple):
-    """What steps leave to each other and to whoever called for them.
-
-    Attributes
-    ----------
-    rates : (6,) array
-        Rate of convergence; last two corrections and their goal [m]; local error [m] of the last step; patience left.
-    counts : (8,) array
-        Whether there is an iteration matrix; fewest iterations with it, excess over them; evaluations, iterations,
-        factorizations; reason of a failure; steps made.
+class Before(NamedTuple):
+    """The last knot (c,) as a configuration, and (1,) whether what poses do not tell is yet to be found for the one
+    that is tried.
     """
 
-    rates: Array
-    counts: IntArray
+    numbers: Vector
+    behind: Vector
 
 
 MODEL: Any = None
 STATE: Any = None
 WORK: Any = None
-KNOTS: Any = None
-SETTINGS: Any = None
-PROGRESS: Any = None
-ADVANCE: Any = None
 FORCES: Any = None
 REMEMBER: Any = None
 CONDITIONS: Any = None
@@ -244,7 +216,6 @@ SUMMED: Any = None
 ENERGIES: Any = None
 KNOT: Any = None
 ACTING: Any = None
-FACTOR: Any = None
 if ENABLED:
     from numba import types as _t
 
@@ -254,13 +225,10 @@ if ENABLED:
     _others = (_i1, _r3, _i1, _r2, _i1, _i2, _r2, _i1, _i1, _r2, _i2, _r2, _i2, _r2, _r2)
     _joints = (_i2, _r2, _i1, _r1, _i1, _r2)
     MODEL = _t.NamedTuple((_t.int64, _r2, _i2, *_beams, *_others, *_joints, _r1, _i1, _i1), Model)
-    _tried = (_r2, _r2, _r1, _r2, _r1, _r1)
-    STATE = _t.NamedTuple((*_tried, _r1, _r1), State)
-    _sums = (_r4, _r3, *(_r2,) * 3, _r1, _r1, _r4, _r3, _r1, _r2, _i1, _r1, _r1)
+    _tried = (_r2, _r2, _r1, _r2)
+    STATE = _t.NamedTuple(_tried, State)
+    _sums = (_r4, _r3, *(_r2,) * 3, _r1, _r1, _r4, _r3, _r1)
     WORK = _t.NamedTuple((*_tried, *(_r1,) * 9, *_sums), Work)
-    KNOTS = _t.NamedTuple((_r3, _r2, _r2), Knots)
-    SETTINGS = _t.NamedTuple((*(_t.float64,) * 20, *(_t.int64,) * 3), Settings)
-    PROGRESS = _t.NamedTuple((_r1, _i1), Progress)
     FORCES = _t.void(MODEL, WORK, STATE, _r1)
     REMEMBER = _t.void(MODEL, WORK, STATE)
     CONDITIONS = _t.void(MODEL, WORK, _r1)
@@ -269,6 +237,8 @@ if ENABLED:
     ENERGIES = _t.void(MODEL, WORK, _r1)
     KNOT = _t.void(MODEL, WORK, _r2)
     ACTING = _t.void(MODEL, WORK, _r1, _r2)
-    FACTOR = _t.int64(MODEL, WORK, _r1, _t.float64, _t.float64, _t.float64)
-    _steps = (MODEL, STATE, WORK, SETTINGS, PROGRESS, _r2, KNOTS, _t.int64)
-    ADVANCE = _t.int64(pointer(FORCES), pointer(FACTOR), *_steps)
+
+read_model, read_work, read_state = reader(Model), reader(Work), reader(State)
+read_stepping, read_before, read_factors = reader(Stepping), reader(Before), reader(Factors)
+call_forces, call_remember, call_knot = caller(FORCES), caller(REMEMBER), caller(KNOT)
+call_blocks, call_weighted = caller(BLOCKS), caller(SUMMED)

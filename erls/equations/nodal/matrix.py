@@ -1,13 +1,25 @@
-"""The scaled iteration matrix of a nodal system as a band, with the scales of `erls.maths.saddle`."""
+"""The scaled iteration matrix of a nodal system as a band, with the scales of `erls.maths.saddle`; functions of
+`erls.equations.stepped`.
+"""
 
 from __future__ import annotations
 
+from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.nodal.blocks import blocks, weighted
-from erls.equations.nodal.contract import FACTOR, Model, Work
+from erls.equations.nodal.contract import (
+    Model,
+    Work,
+    call_blocks,
+    call_weighted,
+    read_factors,
+    read_model,
+    read_stepping,
+    read_work,
+)
 from erls.maths import band
-from erls.maths.jit import kernel, part
+from erls.maths.jit import inlined, kernel, part
 from erls.maths.vectors import Rotation, nine, times
+from erls.maths.views import vector_at
 
 _ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -33,9 +45,9 @@ def _add_element(band: Array, place: IntArray, pairs: IntArray, e: int, whole: A
 
 @part
 def _add_condition(
-    band: Array, place: IntArray, column: int, at: int, turn: Rotation, gradient: Array, of_q: Array
+    band: Array, place: IntArray, column: int, at: int, turn: Rotation, gradient: Array, of_q: Array, beta: float
 ) -> None:
-    """A node's share, its velocities from ``at`` on, of row B T and column Bᵀ of a condition."""
+    """A node's share, its velocities from ``at`` on, of row B T and column Bᵀ of a condition; ``of_q`` is β T."""
     linear = times(turn, (gradient[0], gradient[1], gradient[2]))
     for i in range(6):
         entry = linear[i] if i < 3 else gradient[i]
@@ -43,7 +55,7 @@ def _add_condition(
         total = 0.0 * entry
         for k in range(6):
             total += gradient[k] * of_q[k, i]
-        _enter(band, place, column, at + i, total)
+        _enter(band, place, column, at + i, total / beta)
 
 
 @part
@@ -57,15 +69,13 @@ def _largest(turn: Rotation, gradient: Array, metres: Array, at: int) -> float:
 
 
 @part
-def _scale(
-    band: Array, order: IntArray, inertia: Array, metres: Array, period: float, left: Array, right: Array
-) -> None:
+def _scale(band: Array, order: IntArray, inertia: Array, metres: Array, left: Array, right: Array) -> None:
     """Units of `erls.maths.saddle`: metres, and newtons per mass."""
     n = len(metres)
     mass = 0.0
     for i in range(n):
         mass = max(mass, inertia[i] / metres[i] ** 2)
-    force = period**2 / (mass if mass > 0.0 else 1.0)
+    force = 1.0 / (mass if mass > 0.0 else 1.0)
     for i in range(n):
         left[i], right[i] = force / metres[i], 1.0 / metres[i]
     for i in range(n, len(order)):
@@ -77,20 +87,51 @@ def _scale(
             band[i, j - i + width] *= scale * right[order[j]]
 
 
-@kernel(FACTOR, counted=False)
-def iteration_matrix(model: Model, work: Work, sample: Array, to_a: float, to_v: float, period: float) -> int:
-    """Factor [[β' M + γ' C + K T, Bᵀ], [B T, 0]]; 0, or 1 + the number of the unknown that is to blame.
+@inlined
+def _add_joints(model: Model, work: Work, beta: float, table: Array, left: Array) -> None:
+    """Rows and columns of all conditions, and their scales."""
+    n = len(work.force)
+    for j in range(len(model.joint_nodes)):
+        for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
+            size = 0.0
+            for side in range(2):
+                node = model.joint_nodes[j, side]
+                if node < 0:
+                    continue
+                turn, gradient = _ONE, work.gradient[row, 6 * side : 6 * side + 6]
+                if not model.local:
+                    turn = nine(work.poses, node, 3)
+                size = max(size, _largest(turn, gradient, model.metres, 6 * node))
+                of_q, place = work.factors[node, 2], model.place
+                _add_condition(table, place, n + row, 6 * node, turn, gradient, of_q, beta)
+            # so that the largest derivative by a displacement is one
+            left[n + row] = 1.0 / size if size > 0.0 else 1.0
 
-    ``work`` holds the state with `forces` evaluated.
-    """
-    table = work.band
+
+@kernel(contract.FACTOR, counted=False)
+def factor(
+    reals: Array,
+    integers: IntArray,
+    scratch: Array,
+    t: float,
+    q: Array,
+    v: Array,
+    alpha: float,
+    beta: float,
+    factors: Array,
+) -> int:
+    """Factor [[M + α C + β K T, Bᵀ], [B T, 0]] at the state whose residual was found last; see `stepped`."""
+    own = read_stepping(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, own.model), read_work(scratch, integers, own.work)
+    room, sample = read_factors(factors, integers, own.factors), vector_at(scratch, 0, own.samples)
+    table, n = room.band, len(work.force)
     for i in range(table.shape[0]):
         for j in range(table.shape[1]):
             table[i, j] = 0.0
-    for i in range(len(work.force)):
+    for i in range(n):
         work.inertia[i] = 0.0
-    blocks(model, work, sample, 0)
-    weighted(model, work, to_a, to_v, 1.0)
+    call_blocks(own.blocks, model, work, sample, 0)
+    call_weighted(own.weighted, model, work, 1.0, alpha, beta)
     for e in range(len(model.pairs)):
         _add_element(table, model.place, model.pairs, e, work.whole[e])
         for side in range(2):
@@ -103,26 +144,27 @@ def iteration_matrix(model: Model, work: Work, sample: Array, to_a: float, to_v:
             for i in range(3):
                 for j in range(3):
                     _enter(table, model.place, 6 * node + i, 6 * node + 3 + j, work.turning[node, i, j])
-    for j in range(len(model.joint_nodes)):
-        for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
-            size = 0.0
-            for side in range(2):
-                node = model.joint_nodes[j, side]
-                if node < 0:
-                    continue
-                turn, gradient = _ONE, work.gradient[row, 6 * side : 6 * side + 6]
-                if not model.local:
-                    turn = nine(work.poses, node, 3)
-                size = max(size, _largest(turn, gradient, model.metres, 6 * node))
-                place = model.place
-                _add_condition(table, place, len(work.force) + row, 6 * node, turn, gradient, work.factors[node, 2])
-            # so that the largest derivative by a displacement is one
-            work.left[len(work.force) + row] = 1.0 / size if size > 0.0 else 1.0
-    _scale(table, model.order, work.inertia, model.metres, period, work.left, work.right)
-    found = band.factor(table, work.pivots)
+    _add_joints(model, work, beta, table, room.left)
+    _scale(table, model.order, work.inertia, model.metres, room.left, room.right)
+    for k in range(len(room.gap)):
+        room.force[k], room.gap[k] = 1.0 / room.right[n + k], room.left[n + k]
+    found = band.factor(table, room.pivots)
     if found == 0:
         return 0
     for i in range(len(model.place)):
         if model.place[i] == found - 1:
             return i + 1
     return int(found)
+
+
+@kernel(contract.SOLVE, counted=False)
+def solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
+    """Replace [b; Φ] by [x; β λ]."""
+    own = read_stepping(reals, integers, integers[len(integers) - 1])
+    order = read_model(reals, integers, own.model).order
+    room = read_factors(factors, integers, own.factors)
+    for i in range(len(order)):
+        room.ordered[i] = room.left[order[i]] * b[order[i]]
+    band.solve(room.band, room.pivots, room.ordered)
+    for i in range(len(order)):
+        b[order[i]] = room.right[order[i]] * room.ordered[i]

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from erls.equations.nodal.actuators import Actuators
 from erls.equations.nodal.beam import Beams
-from erls.equations.nodal.contract import Model, Work
+from erls.equations.nodal.contract import Factors, Model, Work
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import JointRows
 from erls.equations.nodal.loads import NodalLoads
@@ -100,10 +100,9 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
     )
 
 
-def room(model: Model, width: int, kind: type = float) -> Work:
-    """Memory for evaluations, and with the ``width`` of the band for steps (0 for none)."""
+def room(model: Model, kind: type = float) -> Work:
+    """Memory for evaluations."""
     n, m, k, e = len(model.metres), len(model.conditions), len(model.metres) // 6, len(model.pairs)
-    unknowns = n + m if width else 0
     per_velocity = ("v", "a", "increment", "twist", "rate", "force", "reaction", "inertia")
     shapes: dict[str, tuple[int, ...]] = {
         "poses": (k, 12),
@@ -112,17 +111,22 @@ def room(model: Model, width: int, kind: type = float) -> Work:
         "wound": (len(model.windings), 3),
         **dict.fromkeys(per_velocity, (n,)),
         **dict.fromkeys(("multipliers", "violation", "drift", "bias"), (m,)),
-        **dict.fromkeys(("correction", "ordered", "left", "right"), (unknowns,)),
         "blocks": (e, 3, 12, 12),
         "whole": (e, 12, 12),
         **dict.fromkeys(("rows", "shape"), (6, 12)),
         "gradient": (m, 12),
         "factors": (k, 3, 6, 6),
         "turning": (k, 3, 3),
-        "band": (unknowns, 3 * width + 1),
     }
-    arrays: dict[str, Array] = {name: np.zeros(shape, dtype=kind) for name, shape in shapes.items()}
-    return Work(**arrays, pivots=np.zeros(unknowns, dtype=np.int64))
+    return Work(**{name: np.zeros(shape, dtype=kind) for name, shape in shapes.items()})
+
+
+def factor_room(model: Model, width: int) -> Factors:
+    """Memory for a factored iteration matrix in a band of this width."""
+    m, unknowns = len(model.conditions), len(model.place)
+    of_rows, per_condition = (unknowns,), (m,)
+    shapes = per_condition, per_condition, of_rows, of_rows, of_rows, (unknowns, 3 * width + 1), of_rows
+    return Factors(*map(np.zeros, shapes))
 
 
 def band_order(count: int, pairs: IntArray, rows: JointRows) -> tuple[IntArray, int]:

@@ -42,3 +42,17 @@ def poses_of(rows: Array) -> Array:
     result[..., :3, 3], result[..., :3, :3] = rows[..., :3], rows[..., 3:].reshape(*rows.shape[:-1], 3, 3)
     result[..., 3, 3] = 1.0
     return result
+
+
+def numbers_of(q: Nodes) -> Array:
+    """(c,) a configuration in flat memory, as a `erls.equations.nodal.contract.State` lies there."""
+    return np.concatenate([part.ravel() for part in (rows_of(q.poses), q.bent, q.turned, q.wound)])
+
+
+def of_numbers(numbers: Array, like: Nodes) -> Nodes:
+    """The other way, for a configuration of the same system."""
+    rows = (len(like.poses), 12)
+    shapes = rows, like.bent.shape, like.turned.shape, like.wound.shape
+    ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
+    parts = [x.reshape(shape).copy() for x, shape in zip(np.split(numbers, ends[:-1]), shapes, strict=True)]
+    return Nodes(poses_of(parts[0]), *parts[1:])

@@ -1,268 +1,179 @@
-"""Steps of Lie-group generalized-α, many at once: the algorithm of `erls.integrate.stepping.generalized_alpha`."""
+"""A nodal system as steps of generalized-α take it: `erls.equations.stepped`.
+
+A configuration is a `State` in flat memory. Of one that is tried only the poses are set; what they do not tell follows
+when a step is accepted.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from typing import TypeAlias
+from typing import Protocol
 
-from erls.equations.compiled_system import Array
-from erls.equations.nodal.contract import ADVANCE, Knots, Model, Progress, Settings, State, Work
-from erls.equations.nodal.motion import compose, set_twists
-from erls.equations.nodal.outputs import knot
-from erls.equations.nodal.sums import remember
-from erls.maths import band
-from erls.maths.jit import inlined, kernel
+import numpy as np
 
-Forces: TypeAlias = Callable[[Model, Work, State, Array], None]
-Factor: TypeAlias = Callable[[Model, Work, Array, float, float, float], int]
-
-DONE, FAILED, INACCURATE, TIMID = 0, 1, 2, 3
-"""Ends of a stretch: all steps made; Newton's method failed; the local error is too large; a larger step would do."""
-
-SINGULAR, SLOW, INFINITE = 1, 2, 3
-"""Reasons of a failure."""
-
-RATE, BEFORE, SIZE, GOAL, ERROR, SPENT = range(6)
-MATRIX, USUAL, EXCESS, EVALUATIONS, ITERATIONS, FACTORIZATIONS, REASON, STEPS = range(8)
-AUTO, UPDATE, FROZEN = range(3)
-
-
-@inlined
-def _judge(state: State, work: Work, settings: Settings, progress: Progress, metres: Array) -> int:
-    if settings.error_limit == 0.0:
-        return DONE
-    error = 0.0
-    for i in range(len(work.a)):
-        error = max(error, metres[i] * abs(work.a[i] - state.a[i]))
-    error *= settings.error_factor
-    progress.rates[ERROR] = error
-    if error > settings.error_limit:
-        return INACCURATE
-    return TIMID if settings.growth > 0.0 and error * settings.growth**3 < settings.error_limit else DONE
+from erls.equations import compiled_system as contract
+from erls.equations.compiled_system import Array, Factoring, IntArray
+from erls.equations.nodal import contract as own
+from erls.equations.nodal.blocks import blocks, weighted
+from erls.equations.nodal.contract import (
+    Before,
+    Model,
+    Stepping,
+    call_forces,
+    call_knot,
+    call_remember,
+    read_before,
+    read_model,
+    read_state,
+    read_stepping,
+    read_work,
+)
+from erls.equations.nodal.matrix import factor, solve
+from erls.equations.nodal.model import factor_room, room
+from erls.equations.nodal.motion import compose as composed
+from erls.equations.nodal.nodes import Nodes, numbers_of, of_numbers, rows_of
+from erls.equations.nodal.outputs import knot as store
+from erls.equations.nodal.sums import forces, remember
+from erls.equations.stepped import COMPOSE, SETTLE, Stepped
+from erls.equations.system import MovingSystem, metre_scales
+from erls.maths.calls import address_of
+from erls.maths.jit import kernel
+from erls.maths.records import Memory
+from erls.maths.views import vector_at
 
 
-@inlined
-def _step(
-    forces: Forces,
-    factor: Factor,
-    model: Model,
-    state: State,
-    work: Work,
-    settings: Settings,
-    progress: Progress,
-    sample: Array,
-) -> bool:
-    """One step from ``state`` into ``work``; False when Newton's method fails even with a fresh matrix."""
-    counts = progress.counts
-    fresh = counts[MATRIX] == 0 or settings.mode == UPDATE
-    if settings.mode == AUTO and progress.rates[SPENT] >= settings.patience:
-        fresh = True
-    while True:
-        _predict(state, work, settings)
-        if _iterate(forces, factor, model, state, work, settings, progress, sample, fresh):
-            return True
-        if fresh or settings.mode == FROZEN:
-            return False
-        fresh = True
+class _System(MovingSystem, Protocol):
+    """What is asked of a system; see `erls.equations.nodal.assembly.NodalSystem`."""
+
+    width: int
+    model: Model
+    start: Nodes
+
+    @property
+    def size(self) -> int:
+        """Number of velocities."""
+
+    @property
+    def constraints(self) -> int:
+        """Number of conditions."""
+
+    def samples(self, times: Array) -> Array:
+        """What depends on time alone."""
 
 
-@inlined
-def _predict(state: State, work: Work, settings: Settings) -> None:
-    h, beta, gamma = settings.h, settings.beta, settings.gamma
-    for i in range(len(work.v)):
-        guess = state.a[i] if settings.predict else 0.0
-        new = settings.pull * state.a[i] + settings.keep * state.algorithmic[i] + settings.share * guess
-        work.increment[i] = h * state.v[i] + h * h * ((0.5 - beta) * state.algorithmic[i] + beta * new)
-        work.v[i] = state.v[i] + h * ((1 - gamma) * state.algorithmic[i] + gamma * new)
-        work.a[i] = guess
-    for i in range(len(work.multipliers)):
-        work.multipliers[i] = state.multipliers[i] if settings.predict else 0.0
+@kernel(COMPOSE, counted=False)
+def compose(
+    reals: Array, integers: IntArray, scratch: Array, metres: Array, start: Array, d: Array, out: Array
+) -> float:
+    """Poses ∘ exp(d); the size of the mechanism."""
+    known = read_stepping(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before = read_before(scratch, integers, known.before)
+    for i in range(len(start)):
+        before.numbers[i] = start[i]
+    before.behind[0] = 1.0
+    for i in range(len(d)):
+        work.increment[i] = d[i]
+    here, there = read_state(start, integers, known.state), read_state(out, integers, known.state)
+    composed(model, here.poses, work.increment, there.poses)
+    reach: float = known.reach
+    return reach
 
 
-@inlined
-def _iterate(
-    forces: Forces,
-    factor: Factor,
-    model: Model,
-    state: State,
-    work: Work,
-    settings: Settings,
-    progress: Progress,
-    sample: Array,
-    fresh: bool,
-) -> bool:
-    rates, counts = progress.rates, progress.counts
+@kernel(contract.RESIDUAL, counted=False)
+def residual(
+    reals: Array, integers: IntArray, scratch: Array, t: float, q: Array, v: Array, a: Array, out: Array
+) -> None:
+    """[M a + Bᵀ λ - f; Φ], then the norms of M a - f and of Bᵀ λ [N]."""
+    known = read_stepping(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before, poses = read_before(scratch, integers, known.before), read_state(q, integers, known.state).poses
     n, m = len(work.v), len(work.multipliers)
-    rate = max(rates[RATE], settings.fastest) ** 0.8
-    goal = settings.tolerance + settings.rounding
-    before = earlier = largest = size = 0.0
-    for k in range(settings.iterations + 1):
-        compose(model, state.poses, work.increment, work.poses)
-        forces(model, work, state, sample)
-        counts[EVALUATIONS] += 1
-        force = reaction = both = gap = 0.0
-        for i in range(n):
-            f, r = work.force[i] / model.metres[i], work.reaction[i] / model.metres[i]
-            force += f * f
-            reaction += r * r
-            both += (f + r) * (f + r)
-        if not math.isfinite(force + reaction):
-            for i in range(n):
-                work.correction[i] = work.force[i] + work.reaction[i]
-            for i in range(m):
-                work.correction[n + i] = work.violation[i]
-            counts[REASON] = INFINITE
-            return False
-        largest = max(largest, math.sqrt(force))
-        if k > 0 and math.sqrt(both) <= settings.balance * (largest + math.sqrt(reaction)):
-            for i in range(m):
-                gap = max(gap, abs(work.violation[i]) * work.left[n + i])
-            if gap <= settings.balance * settings.reach:
-                set_twists(model, work)
-                _note(settings, progress, k, rate)
-                return True
-        if k == settings.iterations:
-            break
-        if fresh:
-            found = factor(model, work, sample, settings.to_a, settings.to_v, settings.period)
-            counts[FACTORIZATIONS] += 1
-            counts[MATRIX], counts[USUAL], counts[EXCESS] = 1, settings.iterations, 0
-            rates[RATE], rates[SPENT] = settings.slowest, 0.0
-            if found:
-                counts[MATRIX], counts[REASON] = 0, SINGULAR
-                for i in range(n + m):
-                    work.correction[i] = 0.0
-                work.correction[found - 1] = 1.0
-                return False
-        size = _correct(model, work, settings)
-        counts[ITERATIONS] += 1
-        if not math.isfinite(size):
-            counts[REASON] = INFINITE
-            return False
-        if k > 0:
-            rate = size / before if k == 1 else math.sqrt(size / earlier)  # they rise and fall in turns
-        if size <= settings.rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
-            _settle(model, state, work)
-            _note(settings, progress, k + 1, rate)
-            return True
-        # a first correction may be small by luck; later ones must lead to the goal in time
-        left = 0.0
-        if k > 0:
-            left = math.log(goal * (1 - rate) / size) / math.log(rate) if 0 < rate < 1 else math.inf
-        stale = settings.mode == AUTO and not fresh
-        if k > 1 and (rate > 2 or (left > settings.iterations - k and not stale)):
-            break
-        fresh = settings.mode == UPDATE or (settings.mode == AUTO and k > 1 and left > settings.patience)
-        earlier = before
-        before = size
-    rates[BEFORE], rates[SIZE], rates[GOAL] = before, size, goal
-    counts[REASON] = SLOW
-    return False
+    for node in range(len(poses)):
+        for i in range(12):
+            work.poses[node, i] = poses[node, i]
+    for i in range(n):
+        work.v[i], work.a[i] = v[i], a[i]
+    for k in range(m):
+        work.multipliers[k] = a[n + k]
+    held, sample = read_state(before.numbers, integers, known.state), vector_at(scratch, 0, known.samples)
+    call_forces(known.forces, model, work, held, sample)
+    before.behind[0] = 0.0
+    force = reaction = 0.0
+    for i in range(n):
+        f, r = work.force[i] / model.metres[i], work.reaction[i] / model.metres[i]
+        force += f * f
+        reaction += r * r
+        out[i] = work.force[i] + work.reaction[i]
+    for k in range(m):
+        out[n + k] = work.violation[k]
+    out[n + m], out[n + m + 1] = np.sqrt(force), np.sqrt(reaction)
 
 
-@inlined
-def _correct(model: Model, work: Work, settings: Settings) -> float:
-    """Solve for a correction, apply it, and return its size [m]."""
-    n = len(work.v)
-    ordered = work.ordered
-    for i in range(len(ordered)):
-        unknown = model.order[i]
-        right = work.force[unknown] + work.reaction[unknown] if unknown < n else work.violation[unknown - n]
-        ordered[i] = work.left[unknown] * right
-    band.solve(work.band, work.pivots, ordered)
-    size: float = 0.0
-    for i in range(len(ordered)):
-        unknown = model.order[i]
-        work.correction[unknown] = ordered[i]
-        if not abs(ordered[i]) <= size:  # NaN too
-            size = abs(ordered[i])
-            if not math.isfinite(size):
-                return size
-        move = work.right[unknown] * ordered[i]
-        if unknown < n:
-            work.increment[unknown] -= move
-            work.v[unknown] -= settings.to_v * move
-            work.a[unknown] -= settings.to_a * move
-        else:
-            work.multipliers[unknown - n] -= move
-    return size
-
-
-@inlined
-def _settle(model: Model, state: State, work: Work) -> None:
-    """Bring everything in ``work`` to its last increment."""
-    compose(model, state.poses, work.increment, work.poses)
-    remember(model, work, state)
-    set_twists(model, work)
-
-
-@inlined
-def _note(settings: Settings, progress: Progress, iterations: int, rate: float) -> None:
-    """How fast iteration was."""
-    rates, counts = progress.rates, progress.counts
-    rates[RATE] = min(rate, settings.slowest)
-    counts[USUAL] = min(counts[USUAL], iterations)
-    rates[SPENT] = max(0.0, rates[SPENT] + iterations - max(counts[USUAL], 2) - settings.tolerated)
-
-
-@inlined
-def _accept(state: State, work: Work, settings: Settings) -> None:
-    """The state that was tried becomes the state."""
-    for i in range(len(work.v)):
-        known = settings.pull * state.a[i] + settings.keep * state.algorithmic[i]
-        state.algorithmic[i] = known + settings.share * work.a[i]
-        state.a[i], state.v[i] = work.a[i], work.v[i]
-    for i in range(len(work.multipliers)):
-        state.multipliers[i] = work.multipliers[i]
-    for i in range(len(work.turned)):
-        state.turned[i] = work.turned[i]
-    for k in range(len(work.wound)):
-        for i in range(3):
-            state.wound[k, i] = work.wound[k, i]
-    for e in range(len(work.bent)):
-        for i in range(6):
-            state.bent[e, i] = work.bent[e, i]
+@kernel(SETTLE, counted=False)
+def settle(
+    reals: Array, integers: IntArray, scratch: Array, t: float, q: Array, v: Array, a: Array, knot: Array
+) -> int:
+    """A knot; ``q`` gets what its poses do not tell."""
+    known = read_stepping(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before, there = read_before(scratch, integers, known.before), read_state(q, integers, known.state)
     for node in range(len(work.poses)):
         for i in range(12):
-            state.poses[node, i] = work.poses[node, i]
+            work.poses[node, i] = there.poses[node, i]
+    for i in range(len(work.v)):
+        work.v[i], work.a[i] = v[i], a[i]
+    if before.behind[0] != 0.0:
+        call_remember(known.remember, model, work, read_state(before.numbers, integers, known.state))
+    for e in range(len(work.bent)):
+        for i in range(6):
+            there.bent[e, i] = work.bent[e, i]
+    for k in range(len(work.turned)):
+        there.turned[k] = work.turned[k]
+    for k in range(len(work.wound)):
+        for i in range(3):
+            there.wound[k, i] = work.wound[k, i]
+    call_knot(known.knot, model, work, knot)
+    return 0
 
 
-@inlined
-def _store(model: Model, work: Work, knots: Knots, at: int) -> None:
-    """Positions and rotation matrices with their derivatives, joint coordinates, rates of twists, multipliers."""
-    knot(model, work, knots.states[at])
-    for i in range(len(work.a)):
-        knots.accelerations[at, i] = work.a[i]
-    for i in range(len(work.multipliers)):
-        knots.multipliers[at, i] = work.multipliers[i]
-
-
-
-@kernel(ADVANCE, counted=False)
-def advance(
-    forces: Forces,
-    factor: Factor,
-    model: Model,
-    state: State,
-    work: Work,
-    settings: Settings,
-    progress: Progress,
-    samples: Array,
-    knots: Knots,
-    first: int,
-) -> int:
-    """Steps to the times of ``samples``, one row each; knots go into rows from ``first`` on."""
-    progress.counts[STEPS] = 0
-    for k in range(len(samples)):
-        if not _step(forces, factor, model, state, work, settings, progress, samples[k]):
-            return FAILED
-        status = _judge(state, work, settings, progress, model.metres)
-        if status == INACCURATE:
-            return status
-        _accept(state, work, settings)
-        _store(model, work, knots, first + k)
-        progress.counts[STEPS] = k + 1
-        if status == TIMID:
-            return status
-    return DONE
+def stepped(system: _System) -> Stepped:
+    """A system in compiled form, for one run."""
+    model, start = system.model, system.start
+    integers: list[int] = []
+    samples = system.samples(np.zeros(1)).shape[1]
+    constants, scratch = Memory(integers), Memory(integers, np.zeros(samples))
+    factors = Memory(integers)
+    state = own.State(rows_of(start.poses), start.bent, start.turned, start.wound)
+    whole = Stepping(
+        model=constants.put(model),
+        work=scratch.put(room(model)),
+        before=scratch.put(Before(numbers_of(start), np.zeros(1))),
+        state=Memory(integers).put(state),
+        factors=factors.put(factor_room(model, system.width)),
+        forces=address_of(forces, own.FORCES),
+        remember=address_of(remember, own.REMEMBER),
+        knot=address_of(store, own.KNOT),
+        blocks=address_of(blocks, own.BLOCKS),
+        weighted=address_of(weighted, own.SUMMED),
+        samples=samples,
+        reach=float(metre_scales(system).max(initial=1.0)),
+    )
+    integers.append(constants.put(whole))
+    return Stepped(
+        system.size,
+        system.constraints,
+        12 * len(start.poses) + len(start.turned),
+        True,
+        constants.numbers,
+        np.array(integers, dtype=np.int64),
+        scratch.numbers,
+        compose,
+        residual,
+        settle,
+        None,
+        None,
+        Factoring(len(factors.numbers), factor, solve, factor, solve),
+        numbers_of,
+        lambda numbers: of_numbers(numbers, start),
+        samples=system.samples,
+    )
