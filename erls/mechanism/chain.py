@@ -77,6 +77,11 @@ class Mechanism:
         return [k for k, joint in enumerate(self.joints) if joint.parent == number]
 
     @property
+    def bodies(self) -> list[int]:
+        """Links that are more than a place between two motions of one joint."""
+        return [k for k, link in enumerate(self.links) if not link.intermediate]
+
+    @property
     def outermost(self) -> list[int]:
         """Links that bear no other."""
         return [k for k in range(len(self.links)) if k not in self.parents]

@@ -79,6 +79,8 @@ class Joint:
         Number of the link that it stands on, -1 for the ground.
     seat : InterfaceNode or None
         Where it stands on that link; None on the ground.
+    fixed : bool
+        Whether it is there to hold two links together: its motion is prescribed, and nothing drives it.
     """
 
     name: str
@@ -92,6 +94,7 @@ class Joint:
     rate: float
     parent: int = -1
     seat: InterfaceNode | None = None
+    fixed: bool = False
 
     @property
     def screw(self) -> Array:

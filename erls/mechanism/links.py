@@ -54,6 +54,8 @@ class Link:
         Of a link made of beams, for formulations with elements of their own.
     pieces : tuple of Link
         Substructures that a modal formulation solves for instead, without payloads; empty for a link in one piece.
+    intermediate : bool
+        Whether it is nothing but a place between two motions of one joint.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Link:
     payloads: tuple[Payload, ...] = ()
     description: LinkDescription | None = None
     pieces: tuple[Link, ...] = ()
+    intermediate: bool = False
 
     @property
     def elastic_modes(self) -> int:

@@ -1,8 +1,7 @@
 """Links split into substructures: pieces of their own, rigidly joined, in a mechanism that formulations solve.
 
 A link is one body for whoever asks a run, and a chain of pieces for the equations of motion. All pieces share the mesh
-frame of their link. A weld between two of them is a revolute joint held at 0: where a motion is prescribed every
-formulation keeps all six conditions, so that a weld needs nothing of its own.
+frame of their link, and a fixed joint holds each on the one before.
 """
 
 from __future__ import annotations
@@ -17,10 +16,8 @@ import numpy as np
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, Point
-from erls.mechanism.curves import piecewise
-from erls.mechanism.drives import Drive
-from erls.mechanism.joint_types import REVOLUTE
-from erls.mechanism.joints import Joint, JointForces
+from erls.mechanism.compound_joints import fixed_joint
+from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, payload_invariants
 from erls.mechanism.loops import LoopEnd
 from fe_import.model import IntArray
@@ -120,20 +117,9 @@ def _seat(mechanism: Mechanism, joint: Joint, ranges: Sequence[range], places: S
 
 def _weld(link: Link, number: int, parent: int) -> Joint:
     """Joint that holds piece ``number`` on the one before."""
-    held, position = Drive("motion", motion=piecewise([], [0.0])), link.pieces[number].inboard.position
-    return Joint(
-        name=f"{link.name}: weld {number}",
-        freedom=REVOLUTE,
-        before=pose(position=position),
-        after=pose(position=-position),
-        forces=JointForces(),
-        rotor_inertia=0.0,
-        drive=held,
-        position=0.0,
-        rate=0.0,
-        parent=parent,
-        seat=link.pieces[number - 1].model.interface_nodes[1],
-    )
+    position = link.pieces[number].inboard.position
+    seat = link.pieces[number - 1].model.interface_nodes[1]
+    return fixed_joint(f"{link.name}: weld {number}", pose(position=position), pose(position=-position), parent, seat)
 
 
 def _loaded(piece: Link, whole: Link, places: IntArray, number: int) -> Link:

@@ -14,6 +14,7 @@ from erls.run.file import EARLIER, load_run
 from erls.run.file import SCHEMA as RUN_SCHEMA
 from erls.scene.bodies.schema import BodyScene
 from erls.scene.chain import Scene
+from erls.scene.joints import Joint
 from erls.scene.read import load_scene
 from fe_import.description.link import LinkFile, load_link
 from fe_import.files.hdf5.files import open_for_reading
@@ -87,15 +88,21 @@ def _modal_info(model: ModalModel) -> tuple[dict[str, Any], str]:
     return summary, modal_report(model)
 
 
+def _drives(joint: Joint) -> str:
+    """Of all coordinates of a joint."""
+    acting = joint.coordinates or {"": joint}
+    return ", ".join(f"{name} {msgspec.to_builtins(each.drive)['type']}".strip() for name, each in acting.items())
+
+
 def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
     record = scene.record
     rows = [
-        (joint.name, joint.type, msgspec.to_builtins(joint.drive)["type"], link.name, _source(link))
+        (joint.name, joint.type, _drives(joint), joint.on, link.name, _source(link))
         for joint, link in zip(record.joints, record.links, strict=True)
     ]
     simulation = msgspec.to_builtins(record.simulation)
     text = f"{scene.name}: scene with {len(rows)} joints\n\n" + table(
-        ("joint", "type", "drive", "link", "source"), rows
+        ("joint", "type", "drive", "on", "link", "source"), rows
     )
     text += "\n\npoints: " + (", ".join(p.name for p in record.points) or "none")
     if record.loops:

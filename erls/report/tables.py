@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import getitem
 
 import numpy as np
 
@@ -115,8 +117,8 @@ def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
     ]
     rows = []
     for sample in s["samples"]:
-        for name, joint in sample["joints"].items():
-            revolute = run.formulation.mechanism.joints[run.joint_names.index(name)].freedom.turns
+        for name, moved in zip(run.joint_names, run.formulation.mechanism.joints, strict=True):
+            revolute, joint = moved.freedom.turns, reduce(getitem, name.split("/"), sample["joints"])
 
             def show(value: float, revolute: bool = revolute) -> str:
                 return f"{np.degrees(value):.4f} deg" if revolute else f"{value:.6f} m"

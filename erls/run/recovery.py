@@ -22,7 +22,6 @@ from erls.mechanism.links import Link
 from erls.run.chain.run import ChainRun
 from erls.run.link_loads import link_loads
 from erls.run.record import Run
-from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
 from fe_import.modal.recovery_maps import UNITS, RecoveryMaps, spin_products
 from fe_import.recovery.recover import mode_acceleration, mode_displacement, required_maps
@@ -175,6 +174,5 @@ def _link(run: Run, name: str) -> tuple[int, Link]:
     if not isinstance(run, ChainRun):
         message, remedy = "stress and section forces are those of links", "ask a run of a chain"
         raise SceneError(Cause.BAD_FIELD, message, where="run", value=type(run).__name__, remedy=remedy)
-    choose(name, run.link_names, "link", SceneError)
-    number = run.link_names.index(name)
+    number = run.link_number(name)
     return number, run.formulation.mechanism.links[number]

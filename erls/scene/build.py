@@ -15,6 +15,7 @@ from erls.errors import Cause, SceneError
 from erls.maths.se3 import inverse
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, Point
+from erls.mechanism.compound_joints import expand
 from erls.mechanism.effects import ALL, inconsistencies, named_effects
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model, truncated
@@ -84,7 +85,7 @@ def build_mechanism(
         Naming file, field, value and remedy.
     """
     record, file = scene.record, str(scene.path)
-    joints = build_joints(scene)  # first: a faulty one is found before time goes into reductions
+    rows = build_joints(scene)  # first: a faulty one is found before time goes into reductions
     if models is None:
         models, descriptions = link_models(scene, tell), _beam_descriptions(scene)
         pieces = _pieces(scene, models, tell)
@@ -94,20 +95,20 @@ def build_mechanism(
             zip(record.links, models, descriptions or [None] * len(models), strict=True)
         )
     ]
-    joints = [replace(joint, seat=_seat(scene, k, links)) for k, joint in enumerate(joints)]
+    rows = [[replace(row[0], seat=_seat(scene, k, links)), *row[1:]] for k, row in enumerate(rows)]
     links = [
         replace(link, pieces=piece_links(given, link, own, f"{file}: links[{k}]")) if own else link
         for k, (link, given, own) in enumerate(zip(links, record.links, pieces or [()] * len(links), strict=True))
     ]
-    warnings = [w for joint, link in zip(joints, links, strict=True) for w in _arm_warnings(joint, link)]
+    warnings = [w for row, link in zip(rows, links, strict=True) for w in _arm_warnings(row[-1], link)]
     warnings += [w for link in links for w in piece_warnings(link)]
     points = [_point(scene, k, links) for k in range(len(record.points))]
-    links = _with_payloads(scene, joints, links, points)
+    whole = expand(rows, _with_payloads(scene, rows, links, points))
     chain = Mechanism(
         name=scene.name,
-        joints=tuple(joints),
-        links=tuple(links),
-        points=tuple(points),
+        joints=whole.joints,
+        links=whole.links,
+        points=tuple(replace(point, link=int(whole.numbers[point.link])) for point in points),
         gravity=np.array(record.gravity),
         static_start=record.initial.deformation == "static",
         bandwidth=record.simulation.bandwidth,
@@ -267,9 +268,12 @@ def _interface(model: ModalModel, name: str, where: str) -> InterfaceNode:
 
 def _arm_warnings(joint: Joint, link: Link) -> list[str]:
     """A joint axis that misses its interface is bridged by a rigid arm; often a wrong mesh pose."""
+    if joint.fixed:
+        return []
     frame = inverse(joint.after)
     arm = link.inboard.position - frame[:3, 3]
-    off_axis = arm - (arm @ frame[:3, 2]) * frame[:3, 2]
+    axis = frame[:3, joint.freedom.axis]
+    off_axis = arm - (arm @ axis) * axis
     size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
     if np.linalg.norm(off_axis) <= 1e-6 * max(size, 1e-9):
         return []
@@ -303,7 +307,7 @@ def _point(scene: Scene, k: int, links: list[Link]) -> Point:
     return Point(point.name, number, known[point.node])
 
 
-def _with_payloads(scene: Scene, joints: list[Joint], links: list[Link], points: list[Point]) -> list[Link]:
+def _with_payloads(scene: Scene, rows: list[list[Joint]], links: list[Link], points: list[Point]) -> list[Link]:
     """Payloads on points, and motors where their joint stands."""
     result = list(links)
     names = {p.name: p for p in points}
@@ -335,7 +339,7 @@ def _with_payloads(scene: Scene, joints: list[Joint], links: list[Link], points:
         place = f"{scene.path}: joints[{k}].motor"
         mass = Place(scene.folder, place).not_negative("mass", joint.motor.mass)
         inertia = inertia_matrix(joint.motor.inertia, f"{place}.inertia", SceneError)
-        seat = joints[k].seat
+        seat, parent = rows[k][0].seat, rows[k][0].parent
         if seat is not None and (mass or inertia.any()):  # others stand on the ground
-            add(joints[k].parent, seat.node, np.zeros(3), mass, inertia, place, motor=True)
+            add(parent, seat.node, np.zeros(3), mass, inertia, place, motor=True)
     return result

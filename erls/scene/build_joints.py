@@ -10,13 +10,14 @@ import numpy as np
 
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array, fixed_axes
+from erls.mechanism.compound_joints import fixed_joint
 from erls.mechanism.dh import DHRow, split
 from erls.mechanism.drives import build_drive
-from erls.mechanism.joint_types import JOINT_TYPES
+from erls.mechanism.joint_types import JOINT_TYPES, Freedom
 from erls.mechanism.joints import Joint, JointForces
 from erls.mechanism.place import Place
 from erls.scene.chain import Base, Scene, SceneRecord
-from erls.scene.joints import Branch, Loop
+from erls.scene.joints import Branch, Coordinate, Loop
 from erls.scene.joints import Joint as JointRecord
 from erls.scene.links import MeshPose
 
@@ -31,8 +32,14 @@ def stands_on(scene: SceneRecord, k: int) -> int:
     return [link.name for link in scene.links].index(on) if on else k - 1
 
 
-def build_joints(scene: Scene) -> list[Joint]:
-    """The joints, on their Denavit-Hartenberg rows and mesh poses; where they stand on a link is not said yet.
+def joint_coordinates(joint: JointRecord) -> dict[str, Freedom]:
+    """The coordinates of a joint by the names that reports give them."""
+    freedoms = JOINT_TYPES[joint.type].freedoms or ()
+    return {f"{joint.name}/{freedom.name}" if freedom.name else joint.name: freedom for freedom in freedoms}
+
+
+def build_joints(scene: Scene) -> list[list[Joint]]:
+    """The motions of each joint, on its Denavit-Hartenberg row and mesh pose; at which interface is not said yet.
 
     Raises
     ------
@@ -41,7 +48,7 @@ def build_joints(scene: Scene) -> list[Joint]:
     """
     record = scene.record
     base = _pose(record.base)
-    result: list[Joint] = []
+    result: list[list[Joint]] = []
     rows: list[Array] = []  # of each link: where the row of the next joint starts, in its mesh frame
     for k, (joint, link) in enumerate(zip(record.joints, record.links, strict=True)):
         place, parent = f"{scene.path}: joints[{k}]", stands_on(record, k)
@@ -53,8 +60,8 @@ def build_joints(scene: Scene) -> list[Joint]:
         elif parent >= 0:
             start = rows[parent]
         after = second @ mesh if in_dh else mesh
-        found = _joint(joint, start @ first, after, Place(scene.folder, place))
-        result.append(replace(found, parent=parent))
+        found = _motions(joint, start @ first, after, Place(scene.folder, place))
+        result.append([replace(found[0], parent=parent), *found[1:]])
         rows.append(inverse(mesh) if in_dh else inverse(mesh) @ second)
     return result
 
@@ -75,24 +82,41 @@ def _dh_row(joint: JointRecord, place: str) -> DHRow:
     )
 
 
-def _joint(joint: JointRecord, before: Array, after: Array, place: Place) -> Joint:
-    freedom = JOINT_TYPES[joint.type].one
-    assert freedom is not None
+def _motions(joint: JointRecord, before: Array, after: Array, place: Place) -> list[Joint]:
+    """The motions of a joint, one after another."""
+    freedoms = joint_coordinates(joint)
+    if not freedoms:
+        return [fixed_joint(joint.name, before, after)]
+    result = []
+    for number, (name, freedom) in enumerate(freedoms.items()):
+        acting: JointRecord | Coordinate = joint
+        at = place
+        if freedom.name:
+            acting = joint.coordinates.get(freedom.name, Coordinate())
+            at = place.at("coordinates").at(freedom.name)
+        ends = before if number == 0 else np.eye(4), after if number == len(freedoms) - 1 else np.eye(4)
+        result.append(_motion(name, freedom, *ends, acting, at))
+    return result
+
+
+def _motion(
+    name: str, freedom: Freedom, before: Array, after: Array, record: JointRecord | Coordinate, place: Place
+) -> Joint:
     place = replace(place, revolute=freedom.turns)
-    drive = build_drive(joint.drive, place.folder, place.field("drive"), freedom.turns)
+    drive = build_drive(record.drive, place.folder, place.field("drive"), freedom.turns)
     start = place.at("initial")
-    position = angle(start, "position", joint.initial.position, joint.initial.position_deg)
-    rate = angle(start, "rate", joint.initial.rate, joint.initial.rate_deg)
+    position = angle(start, "position", record.initial.position, record.initial.position_deg)
+    rate = angle(start, "rate", record.initial.rate, record.initial.rate_deg)
     if drive.prescribed:
-        if any(getattr(joint.initial, f) is not None for f in joint.initial.__struct_fields__):
+        if any(getattr(record.initial, f) is not None for f in record.initial.__struct_fields__):
             raise place.error(
                 "initial",
                 "a prescribed motion fixes its own start",
                 remedy="remove 'initial', or change the motion",
             )
         position, rate, _ = drive.reference(0.0)  # type: ignore[misc]
-    forces, rotor = joint_forces(joint, place), reflected_inertia(joint, place)
-    return Joint(joint.name, freedom, before, after, forces, rotor, drive, position, rate)
+    forces, rotor = joint_forces(record, place), reflected_inertia(record, place)
+    return Joint(name, freedom, before, after, forces, rotor, drive, position, rate)
 
 
 def angle(place: Place, name: str, plain: float | None, degrees: float | None) -> float:
@@ -112,7 +136,7 @@ def angle(place: Place, name: str, plain: float | None, degrees: float | None) -
     return place.number(name, plain or 0.0)
 
 
-def joint_forces(record: JointRecord | Loop, place: Place) -> JointForces:
+def joint_forces(record: JointRecord | Coordinate | Loop, place: Place) -> JointForces:
     """Spring, damper and friction of a joint.
 
     Raises
@@ -130,7 +154,7 @@ def joint_forces(record: JointRecord | Loop, place: Place) -> JointForces:
     )
 
 
-def reflected_inertia(record: JointRecord | Loop, place: Place) -> float:
+def reflected_inertia(record: JointRecord | Coordinate | Loop, place: Place) -> float:
     """Inertia of the rotor on the joint's coordinate [kg m² or kg].
 
     Raises

@@ -44,7 +44,7 @@ def build_loops(scene: Scene, mechanism: Mechanism) -> tuple[Loop, ...]:
 
 def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Place) -> Loop:
     place = at.where
-    names = [link.name for link in mechanism.links]
+    names = [link.name for link in mechanism.links]  # those between motions of a joint are not chosen from
     number = names.index(record.link)
     node = _node(mechanism, number, record.node, f"{place}.node")
     if record.axis is None:  # parallel to the joint that carries the link

@@ -5,11 +5,11 @@ from __future__ import annotations
 from erls.errors import SceneError
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joint_types import CHAIN_TYPES, JOINT_TYPES
-from erls.scene.build_joints import GROUND
+from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, SceneRecord
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_names, check_tables, directed, not_negative
-from erls.scene.joints import Loop
+from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping
 from fe_import.files.toml import choose
@@ -18,7 +18,8 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
-_ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "damping", "friction", "motor")  # on one coordinate
+# on one coordinate
+_ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
 
 
 def check_scene(scene: SceneRecord, file: str) -> None:
@@ -51,6 +52,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         choose(joint.type, CHAIN_TYPES, f"{file}: joints[{k}].type", SceneError)
         choose(joint.dh.convention, CONVENTIONS, f"{file}: joints[{k}].dh.convention", SceneError)
         _check_place(scene, k, f"{file}: joints[{k}]")
+        _check_coordinates(joint, f"{file}: joints[{k}]")
     for k, link in enumerate(scene.links):
         _check_link(link, f"{file}: links[{k}]")
         _check_substructures(link, scene.simulation.formulation, f"{file}: links[{k}].substructures")
@@ -101,19 +103,40 @@ def _check_place(scene: SceneRecord, k: int, place: str) -> None:
         raise bad(f"{place}.branch", "missing, since another joint stands on the same link", bearing, remedy)
 
 
+def _check_coordinates(joint: Joint, place: str) -> None:
+    """What acts in a joint stands at its coordinate, or at each of its coordinates."""
+    known = [freedom.name for freedom in JOINT_TYPES[joint.type].freedoms or () if freedom.name]
+    for name in joint.coordinates:
+        if not known:
+            message = f"a {joint.type} joint has no coordinates with names"
+            raise bad(f"{place}.coordinates", message, name, "remove it")
+        choose(name, known, f"{place}.coordinates", SceneError)
+    if JOINT_TYPES[joint.type].one is not None:
+        return
+    plain = type(joint)(name=joint.name, dh=joint.dh)
+    remedy = f"put it into coordinates.{known[0]}" if known else "remove it"
+    for field in (*_ACTING, "initial"):
+        given = getattr(joint, field, None)
+        if field == "motor" and joint.motor.rotor_inertia == 0.0:
+            continue  # its mass is that of the link below
+        if given != getattr(plain, field, None):
+            message = f"a {joint.type} joint has no single coordinate that this could act along"
+            raise bad(f"{place}.{field}", message, joint.type, remedy)
+
+
 def _check_event(event: Event, scene: SceneRecord, place: str) -> None:
     if bool(event.joint) == bool(event.point):
         raise bad(place, "give exactly one of 'joint' and 'point'", event.name, "name what the event watches")
+    freedoms = {name: freedom for joint in scene.joints for name, freedom in joint_coordinates(joint).items()}
     if event.joint:
-        choose(event.joint, [joint.name for joint in scene.joints], f"{place}.joint", SceneError)
+        choose(event.joint, freedoms, f"{place}.joint", SceneError)
     else:
         choose(event.point, [point.name for point in scene.points], f"{place}.point", SceneError)
     choose(event.coordinate, OF_JOINTS if event.joint else OF_POINTS, f"{place}.coordinate", SceneError)
     choose(event.direction, DIRECTIONS, f"{place}.direction", SceneError)
     if (event.value is None) == (event.value_deg is None):
         raise bad(place, "give exactly one of 'value' and 'value_deg'", event.name, "say what is crossed")
-    turns = any(joint.name == event.joint and joint.type == "revolute" for joint in scene.joints)
-    if event.value_deg is not None and not turns:
+    if event.value_deg is not None and not (event.joint and freedoms[event.joint].turns):
         raise bad(f"{place}.value_deg", "only revolute joints have degrees", event.value_deg, "use value, in metres")
 
 

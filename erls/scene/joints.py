@@ -112,6 +112,31 @@ class Acting(Record, frozen=True, kw_only=True):
     friction: Friction | None = None
 
 
+class Coordinate(Acting, frozen=True):
+    """One of several coordinates of a joint, and what acts along it.
+
+    Attributes
+    ----------
+    initial : JointInitial
+        Coordinate and rate at time 0.
+    drive : DriveRecord
+        What moves it; nothing unless given.
+    stiffness : float
+        Of a spring along it [N m/rad or N/m].
+    rest, rest_deg : float, optional
+        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
+    damping : float
+        Viscous damping [N m s/rad or N s/m].
+    friction : Friction, optional
+        Coulomb friction; none unless given.
+    motor : Rotor
+        Rotor inertia.
+    """
+
+    initial: JointInitial = JointInitial()
+    motor: Rotor = Rotor()
+
+
 class Branch(Record, frozen=True):
     """Pose of the frame from which the Denavit-Hartenberg row of a joint starts, in the mesh frame of the link that it
     stands on; on the ground, in the base frame.
@@ -129,7 +154,7 @@ class Branch(Record, frozen=True):
 
 
 class Joint(Acting, frozen=True):
-    """A joint between a link (or the ground) and the link that it carries; it moves about or along its z axis.
+    """A joint between a link (or the ground) and the link that it carries.
 
     Attributes
     ----------
@@ -138,7 +163,12 @@ class Joint(Acting, frozen=True):
     dh : DH
         Its Denavit-Hartenberg row.
     type : str
-        ``revolute`` turns about z, ``prismatic`` slides along z.
+        What it leaves free: ``revolute`` turns about z, ``prismatic`` slides along z, ``cylindrical`` both (``slide``,
+        ``turn``), ``universal`` turns about x and then about its new y (``x``, ``y``), ``planar`` slides along x and y
+        and turns about z (``x``, ``y``, ``turn``), ``fixed`` holds.
+    coordinates : dict of Coordinate
+        What acts along each coordinate of a joint that has several, by the names above; reports call them
+        ``joint/coordinate``. A joint of one coordinate has these fields itself.
     on : str
         The link that it stands on, or ``ground``; the link before unless given.
     at : str
@@ -167,6 +197,7 @@ class Joint(Acting, frozen=True):
     name: str
     dh: DH
     type: str = "revolute"
+    coordinates: dict[str, Coordinate] = {}
     on: str = ""
     at: str = ""
     branch: Branch | None = None

@@ -42,7 +42,8 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
 
 def models_of(run: ChainRun) -> tuple[list[ModalModel], list[LinkDescription | None], list[list[ModalModel]]]:
     """Modal models of the links of a run, descriptions, and modal models of their pieces, for `build_mechanism`."""
-    links = run.formulation.mechanism.links
+    mechanism = run.formulation.mechanism
+    links = [mechanism.links[k] for k in mechanism.bodies]
     pieces = [[piece.model for piece in link.pieces] for link in links]
     return [link.model for link in links], [link.description for link in links], pieces
 

@@ -91,7 +91,8 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
     places = np.array([_points(run, state) for state in states])
     acceleration = np.array(accelerated)
     joints = run.joint_names
-    models = {name: link.model for name, link in zip(run.link_names, formulation.mechanism.links, strict=True)}
+    numbers = {name: run.link_number(name) for name in run.link_names}
+    models = {name: formulation.mechanism.links[k].model for name, k in numbers.items()}
     return Outputs(
         times=t,
         points={name: places[:, k] for k, name in enumerate(run.point_names)},
@@ -107,7 +108,7 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
         size=max(float(np.linalg.norm(np.ptp(m.nodes, axis=0))) for m in models.values()),
         mode_energy={
             name: _mode_energy(np.array([x.modal[k][6:] for x in states]), m.frequencies_hz[6:])
-            for k, (name, m) in enumerate(models.items())
+            for (name, m), k in zip(models.items(), numbers.values(), strict=True)
         },
         mode_kinds={name: m.kinds[6:] for name, m in models.items()},
         mode_frequencies={name: m.frequencies_hz[6:] for name, m in models.items()},

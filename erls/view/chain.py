@@ -72,11 +72,15 @@ class ChainPose(Pose):
 
     def nodes(self, magnification: float) -> list[Array]:
         """(n, 3) nodes of each link."""
-        return [self._nodes(k, magnification) for k in range(len(self.mechanism.links))]
+        return [self._nodes(k, magnification) for k in self.mechanism.bodies]
 
     def deflections(self) -> list[Array]:
         """(n,) of each link against the equivalent rigid one [m]."""
-        return [np.linalg.norm(self._displacement(k), axis=1) for k in range(len(self.mechanism.links))]
+        return [np.linalg.norm(self._displacement(k), axis=1) for k in self.mechanism.bodies]
+
+    @property
+    def _links(self) -> list[Link]:
+        return [self.mechanism.links[k] for k in self.mechanism.bodies]
 
     def anchor(self) -> Array:
         """(3,) the last link."""
@@ -85,9 +89,7 @@ class ChainPose(Pose):
     def parts(self, magnification: float, unit: float) -> list[Part]:
         """Deformed links."""
         found = []
-        for link, places, moved in zip(
-            self.mechanism.links, self.nodes(magnification), self.deflections(), strict=True
-        ):
+        for link, places, moved in zip(self._links, self.nodes(magnification), self.deflections(), strict=True):
             model, root = link.model, link.inboard.node
             surface = part_surface(places, model.triangles, chains(model.nodes, model.lines), root, 1e3 * moved, unit)
             found.append(Part(surface, bool(len(model.triangles))))
@@ -105,7 +107,7 @@ class ChainPose(Pose):
         import pyvista as pv
 
         result = []
-        for link, places in zip(self.mechanism.links, self.nodes(0.0), strict=True):
+        for link, places in zip(self._links, self.nodes(0.0), strict=True):
             if len(link.model.triangles):
                 solid = pv.PolyData.from_regular_faces(places, link.model.triangles)
                 result.append(solid.extract_feature_edges(SHARP))
@@ -117,7 +119,8 @@ class ChainPose(Pose):
     def meshes(self, magnification: float) -> list[PartMesh]:
         """Links, in the order of their nodes."""
         found = []
-        for k, (link, places) in enumerate(zip(self.mechanism.links, self.nodes(magnification), strict=True)):
+        for k, places in zip(self.mechanism.bodies, self.nodes(magnification), strict=True):
+            link = self.mechanism.links[k]
             model = link.model
             cells = [(kind, c) for kind, c in (("line", model.lines), ("triangle", model.triangles)) if len(c)]
             cells = cells or [("vertex", np.arange(len(places))[:, None])]
@@ -145,8 +148,9 @@ def joint_places(mechanism: Mechanism, state: State, magnification: float) -> li
         after = mechanism.links[k]
         outer = _displaced(after, after.inboard, inverse(joint.after), state, k, magnification)
         outer_node = node_positions(mechanism, state, k, [after.inboard.node], magnification)[0]
-        kind = "revolute" if joint.freedom.turns else "prismatic"
-        result.append(JointPlace(kind, inner, outer, inner_node, outer_node))
+        kind = "fixed" if joint.fixed else "revolute" if joint.freedom.turns else "prismatic"
+        along = pose(np.roll(np.eye(3), joint.freedom.axis - 2, axis=0))  # z along the axis of the motion
+        result.append(JointPlace(kind, inner @ along, outer @ along, inner_node, outer_node))
     return result
 
 

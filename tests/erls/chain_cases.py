@@ -25,6 +25,7 @@ PROFILES = [
 ]
 TORQUE = {"type": "torque", "profiles": PROFILES}
 PD: dict[str, Any] = {"type": "pd", "motion": QUINTIC, "proportional_gain": 30.0, "derivative_gain": 2.0}
+FED = {**PD, "feed_forward": True}
 SPRING: dict[str, Any] = {
     "stiffness": 3.0,
     "rest": 0.2,
@@ -81,6 +82,16 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
         set(),
         True,
     ),
+    "joints of several coordinates": (
+        [
+            _joint("a", "cylindrical", 25.0, coordinates={"slide": SPRING, "turn": {"drive": FED}}),
+            _joint("b", "universal", -15.0, coordinates={"y": _driven(SINE)}),
+            _joint("c", "planar", 15.0, coordinates={"x": {"stiffness": 40.0}, "turn": SPRING}),
+            _joint("d", "fixed", 50.0),
+        ],
+        set(),
+        True,
+    ),
     **{
         f"without {name}": ([_joint("a", alpha=35.0), _joint("b", **_driven(SINE)), _joint("c")], {name}, True)
         for name in INERTIAL
@@ -89,8 +100,8 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
     "no effects": ([_joint("a", alpha=35.0), _joint("b")], set(INERTIAL), True),
 }
 
-SERIAL = [name for name in CASES if name != "branches"]
-"""Chains in which every link stands on the one before."""
+SERIAL = [name for name in CASES if name not in ("branches", "joints of several coordinates")]
+"""Chains of joints of one coordinate in which every link stands on the one before."""
 
 
 @dataclass(frozen=True)

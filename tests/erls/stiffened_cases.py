@@ -28,7 +28,7 @@ MIXED: dict[str, set[int]] = {  # links without second-order data
 }
 RIGID = {"rigid first link": {"a"}, "rigid middle link": {"b"}, "rigid last link": {"c"}}
 CASES = (*chain_cases.CASES, *ARMS, *MIXED, *RIGID)
-SERIAL = tuple(name for name in CASES if name != "branches")
+SERIAL = tuple(name for name in CASES if name not in chain_cases.CASES or name in chain_cases.SERIAL)
 
 
 def _bare(mechanism: Mechanism, which: set[int]) -> Mechanism:

@@ -10,7 +10,7 @@ import pytest
 import scenes
 
 from erls.equations.ffr.formulation import Ffr
-from erls.mechanism.chain import Mechanism, poses
+from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import DEFAULT
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 from erls.mechanism.without_effects import with_rigid

@@ -41,8 +41,10 @@ def write_chain(group: h5py.Group, run: ChainRun) -> None:
     stored: list[ModalModel] = []
     numbers: list[int] = []
     models = group.create_group("models")
-    every = [link.model for link in run.formulation.mechanism.links]
-    every += [piece.model for link in run.formulation.mechanism.links for piece in link.pieces]
+    mechanism = run.formulation.mechanism
+    links = [mechanism.links[k] for k in mechanism.bodies]
+    every = [link.model for link in links]
+    every += [piece.model for link in links for piece in link.pieces]
     for model in every:
         known = [k for k, other in enumerate(stored) if other is model]
         if not known:
@@ -50,7 +52,6 @@ def write_chain(group: h5py.Group, run: ChainRun) -> None:
             stored.append(model)
             write_modal_group(models.create_group(f"{len(stored):04d}"), model)
         numbers.append(known[0] + 1)
-    links = run.formulation.mechanism.links
     own, others = np.split(np.array(numbers, dtype=np.int64), [len(links)])
     write_array(group, "model_of_link", own, "1", "group of models/ of each link")
     counts = np.array([len(link.pieces) for link in links], dtype=np.int64)

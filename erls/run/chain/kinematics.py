@@ -67,13 +67,25 @@ class ChainMotion(Run):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Joints, from the ground outward."""
+        """Joints, from the ground outward; of a joint of several coordinates each one, ``joint/coordinate``."""
         return tuple(j.name for j in self.formulation.mechanism.joints)
 
     @property
     def link_names(self) -> tuple[str, ...]:
         """Links, from the ground outward."""
-        return tuple(link.name for link in self.formulation.mechanism.links)
+        links = self.formulation.mechanism.links
+        return tuple(links[k].name for k in self.formulation.mechanism.bodies)
+
+    def link_number(self, link: str) -> int:
+        """Number of a link in the mechanism.
+
+        Raises
+        ------
+        SceneError
+            BAD_REFERENCE.
+        """
+        choose(link, self.link_names, "link", SceneError)
+        return self.formulation.mechanism.bodies[self.link_names.index(link)]
 
     def _interpolated(self, t: ArrayLike) -> tuple[tuple[int, ...], Array, Array, Array]:
         """Shape of ``t``; flat times, y and v."""
@@ -125,7 +137,6 @@ class ChainMotion(Run):
 
     def modal_coordinates(self, link: str, t: ArrayLike) -> Array:
         """(..., 6 + n) modal coordinates of a link, rigid-body ones first [m √kg]."""
-        choose(link, self.link_names, "link", SceneError)
-        number = self.link_names.index(link)
+        number = self.link_number(link)
         modes = self.formulation.mechanism.links[number].model.modes
         return np.array([s.modal[number] for s in self.states(t)]).reshape(*np.shape(t), modes)

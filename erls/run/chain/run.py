@@ -145,7 +145,7 @@ class ChainRun(ChainMotion):
         mechanism = self.formulation.mechanism
         joints: list[Joint | LoopFreedom] = [*mechanism.joints]
         joints += [x.freedom for x in mechanism.loops if x.freedom is not None]
-        passive = all(j.drive.kind == "free" and not j.forces.damping and not j.forces.friction for j in joints)
+        passive = all(_passive(j) for j in joints)
         damped = any(link.damping.any() for link in mechanism.links)
         return passive and not damped and conserves_energy(mechanism.effects)
 
@@ -153,10 +153,14 @@ class ChainRun(ChainMotion):
         """Joints and points at given times, as in the JSON of ``erls simulate``."""
         result = []
         for t, s in zip(times, self.states(times), strict=True):
-            joints = {
-                name: {"coordinate": float(s.coordinates[k]), "angle": float(s.angles[k])}
-                for k, name in enumerate(self.joint_names)
-            }
+            joints: dict[str, Any] = {}
+            for k, name in enumerate(self.joint_names):
+                joint, _, coordinate = name.partition("/")
+                found = {"coordinate": float(s.coordinates[k]), "angle": float(s.angles[k])}
+                if coordinate:
+                    joints.setdefault(joint, {})[coordinate] = found
+                else:
+                    joints[joint] = found
             points = {name: self.point_position(s, k).tolist() for k, name in enumerate(self.point_names)}
             result.append({"t": float(t), "joints": joints, "points": points})
         return result
@@ -171,7 +175,7 @@ class ChainRun(ChainMotion):
             vector(columns, plain(name), "m", [self.point_position(s, k) for s in states])
         reactions = self._all_reactions(times)
         for k, joint in enumerate(self.formulation.mechanism.joints):
-            name, unit, effort = plain(joint.name), *(("rad", "N m") if joint.freedom.turns else ("m", "N"))
+            name, (unit, effort) = plain(joint.name), joint.freedom.units
             columns[f"{name}.coordinate [{unit}]"] = np.array([s.coordinates[k] for s in states])
             columns[f"{name}.angle [{unit}]"] = np.array([s.angles[k] for s in states])
             columns[f"{name}.rate [{unit}/s]"] = np.array([s.rates[k] for s in states])
@@ -223,3 +227,9 @@ class ChainRun(ChainMotion):
             **({"events": [asdict(happening) for happening in self.events]} if self.scene.record.events else {}),
             "warnings": list(self.warnings),
         }
+
+
+def _passive(joint: Joint | LoopFreedom) -> bool:
+    """Whether nothing in a joint does work but springs."""
+    still = joint.drive.kind == "free" or (isinstance(joint, Joint) and joint.fixed)
+    return still and not joint.forces.damping and not joint.forces.friction
