@@ -14,8 +14,8 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.parallel.crew import Crew, reported
 from erls.parallel.worker_process import stopped
 from erls.parallel.workers import IDLE, possible
-from erls.run.chain.run import ChainRun
-from erls.simulation.packed_run import PackedRun, packed
+from erls.run.record import Run
+from erls.simulation.packed_run import Packed, packed
 from erls.simulation.variants import Variants
 from fe_import.errors import ReportedError
 
@@ -29,14 +29,14 @@ def simulate_many(
     *,
     progress: Callable[[float, float], None] = lambda done, total: None,
     workers: int | None = None,
-) -> list[ChainRun | ReportedError]:
+) -> list[Run | ReportedError]:
     """Simulate variants of a scene, on several cores where that pays.
 
     This process takes one variant after the other. When by the time that they took more than a second of work is left,
     worker processes come and take some, too; starting one takes about a second, on another core. They stay for five
     minutes, and for later batches pay from 0.2 s of work on. They do not run the script that calls this, so it needs no
-    ``if __name__ == "__main__"``. Runs come back as scene, knots and warnings; their equations of motion are put
-    together from the modal models that all share, when they are first asked for.
+    ``if __name__ == "__main__"``. Runs come back without their equations of motion, which are put together here: of
+    bodies at once, of chains from the modal models that all share, when they are first asked for.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def simulate_many(
 
     Returns
     -------
-    list of ChainRun or ReportedError
+    list of Run or ReportedError
         In the order of the variants. What failed is its error; after an interrupt, what had not finished is an error
         with cause INTERRUPTED, which holds what was computed of it, if anything.
 
@@ -98,12 +98,12 @@ class _Batch:
         name = uuid.uuid4().hex
         tasks = [_Task(name, scene, overrides) for overrides in variants]
         self.crew = Crew(_run, tasks, prepare=_prepare, preparation=tasks[0] if tasks else None)
-        self.found: dict[int, ChainRun | ReportedError] = {}
+        self.found: dict[int, Run | ReportedError] = {}
         self.stopping = False
         self.spent, self.made = 0.0, 0  # by this process: seconds, and runs
         self.begun: float | None = None  # the one that it is at
 
-    def results(self) -> list[ChainRun | ReportedError]:
+    def results(self) -> list[Run | ReportedError]:
         """In the order of the variants."""
         try:
             self._work()
@@ -169,7 +169,7 @@ class _Batch:
             if not self.stopping:
                 self.progress(len(self.found), len(self.variants))
 
-    def _received(self, problem: ReportedError | None, run: PackedRun | None) -> ChainRun | ReportedError:
+    def _received(self, problem: ReportedError | None, run: Packed | None) -> Run | ReportedError:
         made = None if run is None else self.here.unpacked(run)
         if isinstance(problem, SimulationError) and made is not None:
             problem.run = made
@@ -198,7 +198,7 @@ def _prepare(task: _Task) -> None:
         _variants(task).prepare(task.overrides)
 
 
-def _run(task: _Task) -> tuple[ReportedError | None, PackedRun | None]:
+def _run(task: _Task) -> tuple[ReportedError | None, Packed | None]:
     """The failure of a variant, if it failed, and what was computed of it."""
 
     def look(t: float, duration: float) -> None:
@@ -206,7 +206,7 @@ def _run(task: _Task) -> tuple[ReportedError | None, PackedRun | None]:
             raise _interrupted()
 
     found = _variants(task).run(task.overrides, look)
-    if isinstance(found, ChainRun):
+    if isinstance(found, Run):
         return None, packed(found)
     run = getattr(found, "run", None)
     return found, None if run is None else packed(run)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from erls.equations.formulation import Formulation
+from erls.equations.nodal.scenes.build import assemble
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
 from erls.integrate.base import Solution
 from erls.mechanism.effects import Certificate
+from erls.run.bodies.run import BodyRun
 from erls.run.chain.run import ChainRun
+from erls.run.record import Run
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.simulation.chains import models_of
@@ -34,8 +37,22 @@ class PackedRun:
     certificate: Certificate | None
 
 
-def packed(run: ChainRun) -> PackedRun:
+@dataclass(frozen=True)
+class PackedBodies:
+    """What a run of bodies and beams is without its equations: its kind, and its other fields by name."""
+
+    kind: type[BodyRun]
+    values: dict[str, Any]
+
+
+Packed = PackedRun | PackedBodies
+
+
+def packed(run: Run) -> Packed:
     """A run to be sent."""
+    if isinstance(run, BodyRun):
+        return PackedBodies(type(run), {f.name: getattr(run, f.name) for f in fields(run) if f.name != "assembly"})
+    assert isinstance(run, ChainRun)
     s = run.solution
     if isinstance(run.formulation, QuasiStatic):
         y, v, a = (run.formulation.stored(values) for values in (s.y, s.v, s.a))
@@ -43,8 +60,13 @@ def packed(run: ChainRun) -> PackedRun:
     return PackedRun(run.scene, s, run.wall_s, run.warnings, run.certificate)
 
 
+def unpacked_bodies(run: PackedBodies) -> BodyRun:
+    """A run of bodies that was sent."""
+    return run.kind(assembly=assemble(run.values["scene"]), **run.values)
+
+
 def unpacked(run: PackedRun, like: ChainRun | None) -> ChainRun:
-    """A run that was sent.
+    """A run of a chain that was sent.
 
     Parameters
     ----------

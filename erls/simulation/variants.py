@@ -7,13 +7,16 @@ from pathlib import Path
 
 import msgspec
 
+from erls.equations.nodal.scenes.build import assemble
 from erls.equations.registry import formulate
 from erls.integrate.choice import compile_kernels
 from erls.run.chain.run import ChainRun
+from erls.run.record import Run
+from erls.scene.bodies.schema import BodyScene
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
-from erls.scene.read import load_chain
-from erls.simulation.packed_run import PackedRun, unpacked
+from erls.scene.read import AnyScene, load_scene
+from erls.simulation.packed_run import Packed, PackedBodies, unpacked, unpacked_bodies
 from erls.simulation.simulate import Progress, simulate
 from fe_import.errors import ReportedError
 
@@ -32,7 +35,7 @@ class Variants:
         self.scene = scene
         self._runs: dict[tuple[bytes, bool], ChainRun] = {}
 
-    def run(self, overrides: Sequence[str], progress: Progress) -> ChainRun | ReportedError:
+    def run(self, overrides: Sequence[str], progress: Progress) -> Run | ReportedError:
         """The run of a variant, or its failure.
 
         Parameters
@@ -43,8 +46,8 @@ class Variants:
         """
         try:
             progress(0.0, 0.0)
-            scene = load_chain(self.scene, overrides)
-            run = simulate(scene, progress=progress, like=self._runs.get(_links(scene)))
+            scene = load_scene(self.scene, overrides)
+            run = simulate(scene, progress=progress, like=self._alike(scene))
         except ReportedError as problem:
             return problem
         self._know(run)
@@ -52,19 +55,29 @@ class Variants:
 
     def prepare(self, overrides: Sequence[str]) -> None:
         """Read and compile what a variant needs."""
-        scene = load_chain(self.scene, overrides)
+        scene = load_scene(self.scene, overrides)
+        if isinstance(scene, BodyScene):
+            assemble(scene)
+            return
         formulation = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
         compile_kernels(formulation, scene.record.simulation)
 
-    def unpacked(self, sent: PackedRun) -> ChainRun:
+    def unpacked(self, sent: Packed) -> Run:
         """A run that was computed by another process."""
-        run = unpacked(sent, self._runs.get(_links(sent.scene)))
+        if isinstance(sent, PackedBodies):
+            return unpacked_bodies(sent)
+        run = unpacked(sent, self._alike(sent.scene))
         self._know(run)
         return run
 
-    def _know(self, run: ChainRun) -> None:
+    def _alike(self, scene: AnyScene) -> ChainRun | None:
+        """A run of a chain with the same links."""
+        return self._runs.get(_links(scene)) if isinstance(scene, Scene) else None
+
+    def _know(self, run: Run) -> None:
         """Have later runs with the same links share those of this one."""
-        self._runs.setdefault(_links(run.scene), run)
+        if isinstance(run, ChainRun):
+            self._runs.setdefault(_links(run.scene), run)
         if len(self._runs) > _MOST_KEPT:
             self._runs.pop(next(iter(self._runs)))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import threading
 
@@ -12,7 +13,10 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError
+from erls.run.bodies.run import BodyRun
 from erls.run.chain.run import ChainRun
+from erls.simulation.packed_run import PackedBodies, packed, unpacked_bodies
+from fe_import.errors import ReportedError
 
 TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"
 ROBOT = scenes.ROOT / "data/robot/two_link.toml"
@@ -35,6 +39,29 @@ def test_variants_are_the_runs_one_by_one() -> None:
         np.testing.assert_array_equal(run.solution.y, alone.solution.y)
         assert run.warnings == alone.warnings
     assert runs[1].formulation.mechanism.links[0].model is runs[0].formulation.mechanism.links[0].model  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("scene", "variants"),
+    [
+        ("heavy_top/fast.toml", [["simulation.duration=0.004"], ["simulation.duration=0.004", "gravity=[0, 0, 0]"]]),
+        ("statics/roll_up.toml", [["beams.strip.elements=2"], ["beams.strip.elements=0"], ["beams.strip.elements=4"]]),
+    ],
+)
+def test_scenes_of_bodies_have_variants_too(scene: str, variants: list[list[str]]) -> None:
+    """Motions and equilibria; also as they come from another process, without equations and with all answers."""
+    path = scenes.ROOT / "data" / scene
+    for run, overrides in zip(erls.simulate_many(path, variants), variants, strict=True):
+        if "beams.strip.elements=0" in overrides:
+            assert isinstance(run, ReportedError)
+            assert run.cause == Cause.BAD_FIELD
+            continue
+        assert isinstance(run, BodyRun)
+        alone = {**erls.simulate(erls.load_scene(path, overrides)).summary(), "wall_s": run.wall_s}
+        assert run.summary() == alone
+        sent = pickle.loads(pickle.dumps(packed(run)))
+        assert isinstance(sent, PackedBodies)
+        assert unpacked_bodies(sent).summary() == alone
 
 
 def test_a_faulty_variant_spoils_no_other() -> None:
