@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
+import re
 import tempfile
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import suppress
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -20,46 +24,26 @@ os.environ.setdefault("ERLS_CACHE", os.path.join(tempfile.gettempdir(), f"erls-t
 os.environ.setdefault("ERLS_KERNELS", os.environ["ERLS_CACHE"])
 
 
-KERNELS = (
-    (
-        "equations.nodal.matrix",
-        "equations.nodal.sums",
-        "equations.nodal.step",
-        "equations.serial.stiffness",
-        "equations.ffr.residual",
-        "equations.ffr.mass",
-        "equations.ffr.acceleration",
-        "equations.ffr.link_by_link",
-        "equations.quasi_static.chain",
-        "equations.erls.paper.functions",
-        "equations.erls.paper.acceleration",
-        "auto.deviation",
-    ),
-    (
-        "equations.erls.residual",
-        "equations.erls.segments",
-        "equations.erls.energy",
-        "equations.erls.states",
-        "equations.erls.solve",
-        "equations.erls.stiffened_chain",
-        "equations.erls.stiffened_solve",
-        "equations.erls.stiffened_states",
-        "integrate.stepping.generalized_alpha",
-        "integrate.stepping.lobatto",
-        "equations.independent",
-        "equations.loops.system",
-        "equations.loops.steps",
-        "equations.loops.nearest",
-        "equations.erls.ends",
-        "equations.erls.stiffened_ends",
-    ),
-)
-"""Modules with compiled code, shared out to two processes."""
+_COMPILED = re.compile(r"^@kernel\(", re.MULTILINE)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Compile before the workers of a session start, so that no test pays for it or tells of it."""
-    if not hasattr(config, "workerinput") and not config.option.collectonly:
-        imports = (f"import {', '.join(f'erls.{name}' for name in share)}" for share in KERNELS)
-        jobs = [subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[1]) for code in imports]
-        assert [job.wait() for job in jobs] == [0, 0]
+    if hasattr(config, "workerinput") or config.option.collectonly:
+        return
+    names = _modules()
+
+    def lead(take: Callable[[], str]) -> None:
+        with ProcessPoolExecutor(1, get_context("spawn")) as process, suppress(IndexError):
+            while True:
+                process.submit(exec, f"import {take()}").result()
+
+    with ThreadPoolExecutor(2) as leads:
+        list(leads.map(lead, (names.popleft, names.pop)))  # from both ends: what neighbours share is compiled once
+
+
+def _modules() -> deque[str]:
+    """Those whose functions are compiled when they are imported, packages together."""
+    root = Path(__file__).parents[1]
+    files = [f for f in sorted((root / "erls").rglob("*.py")) if _COMPILED.search(f.read_text(encoding="utf-8"))]
+    return deque(".".join(f.relative_to(root).with_suffix("").parts) for f in files)

@@ -27,17 +27,6 @@ REDUCE = {
     "link", "method", "solver", "dofs", "interface_dofs", "elastic_modes", "frequencies_hz", "mass", "centre_of_mass",
     "inertia", "health", "wall_s", "peak_memory_mb", "output",
 }  # fmt: skip
-OPTIONS = {
-    "reduce": ["--output", "-o", "--method", "--modes", "--json"],
-    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--json"],
-    "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--json"],
-    "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
-                    "--beside", "--set", "--workers", "--json"],
-    "study cost": ["--output", "-o", "--tolerance", "--formulations", "--modes", "--integrators", "--effects",
-                   "--points", "--norm", "--reference", "--budget", "--apply", "--set", "--workers", "--json"],
-    "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--magnify", "--fps", "--speed", "--json"],
-}
 
 
 @pytest.fixture
@@ -250,28 +239,6 @@ def test_info(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert err == ""
 
 
-@pytest.mark.parametrize("command", OPTIONS)
-def test_help_of_a_command(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Exit code 0, on stdout, every option with a sentence."""
-    for flag in ("--help", "-h"):
-        out, err = run(capsys, *command.split(), flag)
-        assert err == ""
-        assert f"erls {command}" in out
-        words = set(re.split(r"[\s,]+", out))
-        assert words >= set(OPTIONS[command])
-    listed = {w for w in words if re.fullmatch(r"--?[a-z-]+", w)} - {"--help", "-h"}
-    assert listed == set(OPTIONS[command])
-
-
-def test_help_of_all(capsys: pytest.CaptureFixture[str]) -> None:
-    """Every command with a sentence; no arguments at all are answered likewise; the version alone."""
-    out, _ = run(capsys, "--help")
-    assert out == run(capsys)[0]
-    for command in OPTIONS:
-        assert re.search(rf"\b{command.split()[0]}  +[A-Z]", out)
-    assert re.fullmatch(r"\d+\.\d+\.\d+\n", run(capsys, "--version")[0])
-
-
 def test_compare_writes_what_it_prints(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """JSON on stdout and in the file alike; a page and a table; the numbers of the page are those of the JSON."""
     arguments = ("compare", "scene.toml", "--formulations", "erls, erls-minimum-norm", "--workers", "1", "-o")
@@ -409,14 +376,3 @@ def test_a_reader_who_has_enough_is_no_error(folder: Path) -> None:
         assert not done.stderr
     os.close(writer)
     assert (folder / "r.h5").exists()
-
-
-def test_help_needs_no_heavy_package() -> None:
-    """Help answers at once: importing the command line imports none of them."""
-    heavy = {"numpy", "scipy", "h5py", "pyvista", "vtkmodules", "matplotlib", "numba", "skfem", "meshio", "msgspec"}
-    code = (
-        "import sys\nfrom erls.cli.main import main\nassert main(['simulate', '--help']) == 0\n"
-        f"print(sorted({heavy!r} & set(sys.modules)), file=sys.stderr)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
-    assert done.stderr.strip() == "[]"

@@ -1,0 +1,64 @@
+"""Help of the command ``erls``: every option with a sentence, at once."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+from erls.cli.main import main
+
+OPTIONS = {
+    "reduce": ["--output", "-o", "--method", "--modes", "--json"],
+    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--json"],
+    "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--json"],
+    "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
+                    "--beside", "--set", "--workers", "--json"],
+    "study cost": ["--output", "-o", "--tolerance", "--formulations", "--modes", "--integrators", "--effects",
+                   "--points", "--norm", "--reference", "--budget", "--apply", "--set", "--workers", "--json"],
+    "effects": ["--set", "--json"],
+    "info": ["--json"],
+    "view": ["--output", "-o", "--at", "--magnify", "--fps", "--speed", "--json"],
+}
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Stdout of a command that tells nothing else."""
+    assert main(arguments) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    return out
+
+
+@pytest.mark.parametrize("command", OPTIONS)
+def test_help_of_a_command(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit code 0, on stdout, every option with a sentence."""
+    for flag in ("--help", "-h"):
+        out = run(capsys, *command.split(), flag)
+        assert f"erls {command}" in out
+        words = set(re.split(r"[\s,]+", out))
+        assert words >= set(OPTIONS[command])
+    listed = {w for w in words if re.fullmatch(r"--?[a-z-]+", w)} - {"--help", "-h"}
+    assert listed == set(OPTIONS[command])
+
+
+def test_help_of_all(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every command with a sentence; no arguments at all are answered likewise; the version alone."""
+    out = run(capsys, "--help")
+    assert out == run(capsys)
+    for command in OPTIONS:
+        assert re.search(rf"\b{command.split()[0]}  +[A-Z]", out)
+    assert re.fullmatch(r"\d+\.\d+\.\d+\n", run(capsys, "--version"))
+
+
+def test_help_needs_no_heavy_package() -> None:
+    """Help answers at once: importing the command line imports none of them."""
+    heavy = {"numpy", "scipy", "h5py", "pyvista", "vtkmodules", "matplotlib", "numba", "skfem", "meshio", "msgspec"}
+    code = (
+        "import sys\nfrom erls.cli.main import main\nassert main(['simulate', '--help']) == 0\n"
+        f"print(sorted({heavy!r} & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stderr.strip() == "[]"
