@@ -14,7 +14,7 @@ import erls
 from erls.equations.erls.formulation import Erls
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
-from erls.errors import Cause, SceneError, SimulationError
+from erls.errors import Cause, SimulationError
 from erls.integrate.base import hermite
 from erls.run.chain.run import ChainRun
 from erls.run.file import load_run, write_run
@@ -300,40 +300,6 @@ def test_energy_does_not_drift() -> None:
 
 
 # (5) faults, and what needs nothing
-
-
-@pytest.mark.parametrize(
-    ("overrides", "message"),
-    [
-        (["simulation.bandwidth=0"], "bandwidth must be positive"),
-        (["simulation.bandwidth=-1.0"], "bandwidth must be positive"),
-        (["simulation.bandwidth=nan"], "not a finite number"),
-        (["simulation.bandwidth=inf"], "not a finite number"),
-        (['simulation.bandwidth="high"'], "expected"),
-        (["simulation.bandwidth=50.0", 'simulation.formulation="nodal"'], "does not go with formulation = 'nodal'"),
-        (
-            ["simulation.bandwidth=50.0", 'simulation.formulation="ffr"', 'simulation.coordinates="absolute"'],
-            "does not go with coordinates = 'absolute'",
-        ),
-        (
-            ["simulation.bandwidth=50.0", 'simulation.formulation="ffr"', "links.l.substructures=2"],
-            "does not go with substructures",
-        ),
-    ],
-)
-def test_faults(overrides: list[str], message: str) -> None:
-    """One message that names the field."""
-    with pytest.raises(SceneError, match=message) as caught:
-        erls.load_scene(FLAT, overrides)
-    assert caught.value.cause == Cause.BAD_FIELD
-    assert "simulation.bandwidth" in str(caught.value.where)
-
-
-def test_loops_are_refused() -> None:
-    """The fast modes of a closed chain are held by its loops."""
-    with pytest.raises(SceneError, match="does not go with loops") as caught:
-        erls.load_scene(scenes.ROOT / "data/four_bar/flexible.toml", ["simulation.bandwidth=50.0"])
-    assert caught.value.cause == Cause.BAD_FIELD
 
 
 def test_bandwidth_above_all_modes_changes_nothing() -> None:

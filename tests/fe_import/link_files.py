@@ -15,6 +15,8 @@ from solid_meshes import box
 from fe_import.description.link import LinkFile, load_link
 from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
+from fe_import.models.model import build_model
+from fe_import.reduce import reduce_model
 
 Array = NDArray[np.float64]
 
@@ -204,3 +206,19 @@ def free_frequencies(model: FEModel, count: int) -> Array:
             break
         old = values
     return np.asarray(np.sqrt(values) / (2 * np.pi))
+
+
+def both(link: LinkFile) -> tuple[FEModel, ModalModel]:
+    """The full model of a link, and the reduced one."""
+    model = build_model(link)
+    return model, reduce_model(model, link)
+
+
+def whole(method: str, dofs: int, interfaces: int = 2) -> dict[str, Any]:
+    """Options that keep every mode of a model."""
+    counts = {
+        "craig-bampton": {"fixed_interface_modes": dofs - 6 * interfaces},
+        "craig-chang": {"free_modes": dofs - 6},
+        "mode-displacement": {"free_modes": dofs - 6},
+    }
+    return {"method": method, **counts.get(method, {})}
