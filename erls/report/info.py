@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from erls.run.file import EARLIER, load_run
 from erls.run.file import SCHEMA as RUN_SCHEMA
 from erls.scene.bodies.schema import BodyScene
 from erls.scene.chain import Scene
-from erls.scene.joints import Joint
+from erls.scene.joints import Acting, Joint
 from erls.scene.read import load_scene
 from fe_import.description.link import LinkFile, load_link
 from fe_import.files.hdf5.files import open_for_reading
@@ -90,7 +91,7 @@ def _modal_info(model: ModalModel) -> tuple[dict[str, Any], str]:
 
 def _drives(joint: Joint) -> str:
     """Of all coordinates of a joint."""
-    acting = joint.coordinates or {"": joint}
+    acting: Mapping[str, Acting] = joint.coordinates or {"": joint}
     return ", ".join(f"{name} {msgspec.to_builtins(each.drive)['type']}".strip() for name, each in acting.items())
 
 
