@@ -68,6 +68,7 @@ EFFECTS: dict[str, Effect] = {
         _inertia("Z", "inertia_second_order", "frame forces quadratic in the deformation: qᵀ Z q", _SQUARE),
         _inertia("Z", "spin_softening", "centrifugal force on the modes, linear in q: -ωᵀ Z ω q", _SQUARE, _LARGER),
         Effect("modal_damping", "damping of the elastic modes", False, of_links=True),
+        Effect("thermal_expansion", "expansion of links by their temperature change", False, of_links=True),
         Effect("joint_stiffness", "springs in joints", False),
         Effect("joint_damping", "viscous damping in joints", False),
         Effect("joint_friction", "Coulomb friction in joints", False),

@@ -13,6 +13,7 @@ from erls.mechanism.effects import EFFECTS
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, payload_invariants, truncated
 from erls.mechanism.loops import Loop, LoopFreedom
+from erls.mechanism.thermal import temperature_change, unwarmed
 
 _Acting = TypeVar("_Acting", Joint, LoopFreedom)
 
@@ -54,6 +55,7 @@ def present(mechanism: Mechanism) -> frozenset[str]:
     found = {
         "gravity": bool(mechanism.gravity.any()),
         "modal_damping": any(link.damping.any() for link in links),
+        "thermal_expansion": any(temperature_change(link) for link in links),
         "joint_stiffness": any(joint.forces.stiffness for joint in joints),
         "joint_damping": any(joint.forces.damping for joint in joints),
         "joint_friction": any(joint.forces.friction for joint in joints),
@@ -86,6 +88,8 @@ def _joint_without(joint: _Acting, off: Set[str]) -> _Acting:
 def _link_without(link: Link, off: Set[str]) -> Link:
     if "modal_damping" in off:
         link = replace(link, damping=np.zeros_like(link.damping))
+    if not off.isdisjoint({"thermal_expansion", "flexibility"}):
+        link = replace(link, model=unwarmed(link.model))
     if "flexibility" in off and link.elastic_modes:
         link = replace(link, model=truncated(link.model, 0), stiffness=np.zeros(0), damping=np.zeros(0), pieces=())
     link = replace(link, pieces=tuple(_link_without(piece, off) for piece in link.pieces))

@@ -20,13 +20,14 @@ from erls.mechanism.effects import ALL, inconsistencies, named_effects
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model, truncated
 from erls.mechanism.place import Place
+from erls.mechanism.thermal import at_temperature, unwarmed
 from erls.mechanism.without_effects import without
 from erls.scene.build_joints import build_joints, stands_on
 from erls.scene.build_loops import build_loops
 from erls.scene.build_substructures import piece_links, piece_models, piece_warnings
 from erls.scene.chain import Scene
 from erls.scene.links import Link as LinkRecord
-from fe_import.description.link import load_link
+from fe_import.description.link import LinkFile, load_link
 from fe_import.description.records import LinkDescription
 from fe_import.errors import FEImportError, ReportedError
 from fe_import.files.toml import choose
@@ -128,6 +129,7 @@ def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
             link.modal_file,
             link.flexible,
             link.elastic_modes,
+            link.temperature_change,
             json.dumps(link.reduction, sort_keys=True, default=str),
             link.name if link.rigid else "",
         )
@@ -145,9 +147,10 @@ def _pieces(scene: Scene, models: Sequence[ModalModel], tell: Message) -> list[t
         if link.substructures == 1 or not link.flexible or not solves_pieces:
             result.append(())
             continue
-        description = load_link(scene.folder / link.model, {**link.reduction, "form": "orthonormal"})
+        description = _description(scene, link)
         with telling(tell):
-            result.append(piece_models(link, description, model, cache_folder(), f"{scene.path}: links[{k}]"))
+            found = piece_models(link, description, model, cache_folder(), f"{scene.path}: links[{k}]")
+        result.append(tuple(_warmed(piece, link, f"{scene.path}: links[{k}]") for piece in found))
         tell(f"{link.name}: {link.substructures} substructures")
     return result
 
@@ -156,6 +159,12 @@ def _beam_descriptions(scene: Scene) -> list[LinkDescription | None]:
     """Descriptions of the links that are made of beams."""
     found = [load_link(scene.folder / link.model).description if link.model else None for link in scene.record.links]
     return [d if d is not None and d.frame is not None else None for d in found]
+
+
+def _description(scene: Scene, link: LinkRecord) -> LinkFile:
+    """The link's description, its reduction as the scene asks for it."""
+    options = {**link.reduction, "form": "orthonormal"}
+    return load_link(scene.folder / link.model, options, expands=link.temperature_change is not None)
 
 
 def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> ModalModel:
@@ -182,11 +191,11 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
                 remedy="reduce with form = 'orthonormal'",
             )
     else:
-        path = scene.folder / link.model
-        description = _within(f"{place}.model", lambda: load_link(path, {**link.reduction, "form": "orthonormal"}))
+        description = _within(f"{place}.model", lambda: _description(scene, link))
         with telling(tell):
             model, cached = reduce_cached(description, cache_folder())
-        tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({path.name})")
+        tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({description.path.name})")
+    model = _warmed(model, link, place)
     wanted = 0 if not link.flexible else link.elastic_modes
     if wanted is None:
         return model
@@ -199,7 +208,13 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
             limit=model.elastic_modes,
             remedy="ask for fewer, or reduce with more",
         )
-    return truncated(model, wanted)
+    return truncated(model if wanted else unwarmed(model), wanted)
+
+
+def _warmed(model: ModalModel, link: LinkRecord, place: str) -> ModalModel:
+    """The model at the temperature that the scene gives, if it gives one."""
+    change = link.temperature_change
+    return model if change is None else at_temperature(model, change, f"{place}.temperature_change")
 
 
 def _within(place: str, read: Callable[[], T]) -> T:
@@ -214,14 +229,6 @@ def _within(place: str, read: Callable[[], T]) -> T:
 
 def _link(link: LinkRecord, model: ModalModel, k: int, file: str) -> Link:
     place = f"{file}: links[{k}]"
-    if model.thermal is not None and model.thermal.change and model.elastic_modes:  # until every formulation has it
-        raise SceneError(
-            Cause.BAD_FIELD,
-            "the equations of motion do not hold thermal expansion yet",
-            where=place,
-            value=f"{model.thermal.change:g} K",
-            remedy="remove temperature_change from the link description",
-        )
     if link.outboard:
         _interface(model, link.outboard, f"{place}.outboard")
     omega = 2 * np.pi * model.frequencies_hz

@@ -11,7 +11,7 @@ from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_names, check_tables, directed, not_negative
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
-from fe_import.description.check import check_damping
+from fe_import.description.check import check_damping, check_temperature
 from fe_import.files.toml import choose
 
 DIRECTIONS = ("any", "rising", "falling")  # of events
@@ -151,11 +151,13 @@ def _check_link(link: Link, place: str) -> None:
     not_negative(f"{place}.elastic_modes", link.elastic_modes or 0, "a mode count cannot be negative")
     if link.damping is not None:
         check_damping(link.damping, f"{place}.damping", SceneError)
+    if link.temperature_change is not None:
+        check_temperature(link.temperature_change, f"{place}.temperature_change", SceneError)
     if link.rigid is None:
         return
-    for name in ("elastic_modes", "damping"):
+    for name in ("elastic_modes", "damping", "temperature_change"):
         if getattr(link, name):
-            raise bad(f"{place}.{name}", "a rigid link does not vibrate", link.name, f"remove {name!r}")
+            raise bad(f"{place}.{name}", "a rigid link does not deform", link.name, f"remove {name!r}")
     not_negative(f"{place}.rigid.mass", link.rigid.mass, "a mass cannot be negative")
     if not link.rigid.points:
         remedy = "give the inboard one at least, points = { root = [0, 0, 0] }"

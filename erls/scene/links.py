@@ -78,6 +78,8 @@ class Link(Record, frozen=True):
         Where the mesh frame sits.
     damping : Damping, optional
         Instead of that of the model.
+    temperature_change : float, optional
+        Instead of that of the model [K]; it needs the expansion of its materials.
     """
 
     name: str
@@ -92,3 +94,4 @@ class Link(Record, frozen=True):
     outboard: str = ""
     mesh_pose: MeshPose = MeshPose()
     damping: Damping | None = None
+    temperature_change: float | None = None

@@ -111,18 +111,41 @@ def _check_temperature(link: LinkDescription, change: float, file: str) -> None:
     if link.frame is None:
         message = "only links made of beams expand with temperature"
         raise _fail(place, message, change, "remove it, or give the link as 'frame'")
-    if not abs(change) <= MOST_KELVIN:  # not a number fails too
-        message, remedy = "no solid is that hot", "give the change of temperature in kelvin"
-        raise _fail(place, message, change, remedy, MOST_KELVIN)
+    check_temperature(change, place)
     if link.reduction.form == "physical":
         message = "the physical form carries no thermal expansion"
         raise _fail(place, message, change, "remove it, or use form = 'orthonormal'")
     for member in link.frame.members:
         material = link.materials.get(member.material)
-        if material is not None and material.thermal_expansion is None:
-            message = "a link with a temperature change needs the expansion of its materials"
-            where = f"{file}: materials.{member.material}.thermal_expansion"
-            raise _fail(where, message, remedy="give it per kelvin, as 12e-6; 0 for what does not expand")
+        if material is not None:
+            check_expansion(material, f"{file}: materials.{member.material}.thermal_expansion")
+
+
+def check_temperature(change: float, where: str, error: type[ReportedError] = FEImportError) -> None:
+    """Refuse a change of temperature [K] that melts anything.
+
+    Raises
+    ------
+    ReportedError
+        Of class ``error``, BAD_FIELD.
+    """
+    if not abs(change) <= MOST_KELVIN:  # not a number fails too
+        message, remedy = "no solid is that hot", "give the change of temperature in kelvin"
+        raise error(Cause.BAD_FIELD, message, where=where, value=change, limit=MOST_KELVIN, remedy=remedy)
+
+
+def check_expansion(material: Material, where: str, error: type[ReportedError] = FEImportError) -> None:
+    """Refuse a material whose expansion is needed and not known; it is not taken for zero.
+
+    Raises
+    ------
+    ReportedError
+        Of class ``error``, BAD_FIELD.
+    """
+    if material.thermal_expansion is None:
+        message = "a temperature change needs the expansion of the materials"
+        remedy = "give it per kelvin, as 12e-6; 0 for what does not expand"
+        raise error(Cause.BAD_FIELD, message, where=where, remedy=remedy)
 
 
 def check_damping(d: Damping, where: str, error: type[ReportedError] = FEImportError) -> None:

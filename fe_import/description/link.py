@@ -39,7 +39,7 @@ class LinkFile:
         return digest.hexdigest()
 
 
-def load_link(path: Path | str, overrides: dict[str, Any] | None = None) -> LinkFile:
+def load_link(path: Path | str, overrides: dict[str, Any] | None = None, expands: bool = False) -> LinkFile:
     """Read and check a link description.
 
     Parameters
@@ -47,6 +47,8 @@ def load_link(path: Path | str, overrides: dict[str, Any] | None = None) -> Link
     path : Path or str
     overrides : dict, optional
         Fields of the ``reduction`` table that replace those of the file (``method``, ``elastic_modes`` ...).
+    expands : bool
+        Prepare its reduction for a temperature change, also where the file gives none.
 
     Raises
     ------
@@ -62,6 +64,8 @@ def load_link(path: Path | str, overrides: dict[str, Any] | None = None) -> Link
                 for field in set(table) - {"form"}:  # they belong to the file's method
                     del table[field]
             table.update(overrides)
+    if expands:
+        data.setdefault("temperature_change", 0.0)
     description = convert(data, LinkDescription, str(path))
     if not description.name:
         description = msgspec.structs.replace(description, name=path.name.removesuffix(".toml"))

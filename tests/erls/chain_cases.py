@@ -15,6 +15,7 @@ from erls.equations.erls.formulation import Erls
 from erls.equations.erls.pack import pack_chain
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import EFFECTS
+from fe_import.modal.thermal import ThermalExpansion
 
 INERTIAL = [name for name, effect in EFFECTS.items() if effect.in_equations]
 SINE = {"shape": "sine", "amplitude": 0.5, "frequency_hz": 1.0, "phase_deg": 30.0}
@@ -137,6 +138,16 @@ def mechanism(folder: Path, name: str, source: dict[str, str] = scenes.ARM) -> M
         data["payloads"] = [{"point": "end", "mass": 0.2, "offset": [0.02, 0.0, 0.1]}]
     found = scenes.mechanism(scenes.write_toml(folder / "case.toml", data))
     return replace(found, effects=found.effects - off)
+
+
+def warm(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with links that expand anyhow: random thermal forces, up to millimetres."""
+    rng, links = np.random.default_rng(8), []
+    for link in mechanism.links:
+        force = np.concatenate([np.zeros(6), 1e-4 * link.stiffness * rng.uniform(-1, 1, link.elastic_modes)])
+        thermal = ThermalExpansion(10.0, force, np.zeros((0, 6)), np.zeros((0, 6)))
+        links.append(replace(link, model=replace(link.model, thermal=thermal)))
+    return replace(mechanism, links=tuple(links))
 
 
 def states(chain: Erls, name: str) -> list[State]:

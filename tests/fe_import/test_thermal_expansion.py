@@ -329,7 +329,7 @@ def test_faulty_requests(tmp_path: Path, changes: dict[str, Any], place: str, sa
 
 def test_a_change_needs_a_coefficient(tmp_path: Path) -> None:
     """It is not taken for zero."""
-    with pytest.raises(FEImportError, match="needs the expansion of its materials") as caught:
+    with pytest.raises(FEImportError, match="needs the expansion of the materials") as caught:
         frame_link(tmp_path, temperature_change=CHANGE)
     assert caught.value.cause is Cause.BAD_FIELD
     assert caught.value.where.endswith("materials.m.thermal_expansion")

@@ -22,6 +22,7 @@ from erls.equations.erls.records import (
     read_link_state,
 )
 from erls.equations.erls.second_order import bend_frames, correct_twist
+from erls.equations.serial.elastic import elastic_energy
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
@@ -89,7 +90,7 @@ def add_energies(
                     moment[i] = bent.moment[i]
         out[0] += _kinetic(chain, link, state, twist) + joint.rotor * motion.coordinate[1] ** 2 / 2
         for i in range(len(modes.stiffness)):
-            out[1] += modes.stiffness[i] * y[modes.first + i] ** 2 / 2
+            out[1] += elastic_energy(modes.stiffness[i], y[modes.first + i], modes.rest[i])
         # g · place of the frame, from link to link
         height = state.other
         if link.parent < 0:

@@ -27,6 +27,7 @@ from erls.equations.erls.records import (
     read_link_state,
 )
 from erls.equations.erls.second_order import bend_frames, correct_twist, feel_curvature, set_arm
+from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.feed_forward import feed_forward
 from erls.equations.serial.joints import effort
 from erls.equations.serial.records import (
@@ -188,7 +189,8 @@ def balance(
         state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
         for i in range(len(modes.stiffness)):
             place = modes.first + i
-            out[place] = state.modal[6 + i] + modes.stiffness[i] * y[place] + modes.damping[i] * v[place]
+            held = elastic_force(modes.stiffness[i], y[place], modes.rest[i])
+            out[place] = state.modal[6 + i] + held + modes.damping[i] * v[place]
         total = push_joint(serial, chain, reals, integers, scratch, k, bends) + joint.rotor * motion.coordinate[2]
         motion.forces[1] = 0.0
         if joint.acts:

@@ -201,7 +201,7 @@ class ConstrainedFfr:
         """(n,) M a - f, without the forces of the constraints."""
         result = np.empty(self.size)
         elastic, rates, accelerations = result[self.elastic], v[self.elastic], a[self.elastic]
-        elastic[:] = self.reduced.stiffness * q.eta + self.reduced.damping * rates
+        elastic[:] = self.reduced.elastic_forces(q.eta) + self.reduced.damping * rates
         for world, move, at, data in zip(q.poses, self.twists, self.modes, self.data, strict=True):
             wrench, forces = data.forces(v[move], a[move], q.eta[at], rates[at], accelerations[at])
             weight, elastic_weight = data.weight(world[:3, :3].T @ self.mechanism.gravity, q.eta[at])
@@ -319,7 +319,7 @@ class ConstrainedFfr:
         ):
             kinetic += 0.5 * rotor * float(row @ v) ** 2
             springs += 0.5 * joint.forces.stiffness * float(angle - joint.forces.rest) ** 2
-        return Energy(kinetic, float(0.5 * self.reduced.stiffness @ q.eta**2), gravity, springs)
+        return Energy(kinetic, self.reduced.elastic_energy(q.eta), gravity, springs)
 
     def reactions(self, t: float, q: Configuration, v: Array, a: Array, multipliers: Array) -> list[Reaction]:
         """Joint reactions from multipliers, forces and rotors, at the displaced inboard nodes."""

@@ -18,6 +18,7 @@ from erls.equations.ffr.records import (
     read_node_state,
 )
 from erls.equations.ffr.segments import fill_segments
+from erls.equations.serial.elastic import elastic_energy
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
@@ -59,7 +60,7 @@ def energy(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array,
             out[0] += state.arrived[i] * (dot(own.inertia[i], state.arrived) / 2 + dot(own.coupling[i], rates))
         for i in range(len(rates)):
             out[0] += rates[i] * dot(modes.mass[i], rates) / 2
-            out[1] += modes.stiffness[i] * q[i] ** 2 / 2
+            out[1] += elastic_energy(modes.stiffness[i], q[i], modes.rest[i])
         for r in range(own.change.shape[0]):
             out[0] += dot(own.change[r], rates) * dot(own.partner[r], rates) / 2
         out[0] += joint.rotor * turning.coordinate[1] ** 2 / 2

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from erls.equations.ffr.bent import bent_forces, correct_frame, modal_forces
 from erls.equations.ffr.records import BentBody, BentState, Body, BodyState, Frames
+from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.records import Modes
 from erls.maths.jit import part, spliced
 from erls.maths.products import add_columns, add_rows, add_symmetric, clear, dot
@@ -147,7 +148,7 @@ def link_forces(
         add_rows(body.coupling, moved, 1.0, state.wrench)
     if len(forces) > 0:
         for i in range(len(forces)):
-            forces[i] = modes.stiffness[i] * q[i] + modes.damping[i] * rates[i]
+            forces[i] = elastic_force(modes.stiffness[i], q[i], modes.rest[i]) + modes.damping[i] * rates[i]
         pull = state.spare[:6]  # of the frame, less the weight
         for i in range(3):
             pull[i], pull[3 + i] = state.twist_rate[i] - state.gravity[i], state.twist_rate[3 + i]

@@ -104,7 +104,8 @@ class NodalSystem:
         self._sampled: tuple[float, Array] = (np.nan, np.zeros(0))
         self._tied: tuple[float, Nodes | None, tuple[Array, ...]] = (np.nan, None, ())
         self.start = self.at(poses, built)
-        self.model.beam_built[:] = self.start.bent  # the same to the last bit: no strain as built
+        # the same to the last bit: no strain as built, unless it expands
+        self.model.beam_built[:] = self.kinds.beams.without_force(self.start.bent)
 
     @property
     def size(self) -> int:

@@ -29,11 +29,14 @@ class Beam:
     frames : (2, 4, 4) array
         Sections at the ends as built, in the world; x runs along the beam.
     section : BeamSection
+    expansion : float
+        Axial strain without force, of temperature.
     """
 
     nodes: tuple[int, int]
     frames: Array
     section: BeamSection
+    expansion: float = 0.0
 
 
 def straight(nodes: tuple[int, int], start: Array, end: Array, section: BeamSection, up: Array) -> Beam:
@@ -81,11 +84,18 @@ class Beams:
         self.length: Array = np.linalg.norm(self.built[:, :3], axis=1)
         self.stiffness = np.array([b.section.stiffness for b in beams]).reshape(-1, 6, 6) / self.length[:, None, None]
         self.inertia = np.array([b.section.inertia for b in beams]).reshape(-1, 6, 6) * self.length[:, None, None]
+        self.expansion = np.array([b.expansion for b in beams])
         self.gravity = np.asarray(gravity, dtype=float)
 
     def strains(self, bent: Array) -> Array:
-        """(e, 6) [γ; κ] of elements with twists d (e, 6)."""
-        result: Array = (bent - self.built) / self.length[:, None]
+        """(e, 6) [γ; κ] of elements with twists d (e, 6), less their expansion."""
+        result: Array = (bent - self.without_force(self.built)) / self.length[:, None]
+        return result
+
+    def without_force(self, built: Array) -> Array:
+        """(e, 6) d₀: twists as built, lengthened by the expansion, which changes no angle."""
+        result: Array = built.copy()
+        result[:, :3] *= 1 + self.expansion[:, None]
         return result
 
     def sections_at(self, poses: Array, bent: Array, elements: IntArray, fractions: Array) -> Array:

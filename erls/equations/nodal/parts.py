@@ -19,6 +19,7 @@ from erls.maths import motion_maps as motions
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.mechanism.links import Link, link_mass_properties
+from erls.mechanism.thermal import temperature_change
 from fe_import.description.records import Frame
 from fe_import.elements.frame import FrameElement
 from fe_import.models.frame import FrameMesh
@@ -122,7 +123,11 @@ def node_at(parts: LinkParts, number: int, where: str) -> int:
 def _beams_and_bodies(
     link: Link, parts: FrameParts, places: tuple[IntArray, Array]
 ) -> tuple[list[Beam], list[RigidBody]]:
-    beams = [_beam(e, parts.frame, parts.mesh.nodes) for e in parts.mesh.elements]
+    warmer = temperature_change(link)
+    beams = [
+        replace(_beam(e, parts.frame, parts.mesh.nodes), expansion=warmer * e.thermal_expansion)
+        for e in parts.mesh.elements
+    ]
     bodies = [RigidBody(m.node, m.mass, _symmetric(m.inertia)) for m in parts.masses]
     meshed = LinkParts(parts.mesh.nodes, beams, [], *places)
     for payload in link.payloads:

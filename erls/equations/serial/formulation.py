@@ -13,10 +13,13 @@ import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import Reaction, TreeFormulation
+from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.equations.serial.singular import singular_mass
+from erls.maths.jit import plain
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.thermal import elastic_rest
 
 
 class SerialFormulation(TreeFormulation):
@@ -30,8 +33,8 @@ class SerialFormulation(TreeFormulation):
     ----------
     elastic : int
         Elastic coordinates of all links.
-    stiffness, damping : (elastic,) arrays
-        Of the elastic coordinates.
+    stiffness, damping, rest : (elastic,) arrays
+        Of the elastic coordinates; what they are without load.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -43,6 +46,7 @@ class SerialFormulation(TreeFormulation):
         self.free = np.concatenate([self.free_joints, self.joints + np.arange(self.elastic)])
         self.stiffness = np.concatenate([link.stiffness for link in mechanism.links])
         self.damping = np.concatenate([link.damping for link in mechanism.links])
+        self.rest = np.concatenate([elastic_rest(link) for link in mechanism.links])
 
     @property
     @abstractmethod
@@ -76,6 +80,14 @@ class SerialFormulation(TreeFormulation):
             system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), both[0], both[1]
         )
         return both[0], both[1]
+
+    def elastic_forces(self, q: Array) -> Array:
+        """(elastic,) what links do against elastic coordinates."""
+        return np.asarray(plain(elastic_force)(self.stiffness, q, self.rest))
+
+    def elastic_energy(self, q: Array) -> float:
+        """Of elastic coordinates [J]."""
+        return float(self.stiffness @ (q - self.rest) ** 2 / 2)
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """(n,) accelerations from the equations of motion.

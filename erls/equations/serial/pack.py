@@ -19,6 +19,7 @@ from erls.mechanism.joint_types import Freedom
 from erls.mechanism.joints import Joint as MechanismJoint
 from erls.mechanism.joints import JointForces
 from erls.mechanism.links import Link
+from erls.mechanism.thermal import elastic_rest
 
 
 def step_parts(before: Array, freedom: Freedom, after: Array) -> Array:
@@ -82,7 +83,8 @@ def joint_record(memory: Memory, joint: MechanismJoint, place: int, step: Array,
 
 def modes_record(first: int, mass: Array, link: Link, decoupled: DecoupledModes) -> Modes:
     """Elastic coordinates of a link that begin at ``first``; ``mass`` (e, e)."""
-    return Modes(first, mass, link.stiffness, link.damping, decoupled.vectors, decoupled.stiffness, decoupled.damping)
+    own = link.stiffness, link.damping, elastic_rest(link)
+    return Modes(first, mass, *own, decoupled.vectors, decoupled.stiffness, decoupled.damping)
 
 
 def put_all(memory: Memory, records: Sequence[Any]) -> int:

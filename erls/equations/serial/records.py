@@ -115,6 +115,8 @@ class Modes(NamedTuple):
     mass : (e, e) array
         M_ee [generalized].
     stiffness, damping : (e,) arrays
+    rest : (e,) array
+        Coordinates of the link without load.
     decoupled : (e, e) array
         V with Vᵀ M_ee V = 1 and Vᵀ K V diagonal, for matrices that are solved link by link.
     decoupled_stiffness, decoupled_damping : (e,) arrays
@@ -125,6 +127,7 @@ class Modes(NamedTuple):
     mass: Matrix
     stiffness: Vector
     damping: Vector
+    rest: Vector
     decoupled: Matrix
     decoupled_stiffness: Vector
     decoupled_damping: Vector

@@ -8,6 +8,7 @@ from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dyn
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
 from erls.scene.checks import bad, check_names, check_stepping, check_tables, directed, not_negative
 from erls.scene.integrators import MATRICES
+from fe_import.description.check import check_expansion, check_temperature
 from fe_import.elements.sections import check_section
 from fe_import.files.toml import choose
 
@@ -35,6 +36,9 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
     _check_properties(scene, file)
     for k, beam in enumerate(scene.beams):
         _check_beam(beam, scene, nodes, f"{file}: beams[{k}]")
+        if beam.temperature_change:
+            where = f"{file}: materials.{beam.material}.thermal_expansion"
+            check_expansion(scene.materials[beam.material], where, SceneError)
     nodes += [f"{b.name}/{k}" for b in scene.beams for k in range(1, b.elements)]
     for k, mass in enumerate(scene.masses):
         choose(mass.node, nodes, f"{file}: masses[{k}].node", SceneError)
@@ -104,6 +108,7 @@ def _check_beam(beam: Beam, scene: BodySceneRecord, nodes: list[str], place: str
     choose(beam.end, nodes, f"{place}.to", SceneError)
     choose(beam.section, scene.sections, f"{place}.section", SceneError)
     choose(beam.material, scene.materials, f"{place}.material", SceneError)
+    check_temperature(beam.temperature_change, f"{place}.temperature_change", SceneError)
     if beam.start == beam.end:
         raise bad(f"{place}.to", "a beam runs between two nodes", beam.end, "name another node")
     if not 1 <= beam.elements <= MOST_ELEMENTS:

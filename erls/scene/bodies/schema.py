@@ -76,6 +76,8 @@ class Beam(Record, frozen=True):
         unless given.
     twist_deg : float
         How far the section turns about the beam from start to end [deg].
+    temperature_change : float
+        From that of its shape without stress [K]; its material needs a ``thermal_expansion``.
     """
 
     name: str
@@ -88,6 +90,7 @@ class Beam(Record, frozen=True):
     chords: bool = False
     local_z: Vector | None = None
     twist_deg: float = 0.0
+    temperature_change: float = 0.0
 
 
 class Connection(Record, frozen=True):

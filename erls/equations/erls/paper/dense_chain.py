@@ -134,7 +134,7 @@ class DenseChain(SerialFormulation):
             springs += joint.forces.stiffness * (self.joint(k).turn[0] - joint.forces.rest) ** 2 / 2
         return Energy(
             kinetic=float(rate @ mass @ rate / 2),
-            elastic=float(self.stiffness @ place**2 / 2),
+            elastic=self.elastic_energy(place),
             gravity=float(sum(self.link(k).potential[0] for k in range(self.joints))),
             springs=float(springs),
         )

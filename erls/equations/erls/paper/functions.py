@@ -30,6 +30,7 @@ from erls.equations.erls.paper.records import (
     read_paper,
     read_row_state,
 )
+from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.feed_forward import feed_forward
 from erls.equations.serial.joints import effort, gains
 from erls.equations.serial.records import (
@@ -121,7 +122,8 @@ def residual(
         modes = read_modes(reals, integers, serial.modes + k * MODES)
         first = serial.links + modes.first - paper.free
         for i in range(len(modes.stiffness)):
-            force[first + i] += modes.stiffness[i] * c.place[first + i] + modes.damping[i] * c.rate[first + i]
+            held = elastic_force(modes.stiffness[i], c.place[first + i], modes.rest[i])
+            force[first + i] += held + modes.damping[i] * c.rate[first + i]
         for i in range(6):
             state.borne[i] = state.force[i]
     for k in range(serial.links - 1, -1, -1):

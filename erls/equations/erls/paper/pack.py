@@ -29,6 +29,7 @@ from erls.maths.se3 import inverse, twist_cross
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link
+from erls.mechanism.thermal import elastic_rest
 from fe_import.model import InterfaceNode
 
 GAUGES = ("joint-angle", "minimum-norm")
@@ -96,7 +97,8 @@ def _modes(mechanism: Mechanism, first: int) -> list[Modes]:
     result, none = [], np.zeros(0)
     for link in mechanism.links:
         mass = link.invariants.m[6:, 6:]
-        result.append(Modes(first, mass, link.stiffness, link.damping, np.zeros((0, 0)), none, none))
+        own = link.stiffness, link.damping, elastic_rest(link)
+        result.append(Modes(first, mass, *own, np.zeros((0, 0)), none, none))
         first += link.elastic_modes
     return result
 

@@ -136,7 +136,9 @@ def _elements(
         poses.append(pose(position=station[:3, 3]))
     chain.append(ends[1])
     section = _section(record, beam, file)
-    return [Beam((a, b), frames, section) for a, b, frames in zip(chain[:-1], chain[1:], found.elements, strict=True)]
+    warm = beam.temperature_change * (record.materials[beam.material].thermal_expansion or 0.0)
+    ends_of = zip(chain[:-1], chain[1:], found.elements, strict=True)
+    return [Beam((a, b), frames, section, warm) for a, b, frames in ends_of]
 
 
 def _section(record: BodySceneRecord, beam: BeamRecord, file: str) -> BeamSection:
