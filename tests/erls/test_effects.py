@@ -199,6 +199,7 @@ def test_sizes_on_the_steel_l(name: str, distance: float) -> None:
 CHANGED: dict[str, tuple[str, ...]] = {
     "gravity": ("gravity=[0.0, 0.0, 0.0]",),
     "modal_damping": ("links.b.damping.ratio=0.0",),
+    "thermal_expansion": ("links.c.temperature_change=0.0",),
     "joint_stiffness": ("joints.j1.stiffness=0.0",),
     "joint_damping": ("joints.j2.damping=0.0",),
     "joint_friction": ("joints.j3.friction.force=0.0",),
@@ -218,6 +219,8 @@ def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     data["joints"][1].update(damping=0.02, motor={"mass": 0.2})
     data["joints"][2].update(friction={"force": 0.05})
     data["links"][1]["damping"] = {"ratio": 0.02}
+    scenes.arm_link(folder, materials={"m": {"thermal_expansion": 23e-6}}, temperature_change=0.0)
+    data["links"][2]["temperature_change"] = 40.0
     return scenes.write_toml(path, data)
 
 

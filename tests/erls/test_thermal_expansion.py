@@ -257,7 +257,8 @@ def test_stiffness_acts_about_the_expanded_link(tmp_path: Path, name: str, stiff
     found = [s.residual(at.t, at.y, at.v, at.a) for s in systems]
     rest = np.concatenate([elastic_rest(link) for link in warm.links])
     stiffness = np.concatenate([link.stiffness for link in warm.links])
-    pushed = found[0] - np.concatenate([np.zeros(len(rest) * 0 + systems[0].size - len(rest)), stiffness * rest])
+    pushed = found[0].copy()
+    pushed[-len(rest) :] -= stiffness * rest
     np.testing.assert_allclose(found[1], pushed, atol=1e-12 * np.abs(pushed).max())
     np.testing.assert_array_equal(found[2], found[0])
     assert "thermal_expansion" in present(warm)
@@ -284,7 +285,7 @@ def test_substructures_expand_together(tmp_path: Path) -> None:
 
 
 def test_the_scene_sets_the_temperature(tmp_path: Path) -> None:
-    """Of a link whose materials say how they expand; kept in run files; left out by its effect; rigid links keep shape."""
+    """Where materials say how they expand; kept in run files; left out by its effect; rigid links keep their shape."""
     scenes.arm_link(tmp_path, **STRAIGHT, **COEFFICIENT, recovery={"all": True})
     path = two_arms(tmp_path, {})
     run = made(path, ("links.b.temperature_change=100",))

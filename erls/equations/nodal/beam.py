@@ -1,7 +1,8 @@
 """Beam elements: sections between two nodes, straight or curved, and their arrays.
 
 Section frames are fixed to the node frames, so that members may meet at a node under any angle; the twist d₀ from one
-end to the other follows from the frames as built. Forces are in `erls.equations.nodal.beam_forces`.
+end to the other without force follows from the frames as built, and from how far the element expands. Forces are in
+`erls.equations.nodal.beam_forces`.
 """
 
 from __future__ import annotations
@@ -80,16 +81,17 @@ class Beams:
         self.nodes: IntArray = np.array([b.nodes for b in beams], dtype=np.int64).reshape(-1, 2)
         self.frames = motions.inverse(poses[self.nodes]) @ np.array([b.frames for b in beams]).reshape(-1, 2, 4, 4)
         sections = poses[self.nodes] @ self.frames
-        self.built = motions.log(motions.inverse(sections[:, 0]) @ sections[:, 1])
-        self.length: Array = np.linalg.norm(self.built[:, :3], axis=1)
+        built = motions.log(motions.inverse(sections[:, 0]) @ sections[:, 1])
+        self.length: Array = np.linalg.norm(built[:, :3], axis=1)
+        self.expansion = np.array([b.expansion for b in beams])
+        self.built = self.without_force(built)
         self.stiffness = np.array([b.section.stiffness for b in beams]).reshape(-1, 6, 6) / self.length[:, None, None]
         self.inertia = np.array([b.section.inertia for b in beams]).reshape(-1, 6, 6) * self.length[:, None, None]
-        self.expansion = np.array([b.expansion for b in beams])
         self.gravity = np.asarray(gravity, dtype=float)
 
     def strains(self, bent: Array) -> Array:
         """(e, 6) [γ; κ] of elements with twists d (e, 6), less their expansion."""
-        result: Array = (bent - self.without_force(self.built)) / self.length[:, None]
+        result: Array = (bent - self.built) / self.length[:, None]
         return result
 
     def without_force(self, built: Array) -> Array:
