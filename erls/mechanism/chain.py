@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.maths.se3 import twist_cross, twist_transform
+from erls.maths.rotation_maps import exp, tangent, tangent_derivative
+from erls.maths.se3 import pose, twist_cross, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.effects import DEFAULT
 from erls.mechanism.joints import Joint
@@ -82,6 +83,11 @@ class Mechanism:
         return [k for k, link in enumerate(self.links) if not link.intermediate]
 
     @property
+    def rotation_vectors(self) -> tuple[int, ...]:
+        """Joints whose coordinate is the first component of a rotation vector; the next two are the others."""
+        return tuple(k for k, joint in enumerate(self.joints) if joint.freedom.vector and joint.freedom.axis == 0)
+
+    @property
     def outermost(self) -> list[int]:
         """Links that bear no other."""
         return [k for k in range(len(self.links)) if k not in self.parents]
@@ -99,54 +105,81 @@ class Kinematics:
         Twist of the link below, or of the ground, to that of the link.
     twists, biases : list of (6,) arrays
         Twist of each link, and its derivative at zero joint acceleration.
+    screws : list of (6,) arrays
+        Motion subspace of each joint, in the frame of the link that it carries.
     """
 
     poses: list[Array]
     transforms: list[Array]
     twists: list[Array]
     biases: list[Array]
+    screws: list[Array]
+
+
+def joint_poses(mechanism: Mechanism, theta: Array) -> list[Array]:
+    """(4, 4) each: what the joints move; the first of the three motions of a rotation vector turns for all."""
+    result = [joint.freedom.pose(coordinate) for joint, coordinate in zip(mechanism.joints, theta, strict=True)]
+    for k in mechanism.rotation_vectors:
+        result[k] = pose(exp(np.asarray(theta[k : k + 3])))
+    return result
 
 
 def poses(mechanism: Mechanism, theta: Array) -> list[Array]:
     """World poses of the link frames, (4, 4) each."""
     result: list[Array] = []
-    for joint, coordinate in zip(mechanism.joints, theta, strict=True):
-        step = joint.before @ joint.freedom.pose(coordinate) @ joint.after
+    for joint, moved in zip(mechanism.joints, joint_poses(mechanism, theta), strict=True):
+        step = joint.before @ moved @ joint.after
         result.append(step if joint.parent < 0 else result[joint.parent] @ step)
     return result
 
 
-def kinematics(mechanism: Mechanism, screws: list[Array], theta: Array, rates: Array) -> Kinematics:
+def _screws(mechanism: Mechanism, theta: Array, rates: Array) -> tuple[list[Array], list[Array]]:
+    """(6,) motion subspaces in the mesh frames of the links that joints carry, and what they add to accelerations."""
+    screws = [joint.screw for joint in mechanism.joints]
+    biases = [np.zeros(6) for _ in screws]
+    for k in mechanism.rotation_vectors:
+        psi, rate = np.asarray(theta[k : k + 3]), np.asarray(rates[k : k + 3])
+        columns, carry = tangent(psi), twist_transform(mechanism.joints[k + 2].after)
+        found = [np.concatenate([np.zeros(3), columns[:, i]]) for i in range(3)]
+        moved = [screw * speed for screw, speed in zip(found, rate, strict=True)]
+        change = np.concatenate([np.zeros(3), tangent_derivative(psi, rate) @ rate])
+        biases[k + 1] = twist_cross(moved[1]) @ moved[0]
+        biases[k + 2] = carry @ (twist_cross(moved[2]) @ (moved[0] + moved[1]) + change)
+        screws[k : k + 3] = [found[0], found[1], carry @ found[2]]
+    return screws, biases
+
+
+def kinematics(mechanism: Mechanism, theta: Array, rates: Array) -> Kinematics:
     """Poses, twists and bias accelerations of all links.
 
     Parameters
     ----------
     mechanism : Mechanism
-    screws : list of (6,) arrays
-        ``joint.screw`` of every joint (constant).
     theta, rates : (n,) arrays
     """
-    result = Kinematics([], [], [], [])
-    for joint, screw, coordinate, rate in zip(mechanism.joints, screws, theta, rates, strict=True):
+    screws, added = _screws(mechanism, theta, rates)
+    result = Kinematics([], [], [], [], screws)
+    moves = joint_poses(mechanism, theta)
+    for joint, screw, more, moved, rate in zip(mechanism.joints, screws, added, moves, rates, strict=True):
         world, twist, bias = np.eye(4), np.zeros(6), np.zeros(6)
         if joint.parent >= 0:
             world, twist, bias = (x[joint.parent] for x in (result.poses, result.twists, result.biases))
-        step = joint.before @ joint.freedom.pose(coordinate) @ joint.after
+        step = joint.before @ moved @ joint.after
         transform = twist_transform(step)
         twist = transform @ twist + screw * rate
         result.poses.append(world @ step)
         result.transforms.append(transform)
         result.twists.append(twist)
-        result.biases.append(transform @ bias - twist_cross(screw * rate) @ twist)
+        result.biases.append(transform @ bias - twist_cross(screw * rate) @ twist + more)
     return result
 
 
-def jacobians(mechanism: Mechanism, transforms: list[Array], screws: list[Array]) -> list[Array]:
+def jacobians(mechanism: Mechanism, found: Kinematics) -> list[Array]:
     """(6, n) Jacobian of every link's twist with respect to the joint rates."""
-    count = len(screws)
+    count = len(found.screws)
     result: list[Array] = []
     for k, joint in enumerate(mechanism.joints):
-        current = np.zeros((6, count)) if joint.parent < 0 else transforms[k] @ result[joint.parent]
-        current[:, k] = screws[k]
+        current = np.zeros((6, count)) if joint.parent < 0 else found.transforms[k] @ result[joint.parent]
+        current[:, k] = found.screws[k]
         result.append(current)
     return result

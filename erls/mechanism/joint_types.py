@@ -34,12 +34,16 @@ class Freedom:
         What tells it from the others of its joint.
     pitch : float
         Of a motion that turns: how far it goes along its axis [m/rad].
+    vector : bool
+        Whether its coordinate is that component of a rotation vector ψ, which turns by exp(ψ̃): such motions come in
+        threes, x, y and z, and none is a screw by itself.
     """
 
     axis: int
     turns: bool
     name: str = ""
     pitch: float = 0.0
+    vector: bool = False
 
     @property
     def row(self) -> int:
@@ -67,10 +71,13 @@ class Freedom:
         return ("rad", "N m") if self.turns else ("m", "N")
 
     def parts(self) -> Array:
-        """(4, 4, 4) its pose is a constant part, plus others times cosine and sine of the coordinate, and times it."""
+        """(4, 4, 4) its pose is a constant part, plus others times cosine and sine of the coordinate, and times it.
+
+        Of a component of a rotation vector it is the constant part alone.
+        """
         result = np.zeros((4, 4, 4))
         result[0], result[3, :3, 3] = np.eye(4), self.advance
-        if self.turns:
+        if self.turns and not self.vector:
             along = np.outer(self.direction, self.direction)
             result[0, :3, :3], result[1, :3, :3], result[2, :3, :3] = along, np.eye(3) - along, skew(self.direction)
         return result
@@ -152,6 +159,8 @@ class JointType(NamedTuple):
 
 
 _TURN, _SLIDE = Freedom(Z, True), Freedom(Z, False)
+_SHIFT = tuple(Freedom(axis, False, 'xyz'[axis]) for axis in (X, Y, Z))
+_VECTOR = tuple(Freedom(axis, True, f"turn_{'xyz'[axis]}", vector=True) for axis in (X, Y, Z))
 
 JOINT_TYPES: dict[str, JointType] = {
     "revolute": JointType((_TURN,), _PINNED + _PARALLEL),
@@ -163,13 +172,16 @@ JOINT_TYPES: dict[str, JointType] = {
     "planar": JointType(
         (Freedom(X, False, "x"), Freedom(Y, False, "y"), replace(_TURN, name="turn")), (_PINNED[Z], *_PARALLEL)
     ),
-    "spherical": JointType(None, _PINNED, axes=0),
+    "spherical": JointType(_VECTOR, _PINNED, axes=0),
+    "floating": JointType((*_SHIFT, *_VECTOR), (), axes=0),
     "line": JointType(None, _PINNED[:2]),  # a point on a straight line
     "fixed": JointType((), _PINNED + _STRAIGHT, axes=0),
 }
 """The axis of all but the universal joint is z; its own are the inner frame's x and the outer frame's y."""
 
 CHAIN_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.freedoms is not None)
+HOLDING_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.conditions)
+"""Those of chains, and those of loops and of nodes."""
 
 
 REVOLUTE, PRISMATIC = _TURN, _SLIDE

@@ -36,6 +36,9 @@ def turning_signs(mechanism: Mechanism, loop: Loop) -> tuple[Array, bool]:
         joint = mechanism.joints[k]
         if not joint.freedom.turns:
             continue
+        if joint.freedom.vector:
+            complete = False
+            continue
         along = float((frames[k] @ inverse(joint.after))[:3, joint.freedom.axis] @ axis)
         if abs(abs(along) - 1) < _PARALLEL:
             signs[k] = np.sign(along) * (1.0 if k in _below(mechanism, outer) else -1.0)

@@ -17,7 +17,7 @@ from msgspec import inspect as schema
 
 from erls.equations.registry import FORMULATIONS
 from erls.mechanism.dh import CONVENTIONS
-from erls.mechanism.joint_types import CHAIN_TYPES, JOINT_TYPES
+from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES
 from erls.scene import chain, check, check_settings, joints, links
 from erls.scene.bodies import analyses
 from erls.scene.bodies.schema import BodySceneRecord, Connection
@@ -45,11 +45,11 @@ OPTIONS: dict[tuple[Record, str], Collection[str]] = {
     (Simulation, "integrator"): INTEGRATORS,
     (joints.DH, "convention"): CONVENTIONS,
     (joints.Joint, "type"): CHAIN_TYPES,
-    (joints.Loop, "type"): JOINT_TYPES,
+    (joints.Loop, "type"): HOLDING_TYPES,
     (links.MeshPose, "frame"): check.FRAMES,
     (chain.Initial, "deformation"): check.DEFORMATIONS,
     (chain.Event, "direction"): check.DIRECTIONS,
-    (Connection, "type"): JOINT_TYPES,
+    (Connection, "type"): HOLDING_TYPES,
     (analyses.Dynamics, "group"): analyses.GROUPS,
     (analyses.Dynamics, "iteration_matrix"): MATRICES,
     (analyses.StaticSteps, "tangent"): analyses.TANGENTS,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from erls.errors import SceneError
 from erls.mechanism.dh import CONVENTIONS
-from erls.mechanism.joint_types import CHAIN_TYPES, JOINT_TYPES
+from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, SceneRecord
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_names, check_tables, directed, not_negative
-from erls.scene.joints import Joint, Loop
+from erls.scene.joints import Coordinate, Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping, check_temperature
 from fe_import.files.toml import choose
@@ -111,6 +111,7 @@ def _check_coordinates(joint: Joint, place: str) -> None:
             message = f"a {joint.type} joint has no coordinates with names"
             raise bad(f"{place}.coordinates", message, name, "remove it")
         choose(name, known, f"{place}.coordinates", SceneError)
+        _check_component(joint, name, f"{place}.coordinates.{name}")
     if JOINT_TYPES[joint.type].one is not None:
         return
     plain = type(joint)(name=joint.name, dh=joint.dh)
@@ -122,6 +123,16 @@ def _check_coordinates(joint: Joint, place: str) -> None:
         if given != getattr(plain, field, None):
             message = f"a {joint.type} joint has no single coordinate that this could act along"
             raise bad(f"{place}.{field}", message, joint.type, remedy)
+
+
+def _check_component(joint: Joint, name: str, place: str) -> None:
+    """Nothing acts along a component of a rotation vector, which is the turn about no axis."""
+    if not any(freedom.name == name and freedom.vector for freedom in JOINT_TYPES[joint.type].freedoms or ()):
+        return
+    for field in (*_ACTING[2:], "motor"):
+        if getattr(joint.coordinates[name], field) != getattr(Coordinate(), field):
+            message = "nothing acts along a component of a rotation vector, which turns about no axis of its own"
+            raise bad(f"{place}.{field}", message, name, "use joints of one turn each, or take it out")
 
 
 def _check_event(event: Event, scene: SceneRecord, place: str) -> None:
@@ -197,7 +208,7 @@ def _check_bandwidth(scene: SceneRecord, place: str) -> None:
 
 def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
     links = [link.name for link in scene.links]
-    choose(loop.type, JOINT_TYPES, f"{place}.type", SceneError)
+    choose(loop.type, HOLDING_TYPES, f"{place}.type", SceneError)
     choose(loop.link, links, f"{place}.link", SceneError)
     if loop.to_link:
         choose(loop.to_link, links, f"{place}.to_link", SceneError)

@@ -165,7 +165,8 @@ class Joint(Acting, frozen=True):
     type : str
         What it leaves free: ``revolute`` turns about z, ``prismatic`` slides along z, ``cylindrical`` both (``slide``,
         ``turn``), ``universal`` turns about x and then about its new y (``x``, ``y``), ``planar`` slides along x and y
-        and turns about z (``x``, ``y``, ``turn``), ``fixed`` holds.
+        and turns about z (``x``, ``y``, ``turn``), ``spherical`` turns by a rotation vector (``turn_x``, ``turn_y``,
+        ``turn_z``), ``floating`` does all (``x``, ``y``, ``z``, then that vector), ``fixed`` holds.
     coordinates : dict of Coordinate
         What acts along each coordinate of a joint that has several, by the names above; reports call them
         ``joint/coordinate``. A joint of one coordinate has these fields itself.

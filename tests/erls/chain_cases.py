@@ -93,6 +93,15 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
         set(),
         True,
     ),
+    "rotation vectors": (
+        [
+            _joint("a", "floating", 25.0, coordinates={"x": SPRING}),
+            _joint("b", alpha=-15.0, drive={**PD, "feed_forward": True}),
+            _joint("c", "spherical", 15.0),
+        ],
+        set(),
+        True,
+    ),
     **{
         f"without {name}": ([_joint("a", alpha=35.0), _joint("b", **_driven(SINE)), _joint("c")], {name}, True)
         for name in INERTIAL
@@ -101,7 +110,8 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
     "no effects": ([_joint("a", alpha=35.0), _joint("b")], set(INERTIAL), True),
 }
 
-SERIAL = [name for name in CASES if name not in ("branches", "joints of several coordinates")]
+NOT_SERIAL = ("branches", "joints of several coordinates", "rotation vectors")
+SERIAL = [name for name in CASES if name not in NOT_SERIAL]
 """Chains of joints of one coordinate in which every link stands on the one before."""
 
 

@@ -14,11 +14,11 @@ from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.pack import pack_frames
 from erls.mechanism.chain import Mechanism
 
-NOT_SERIAL = ("joints of several coordinates", "branches")
-ON_MEAN_AXES = (*NOT_SERIAL, "one link, payload, spring", "parallel axes with a slide", "axes that part", "controllers")
+SOME = ("one link, payload, spring", "parallel axes with a slide", "axes that part", "controllers")
+ON_MEAN_AXES = (*chain_cases.NOT_SERIAL, *SOME)
 PARTLY_RIGID = {"rigid in the middle": (1,), "rigid at the ends": (0, 2), "all rigid": (0, 1, 2)}
 FEW = ("one link, payload, spring", "axes that part", "prescribed in the middle", "no effects")
-STIFFENED = (*NOT_SERIAL, *FEW, *PARTLY_RIGID)
+STIFFENED = (*chain_cases.NOT_SERIAL, *FEW, *PARTLY_RIGID)
 CASES = [
     *(f"tangent: {name}" for name in (*chain_cases.CASES, *PARTLY_RIGID)),
     *(f"mean-axis: {name}" for name in (*ON_MEAN_AXES, *PARTLY_RIGID)),

@@ -16,7 +16,7 @@ from erls.equations.loops.rows import LoopRows
 from erls.errors import Cause, SimulationError
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, fixed_axes, skew
-from erls.mechanism.joint_types import JOINT_TYPES
+from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES
 from erls.mechanism.links import link_mass_properties
 from erls.mechanism.loops import Loop, LoopEnd
 from erls.run.link_loads import link_loads
@@ -74,7 +74,7 @@ def test_frames_sit_where_runs_draw_the_nodes(tmp_path: Path, name: str) -> None
         assert distance < float(phi @ phi) * float(np.linalg.norm(OFFSET[:3, 3])) + 1e-14
 
 
-@pytest.mark.parametrize("kind", JOINT_TYPES)
+@pytest.mark.parametrize("kind", HOLDING_TYPES)
 def test_conditions_against_differences(tmp_path: Path, kind: str) -> None:
     """Φ̇ and Φ̈ of each kind of closing joint, between two links and to the ground; names for every row. 1e-6."""
     tree = loop_scenes.tree(scenes.mechanism(scenes.three_links(tmp_path, "mixed")), "ffr")

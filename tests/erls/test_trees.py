@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import chain_cases
 import numpy as np
 import pytest
 import scenes
 
 from erls.equations.ffr.formulation import Ffr
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import DEFAULT
+from erls.mechanism.drives import Drive
+from erls.mechanism.joints import JointForces
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 from erls.mechanism.without_effects import with_rigid
 
-STIFFENED = ",".join(sorted(DEFAULT | {"geometric_stiffening", "foreshortening"}))
 ARM = {**scenes.ARM, "mesh_pose": {"frame": "joint"}}
 BODY = {
     "mass": 2.0,
@@ -94,3 +96,15 @@ def test_rigid_tree(tmp_path: Path, formulation: str) -> None:
     y, v, a = _state(mechanism, equations.size)
     expected = inverse_dynamics(mechanism, y, v, a)
     np.testing.assert_allclose(equations.residual(0.0, y, v, a), expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_rotation_vectors(tmp_path: Path) -> None:
+    """Rigid links on floating and spherical joints against the recursive Newton-Euler method: 1e-12 of the largest."""
+    mechanism = _rigid(chain_cases.mechanism(tmp_path, "rotation vectors"))
+    free = [replace(joint, drive=Drive(), forces=JointForces(), rotor_inertia=0.0) for joint in mechanism.joints]
+    mechanism = replace(mechanism, joints=tuple(free))
+    y, v, a = _state(mechanism, len(free))
+    expected = inverse_dynamics(mechanism, y, v, a)
+    for equations in (scenes.erls(mechanism), Ffr(mechanism)):
+        found = equations.residual(0.0, y, v, a)
+        np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())

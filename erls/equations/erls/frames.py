@@ -16,6 +16,7 @@ from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
     MODES,
+    JointState,
     Serial,
     read_joint,
     read_joint_state,
@@ -49,7 +50,7 @@ def place_frames(
         first = read_modes(reals, integers, serial.modes + k * MODES).first
         link = read_link(reals, integers, chain.links + k * LINK)
         state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
-        move_joint(joint, motion, reals, integers, t, y, v, a)
+        move_joint(serial, k, joint, motion, reals, integers, scratch, t, y, v, a)
         u, q = state.u, state.q
         for i in range(6, len(q)):
             q[i] = y[first + i - 6]
@@ -70,19 +71,18 @@ def move_frames(
     """Twists and displacement rates of all link frames, at accelerations ``a``, or at zero ones where it is empty."""
     place_frames(serial, chain, reals, integers, scratch, t, y, v, a)
     for k in range(serial.links):
-        screw = read_joint(reals, integers, serial.joints + k * JOINT).screw
         motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
         first = read_modes(reals, integers, serial.modes + k * MODES).first
         link = read_link(reals, integers, chain.links + k * LINK)
         state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
-        rate, acceleration, pose = motion.coordinate[1], motion.coordinate[2], motion.pose
+        pose = motion.pose
         qd, qdd = state.q_rate, state.q_acceleration
         for i in range(6, len(qd)):
             qd[i] = v[first + i - 6]
             qdd[i] = a[first + i - 6] if len(a) else 0.0
         if link.parent < 0:
             for i in range(6):
-                state.twist[i], state.twist_rate[i] = screw[i] * rate, screw[i] * acceleration
+                state.twist[i], state.twist_rate[i] = motion.twist[i], motion.twist_rate[i]
             clear(state.u_rate)
             clear(state.u_acceleration)
             rotate_back(pose, serial.gravity, state.down)
@@ -91,25 +91,24 @@ def move_frames(
             transform_motion(pose, before.twist, state.twist)
             transform_motion(pose, before.twist_rate, state.twist_rate)
             for i in range(6):
-                state.twist[i] += screw[i] * rate
-                state.twist_rate[i] += screw[i] * acceleration
-            add_motion_cross(screw, state.twist, -rate, state.twist_rate)
+                state.twist[i] += motion.twist[i]
+                state.twist_rate[i] += motion.twist_rate[i]
+            add_motion_cross(motion.twist, state.twist, -1.0, state.twist_rate)
             _interface(pose, before.u_rate, link.out, before.q_rate[6:], state.u_rate)
             if len(a):
                 _interface(pose, before.u_acceleration, link.out, before.q_acceleration[6:], state.u_acceleration)
             else:
                 transform_motion(pose, before.u_acceleration, state.u_acceleration)
-            turn_along(state.u, state.u_rate, state.u_acceleration, screw, rate, acceleration)
+            turn_along(state.u, state.u_rate, state.u_acceleration, motion)
             rotate_back(pose, before.down, state.down)
         for i in range(6):
             qd[i], qdd[i] = state.u_rate[i], state.u_acceleration[i]
 
 
 @part
-def turn_along(x: Array, x_rate: Array, x_acceleration: Array, screw: Array, rate: float, acceleration: float) -> None:
+def turn_along(x: Array, x_rate: Array, x_acceleration: Array, motion: JointState) -> None:
     """Derivatives of T(θ) x that change with the joint, added to those of x alone."""
-    add_motion_cross(screw, x_rate, -rate, x_acceleration)
-    add_motion_cross(screw, x, -rate, x_rate)
-    add_motion_cross(screw, x_rate, -rate, x_acceleration)
-    add_motion_cross(screw, x, -acceleration, x_acceleration)
-
+    add_motion_cross(motion.twist, x_rate, -1.0, x_acceleration)
+    add_motion_cross(motion.twist, x, -1.0, x_rate)
+    add_motion_cross(motion.twist, x_rate, -1.0, x_acceleration)
+    add_motion_cross(motion.twist_rate, x, -1.0, x_acceleration)

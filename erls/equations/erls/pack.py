@@ -34,7 +34,9 @@ def rotation_axes(joints: Sequence[Joint]) -> list[Array]:
     result: list[Array] = []
     for joint in joints:
         axes = result[joint.parent] if joint.parent >= 0 else np.zeros((0, 3))
-        if joint.freedom.turns:
+        if joint.freedom.vector:
+            axes = np.eye(3)
+        elif joint.freedom.turns:
             along = joint.before[:3, joint.freedom.axis]
             if len(axes) == 1 and np.linalg.norm(np.cross(axes[0], along)) > _PARALLEL:
                 axes = np.eye(3)

@@ -109,21 +109,20 @@ def push_joint(
     serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int, bends: Any
 ) -> Any:
     """Force along a joint by those on its link and on all that it bears, before `hand_back`."""
-    joint = read_joint(reals, integers, serial.joints + k * JOINT)
+    motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
     state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
-    total = dot6(joint.screw, state.wrench)
+    total = dot6(motion.screw, state.wrench)
     if read_link(reals, integers, chain.links + k * LINK).parent < 0:
         return total
     # the joint turns the displacement along: u̇ holds -ad(S θ̇) u
     clear(state.point)
-    add_motion_cross(state.u, joint.screw, 1.0, state.point)
+    add_motion_cross(state.u, motion.screw, 1.0, state.point)
     if bends is not None:
-        coordinate = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).coordinate
         bend = read_bend(reals, integers, chain.bends + k * BEND)
         bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
         if bend.armed:
-            _turn_arm_back(bend, state, bent, coordinate[0])
-        total += _push_along(bend, state, bent, joint.screw)
+            _turn_arm_back(bend, state, bent, motion.coordinate[0])
+        total += _push_along(bend, state, bent, motion.screw)
     return total + dot6(state.point, state.force)
 
 

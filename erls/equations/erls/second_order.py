@@ -40,7 +40,7 @@ from erls.equations.erls.records import (
     read_link,
     read_link_state,
 )
-from erls.equations.serial.records import JOINT, JOINT_STATE, Serial, read_joint, read_joint_state
+from erls.equations.serial.records import JOINT_STATE, Serial, read_joint_state
 from erls.maths.jit import inlined, part, reordered
 from erls.maths.products import add_rows, clear, dot
 from erls.maths.so3 import Array
@@ -85,11 +85,9 @@ def bend_frames(serial: Serial, chain: Chain, reals: Array, integers: IntArray, 
             for i in range(6):
                 bent.carried[i] = bent.e[i]
             if moving:
-                screw = read_joint(reals, integers, serial.joints + k * JOINT).screw
                 transform_motion(motion.pose, bent.e_rate, bent.e_rate)
                 transform_motion(motion.pose, bent.e_acceleration, bent.e_acceleration)
-                rate, acceleration = motion.coordinate[1], motion.coordinate[2]
-                turn_along(bent.e, bent.e_rate, bent.e_acceleration, screw, rate, acceleration)
+                turn_along(bent.e, bent.e_rate, bent.e_acceleration, motion)
             if bend.armed:
                 _turn_arm(bend, state, bent, motion.coordinate, moving)
         for i in range(6):

@@ -32,11 +32,9 @@ from erls.equations.erls.records import (
 )
 from erls.equations.erls.second_order import bend_frames, curve_inertia, set_arm
 from erls.equations.serial.records import (
-    JOINT,
     JOINT_STATE,
     MODES,
     Serial,
-    read_joint,
     read_joint_state,
     read_modes,
     read_serial,
@@ -311,7 +309,6 @@ def set_segments(
         state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
         own = read_segment(scratch, integers, chain.segments + k * SEGMENT)
         motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
-        joint = read_joint(reals, integers, serial.joints + k * JOINT)
         decoupled = read_modes(reals, integers, serial.modes + k * MODES).decoupled
         deform(chain, link, state)
         axes = link.axes
@@ -326,7 +323,7 @@ def set_segments(
                 _linear_inertia(chain, link, state, own, decoupled, turns)
         else:
             _linear_inertia(chain, link, state, own, decoupled, turns)
-        _subspace(joint.screw, axes, link.parent >= 0, state, own)
+        _subspace(motion.screw, axes, link.parent >= 0, state, own)
         if link.parent >= 0:
             axes_before = read_link(reals, integers, chain.links + link.parent * LINK).axes
             if bends is not None:
@@ -337,7 +334,7 @@ def set_segments(
                 bend = read_bend(reals, integers, chain.bends + k * BEND)
                 bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
                 before = read_modes(reals, integers, serial.modes + link.parent * MODES).decoupled
-                _turn_along(bend, state, bent, joint.screw, own)
+                _turn_along(bend, state, bent, motion.screw, own)
                 if bend.bows:
                     _bow(motion.pose, bent, state, own, before, turns)
                 if bend.armed:

@@ -31,6 +31,7 @@ from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
     MODES,
+    JointState,
     Serial,
     read_joint,
     read_joint_state,
@@ -52,7 +53,7 @@ def place_frames(
     for k in range(serial.links):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         moved = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
-        move_joint(joint, moved, reals, integers, t, y, v, a)
+        move_joint(serial, k, joint, moved, reals, integers, scratch, t, y, v, a)
         if read_body(reals, integers, frames.bodies + k * BODY).bent:
             modes = read_modes(reals, integers, serial.modes + k * MODES)
             bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
@@ -83,7 +84,6 @@ def move_frames(
     for k in range(serial.links):
         body = read_body(reals, integers, frames.bodies + k * BODY)
         state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
-        joint = read_joint(reals, integers, serial.joints + k * JOINT)
         moved = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
         base = read_node(reals, integers, frames.nodes + 2 * k * NODE)
         base_state = read_node_state(scratch, integers, frames.node_states + 2 * k * NODE_STATE)
@@ -104,19 +104,18 @@ def move_frames(
             transform_motion(moved.pose, state.twist, state.twist)
             transform_motion(moved.pose, state.twist_rate, state.twist_rate)
             rotate_back(moved.pose, state.gravity, state.gravity)
-        _turn_joint(joint.screw, moved.coordinate, state.twist, state.twist_rate, state.arrived)
+        _turn_joint(moved, state.twist, state.twist_rate, state.arrived)
         if inner.moves:
             _arrive(inner_state, state)
 
 
 @part
-def _turn_joint(screw: Array, coordinate: Array, twist: Array, rate: Array, arrived: Array) -> None:
+def _turn_joint(moved: JointState, twist: Array, rate: Array, arrived: Array) -> None:
     """Over a joint: ν + S θ̇, and its rate."""
-    speed, acceleration = coordinate[1], coordinate[2]
-    add_motion_cross(twist, screw, speed, rate)
+    add_motion_cross(twist, moved.twist, 1.0, rate)
     for i in range(6):
-        twist[i] += screw[i] * speed
-        rate[i] += screw[i] * acceleration
+        twist[i] += moved.twist[i]
+        rate[i] += moved.twist_rate[i]
         arrived[i] = twist[i]
 
 

@@ -124,7 +124,8 @@ def _axes(given: Given, k: int) -> Array:
     axes, or with a corrected twist all three.
     """
     joint = given.mechanism.joints[k]
-    if given.every_axis or given.parents[k] >= 0 or given.bent(k) or (given.floats and given.data[k].size):
+    floats = given.floats and given.data[k].size
+    if joint.freedom.vector or given.every_axis or given.parents[k] >= 0 or given.bent(k) or floats:
         return np.eye(3)
     return joint.screw[None, 3:] if joint.freedom.turns else np.zeros((0, 3))
 

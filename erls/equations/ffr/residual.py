@@ -93,7 +93,7 @@ def residual(
         forces[1] = 0.0
         if joint.acts:
             forces[1] = effort(joint, reals, integers, t, turning[0], turning[1], moved.feed[0])
-        forces[0] = dot6(joint.screw, borne) + joint.rotor * turning[2] - forces[1]
+        forces[0] = dot6(moved.screw, borne) + joint.rotor * turning[2] - forces[1]
         if joint.place >= 0:
             out[joint.place] = forces[0]
         if body.parent >= 0:

@@ -37,11 +37,9 @@ from erls.equations.ffr.records import (
     read_node_state,
 )
 from erls.equations.serial.records import (
-    JOINT,
     JOINT_STATE,
     MODES,
     Serial,
-    read_joint,
     read_joint_state,
     read_modes,
 )
@@ -103,8 +101,8 @@ def _reach(
     integers: IntArray, scratch: Array,
 ) -> None:  # fmt: skip
     """L, N and S."""
-    joint = read_joint(reals, integers, serial.joints + k * JOINT)
-    pose = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose
+    joint = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
+    pose = joint.pose
     for i in range(6):
         own.subspace[i] = joint.screw[i]
     if parent < 0:

@@ -49,6 +49,7 @@ def force_record(
     gain, rate_gain = drive.gains
     return Joint(
         place=-1,
+        component=-1,
         motion=put_curve(memory, motion),
         load=put_curve(memory, drive.load),
         feeds=0,
@@ -73,6 +74,7 @@ def joint_record(memory: Memory, joint: MechanismJoint, place: int, step: Array,
     drive = joint.drive
     return force_record(memory, joint.forces, drive, joint.rotor_inertia, drive.motion)._replace(
         place=place,
+        component=joint.freedom.axis if joint.freedom.vector else -1,
         feeds=int(drive.feed_forward),
         acts=int(joint_acts(joint)),
         held=joint.position,
@@ -95,7 +97,9 @@ def put_all(memory: Memory, records: Sequence[Any]) -> int:
 
 def joint_states(scratch: Memory, count: int) -> int:
     """Memory for the motion of joints."""
-    return put_all(scratch, [JointState(np.zeros(3), np.zeros(12), np.zeros(1), np.zeros(2)) for _ in range(count)])
+    sizes = {"coordinate": 3, "pose": 12, "screw": 6, "twist": 6, "twist_rate": 6, "feed": 1, "forces": 2}
+    room = JointState(**{name: np.zeros(size) for name, size in sizes.items()})
+    return put_all(scratch, [room] * count)
 
 
 def rigid_links(mechanism: Mechanism, constants: Memory, scratch: Memory) -> tuple[int, int]:

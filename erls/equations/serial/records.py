@@ -46,6 +46,8 @@ class Joint(NamedTuple):
     ----------
     place : int
         Of its coordinate among the independent ones; -1 where it is prescribed.
+    component : int
+        Of a rotation vector: 0, 1, 2; -1 for a motion of its own.
     motion, load : int
         Places of the curves of the prescribed or wanted coordinate and of the given force; -1 without.
     feeds, acts : int
@@ -62,10 +64,11 @@ class Joint(NamedTuple):
         Pose of the frame behind the joint in the frame before it: constant part, those with cosine and sine of the
         coordinate, and that with the coordinate itself.
     screw : (6,) array
-        Motion subspace S: twist of unit rate, in the frame behind the joint.
+        Motion subspace S: twist of unit rate, in the frame behind the joint; where it is constant.
     """
 
     place: int
+    component: int
     motion: int
     load: int
     feeds: int
@@ -93,6 +96,10 @@ class JointState(NamedTuple):
         θ, θ̇, θ̈.
     pose : (12,) array
         Of the frame behind the joint in that before it, see `erls.maths.spatial`.
+    screw : (6,) array
+        S, in the frame behind the joint.
+    twist, twist_rate : (6,) arrays
+        S θ̇, and its derivative there.
     feed : (1,) array
         Force that feeds forward.
     forces : (2,) array
@@ -101,6 +108,9 @@ class JointState(NamedTuple):
 
     coordinate: Vector
     pose: Vector
+    screw: Vector
+    twist: Vector
+    twist_rate: Vector
     feed: Vector
     forces: Vector
 

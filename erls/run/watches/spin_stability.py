@@ -84,7 +84,6 @@ def spin_warnings(mechanism: Mechanism, motion: Iterable[tuple[float, Array, Arr
         for k, link in enumerate(mechanism.links)
         if link.elastic_modes and not (stiffened and link.second_order is not None)
     }
-    screws = [joint.screw for joint in mechanism.joints]
     bounds = {k: float(np.linalg.eigvalsh(np.einsum("aaij->ij", parts))[-1]) for k, parts in softened.items()}
     worst: dict[int, tuple[float, float]] = {}  # largest share lost, and its speed
     lost: dict[int, tuple[float, float]] = {}  # time and speed at which all of it is
@@ -95,7 +94,7 @@ def spin_warnings(mechanism: Mechanism, motion: Iterable[tuple[float, Array, Arr
             bound = np.abs(rates[turning]).sum() ** 2 * largest
         if not _NOTABLE < bound < np.inf:
             continue
-        twists = kinematics(mechanism, screws, theta, rates).twists
+        twists = kinematics(mechanism, theta, rates).twists
         for k, parts in softened.items():
             omega = twists[k][3:]
             if omega @ omega * bounds[k] <= _NOTABLE:  # about any axis

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.errors import SceneError
-from erls.mechanism.joint_types import JOINT_TYPES
+from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
 from erls.scene.checks import bad, check_names, check_stepping, check_tables, directed, not_negative
@@ -119,7 +119,7 @@ def _check_beam(beam: Beam, scene: BodySceneRecord, nodes: list[str], place: str
 
 
 def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
-    choose(joint.type, JOINT_TYPES, f"{place}.type", SceneError)
+    choose(joint.type, HOLDING_TYPES, f"{place}.type", SceneError)
     choose(joint.node, nodes, f"{place}.node", SceneError)
     choose(joint.to, [GROUND, *nodes], f"{place}.to", SceneError)
     if joint.node == joint.to:

@@ -41,9 +41,8 @@ def displaced_frames(chain: Chain, t: float, y: Array, v: Array, ends: Sequence[
             theta[k], rates[k], driven[k] = joint.drive.reference(t)  # type: ignore[misc]
     places = chain.compatibility.layout
     q, qd, d, g, n = chain.compatibility.acceleration(theta, rates, y[f:], v[f:])
-    screws = [joint.screw for joint in mechanism.joints]
-    rigid = kinematics(mechanism, screws, theta, rates)
-    turning = jacobians(mechanism, rigid.transforms, screws)
+    rigid = kinematics(mechanism, theta, rates)
+    turning = jacobians(mechanism, rigid)
     bias = chain.compatibility.stack(g @ driven + n, np.zeros(elastic))
     result: list[FrameMotion] = []
     for k, node, offset in ((int(end.link or 0), end.node, end.frame) for end in ends):

@@ -127,7 +127,7 @@ def move(
     for k in range(links):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         state = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
-        move_joint(joint, state, reals, integers, t, y, v, a)
+        move_joint(serial, k, joint, state, reals, integers, scratch, t, y, v, a)
         c.place[k], c.rate[k], c.acceleration[k] = state.coordinate[0], state.coordinate[1], state.coordinate[2]
     for i in range(paper.elastic):
         at = paper.free + i
