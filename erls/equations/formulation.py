@@ -80,6 +80,17 @@ class State:
     nodes: list[Array] | None = None
 
 
+@dataclass(frozen=True)
+class LoopForce:
+    """What a closing joint does to its outer link: force [N] and moment [N m] about the outer frame, and the place of
+    that frame's origin [m]; world axes.
+    """
+
+    force: Array
+    moment: Array
+    place: Array
+
+
 class Formulation(Protocol):
     """Equations of motion of a mechanism with what is asked of its states."""
 
@@ -106,6 +117,23 @@ class Formulation(Protocol):
 
     def describe(self) -> dict[str, Any]:
         """Names and sizes for reports."""
+
+
+class LoopFormulation(Formulation, Protocol):
+    """A formulation of a mechanism with loops; they go by their numbers."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know about the loops."""
+
+    def loop_forces(self, t: float, y: Array, v: Array) -> list[LoopForce]:
+        """What every closing joint does to its link."""
+
+    def loop_motion(self, t: float, y: Array, v: Array, loop: int) -> tuple[float, float]:
+        """Coordinate of a revolute or prismatic closing joint, and its rate."""
+
+    def loop_effort(self, t: float, y: Array, v: Array, loop: int) -> float:
+        """Force of drive, spring, damper and friction along it; for a prescribed motion what its motor must give."""
 
 
 @runtime_checkable

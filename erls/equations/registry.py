@@ -12,9 +12,11 @@ from typing import NamedTuple
 
 from erls.equations.formulation import Formulation, TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.loops.start import ClosedStart, closed_start
 from erls.equations.substructures import Substructured
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split, split
+from erls.mechanism.without_effects import with_rigid
 from erls.scene.settings import Simulation
 
 
@@ -37,7 +39,15 @@ def _ffr(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
 def _nodal(mechanism: Mechanism, settings: Simulation) -> Formulation:
     from erls.equations.nodal.equations import Nodal
 
-    return Nodal(mechanism, settings.elements_per_member)
+    return Nodal(mechanism, settings.elements_per_member, _closed_start(mechanism) if mechanism.loops else None)
+
+
+def _closed_start(mechanism: Mechanism) -> ClosedStart:
+    """Of the same mechanism with rigid links."""
+    from erls.equations.erls.formulation import Erls
+
+    rigid = with_rigid(mechanism, {link.name for link in mechanism.links})
+    return closed_start(ClosedChain(Erls(rigid)))
 
 
 TREES: dict[str, Callable[[Mechanism, Simulation], TreeFormulation]] = {

@@ -38,8 +38,10 @@ def _nodal(mechanism: Mechanism, settings: Simulation) -> Integrate:
 
 
 def _compile_nodal(system: Any, settings: Simulation) -> None:
-    for name in ("matrix", "step"):
-        import_module(f"erls.equations.nodal.{name}")
+    loop = "erls.integrate.stepping.generalized_alpha"
+    with compiling_beside(loop):
+        import_module("erls.equations.nodal.compiled")
+    import_module(loop)
 
 
 def _pieces(mechanism: Mechanism, settings: Simulation) -> Integrate:

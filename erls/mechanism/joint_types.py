@@ -152,6 +152,13 @@ class JointType(NamedTuple):
         return sum(bool(condition.line.any()) for condition in self.conditions) < 3
 
     @property
+    def mutual(self) -> bool:
+        """Whether the conditions say the same when both frames change places: what slides does so along axes that stay
+        parallel. Those of a universal joint then change theirs, too.
+        """
+        return not self.slides or bool(self.aligned)
+
+    @property
     def aligned(self) -> tuple[int, ...]:
         """Axes of the frames that point the same way: where they point opposite ways, the conditions hold as well."""
         turning = sum(bool(condition.entries.any()) for condition in self.conditions)

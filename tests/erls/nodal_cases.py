@@ -66,7 +66,7 @@ def evaluate(known: NodalSystem) -> dict[str, Array]:
     """By the functions of `erls.equations.stepped` at `state`: residual with violations and norms (n + m + 2,), metres
     per unit of conditions, and the unknowns for `right` with the factored iteration matrix.
     """
-    from erls.equations.nodal.step import stepped
+    from erls.equations.nodal.compiled import stepped
 
     steps = stepped(known)
     constants, n, m = (steps.reals, steps.integers), known.size, known.constraints

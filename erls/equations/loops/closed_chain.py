@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.linalg as la
 
-from erls.equations.formulation import Energy, Reaction, State, TreeFormulation
+from erls.equations.formulation import Energy, LoopForce, Reaction, State, TreeFormulation
 from erls.equations.loops.efforts import ActuatedTree, LoopEfforts
-from erls.equations.loops.failures import comes_apart, locks
-from erls.equations.loops.rows import Closure, LoopForce, LoopRows, about, applied
+from erls.equations.loops.failures import comes_apart, locks, warnings_of
+from erls.equations.loops.rows import Closure, LoopRows, about, applied
 from erls.equations.loops.start import Start, find_start, start_velocity
 from erls.equations.loops.static import closed_equilibrium
 from erls.equations.system import metre_scales
@@ -103,12 +103,7 @@ class ClosedChain:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know about the loops."""
-        if not self.redundant:
-            return ()
-        return (
-            f"{len(self.redundant)} conditions of the loops follow from the others and are left out: "
-            f"{'; '.join(self.redundant)}; of the forces that they could carry the smallest are taken",
-        )
+        return warnings_of(self.redundant)
 
     def closure(self, t: float, y: Array, v: Array) -> Closure:
         """Conditions of the loops at a state."""

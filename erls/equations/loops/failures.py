@@ -30,3 +30,13 @@ def locks(t: float, loop: str, value: float, start: float) -> SimulationError:
         limit=f"{start:.3g} at the start",
         remedy="keep the drive within what the lengths of the links allow, or end the run before",
     )
+
+
+def warnings_of(redundant: tuple[str, ...]) -> tuple[str, ...]:
+    """What the user should know about conditions that are left out."""
+    if not redundant:
+        return ()
+    return (
+        f"{len(redundant)} conditions of the loops follow from the others and are left out: {'; '.join(redundant)}; "
+        "of the forces that they could carry the smallest are taken",
+    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.equations.formulation import TreeFormulation
+from erls.equations.formulation import LoopForce, TreeFormulation
 from erls.equations.serial.joint_frames import (
     Conditions,
     FrameMotion,
@@ -51,17 +51,6 @@ class Closure:
     relative: list[JointMotion]
     moves: list[Array]
     left: list[Array]
-
-
-@dataclass(frozen=True)
-class LoopForce:
-    """What a closing joint does to its outer link: force [N] and moment [N m] about the outer frame, and the place of
-    that frame's origin [m]; world axes.
-    """
-
-    force: Array
-    moment: Array
-    place: Array
 
 
 class LoopRows:

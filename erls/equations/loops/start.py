@@ -42,6 +42,45 @@ class Start:
     following: IntArray
 
 
+@dataclass(frozen=True)
+class ClosedStart:
+    """How the joints of rigid links begin in closed loops, for formulations without joint coordinates of their own.
+
+    Attributes
+    ----------
+    positions, rates : (joints,) arrays
+        [rad, rad/s or m, m/s]
+    coordinates : (loops,) array
+        Of closing joints with one coordinate, turns counted; 0 of the others.
+    held : tuple of int
+        Joints that keep what they are given, prescribed ones included.
+    """
+
+    positions: Array
+    rates: Array
+    coordinates: Array
+    held: tuple[int, ...]
+
+
+def closed_start(chain: ClosedChain) -> ClosedStart:
+    """The start of a chain of rigid links.
+
+    Raises
+    ------
+    SimulationError
+        LOOP_OPEN: the links do not reach.
+    """
+    found = chain.start
+    rate = start_velocity(chain, found.y)
+    state = chain.tree.state(0.0, found.y, rate)
+    rates, free = state.rates.copy(), chain.tree.free_joints
+    loops = [k for k, loop in enumerate(chain.mechanism.loops) if loop.freedom is not None]
+    coordinates = np.zeros(len(chain.mechanism.loops))
+    coordinates[loops] = [chain.loop_motion(0.0, found.y, rate, k)[0] for k in loops]
+    held = np.setdiff1d(np.arange(len(rates)), free[found.following])
+    return ClosedStart(state.angles.copy(), rates, coordinates, tuple(held.tolist()))
+
+
 def find_start(chain: ClosedChain) -> Start:
     """Close the loops on the undeformed chain.
 

@@ -23,7 +23,7 @@ class Actuator:
     nodes : tuple of int
         The outer node alone, when the inner frame is fixed to the ground; inner and outer node otherwise.
     inner_frame, outer_frame : (4, 4) array
-        Pose of the joint in the frame of each node, in the world for the ground.
+        Pose of the joint in the frame of each node, in the world for the ground; z is its axis.
     lead : callable
         Torque over time that the drive adds (feed-forward).
     """
@@ -45,7 +45,7 @@ class Actuators:
         self.inner_frames = np.array([a.inner_frame for a in actuators]).reshape(-1, 4, 4)
         self.outer_frames = np.array([a.outer_frame for a in actuators]).reshape(-1, 4, 4)
         self.start = np.array([j.position for j in self.joints], dtype=float)
-        self.along = np.array([j.freedom.row for j in self.joints], dtype=np.int64)
+        self.along = np.array([5 if j.freedom.turns else 2 for j in self.joints], dtype=np.int64)
         self.acting = tuple(j.forces.active or j.drive.kind not in ("free", "motion") for j in self.joints)
         active = [acts or j.rotor_inertia != 0 for acts, j in zip(self.acting, self.joints, strict=True)]
         self.active = np.array(active, dtype=np.int64)

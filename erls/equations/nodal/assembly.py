@@ -252,7 +252,7 @@ class NodalSystem:
         """In compiled form, for one run; None where a method was changed that it stands for."""
         if any(getattr(type(self), name) is not getattr(NodalSystem, name) for name in _STEPPED):
             return None
-        from erls.equations.nodal.step import stepped  # here: it imports the compiler
+        from erls.equations.nodal.compiled import stepped  # here: it imports the compiler
 
         return stepped(self)
 

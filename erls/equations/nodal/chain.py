@@ -1,13 +1,16 @@
-"""A chain of links as one system of nodes, elements and joints, at its initial joint coordinates."""
+"""A tree of links, and the joints that close its loops, as one system of nodes, elements and joints, at its initial
+joint coordinates.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
+from erls.equations.loops.start import ClosedStart
 from erls.equations.nodal.actuators import Actuator, Actuators
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.beam import Beams
@@ -15,23 +18,34 @@ from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import GROUND, Joint, Motion
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import LinkParts, node_at
+from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.maths import motion_maps as motions
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.chain import poses as link_poses
+from erls.mechanism.drives import Drive
+from erls.mechanism.joint_types import JOINT_TYPES, Freedom, Z
+from erls.mechanism.joints import Joint as MechanismJoint
+from erls.mechanism.loops import Loop, LoopEnd
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
 
 @dataclass(frozen=True)
 class Seat:
-    """Where a joint sits: nodes (`GROUND` for the ground) and the pose of its frames there."""
+    """Where a joint sits: nodes (`GROUND` for the ground) and the pose of its frames there, about or along whose z axis
+    it moves.
+    """
 
     inner: int
     outer: int
     inner_frame: Array
     outer_frame: Array
+
+    def screw(self, freedom: Freedom) -> Array:
+        """(6,) twist of unit joint velocity in the axes of the outer node."""
+        return np.asarray(motions.adjoint(self.outer_frame) @ replace(freedom, axis=Z).screw)
 
 
 class ChainSystem(NodalSystem):
@@ -54,7 +68,7 @@ class ChainSystem(NodalSystem):
         super().__init__(poses, [*elements, *actuators], joints)
 
     def joint_motion(self, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """(joints,) coordinates, rates and accelerations."""
+        """(a,) coordinates, rates and accelerations; closing joints with one coordinate come after all others."""
         found = self.in_joints(0.0, q, v, a)
         return found[:, 0], found[:, 1], found[:, 2]
 
@@ -79,33 +93,53 @@ class Chain:
     Attributes
     ----------
     system : ChainSystem
+    full : ChainSystem
+        With all conditions: also with those that follow from others.
+    left_out : tuple of str
+        Names of these.
     beams : Beams or None
     nodes : tuple of slice
         Of each link.
     elements : tuple of int
         First beam element of each link.
-    seats : tuple of Seat
+    seats, closing : tuple of Seat
+        Of the joints, and of those that close loops, which follow them in the systems.
     """
 
     system: ChainSystem
+    full: ChainSystem
+    left_out: tuple[str, ...]
     beams: Beams | None
     nodes: tuple[slice, ...]
     elements: tuple[int, ...]
     seats: tuple[Seat, ...]
+    closing: tuple[Seat, ...]
 
-    def held(self, coordinates: Array) -> NodalSystem:
-        """The same nodes and links, with all joints held and nothing acting in them."""
+    def resting(self, held: Mapping[int, float]) -> NodalSystem:
+        """The same with some joints, by their numbers, held at a coordinate."""
         joints = [
-            replace(joint, motion=_constant(float(c)), breakpoints=())
-            for joint, c in zip(self.system.rows.joints, coordinates, strict=True)
+            replace(joint, motion=_constant(held[k]), breakpoints=()) if k in held else joint
+            for k, joint in enumerate(self.full.rows.joints)
         ]
-        passive = self.system.elements[: -len(self.system.actuators)]
-        return NodalSystem(self.system.start.poses, passive, joints)
+        full = NodalSystem(self.full.start.poses, self.full.elements, joints)
+        if not self.closing:
+            return full
+        joints, left_out = without_redundant(full)
+        return NodalSystem(full.start.poses, full.elements, joints) if left_out else full
 
 
-def build_chain(mechanism: Mechanism, links: Sequence[LinkParts]) -> Chain:
-    """Number nodes and elements link by link, and place them at the initial joint coordinates."""
-    frames = link_poses(mechanism, np.array([j.position for j in mechanism.joints]))
+def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedStart | None = None) -> Chain:
+    """Number nodes and elements link by link, and place them at the initial joint coordinates.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    links : sequence of LinkParts
+    start : ClosedStart, optional
+        Of a mechanism with loops.
+    """
+    positions = np.array([j.position for j in mechanism.joints]) if start is None else start.positions
+    frames = link_poses(mechanism, positions)
     ends = np.cumsum([0, *(len(part.nodes) for part in links)]).tolist()
     nodes = tuple(slice(a, b) for a, b in pairwise(ends))
     poses = np.concatenate(
@@ -126,9 +160,18 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts]) -> Chain:
     if bodies:
         passive.append(RigidBodies(bodies, mechanism.gravity))
     seats = _seats(mechanism, links, ends)
-    system = ChainSystem(poses, passive, [_actuators(mechanism, seats)], _joints(mechanism, seats))
+    closing = tuple(_closing(mechanism, links, ends, loop) for loop in mechanism.loops)
+    acting = _actuators(mechanism, seats, positions)
+    if start is not None:
+        acting += _closing_actuators(mechanism, closing, start)
+    joints, actuators = _joints(mechanism, seats) + _closing_joints(mechanism, closing), [Actuators(acting)]
+    full = system = ChainSystem(poses, passive, actuators, joints)
+    left_out: tuple[str, ...] = ()
+    if closing:
+        joints, left_out = without_redundant(full)
+        system = ChainSystem(poses, passive, actuators, joints) if left_out else full
     firsts = np.cumsum([0, *(len(part.beams) for part in links)])[:-1].tolist()
-    return Chain(system, elastic, nodes, tuple(firsts), seats)
+    return Chain(system, full, left_out, elastic, nodes, tuple(firsts), seats, closing)
 
 
 def _seats(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int]) -> tuple[Seat, ...]:
@@ -142,30 +185,76 @@ def _seats(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[in
             node = node_at(below, joint.seat.node, f"link {mechanism.links[joint.parent].name!r}")
             inner, before = firsts[joint.parent] + node, pose(position=-below.nodes[node]) @ joint.before
         after = pose(position=-place) @ inverse(joint.after)
-        result.append(Seat(inner, firsts[k] + outer, before, after))
+        turn = _to_z(joint.freedom)
+        result.append(Seat(inner, firsts[k] + outer, before @ turn, after @ turn))
     return tuple(result)
 
 
+def _to_z(freedom: Freedom) -> Array:
+    """(4, 4) pose of axes whose z is that of a motion, in those of its joint."""
+    return pose(np.roll(np.eye(3), -(freedom.axis + 1), axis=0).T)
+
+
+def _closing(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int], loop: Loop) -> Seat:
+    """Of a joint that closes a loop; its inner frame stands where the coordinate is zero."""
+
+    def end(given: LoopEnd) -> tuple[int, Array]:
+        if given.link is None:
+            return GROUND, given.frame
+        part, link = links[given.link], mechanism.links[given.link]
+        node = node_at(part, given.node, f"link {link.name!r}")
+        return firsts[given.link] + node, pose(position=link.model.nodes[given.node] - part.nodes[node]) @ given.frame
+
+    (inner, base), (outer, frame) = end(loop.inner), end(loop.outer)
+    if loop.freedom is not None:
+        base = base @ loop.freedom.freedom.pose(-loop.freedom.zero)
+    return Seat(inner, outer, base, frame)
+
+
 def _joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
-    result = []
-    for joint, seat in zip(mechanism.joints, seats, strict=True):
-        motion: Motion | None = None
-        if joint.drive.prescribed:
-            motion = joint.drive.reference  # type: ignore[assignment]
-        kind = "revolute" if joint.freedom.turns else "prismatic"
-        ends = seat.inner, seat.outer, seat.inner_frame, seat.outer_frame
-        result.append(Joint(joint.name, kind, *ends, motion, joint.drive.breakpoints if motion else ()))
-    return result
+    return [
+        _joint(joint.name, "revolute" if joint.freedom.turns else "prismatic", seat, joint.drive)
+        for joint, seat in zip(mechanism.joints, seats, strict=True)
+    ]
 
 
-def _actuators(mechanism: Mechanism, seats: Sequence[Seat]) -> Actuators:
+def _closing_joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
+    kinds = [next(name for name, kind in JOINT_TYPES.items() if kind is loop.type) for loop in mechanism.loops]
+    drives = [None if loop.freedom is None else loop.freedom.drive for loop in mechanism.loops]
+    whole = zip(mechanism.loops, kinds, seats, drives, strict=True)
+    return [_joint(loop.name, kind, seat, drive) for loop, kind, seat, drive in whole]
+
+
+def _joint(name: str, kind: str, seat: Seat, drive: Drive | None) -> Joint:
+    ends = seat.inner, seat.outer, seat.inner_frame, seat.outer_frame
+    if drive is None or not drive.prescribed:
+        return Joint(name, kind, *ends)
+    motion: Motion = drive.reference  # type: ignore[assignment]
+    return Joint(name, kind, *ends, motion, drive.breakpoints)
+
+
+def _actuators(mechanism: Mechanism, seats: Sequence[Seat], positions: Array) -> list[Actuator]:
     """Of all joints."""
     lead = _FeedForward(mechanism)
-    found = []
-    for k, (joint, seat) in enumerate(zip(mechanism.joints, seats, strict=True)):
-        nodes = (seat.outer,) if seat.inner == GROUND else (seat.inner, seat.outer)
-        found.append(Actuator(joint, nodes, seat.inner_frame, seat.outer_frame, lead.of(k)))
-    return Actuators(found)
+    return [
+        _actuator(replace(joint, position=float(positions[k])), seat, lead.of(k))
+        for k, (joint, seat) in enumerate(zip(mechanism.joints, seats, strict=True))
+    ]
+
+
+def _closing_actuators(mechanism: Mechanism, seats: Sequence[Seat], start: ClosedStart) -> list[Actuator]:
+    """Of closing joints with one coordinate, in their order."""
+    found, still = [], np.eye(4)
+    for loop, seat, position in zip(mechanism.loops, seats, start.coordinates.tolist(), strict=True):
+        if (free := loop.freedom) is not None:
+            own = free.freedom, still, still, free.forces, free.rotor_inertia, free.drive
+            found.append(_actuator(MechanismJoint(loop.name, *own, position, 0.0), seat, lambda t: 0.0))
+    return found
+
+
+def _actuator(joint: MechanismJoint, seat: Seat, lead: Callable[[float], float]) -> Actuator:
+    nodes = (seat.outer,) if seat.inner == GROUND else (seat.inner, seat.outer)
+    return Actuator(joint, nodes, seat.inner_frame, seat.outer_frame, lead)
 
 
 class _FeedForward:

@@ -7,54 +7,54 @@ integrator found with them: the rates of the nodes' twists and the multipliers.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from erls.equations.consistency import consistent_acceleration
-from erls.equations.formulation import Energy, Reaction, State
-from erls.equations.nodal.chain import Chain, build_chain
+from erls.equations.consistency import consistent_acceleration, consistent_velocity
+from erls.equations.formulation import Energy, LoopForce, Reaction, State
+from erls.equations.loops.failures import warnings_of
+from erls.equations.loops.start import ClosedStart
+from erls.equations.nodal.chain import Chain, Seat, build_chain
 from erls.equations.nodal.joints import GROUND
 from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import link_parts
+from erls.equations.nodal.redundant import smallest_multipliers
+from erls.equations.nodal.scatter import IntArray
 from erls.equations.nodal.statics import solve_statics
-from erls.errors import Cause, SceneError, SimulationError
+from erls.errors import SimulationError
 from erls.maths import motion_maps as motions
-from erls.maths.so3 import Array
+from erls.maths.saddle import Matrix
+from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.joint_types import Z
 
 
 class Nodal:
-    """Equations of motion of a serial chain; a `Formulation`.
+    """Equations of motion of a tree of links, loops closed; a `LoopFormulation`.
 
     Parameters
     ----------
     mechanism : Mechanism
     elements_per_member : int, optional
         Instead of the numbers in the descriptions of the links.
+    start : ClosedStart, optional
+        Of a mechanism with loops.
 
     Raises
     ------
     SceneError
-        A loop, or a link that is neither rigid nor made of beams; it is named.
+        A link that is neither rigid nor made of beams; it is named.
     """
 
-    def __init__(self, mechanism: Mechanism, elements_per_member: int | None = None) -> None:
-        if mechanism.loops:
-            loop = mechanism.loops[0]
-            carried = next(end.link for end in (loop.outer, loop.inner) if end.link is not None)
-            raise SceneError(
-                Cause.BAD_FIELD,
-                "the nodal formulation closes no loops",
-                where=f"loop {loop.name!r} on link {mechanism.links[carried].name!r}",
-                value="nodal",
-                remedy="use formulation erls or ffr, or a scene of beams and connections, as "
-                "data/slider_crank/fast_beams.toml",
-            )
-        self.mechanism = mechanism
+    def __init__(
+        self, mechanism: Mechanism, elements_per_member: int | None = None, start: ClosedStart | None = None
+    ) -> None:
+        self.mechanism, self._start = mechanism, start
         parts = [link_parts(link, elements_per_member) for link in mechanism.links]
-        self.chain: Chain = build_chain(mechanism, parts)
+        self.chain: Chain = build_chain(mechanism, parts, start)
         self.system = self.chain.system
         self.views = [
             LinkView(link, part, nodes, first)
@@ -63,7 +63,10 @@ class Nodal:
             )
         ]
         self._frames = 12 * self.system.count  # entries of y that hold them
-        self._kept = self._frames + len(mechanism.joints)
+        self._joints = slice(self._frames, self._frames + len(mechanism.joints))
+        self._kept = self._frames + len(self.system.model.actuators)
+        free = [k for k, loop in enumerate(mechanism.loops) if loop.freedom is not None]
+        self._moving = {k: len(mechanism.joints) + n for n, k in enumerate(free)}  # numbers of actuators of loops
 
     @property
     def size(self) -> int:
@@ -87,22 +90,32 @@ class Nodal:
             NO_EQUILIBRIUM, when the start is to be static.
         """
         q = self._equilibrium() if self.mechanism.static_start else self.system.start
+        rates = [joint.rate for joint in self.mechanism.joints] if self._start is None else self._start.rates
         v = np.zeros((self.system.count, 6))
-        moving = np.zeros(6)  # of the link in the world's axes, about its origin
-        for joint, seat, nodes in zip(self.mechanism.joints, self.chain.seats, self.chain.nodes, strict=True):
+        moving: list[Array] = []  # links, in the world's axes, about its origin
+        seats = zip(self.mechanism.joints, rates, self.chain.seats, self.chain.nodes, strict=True)
+        for joint, rate, seat, nodes in seats:
             carrier = np.eye(4) if seat.inner == GROUND else q.poses[seat.inner]
-            moving = moving + motions.adjoint(carrier @ seat.inner_frame) @ joint.freedom.screw * joint.rate
-            v[nodes] = motions.adjoint_inverse(q.poses[nodes]) @ moving
-        a, multipliers = consistent_acceleration(self.system, 0.0, q, v.ravel())
-        y, rates, _ = self.system.stored(0.0, q, v.ravel(), a)
-        return np.concatenate([y, a, multipliers]), np.concatenate([rates, 0 * a, 0 * multipliers])
+            below = np.zeros(6) if joint.parent < 0 else moving[joint.parent]
+            screw = replace(joint.freedom, axis=Z).screw
+            moving.append(below + motions.adjoint(carrier @ seat.inner_frame) @ screw * rate)
+            v[nodes] = motions.adjoint_inverse(q.poses[nodes]) @ moving[-1]
+        velocity = v.ravel()
+        if self.chain.closing:  # links that bend at the start do not move as rigid ones do
+            velocity = consistent_velocity(self.system, 0.0, q, velocity)
+        a, multipliers = consistent_acceleration(self.system, 0.0, q, velocity)
+        y, rate_of_y, _ = self.system.stored(0.0, q, velocity, a)
+        return np.concatenate([y, a, multipliers]), np.concatenate([rate_of_y, 0 * a, 0 * multipliers])
 
     def _equilibrium(self) -> Nodes:
-        """At rest under gravity with the joints held."""
-        held = self.chain.held(np.array([j.position for j in self.mechanism.joints]))
+        """At rest under gravity, and what acts in joints, with joints held; those that follow loops are not."""
+        positions, held = [joint.position for joint in self.mechanism.joints], range(len(self.mechanism.joints))
+        if self._start is not None:
+            positions = self._start.positions.tolist()
+        resting = self.chain.resting({k: positions[k] for k in (held if self._start is None else self._start.held)})
         failure: SimulationError | None = None
         for tangent in ("full", "material"):  # the second converges from farther away
-            found = solve_statics(held, held.start, tangent=tangent)
+            found = solve_statics(resting, resting.start, tangent=tangent, end=0.0)
             if found.failure is None:
                 return self.system.at(found.path[-1].q.poses)
             failure = found.failure
@@ -114,7 +127,7 @@ class Nodal:
         q, velocity = self.configuration(y, v)
         found = [view.at(q.poses, self.chain.beams, q.bent) for view in self.views]
         _, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
-        angles = y[self._frames : self._kept]
+        angles, rates = y[self._joints], rates[: len(self.mechanism.joints)]
         return State(
             t, [x.frame for x in found], [x.modal for x in found], angles, angles, rates, [x.nodes for x in found]
         )
@@ -134,27 +147,65 @@ class Nodal:
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions from the multipliers and what acts along the joints."""
-        q, velocity = self.configuration(y, v)
-        a, multipliers = self._found(y)
-        along = self.system.in_joints(t, q, velocity, a)
-        rows = self.system.constraint_matrix(t, q)
-        result = []
+        acting, result = self._acting(t, y, v), []
         for k, (joint, seat) in enumerate(zip(self.mechanism.joints, self.chain.seats, strict=True)):
-            place = slice(6 * seat.outer, 6 * seat.outer + 6)
-            own = np.flatnonzero(self.system.rows.joint_of_row == k)
-            wrench = -np.asarray(rows[own][:, place].T @ multipliers[own]).ravel()
-            effort, push = float(along[k, 3]), along[k, 4:]
+            wrench = acting.wrench(k, seat)
+            effort, push = float(acting.along[k, 3]), acting.along[k, 4:]
             if joint.drive.prescribed:
-                axis = motions.adjoint(seat.outer_frame) @ joint.freedom.screw
-                effort = float(axis @ wrench)
+                effort = float(seat.screw(joint.freedom) @ wrench)
             wrench = wrench + push
-            turn = q.poses[seat.outer, :3, :3]
+            turn = acting.q.poses[seat.outer, :3, :3]
             result.append(Reaction(turn @ wrench[:3], turn @ wrench[3:], effort))
         return result
+
+    def loop_forces(self, t: float, y: Array, v: Array) -> list[LoopForce]:
+        """What every closing joint does to its link."""
+        acting, result = self._acting(t, y, v), []
+        for k, seat in enumerate(self.chain.closing):
+            wrench = acting.wrench(len(self.mechanism.joints) + k, seat)
+            if k in self._moving:
+                wrench = wrench + acting.along[self._moving[k], 4:]
+            own, arm = acting.q.poses[seat.outer], seat.outer_frame[:3, 3]
+            turn, moment = own[:3, :3], wrench[3:] - cross(arm, wrench[:3])
+            result.append(LoopForce(turn @ wrench[:3], turn @ moment, own[:3, 3] + turn @ arm))
+        return result
+
+    def loop_motion(self, t: float, y: Array, v: Array, loop: int) -> tuple[float, float]:
+        """Coordinate of a revolute or prismatic closing joint, and its rate."""
+        q, velocity = self.configuration(y, v)
+        coordinates, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
+        return float(coordinates[self._moving[loop]]), float(rates[self._moving[loop]])
+
+    def loop_effort(self, t: float, y: Array, v: Array, loop: int) -> float:
+        """Force of drive, spring, damper and friction along it; for a prescribed motion what its motor must give."""
+        acting, free, seat = self._acting(t, y, v), self.mechanism.loops[loop].freedom, self.chain.closing[loop]
+        if free is not None and free.drive.prescribed:
+            return float(seat.screw(free.freedom) @ acting.wrench(len(self.mechanism.joints) + loop, seat))
+        return float(acting.along[self._moving[loop], 3])
+
+    def _acting(self, t: float, y: Array, v: Array) -> _Acting:
+        q, velocity = self.configuration(y, v)
+        a, multipliers = self._found(y)
+        full = self.chain.full
+        if self.chain.left_out:
+            force = np.asarray(self.system.constraint_matrix(t, q).T @ multipliers).ravel()
+            multipliers = smallest_multipliers(full, t, q, force)
+        along = self.system.in_joints(t, q, velocity, a)
+        return _Acting(q, full.rows.joint_of_row, full.constraint_matrix(t, q), multipliers, along)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know about the loops."""
+        return warnings_of(self.chain.left_out)
 
     def describe(self) -> dict[str, Any]:
         """Names and sizes for reports."""
         beams = self.chain.beams
+        own = {loop.name: f"joint {loop.name!r}: " for loop in self.mechanism.loops}
+        loops = [
+            {"name": name, "redundant": [x.removeprefix(start) for x in self.chain.left_out if x.startswith(start)]}
+            for name, start in own.items()
+        ]
         return {
             "formulation": "nodal",
             "joints": len(self.mechanism.joints),
@@ -162,4 +213,23 @@ class Nodal:
             "nodes": self.system.count,
             "velocities": self.system.size,
             "conditions": self.system.constraints,
+            **({"loops": loops} if loops else {}),
         }
+
+
+@dataclass(frozen=True)
+class _Acting:
+    """What acts in the joints of a state: conditions of all joints (m, n), their multipliers (m,), and what actuators
+    do (a, 10).
+    """
+
+    q: Nodes
+    joint_of_row: IntArray
+    rows: Matrix
+    multipliers: Array
+    along: Array
+
+    def wrench(self, number: int, seat: Seat) -> Array:
+        """(6,) of a joint's conditions on its outer node, in the axes of that node."""
+        own, place = np.flatnonzero(self.joint_of_row == number), slice(6 * seat.outer, 6 * seat.outer + 6)
+        return -np.asarray(self.rows[own][:, place].T @ self.multipliers[own]).ravel()

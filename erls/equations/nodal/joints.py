@@ -110,7 +110,7 @@ class JointRows:
     @staticmethod
     def sign(joint: Joint) -> int:
         """-1 where the ground, as the inner frame, changes places with the outer one."""
-        return -1 if joint.inner == GROUND else 1
+        return -1 if joint.inner == GROUND and JOINT_TYPES[joint.type].mutual else 1
 
     @staticmethod
     def driven_along(joint: Joint) -> int:

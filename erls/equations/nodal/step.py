@@ -1,4 +1,5 @@
-"""A nodal system as steps of generalized-α take it: `erls.equations.stepped`.
+"""Functions of `erls.equations.stepped` for nodal systems; those for the iteration matrix are in
+`erls.equations.nodal.matrix`.
 
 A configuration is a `State` in flat memory. Of one that is tried only the poses are set; what they do not tell follows
 when a step is accepted.
@@ -6,18 +7,11 @@ when a step is accepted.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from erls.equations import compiled_system as contract
-from erls.equations.compiled_system import Array, Factoring, IntArray
-from erls.equations.nodal import contract as own
-from erls.equations.nodal.blocks import blocks, weighted
+from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.contract import (
-    Before,
-    Model,
-    Stepping,
     call_forces,
     call_knot,
     call_remember,
@@ -27,37 +21,10 @@ from erls.equations.nodal.contract import (
     read_stepping,
     read_work,
 )
-from erls.equations.nodal.matrix import factor, solve
-from erls.equations.nodal.model import factor_room, room
 from erls.equations.nodal.motion import compose as composed
-from erls.equations.nodal.nodes import Nodes, numbers_of, of_numbers, rows_of
-from erls.equations.nodal.outputs import knot as store
-from erls.equations.nodal.sums import forces, remember
-from erls.equations.stepped import COMPOSE, SETTLE, Stepped
-from erls.equations.system import MovingSystem, metre_scales
-from erls.maths.calls import address_of
+from erls.equations.stepped import COMPOSE, SETTLE
 from erls.maths.jit import kernel
-from erls.maths.records import Memory
 from erls.maths.views import vector_at
-
-
-class _System(MovingSystem, Protocol):
-    """What is asked of a system; see `erls.equations.nodal.assembly.NodalSystem`."""
-
-    width: int
-    model: Model
-    start: Nodes
-
-    @property
-    def size(self) -> int:
-        """Number of velocities."""
-
-    @property
-    def constraints(self) -> int:
-        """Number of conditions."""
-
-    def samples(self, times: Array) -> Array:
-        """What depends on time alone."""
 
 
 @kernel(COMPOSE, counted=False)
@@ -134,46 +101,3 @@ def settle(
             there.wound[k, i] = work.wound[k, i]
     call_knot(known.knot, model, work, knot)
     return 0
-
-
-def stepped(system: _System) -> Stepped:
-    """A system in compiled form, for one run."""
-    model, start = system.model, system.start
-    integers: list[int] = []
-    samples = system.samples(np.zeros(1)).shape[1]
-    constants, scratch = Memory(integers), Memory(integers, np.zeros(samples))
-    factors = Memory(integers)
-    state = own.State(rows_of(start.poses), start.bent, start.turned, start.wound)
-    whole = Stepping(
-        model=constants.put(model),
-        work=scratch.put(room(model)),
-        before=scratch.put(Before(numbers_of(start), np.zeros(1))),
-        state=Memory(integers).put(state),
-        factors=factors.put(factor_room(model, system.width)),
-        forces=address_of(forces, own.FORCES),
-        remember=address_of(remember, own.REMEMBER),
-        knot=address_of(store, own.KNOT),
-        blocks=address_of(blocks, own.BLOCKS),
-        weighted=address_of(weighted, own.SUMMED),
-        samples=samples,
-        reach=float(metre_scales(system).max(initial=1.0)),
-    )
-    integers.append(constants.put(whole))
-    return Stepped(
-        system.size,
-        system.constraints,
-        12 * len(start.poses) + len(start.turned),
-        True,
-        constants.numbers,
-        np.array(integers, dtype=np.int64),
-        scratch.numbers,
-        compose,
-        residual,
-        settle,
-        None,
-        None,
-        Factoring(len(factors.numbers), factor, solve, factor, solve),
-        numbers_of,
-        lambda numbers: of_numbers(numbers, start),
-        samples=system.samples,
-    )

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from erls.equations.formulation import Energy, Reaction
-from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.formulation import Energy, LoopFormulation, Reaction
 from erls.equations.substructures import solved
 from erls.errors import SceneError
 from erls.maths.so3 import Array
@@ -111,8 +110,7 @@ class ChainRun(ChainMotion):
         choose(loop, self.loop_names, "loop", SceneError)
         number = self.loop_names.index(loop)
         _, flat, y, v = self._interpolated(t)
-        chain = solved(self.formulation)
-        assert isinstance(chain, ClosedChain)
+        chain = cast(LoopFormulation, solved(self.formulation))
         found = [chain.loop_forces(*at)[number] for at in zip(flat.tolist(), y, v, strict=True)]
         shape = (*np.shape(t), 3)
         return np.array([f.force for f in found]).reshape(shape), np.array([f.moment for f in found]).reshape(shape)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from erls.equations.loops.closed_chain import ClosedChain
+from typing import cast
+
+from erls.equations.formulation import LoopFormulation
 from erls.equations.substructures import solved
-from erls.run.watches.base import NOTHING, Begun, Finding, Plan, Watch
+from erls.run.watches.base import Begun, Finding, Plan, Watch
 
 
 class LoopConditions(Watch):
@@ -12,10 +14,9 @@ class LoopConditions(Watch):
 
     @staticmethod
     def concerns(plan: Plan) -> bool:
-        """Modal models; the loops of pieces are tied within their chain."""
-        return plan.modal
+        """Mechanisms with loops."""
+        return bool(plan.mechanism.loops)
 
     def begins(self, begun: Begun) -> Finding:
-        """Which ones are left out."""
-        chain = solved(begun.formulation)
-        return Finding(chain.warnings) if isinstance(chain, ClosedChain) else NOTHING
+        """Which ones are left out; those of pieces are tied within their chain."""
+        return Finding(cast(LoopFormulation, solved(begun.formulation)).warnings)
