@@ -35,6 +35,7 @@ def view(
     *,
     output: Output = None,
     at: str = "",
+    mode: int | None = None,
     magnify: float = 1.0,
     fps: int = 30,
     speed: float = 1.0,
@@ -53,6 +54,8 @@ def view(
         File to write.
     at
         Times in seconds, at rest load parameters, separated by commas, instead of even ones (picture, .pvd, .csv).
+    mode
+        Show this vibration or buckling mode of bodies and beams, from 1 on, over the phase of its period (--at).
     magnify
         Factor on the displacement of the links, or of bodies and beams at rest; 1 shows it true.
     fps
@@ -62,10 +65,13 @@ def view(
     json
         Print one JSON object.
     """
+    from erls.run.bodies.mode import mode_of
     from erls.run.file import load_run
     from erls.view import show, write_view
 
     loaded = load_run(run)
+    if mode is not None:
+        loaded = mode_of(loaded, mode)
     if output is None:
         show(loaded)
         return

@@ -106,6 +106,11 @@ class Run(ABC):
         return float(self.times[-1]) if len(self.times) else 0.0
 
     @property
+    def title(self) -> str:
+        """Above its pictures."""
+        return self.scene.name
+
+    @property
     def worth_a_file(self) -> bool:
         """Whether it holds more than its start."""
         return len(self.times) > 1

@@ -66,7 +66,7 @@ def load_chain(path: Path | str, overrides: Iterable[str] = ()) -> Scene:
     scene = load_scene(path, overrides)
     if isinstance(scene, BodyScene):
         message = "a scene of bodies, beams and connections, which is no chain of joints and links"
-        remedy = "use erls simulate, info or view"
+        remedy = "use erls simulate, info or view, and erls.simulate_many for variants"
         raise SceneError(Cause.BAD_FIELD, message, where=str(path), remedy=remedy)
     return scene
 

@@ -114,4 +114,5 @@ def _modes(assembly: Assembly, analysis: AtRest, found: Statics) -> Modes | None
     else:
         return None
     shapes = modes.shapes.reshape(len(modes.values), -1, 6)
-    return Modes(quantity, modes.values, (last.q.poses[:, :3, :3] @ shapes[:, :, :3, None])[..., 0])
+    moved, turned = ((last.q.poses[:, :3, :3] @ part[..., None])[..., 0] for part in (shapes[..., :3], shapes[..., 3:]))
+    return Modes(quantity, modes.values, moved, turned)

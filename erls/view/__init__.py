@@ -105,7 +105,7 @@ def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800)) -> None
     with drawing(), Window(figure, motion, magnification, size) as window:
         if window.hidden:
             raise no_picture("the display cannot be opened")
-        window.interact(f"{run.scene.name}  ·  {displacement(magnification)}")
+        window.interact(f"{run.title}  ·  {displacement(run, magnification)}")
 
 
 def write_view(

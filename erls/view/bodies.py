@@ -16,7 +16,7 @@ from erls.maths import motion_maps as motions
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.run.bodies.connections import joint_frames
-from erls.run.bodies.motion import BodyMotion
+from erls.run.bodies.rest import BodyRest
 from erls.run.bodies.run import BodyRun
 from erls.scene.bodies.schema import GROUND as GROUND_NAME
 from erls.scene.bodies.schema import Body, LineSpring
@@ -109,9 +109,14 @@ class BodyFigure(Figure):
         return found
 
     @cached_property
-    def built_lines(self) -> list[Array]:
-        """Beams as built."""
-        return self.lines(self.built, self.run.assembly.system.start.bent)
+    def origin(self) -> Array:
+        """(n, 4, 4) nodes where displacements count from."""
+        return self.run.origin.poses
+
+    @cached_property
+    def origin_lines(self) -> list[Array]:
+        """Beams there."""
+        return self.lines(self.origin, self.run.origin.bent)
 
     @cached_property
     def ellipsoids(self) -> list[tuple[Array, Array]]:
@@ -148,7 +153,7 @@ class BodyPose(Pose):
     def points(self, magnification: float) -> list[Array]:
         """(3,) places of the reported nodes."""
         numbers = self.figure.run.assembly.numbers
-        places = self._magnified(self.poses[:, :3, 3], self.figure.built[:, :3, 3], magnification)
+        places = self._magnified(self.poses[:, :3, 3], self.figure.origin[:, :3, 3], magnification)
         return [places[numbers[name]] for name in self.figure.run.point_names]
 
     def nodes(self, magnification: float) -> list[Array]:
@@ -158,9 +163,9 @@ class BodyPose(Pose):
         return beams + bodies
 
     def deflections(self) -> list[Array]:
-        """(p,) against where they are built, at rest; zeros of a motion."""
+        """(p,) against where they are built, at rest; zeros of motions, and of modes, whose amplitude means nothing."""
         here = self.nodes(1.0)
-        if isinstance(self.figure.run, BodyMotion):
+        if not isinstance(self.figure.run, BodyRest):
             return [np.zeros(len(places)) for places in here]
         built = BodyPose(self.figure, 0.0, self.figure.built, self.bent).nodes(0.0)
         return [np.linalg.norm(a - b, axis=1) for a, b in zip(here, built, strict=True)]
@@ -197,8 +202,8 @@ class BodyPose(Pose):
         return joints_surface(places, unit) if places else None
 
     def outline(self) -> list[Any]:
-        """Beams as built."""
-        return [polylines(line, [list(range(len(line)))]) for line in self.figure.built_lines]
+        """Beams where displacements count from."""
+        return [polylines(line, [list(range(len(line)))]) for line in self.figure.origin_lines]
 
     def meshes(self, magnification: float) -> list[PartMesh]:
         """Beams as lines through their nodes, bodies as points at their frames."""
@@ -216,15 +221,15 @@ class BodyPose(Pose):
 
     def _lines(self, magnification: float) -> list[Array]:
         lines = self.figure.lines(self.poses, self.bent)
-        return [self._magnified(a, b, magnification) for a, b in zip(lines, self.figure.built_lines, strict=True)]
+        return [self._magnified(a, b, magnification) for a, b in zip(lines, self.figure.origin_lines, strict=True)]
 
-    def _magnified(self, places: Array, built: Array, magnification: float) -> Array:
-        return places if magnification == 1.0 else np.asarray(built + magnification * (places - built))
+    def _magnified(self, places: Array, origin: Array, magnification: float) -> Array:
+        return places if magnification == 1.0 else np.asarray(origin + magnification * (places - origin))
 
     def _node(self, node: int, magnification: float) -> Array:
         """(4, 4) its true turn, at its magnified place."""
-        here, built = self.poses[node], self.figure.built[node]
-        return pose(here[:3, :3], self._magnified(here[:3, 3], built[:3, 3], magnification))
+        here, origin = self.poses[node], self.figure.origin[node]
+        return pose(here[:3, :3], self._magnified(here[:3, 3], origin[:3, 3], magnification))
 
     def _body_places(self, number: int, magnification: float) -> Array:
         """(k, 3) its node, its connections, the ends of its ellipsoid's axes, its centre of mass."""

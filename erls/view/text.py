@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from erls.run.bodies.mode import BodyMode
 from erls.run.record import Run
 from erls.view.camera import Pixels, text_unit
 from erls.view.figure import Pose
@@ -17,7 +18,7 @@ from erls.view.stage import POINTS, Stage, colour_map
 def written(stage: Stage, pixels: Pixels, caption: str) -> Sheet:
     """A rendered picture with title, caption, axes and colour bar; names and times can still be placed on it."""
     sheet = Sheet(pixels)
-    sheet.heading(stage.figure.run.scene.name, caption)
+    sheet.heading(stage.figure.run.title, caption)
     sheet.axes(stage.walls)
     sheet.triad(stage.camera, stage.corner, stage.gravity)
     if stage.motion.elastic:
@@ -25,8 +26,10 @@ def written(stage: Stage, pixels: Pixels, caption: str) -> Sheet:
     return sheet
 
 
-def displacement(magnification: float) -> str:
+def displacement(run: Run, magnification: float) -> str:
     """How displacement is shown."""
+    if isinstance(run, BodyMode):
+        return "amplitude without scale"
     return "true displacement" if magnification == 1.0 else f"displacement × {magnification:g}"
 
 
@@ -38,7 +41,7 @@ def caption(run: Run, poses: Sequence[Pose], magnification: float, speed: float 
         text = f"{times[0]:.{digits}f}"
     else:
         text = f"{min(times):.4g} to {max(times):.4g}"
-    parts = [f"{axis.symbol} = {axis.text(text)}", displacement(magnification)]
+    parts = [f"{axis.symbol} = {axis.text(text)}", displacement(run, magnification)]
     if speed != 1.0:
         parts.append(f"speed × {speed:g}")
     if run.failure is not None:

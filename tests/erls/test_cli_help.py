@@ -20,7 +20,7 @@ OPTIONS = {
                    "--points", "--norm", "--reference", "--budget", "--apply", "--set", "--workers", "--json"],
     "effects": ["--set", "--json"],
     "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--magnify", "--fps", "--speed", "--json"],
+    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--json"],
 }
 
 

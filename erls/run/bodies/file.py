@@ -44,6 +44,7 @@ def write_bodies(group: h5py.Group, run: BodyMotion | BodyRest) -> None:
         unit = "Hz" if run.modes.quantity == "frequency_hz" else "1"
         write_array(group, "modes/values", run.modes.values, unit, run.modes.quantity)
         write_array(group, "modes/moved", run.modes.moved, "1", "mode, node, how it moves in the world")
+        write_array(group, "modes/turned", run.modes.turned, "rad/m", "mode, node, how it turns in the world")
 
 
 def read_bodies(file: Reader, scene: BodyScene, end: End) -> BodyMotion | BodyRest:
@@ -97,5 +98,6 @@ def _modes(file: Reader, scene: BodyScene, assembly: Assembly) -> Modes | None:
     if not isinstance(analysis, (Buckling, Frequencies)) or "modes" not in file.names_inside():
         return None
     values = file.subgroup("modes").array("values", (None,))
-    moved = file.subgroup("modes").array("moved", (len(values), assembly.system.count, 3))
-    return Modes("load" if isinstance(analysis, Buckling) else "frequency_hz", values, moved)
+    shape = len(values), assembly.system.count, 3
+    moved, turned = (file.subgroup("modes").array(name, shape) for name in ("moved", "turned"))
+    return Modes("load" if isinstance(analysis, Buckling) else "frequency_hz", values, moved, turned)

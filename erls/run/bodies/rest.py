@@ -25,13 +25,14 @@ class Modes:
     quantity : str
         What is asked for: ``load`` or ``frequency_hz``.
     values : (k,) array
-    moved : (k, n, 3) array
-        How the nodes move, in the world.
+    moved, turned : (k, n, 3) array
+        How the nodes move and turn, in the world; the largest displacement is 1 m.
     """
 
     quantity: str
     values: Array
     moved: Array
+    turned: Array
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,11 @@ class BodyRun(Run):
         """(k, m) of the conditions of connections."""
 
     @property
+    def origin(self) -> Nodes:
+        """What displacements count from: where all is built."""
+        return self.assembly.system.start
+
+    @property
     def worth_a_file(self) -> bool:
         """Always: the file says what failed."""
         return True
