@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import re
 import shlex
@@ -12,7 +14,6 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 DOCS = sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))
 PAGES = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", *DOCS)}
-_ERLS = "import sys; from erls.cli.main import main; sys.exit(main())"
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -26,17 +27,22 @@ def shell_lines(page: str) -> list[str]:
 
 
 def run(command: str, folder: Path) -> None:
-    """Run ``erls ...`` or ``python -m erls...`` as a user would, from a folder like a checkout; it has to succeed."""
-    words = shlex.split(command)
-    code = ["-c", _ERLS] if words[0].endswith("erls") else []
-    done = subprocess.run(
-        [sys.executable, *code, *words[1:]],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "error" not in done.stderr
+    """Run ``erls ...`` or ``python -m erls...`` as a user would, from a folder like a checkout; it has to succeed.
+
+    Commands run in this process, where everything is loaded; `test_cli` starts some for real.
+    """
+    program, *words = shlex.split(command)
+    told = io.StringIO()
+    if program.endswith("erls"):
+        from erls.cli.main import main
+
+        with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(told):
+            code = main(words)
+    else:
+        settings = {**os.environ, "PYTHONPATH": str(ROOT)}
+        done = subprocess.run([sys.executable, *words], cwd=folder, env=settings, capture_output=True, text=True)
+        code, told = done.returncode, io.StringIO(done.stderr)
+    assert code == 0, told.getvalue()
+    assert "error" not in told.getvalue()
     if "-o" in words:
         assert (folder / words[words.index("-o") + 1]).exists()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-import threading
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -75,14 +76,22 @@ def test_a_faulty_variant_spoils_no_other() -> None:
         erls.simulate_many(TALL, variants, workers=0)
 
 
-def test_an_interrupt_keeps_what_was_computed() -> None:
+def test_an_interrupt_keeps_what_was_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C during a long run: the short one is there, the long one says where it stopped, the next has none."""
-    long = ["simulation.duration=1000", "simulation.step=1e-3"]
-    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
-    results = erls.simulate_many(
-        ROBOT, [["simulation.duration=0.01"], long, long], progress=lambda done, total: timer.start(), workers=1
-    )
+    simulate = erls.simulate
+
+    def interrupted(scene: Any, *, progress: Callable[[float, float], None], **given: Any) -> Any:
+        def look(t: float, duration: float) -> None:
+            progress(t, duration)
+            if t > 0.01:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        return simulate(scene, progress=look, **given)
+
+    monkeypatch.setattr("erls.simulation.variants.simulate", interrupted)
+    long = ["simulation.duration=10", "simulation.step=1e-3"]
+    results = erls.simulate_many(ROBOT, [["simulation.duration=0.01"], long, long], workers=1)
     assert isinstance(results[0], ChainRun)
     assert [stopped.cause for stopped in results[1:]] == [Cause.INTERRUPTED] * 2  # type: ignore[union-attr]
-    assert results[1].run.end > 0  # type: ignore[union-attr]
+    assert 0 < results[1].run.end < 10  # type: ignore[union-attr]
     assert results[2].run is None  # type: ignore[union-attr]
