@@ -7,10 +7,13 @@ from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
+
 from erls.equations.formulation import Formulation, Reporting
 from erls.equations.registry import system_of
 from erls.equations.substructures import solved
 from erls.integrate.base import Observer, Options, Solution
+from erls.integrate.charts import in_charts
 from erls.integrate.registry import integrator_named
 from erls.integrate.thinning import output_step
 from erls.maths.jit import compiling_beside
@@ -119,7 +122,12 @@ INTEGRATIONS: dict[str, Integration] = {
 
 def integrator(mechanism: Mechanism, settings: Simulation) -> Integrate:
     """What integrates that which `erls.equations.registry.formulate` makes of the same."""
-    return INTEGRATIONS[system_of(mechanism, settings)].integrator(mechanism, settings)
+    kind = system_of(mechanism, settings)
+    found = INTEGRATIONS[kind].integrator(mechanism, settings)
+    if kind == "pieces" or not mechanism.rotation_vectors:
+        return found
+    prescribed = np.cumsum([joint.drive.prescribed for joint in mechanism.joints])
+    return in_charts(found, [k - int(prescribed[k]) for k in mechanism.rotation_vectors])
 
 
 def compile_kernels(formulation: Formulation, settings: Simulation) -> None:

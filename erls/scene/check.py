@@ -69,6 +69,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         _check_event(event, scene, f"{file}: events[{k}]")
     if scene.simulation.bandwidth is not None:
         _check_bandwidth(scene, f"{file}: simulation.bandwidth")
+    _check_compound(scene, f"{file}: simulation")
     if scene.loops:
         if scene.simulation.coordinates != "independent":
             message, right = "loops tie independent coordinates", "remove it, or the loops"
@@ -204,6 +205,22 @@ def _check_bandwidth(scene: SceneRecord, place: str) -> None:
             message = f"static correction of modes above a bandwidth does not go with {what}"
             remedy = "remove the bandwidth, so that all modes are integrated"
             raise bad(place, message, s.bandwidth, remedy)
+
+
+def _check_compound(scene: SceneRecord, place: str) -> None:
+    """What joints of several coordinates do not go with."""
+    s = scene.simulation
+    compound = next((joint for joint in scene.joints if len(joint_coordinates(joint)) > 1), None)
+    vector = next((j for j in scene.joints if any(f.vector for f in joint_coordinates(j).values())), None)
+    for field, joint, found, remedy in (
+        ("gauge", compound, s.gauge == "minimum-norm", "use gauge = 'joint-angle'"),
+        ("coordinates", compound, s.coordinates == "absolute", "use coordinates = 'independent'"),
+        ("formulation", compound, s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
+        ("bandwidth", vector, s.bandwidth is not None, "remove the bandwidth, so that all modes are integrated"),
+    ):
+        if joint is not None and found:
+            message = f"does not go with the {joint.type} joint {joint.name!r}"
+            raise bad(f"{place}.{field}", message, getattr(s, field), remedy)
 
 
 def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:

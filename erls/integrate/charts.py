@@ -1,0 +1,124 @@
+"""Rotation vectors that turn on for ever: a run in stretches, between which a vector is exchanged for a shorter one.
+
+A rotation vector ψ tells its rotation badly near a full turn, where T(ψ) is singular. Beyond `LONGEST` it goes on as
+
+    ψ' = (1 - 2π/|ψ|) ψ,   dψ'/dψ = 1 - 2π/|ψ| (1 - n nᵀ),   n = ψ/|ψ|,
+
+which is the same rotation with the opposite sense of turning. Nothing else changes, and no rotation has to be
+remembered beside the coordinates: equations, files and interpolation know vectors alone. At the exchange a solution
+holds two knots, one in either vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from erls.integrate.base import Observer, Options, Solution, StopRun, Work
+from erls.maths.so3 import Array
+
+LONGEST = 1.25 * np.pi
+"""Length of a rotation vector beyond which it is exchanged; a step may go on by the rest of a full turn [rad]."""
+
+
+def exchanged(y: Array, v: Array, places: Sequence[int]) -> tuple[Array, Array]:
+    """The same state with short rotation vectors.
+
+    Parameters
+    ----------
+    y, v : (n,) arrays
+    places : sequence of int
+        Of the first component of each vector among the coordinates.
+    """
+    y, v = y.copy(), v.copy()
+    for k in places:
+        psi, rate = y[k : k + 3], v[k : k + 3]
+        length = float(np.linalg.norm(psi))
+        if length > LONGEST:
+            along = psi / length
+            v[k : k + 3] = rate - 2 * np.pi / length * (rate - along * (along @ rate))
+            y[k : k + 3] = psi - 2 * np.pi * along
+    return y, v
+
+
+def in_charts(integrate: Callable[..., Solution], places: Sequence[int]) -> Callable[..., Solution]:
+    """An integrator that exchanges rotation vectors on its way; ``places`` as of `exchanged`."""
+
+    def integrated(
+        system: Any,
+        times: tuple[float, float],
+        y: Array,
+        v: Array,
+        options: Options,
+        observer: Observer | None = None,
+    ) -> Solution:
+        before: Solution | None = None
+        state = exchanged(np.asarray(y), np.asarray(v), places)
+        start, end = times
+        while True:
+            watch = _Watch(observer, places, before)
+            found = integrate(system, (start, end), *state, options, watch)
+            long = _first_long(found, places)
+            last = len(found.t) - 1 if long is None else long
+            whole = _joined(before, _up_to(found, last))
+            if long is None or watch.stopped or not found.t[long] < end:
+                return whole if long is None else replace(whole, failure=found.failure)
+            start, before = float(found.t[long]), replace(whole, failure=None)
+            state = exchanged(found.y[long], found.v[long], places)
+
+    return integrated
+
+
+class _Watch:
+    """Tells the observer of the whole run, and ends a stretch where a rotation vector has grown too long."""
+
+    def __init__(self, observer: Observer | None, places: Sequence[int], before: Solution | None) -> None:
+        self._observer, self._places, self._before = observer, places, before
+        self.stopped = False
+
+    def __call__(self, t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:
+        kept: Sequence[float] | None = None
+        if self._observer is not None:
+            try:
+                kept = self._observer(t, lambda: _joined(self._before, knots()))
+            except StopRun:
+                self.stopped = True
+                raise
+        if _first_long(knots(), self._places) is not None:
+            raise StopRun
+        return kept
+
+
+def _first_long(solution: Solution, places: Sequence[int]) -> int | None:
+    """The first knot, not counting that at the start, with a vector that is too long."""
+    lengths = [np.linalg.norm(solution.y[1:, k : k + 3], axis=1) for k in places]
+    found = np.flatnonzero(np.max(lengths, axis=0) > LONGEST)
+    return int(found[0]) + 1 if len(found) else None
+
+
+def _up_to(solution: Solution, last: int) -> Solution:
+    """The knots up to one."""
+    count = len(solution.t)
+    parts: dict[str, Any] = {}
+    for field in fields(solution):
+        value = getattr(solution, field.name)
+        if isinstance(value, np.ndarray) and len(value) == count:
+            parts[field.name] = value[: last + 1]
+    return replace(solution, **parts)
+
+
+def _joined(before: Solution | None, after: Solution) -> Solution:
+    """One solution of two stretches."""
+    if before is None:
+        return after
+    parts: dict[str, Any] = {}
+    for field in fields(after):
+        first, second = getattr(before, field.name), getattr(after, field.name)
+        if isinstance(second, np.ndarray):
+            parts[field.name] = np.concatenate([first, second])
+    work = Work(**{f.name: getattr(before.work, f.name) + getattr(after.work, f.name) for f in fields(Work)})
+    warnings = tuple(dict.fromkeys((*before.warnings, *after.warnings)))
+    return replace(after, **parts, work=work, warnings=warnings, choice=before.choice or after.choice)
