@@ -135,11 +135,14 @@ class JointType(NamedTuple):
     conditions : tuple of Condition
     axes : int
         How many directions say how it lies.
+    fields : tuple of str
+        Fields of a joint in a scene that say more: attributes of its freedoms.
     """
 
     freedoms: tuple[Freedom, ...] | None
     conditions: tuple[Condition, ...]
     axes: int = 1
+    fields: tuple[str, ...] = ()
 
     @property
     def one(self) -> Freedom | None:
@@ -172,6 +175,7 @@ _VECTOR = tuple(Freedom(axis, True, f"turn_{'xyz'[axis]}", vector=True) for axis
 JOINT_TYPES: dict[str, JointType] = {
     "revolute": JointType((_TURN,), _PINNED + _PARALLEL),
     "prismatic": JointType((_SLIDE,), _PINNED[:2] + _STRAIGHT),
+    "screw": JointType((_TURN,), (), fields=("pitch",)),
     "cylindrical": JointType((replace(_SLIDE, name="slide"), replace(_TURN, name="turn")), _PINNED[:2] + _PARALLEL),
     "universal": JointType(
         (Freedom(X, True, "x"), Freedom(Y, True, "y")), (*_PINNED, _normal("axes at right angles", X, Y)), axes=2

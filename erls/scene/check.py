@@ -18,6 +18,7 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
+_FIELDS = {field for kind in JOINT_TYPES.values() for field in kind.fields}
 # on one coordinate
 _ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
 
@@ -106,6 +107,10 @@ def _check_place(scene: SceneRecord, k: int, place: str) -> None:
 
 def _check_coordinates(joint: Joint, place: str) -> None:
     """What acts in a joint stands at its coordinate, or at each of its coordinates."""
+    plain = type(joint)(name=joint.name, dh=joint.dh)
+    for field in _FIELDS - set(JOINT_TYPES[joint.type].fields):
+        if getattr(joint, field) != getattr(plain, field):
+            raise bad(f"{place}.{field}", f"a {joint.type} joint has none", getattr(joint, field), "remove it")
     known = [freedom.name for freedom in JOINT_TYPES[joint.type].freedoms or () if freedom.name]
     for name in joint.coordinates:
         if not known:
@@ -115,7 +120,6 @@ def _check_coordinates(joint: Joint, place: str) -> None:
         _check_component(joint, name, f"{place}.coordinates.{name}")
     if JOINT_TYPES[joint.type].one is not None:
         return
-    plain = type(joint)(name=joint.name, dh=joint.dh)
     remedy = f"put it into coordinates.{known[0]}" if known else "remove it"
     for field in (*_ACTING, "initial"):
         given = getattr(joint, field, None)
@@ -211,11 +215,15 @@ def _check_compound(scene: SceneRecord, place: str) -> None:
     """What joints of several coordinates do not go with."""
     s = scene.simulation
     compound = next((joint for joint in scene.joints if len(joint_coordinates(joint)) > 1), None)
+    screw = next((joint for joint in scene.joints if joint.type == "screw"), None)
     vector = next((j for j in scene.joints if any(f.vector for f in joint_coordinates(j).values())), None)
     for field, joint, found, remedy in (
         ("gauge", compound, s.gauge == "minimum-norm", "use gauge = 'joint-angle'"),
+        ("gauge", screw, s.gauge == "minimum-norm", "use gauge = 'joint-angle'"),
+        ("coordinates", screw, s.coordinates == "absolute", "use coordinates = 'independent'"),
+        ("formulation", screw, s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
         ("coordinates", compound, s.coordinates == "absolute", "use coordinates = 'independent'"),
-        ("formulation", compound, s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
+        ("formulation", vector, s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
         ("bandwidth", vector, s.bandwidth is not None, "remove the bandwidth, so that all modes are integrated"),
     ):
         if joint is not None and found:

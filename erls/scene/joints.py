@@ -163,13 +163,16 @@ class Joint(Acting, frozen=True):
     dh : DH
         Its Denavit-Hartenberg row.
     type : str
-        What it leaves free: ``revolute`` turns about z, ``prismatic`` slides along z, ``cylindrical`` both (``slide``,
+        What it leaves free: ``revolute`` turns about z, ``prismatic`` slides along z, ``screw`` does both at once,
+        ``cylindrical`` each for itself (``slide``,
         ``turn``), ``universal`` turns about x and then about its new y (``x``, ``y``), ``planar`` slides along x and y
         and turns about z (``x``, ``y``, ``turn``), ``spherical`` turns by a rotation vector (``turn_x``, ``turn_y``,
         ``turn_z``), ``floating`` does all (``x``, ``y``, ``z``, then that vector), ``fixed`` holds.
     coordinates : dict of Coordinate
         What acts along each coordinate of a joint that has several, by the names above; reports call them
         ``joint/coordinate``. A joint of one coordinate has these fields itself.
+    pitch : float
+        Of a screw: how far it advances along z per radian [m/rad].
     on : str
         The link that it stands on, or ``ground``; the link before unless given.
     at : str
@@ -199,6 +202,7 @@ class Joint(Acting, frozen=True):
     dh: DH
     type: str = "revolute"
     coordinates: dict[str, Coordinate] = {}
+    pitch: float = 0.0
     on: str = ""
     at: str = ""
     branch: Branch | None = None

@@ -93,6 +93,15 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
         set(),
         True,
     ),
+    "screws": (
+        [
+            _joint("a", "screw", 25.0, pitch=0.05, **SPRING),
+            _joint("b", alpha=-15.0, drive=FED),
+            _joint("c", "screw", 15.0, pitch=-0.2),
+        ],
+        set(),
+        True,
+    ),
     "rotation vectors": (
         [
             _joint("a", "floating", 25.0, coordinates={"x": SPRING}),
@@ -110,7 +119,7 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
     "no effects": ([_joint("a", alpha=35.0), _joint("b")], set(INERTIAL), True),
 }
 
-NOT_SERIAL = ("branches", "joints of several coordinates", "rotation vectors")
+NOT_SERIAL = ("branches", "joints of several coordinates", "rotation vectors", "screws")
 SERIAL = [name for name in CASES if name not in NOT_SERIAL]
 """Chains of joints of one coordinate in which every link stands on the one before."""
 

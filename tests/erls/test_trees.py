@@ -98,9 +98,10 @@ def test_rigid_tree(tmp_path: Path, formulation: str) -> None:
     np.testing.assert_allclose(equations.residual(0.0, y, v, a), expected, atol=1e-12 * np.abs(expected).max())
 
 
-def test_rotation_vectors(tmp_path: Path) -> None:
-    """Rigid links on floating and spherical joints against the recursive Newton-Euler method: 1e-12 of the largest."""
-    mechanism = _rigid(chain_cases.mechanism(tmp_path, "rotation vectors"))
+@pytest.mark.parametrize("case", chain_cases.NOT_SERIAL)
+def test_rigid_links_on_all_joints(tmp_path: Path, case: str) -> None:
+    """Against the recursive Newton-Euler method: 1e-12 of the largest force."""
+    mechanism = _rigid(chain_cases.mechanism(tmp_path, case))
     free = [replace(joint, drive=Drive(), forces=JointForces(), rotor_inertia=0.0) for joint in mechanism.joints]
     mechanism = replace(mechanism, joints=tuple(free))
     y, v, a = _state(mechanism, len(free))
