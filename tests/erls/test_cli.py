@@ -269,6 +269,7 @@ def test_mode_study_ends_with_4_unless_converged(folder: Path, capsys: pytest.Ca
     assert "converged at 0 elastic modes" in (folder / "m.html").read_text(encoding="utf-8")
 
 
+BODIES = str(scenes.ROOT / "data/statics/roll_up.toml")
 FAULTY_COMMANDS = [
     (("compare", "scene.toml", "--formulations", "erls"), "needs two formulations"),
     (("compare", "scene.toml", "--formulations", "erls,adams"), "adams"),
@@ -279,6 +280,8 @@ FAULTY_COMMANDS = [
     (("study", "modes", "scene.toml", "--tolerance", "0"), "tolerance"),
     (("study", "modes", "scene.toml", "--tolerance", "nan"), "tolerance"),
     (("compare", "scene.toml", "--workers", "0"), "workers"),
+    *((command, "simulate_many") for command in (("compare", BODIES), ("study", "modes", BODIES),
+                                                 ("study", "cost", BODIES), ("effects", BODIES))),
 ]
 
 

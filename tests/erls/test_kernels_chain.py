@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +9,14 @@ import chain_cases
 import numpy as np
 import pytest
 import scenes
+from twins import Plain, distance, uncompiled
 
-from erls.equations.erls.formulation import Erls
 from erls.equations.erls.paper.dense_chain import DenseChain
 from erls.integrate.base import Options
 from erls.integrate.generalized_alpha import generalized_alpha
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-12
-
-
-def _distance(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
 
 
 @pytest.mark.parametrize("name", chain_cases.CASES)
@@ -35,14 +28,14 @@ def test_the_recursion_equals_the_dense_equations_of_the_paper(name: str, tmp_pa
     for at in chain_cases.states(recursion, name):
         found = chain_cases.evaluate(recursion.compiled, at)
         residual = chain.residual(at.t, at.y, at.v, at.a)
-        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
-        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
-        assert _distance(found["mass"], chain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        assert distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
+        assert distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
+        assert distance(found["mass"], chain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
         stiffness, damping = chain.stiffness_and_damping(at.t, at.y, at.v)
-        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
-        assert _distance(found["damping"], damping) <= LIKE_NUMPY
+        assert distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert distance(found["damping"], damping) <= LIKE_NUMPY
         if np.linalg.eigvalsh(found["mass"])[0] > 0:  # inertia linear in the deformation alone need not be positive
-            assert _distance(found["acceleration"], chain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
+            assert distance(found["acceleration"], chain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
         else:
             assert name in ("without inertia_second_order", "only inertia_first_order")
 
@@ -56,24 +49,17 @@ def test_modes_alone_feel_what_the_elastic_forces_hide(tmp_path: Path) -> None:
         f = len(chain.free_joints)
         y = np.concatenate([at.y[:f], 0 * at.y[f:]])
         found = chain_cases.evaluate(recursion.compiled, chain_cases.State(at.t, y, at.v, at.a))["residual"]
-        assert _distance(found[f:], chain.residual(at.t, y, at.v, at.a)[f:]) <= LIKE_NUMPY
+        assert distance(found[f:], chain.residual(at.t, y, at.v, at.a)[f:]) <= LIKE_NUMPY
 
 
 def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     """The same source as plain Python (``ERLS_JIT=0``) in a process of its own."""
-    output = tmp_path / "twin.npz"
-    folder = Path(__file__).parent
-    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
-    subprocess.run(
-        [sys.executable, str(folder / "chain_cases.py"), str(tmp_path), str(output)], env=environment, check=True
-    )
-    found = chain_cases.all_results(tmp_path)
-    with np.load(output) as twin:
-        assert set(twin) == set(found)
-        for key, values in found.items():
-            # rounding counts with the condition of what is solved, up to 1e8
-            limit = LIKE_NUMPY if key.endswith("acceleration") or "solved" in key else LIKE_TWIN
-            assert _distance(values, twin[key]) <= limit, key
+    found, twin = chain_cases.all_results(tmp_path), uncompiled(chain_cases, tmp_path)
+    assert set(twin) == set(found)
+    for key, values in found.items():
+        # rounding counts with the condition of what is solved, up to 1e8
+        limit = LIKE_NUMPY if key.endswith("acceleration") or "solved" in key else LIKE_TWIN
+        assert distance(values, twin[key]) <= limit, key
 
 
 def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
@@ -98,18 +84,6 @@ def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
     assert status == 1 + 1
 
 
-class _Plain:
-    """A system without its compiled form."""
-
-    def __init__(self, chain: Erls) -> None:
-        self.chain = chain
-
-    compiled = None
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.chain, name)
-
-
 RUNS = ("one link, payload, spring", "parallel axes with a slide", "prescribed in the middle")
 
 
@@ -120,7 +94,7 @@ def test_generalized_alpha_takes_the_same_steps(name: str, tmp_path: Path) -> No
     y, v = chain.initial_state()
     options = Options(step=2e-3)
     fast = generalized_alpha(chain, (0.0, 0.2), y, v, options)
-    slow = generalized_alpha(_Plain(chain), (0.0, 0.2), y, v, options)
+    slow = generalized_alpha(Plain(chain), (0.0, 0.2), y, v, options)
     assert fast.failure is None
     np.testing.assert_array_equal(fast.t, slow.t)
     np.testing.assert_allclose(fast.y, slow.y, atol=1e-10 * np.abs(slow.y).max())
@@ -130,7 +104,7 @@ def test_generalized_alpha_takes_the_same_steps(name: str, tmp_path: Path) -> No
     assert fast.work.factorizations == pytest.approx(slow.work.factorizations, abs=4)
 
 
-@pytest.mark.parametrize("of", [lambda chain: chain, _Plain], ids=["compiled", "NumPy"])
+@pytest.mark.parametrize("of", [lambda chain: chain, Plain], ids=["compiled", "NumPy"])
 def test_motors_at_their_limit_do_not_stall_the_integrator(of: Any, tmp_path: Path) -> None:
     """Budget: while a motor gives all it can its gains are none; with them 63,774 steps were taken instead of 237."""
     chain = chain_cases.equations(tmp_path, "controllers")
@@ -147,7 +121,7 @@ def test_generalized_alpha_halves_and_fails_alike(tmp_path: Path) -> None:
     chain = scenes.equations(scenes.l_scene(tmp_path, joints=[{**scenes.L_SCENE["joints"][0], **hard}]))
     y, v = chain.initial_state()
     fast = generalized_alpha(chain, (0.0, 0.01), y, v, Options(step=1e-3))
-    slow = generalized_alpha(_Plain(chain), (0.0, 0.01), y, v, Options(step=1e-3))
+    slow = generalized_alpha(Plain(chain), (0.0, 0.01), y, v, Options(step=1e-3))
     assert fast.work.rejected_steps == slow.work.rejected_steps > 0
     assert fast.failure is not None
     assert slow.failure is not None

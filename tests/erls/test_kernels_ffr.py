@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +10,7 @@ import ffr_cases
 import numpy as np
 import pytest
 import scenes
+from twins import Plain, distance, uncompiled
 
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr import interface_motion
@@ -31,10 +29,6 @@ LIKE_TWIN = 1e-12
 LIKE_SOLVED = 1e-9
 
 
-def _distance(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
-
-
 @pytest.mark.parametrize("case", ffr_cases.CASES)
 def test_mass_matrices_are_symmetric(case: str, tmp_path: Path) -> None:
     """To the last digit; their values and those of all functions stand in `test_frozen_values`."""
@@ -48,19 +42,12 @@ def test_mass_matrices_are_symmetric(case: str, tmp_path: Path) -> None:
 
 def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     """The same source as plain Python (``ERLS_JIT=0``) in a process of its own."""
-    output = tmp_path / "twin.npz"
-    folder = Path(__file__).parent
-    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
-    subprocess.run(
-        [sys.executable, str(folder / "ffr_cases.py"), str(tmp_path), str(output)], env=environment, check=True
-    )
-    found = ffr_cases.all_results(tmp_path)
-    with np.load(output) as twin:
-        assert set(twin) == set(found)
-        for key, values in found.items():
-            # rounding counts with the condition of what is solved: up to 1e8, and 1e9 of complex matrices on mean axes
-            limit = LIKE_SOLVED if "solved" in key else LIKE_NUMPY if key.endswith("acceleration") else LIKE_TWIN
-            assert _distance(values, twin[key]) <= limit, key
+    found, twin = ffr_cases.all_results(tmp_path), uncompiled(ffr_cases, tmp_path)
+    assert set(twin) == set(found)
+    for key, values in found.items():
+        # rounding counts with the condition of what is solved: up to 1e8, and 1e9 of complex matrices on mean axes
+        limit = LIKE_SOLVED if "solved" in key else LIKE_NUMPY if key.endswith("acceleration") else LIKE_TWIN
+        assert distance(values, twin[key]) <= limit, key
 
 
 @pytest.mark.parametrize("s", [0.0, 1e-9, 9.99e-3, 1.001e-2, 0.499, 0.501, 4.0])
@@ -98,18 +85,6 @@ def test_one_link_runs_as_in_erls() -> None:
     assert np.abs(apart).max() <= 1e-9
 
 
-class _Plain:
-    """A system without its compiled form."""
-
-    compiled = None
-
-    def __init__(self, chain: Ffr) -> None:
-        self.chain = chain
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.chain, name)
-
-
 RUNS = ("tangent stiffened: prescribed in the middle", "mean-axis: parallel axes with a slide")
 
 
@@ -120,7 +95,7 @@ def test_generalized_alpha_takes_the_same_steps(case: str, tmp_path: Path) -> No
     y, v = chain.initial_state()
     options = Options(step=2e-3)
     fast = generalized_alpha(chain, (0.0, 0.1), y, v, options)
-    slow = generalized_alpha(_Plain(chain), (0.0, 0.1), y, v, options)
+    slow = generalized_alpha(Plain(chain), (0.0, 0.1), y, v, options)
     assert fast.failure is None
     np.testing.assert_array_equal(fast.t, slow.t)
     np.testing.assert_allclose(fast.y, slow.y, atol=1e-10 * np.abs(slow.y).max())

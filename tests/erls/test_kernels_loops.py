@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +11,7 @@ import numpy as np
 import pytest
 import stiffened_cases
 from chain_cases import evaluate
+from twins import distance, uncompiled
 
 from erls.equations.erls.formulation import Erls
 from erls.equations.loops.closed_chain import ClosedChain
@@ -23,10 +21,6 @@ from erls.integrate.closed_loops import Watch, loop_integrator
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-11  # relative: sums in another order, through matrices of a condition of about 1e3
-
-
-def _distance(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
 
 
 def _plain(closed: ClosedChain) -> ClosedChain:
@@ -49,13 +43,13 @@ def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
     for at in loop_cases.states(closed, name):
         found = evaluate(closed.compiled, at)
         residual = plain.residual(at.t, at.y, at.v, at.a)
-        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
-        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
-        assert _distance(found["mass"], plain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        assert distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
+        assert distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
+        assert distance(found["mass"], plain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
         stiffness, damping = plain.stiffness_and_damping(at.t, at.y, at.v)
-        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
-        assert _distance(found["damping"], damping) <= LIKE_NUMPY
-        assert _distance(found["acceleration"], plain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
+        assert distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert distance(found["damping"], damping) <= LIKE_NUMPY
+        assert distance(found["acceleration"], plain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
         ours, theirs = closed.closed(at.t, at.y, at.v), plain.closed(at.t, at.y, at.v)
         gaps = [np.abs(plain.openings(plain.closure(at.t, *state))).max() for state in (ours, theirs)]
         assert gaps[0] <= max(1e-12, 10 * gaps[1])
@@ -66,19 +60,12 @@ def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
 
 def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     """The same source as plain Python (``ERLS_JIT=0``) in a process of its own, steps included."""
-    output = tmp_path / "twin.npz"
-    folder = Path(__file__).parent
-    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
-    subprocess.run(
-        [sys.executable, str(folder / "loop_cases.py"), str(tmp_path), str(output)], env=environment, check=True
-    )
-    found = loop_cases.all_results(tmp_path)
-    with np.load(output) as twin:
-        assert set(twin) == set(found)
-        for key, values in found.items():
-            # all but masses have been solved for, as accelerations of open chains
-            limit = LIKE_TWIN if key.endswith("mass") else LIKE_NUMPY
-            assert _distance(values, twin[key]) <= limit, key
+    found, twin = loop_cases.all_results(tmp_path), uncompiled(loop_cases, tmp_path)
+    assert set(twin) == set(found)
+    for key, values in found.items():
+        # all but masses have been solved for, as accelerations of open chains
+        limit = LIKE_TWIN if key.endswith("mass") else LIKE_NUMPY
+        assert distance(values, twin[key]) <= limit, key
 
 
 @pytest.mark.parametrize("name", ["torque on a slide", "controlled turn", "two loops"])
@@ -175,9 +162,9 @@ def test_loops_with_stiffening_run_compiled(name: str, tmp_path: Path) -> None:
     assert closed.compiled is not None
     for at in loop_cases.states(closed, name):
         found = evaluate(closed.compiled, at)
-        assert _distance(found["residual"], plain.residual(at.t, at.y, at.v, at.a)) <= LIKE_NUMPY
-        assert _distance(found["mass"], plain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        assert distance(found["residual"], plain.residual(at.t, at.y, at.v, at.a)) <= LIKE_NUMPY
+        assert distance(found["mass"], plain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
         stiffness, damping = plain.stiffness_and_damping(at.t, at.y, at.v)
-        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
-        assert _distance(found["damping"], damping) <= LIKE_NUMPY
-        assert _distance(found["acceleration"], plain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
+        assert distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert distance(found["damping"], damping) <= LIKE_NUMPY
+        assert distance(found["acceleration"], plain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY

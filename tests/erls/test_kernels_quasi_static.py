@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import chain_cases
-import numpy as np
 import pytest
 import quasi_static_cases as cases
+from twins import distance, uncompiled
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-11  # relative: sums in another order, through matrices of a condition of about 1e3
-
-
-def _distance(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
 
 
 @pytest.mark.parametrize("static", [True, False])
@@ -29,23 +22,17 @@ def test_kernels_equal_the_numpy_equations(name: str, static: bool, tmp_path: Pa
     assert (len(system.modes.stiffness) > 0) == static
     for at in cases.states(system, name):
         found = chain_cases.evaluate(system.compiled, at)
-        assert _distance(found["residual"], system.residual(at.t, at.y, at.v, at.a)) <= LIKE_NUMPY
-        assert _distance(found["mass"], system.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        assert distance(found["residual"], system.residual(at.t, at.y, at.v, at.a)) <= LIKE_NUMPY
+        assert distance(found["mass"], system.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
         stiffness, damping = system.stiffness_and_damping(at.t, at.y, at.v)
-        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
-        assert _distance(found["damping"], damping) <= LIKE_NUMPY
-        assert _distance(found["acceleration"], system.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
+        assert distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert distance(found["damping"], damping) <= LIKE_NUMPY
+        assert distance(found["acceleration"], system.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
 
 
 def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     """The same source as plain Python (``ERLS_JIT=0``) in a process of its own."""
-    output = tmp_path / "twin.npz"
-    folder = Path(__file__).parent
-    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
-    command = [sys.executable, str(folder / "quasi_static_cases.py"), str(tmp_path), str(output)]
-    subprocess.run(command, env=environment, check=True)
-    found = cases.all_results(tmp_path)
-    with np.load(output) as twin:
-        assert set(twin) == set(found)
-        for key, values in found.items():
-            assert _distance(values, twin[key]) <= LIKE_TWIN, key
+    found, twin = cases.all_results(tmp_path), uncompiled(cases, tmp_path)
+    assert set(twin) == set(found)
+    for key, values in found.items():
+        assert distance(values, twin[key]) <= LIKE_TWIN, key

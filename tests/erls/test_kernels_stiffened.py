@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import chain_cases
 import numpy as np
 import pytest
 import scenes
 import stiffened_cases
+from twins import Plain, distance, uncompiled
 
 import erls
 from erls.equations.erls.formulation import Erls
@@ -27,10 +24,6 @@ LIKE_TWIN = 1e-12
 STIFF = 'simulation.effects=["all", "geometric_stiffening", "foreshortening"]'
 
 
-def _distance(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(np.abs(found - expected).max(initial=0.0) / max(np.abs(expected).max(initial=0.0), 1e-300))
-
-
 @pytest.mark.parametrize("name", stiffened_cases.CASES)
 def test_the_recursion_equals_the_dense_equations_of_the_paper(name: str, tmp_path: Path) -> None:
     """Residual (joints and modes apart), mass, stiffness, damping, and what accelerations leave out of balance."""
@@ -41,12 +34,12 @@ def test_the_recursion_equals_the_dense_equations_of_the_paper(name: str, tmp_pa
     for at in stiffened_cases.states(recursion, name):
         found = chain_cases.evaluate(recursion.compiled, at)
         residual = chain.residual(at.t, at.y, at.v, at.a)
-        assert _distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
-        assert _distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
-        assert _distance(found["mass"], chain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
+        assert distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
+        assert distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
+        assert distance(found["mass"], chain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
         stiffness, damping = chain.stiffness_and_damping(at.t, at.y, at.v)
-        assert _distance(found["stiffness"], stiffness) <= LIKE_NUMPY
-        assert _distance(found["damping"], damping) <= LIKE_NUMPY
+        assert distance(found["stiffness"], stiffness) <= LIKE_NUMPY
+        assert distance(found["damping"], damping) <= LIKE_NUMPY
         if np.linalg.eigvalsh(found["mass"])[0] > 0:
             left = chain.residual(at.t, at.y, at.v, found["acceleration"])
             taken = np.abs(found["mass"]) @ np.abs(found["acceleration"])
@@ -65,26 +58,20 @@ def test_second_order_is_felt(tmp_path: Path) -> None:
     linear = Erls(replace(chain.mechanism, effects=chain.mechanism.effects - {"geometric_stiffening"}))
     at = stiffened_cases.states(chain, "arms, mixed")[0]
     forces = [one.residual(at.t, at.y, at.v, at.a) for one in (linear, chain)]
-    assert _distance(*forces) > 1e-2
+    assert distance(*forces) > 1e-2
 
 
 def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     """The same source as plain Python (``ERLS_JIT=0``) in a process of its own."""
-    output, folder = tmp_path / "twin.npz", Path(__file__).parent
-    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parents[1])])}
-    subprocess.run(
-        [sys.executable, str(folder / "stiffened_cases.py"), str(tmp_path), str(output)], env=environment, check=True
-    )
-    found = stiffened_cases.all_results(tmp_path)
-    with np.load(output) as twin:
-        assert set(twin) == set(found)
-        for key, values in found.items():
-            if key.endswith("acceleration"):  # the condition of the mass matrix is up to 1e9: forces that they take
-                mass = found[key.replace("acceleration", "mass")]
-                apart, size = np.abs(mass @ (values - twin[key])), np.abs(mass) @ np.abs(values)
-                assert apart.max() <= LIKE_TWIN * max(size.max(), 1e-300), key
-            else:
-                assert _distance(values, twin[key]) <= LIKE_TWIN, key
+    found, twin = stiffened_cases.all_results(tmp_path), uncompiled(stiffened_cases, tmp_path)
+    assert set(twin) == set(found)
+    for key, values in found.items():
+        if key.endswith("acceleration"):  # the condition of the mass matrix is up to 1e9: forces that they take
+            mass = found[key.replace("acceleration", "mass")]
+            apart, size = np.abs(mass @ (values - twin[key])), np.abs(mass) @ np.abs(values)
+            assert apart.max() <= LIKE_TWIN * max(size.max(), 1e-300), key
+        else:
+            assert distance(values, twin[key]) <= LIKE_TWIN, key
 
 
 def _status(chain: Erls, y: np.ndarray) -> int:
@@ -117,25 +104,13 @@ def test_what_nothing_resists_is_named(tmp_path: Path) -> None:
     assert _status(whole, np.full(whole.size, np.nan)) > 0
 
 
-class _Plain:
-    """A system without its compiled form."""
-
-    def __init__(self, chain: Erls) -> None:
-        self.chain = chain
-
-    compiled = None
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.chain, name)
-
-
 def test_generalized_alpha_takes_the_same_steps(tmp_path: Path) -> None:
     """Compiled loop and NumPy algorithm: the same knots, steps and motion."""
     chain = stiffened_cases.equations(tmp_path, "arms, prescribed")
     y, v = chain.initial_state()
     options = Options(step=2e-3)
     fast = generalized_alpha(chain, (0.0, 0.06), y, v, options)
-    slow = generalized_alpha(_Plain(chain), (0.0, 0.06), y, v, options)
+    slow = generalized_alpha(Plain(chain), (0.0, 0.06), y, v, options)
     assert fast.failure is None
     np.testing.assert_array_equal(fast.t, slow.t)
     np.testing.assert_allclose(fast.y, slow.y, atol=1e-10 * np.abs(slow.y).max())
