@@ -88,6 +88,11 @@ class Mechanism:
         return tuple(k for k, joint in enumerate(self.joints) if joint.freedom.vector and joint.freedom.axis == 0)
 
     @property
+    def reach(self) -> float:
+        """Size of the largest link [m]."""
+        return max(1e-3, *(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in self.links))
+
+    @property
     def outermost(self) -> list[int]:
         """Links that bear no other."""
         return [k for k in range(len(self.links)) if k not in self.parents]

@@ -90,8 +90,8 @@ def slider_crank(**changes: Any) -> dict[str, Any]:
 
 
 def run(folder: Path, data: dict[str, Any], name: str = "erls", **simulation: Any) -> ChainRun:
-    """Simulate in one of `FORMULATIONS`; adaptive integrators choose their steps unless told."""
-    settings = {**data["simulation"], **FORMULATIONS[name], **simulation}
+    """Simulate in one of `FORMULATIONS`, or another by name; adaptive integrators choose their steps unless told."""
+    settings = {**data["simulation"], **FORMULATIONS.get(name, {"formulation": name}), **simulation}
     if simulation.get("integrator", "generalized_alpha") != "generalized_alpha" and "step" not in simulation:
         settings["step"] = 0.1
     return simulate(scenes.write_toml(folder / "loop.toml", {**data, "simulation": settings}))

@@ -22,7 +22,8 @@ RATE = 360.0  # deg/s
 PLANAR = ("translation along z", "rotation about x", "rotation about y")
 
 
-def _complex(positions: Array) -> Array:
+def planar(positions: Array) -> Array:
+    """x + i z."""
     return np.asarray(positions[..., 0] + 1j * positions[..., 2])
 
 
@@ -39,8 +40,8 @@ def test_driven_four_bar_keeps_to_the_closed_form(tmp_path: Path, name: str, int
     at = LENGTHS[0] * np.exp(1j * crank)
     for link, length, angle in zip(("coupler", "rocker"), LENGTHS[1:], loop_scenes.four_bar_angles(crank), strict=True):
         along = length * np.exp(1j * angle)
-        np.testing.assert_allclose(_complex(run.position(f"{link} middle", t)), at + along / 2, atol=1e-12)
-        np.testing.assert_allclose(_complex(run.position(f"{link} tip", t)), at + along, atol=1e-12)
+        np.testing.assert_allclose(planar(run.position(f"{link} middle", t)), at + along / 2, atol=1e-12)
+        np.testing.assert_allclose(planar(run.position(f"{link} tip", t)), at + along, atol=1e-12)
         at = at + along
     np.testing.assert_allclose(at, GROUND, atol=1e-14)
 
@@ -59,7 +60,7 @@ def test_driven_slider_crank_keeps_to_the_closed_form(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.joint_rate("j1", t), rate - np.radians(RATE), rtol=1e-11)
 
 
-def _one_coordinate(times: Array) -> Array:
+def one_coordinate(times: Array) -> Array:
     """Crank angle of the free four-bar: ½ m(φ) φ̇² + V(φ) with the transmission angles of the closed loop."""
     inertias = [m * length**2 / 12 for m, length in zip(MASSES, LENGTHS, strict=True)]
 
@@ -90,12 +91,12 @@ def _one_coordinate(times: Array) -> Array:
 
 
 @pytest.mark.parametrize("name", ["erls", "ffr"])
-def test_free_four_bar_against_one_coordinate(tmp_path: Path, name: str) -> None:
+def test_free_four_bar_againstone_coordinate(tmp_path: Path, name: str) -> None:
     """Released at rest; rtol 1e-9 against 1e-12: 1e-8 rad within 0.3 s. Energy stays, to 1e-8 J."""
     settings = {"integrator": "dop853", "rtol": 1e-9, "atol": 1e-10, "duration": 0.3}
     run = loop_scenes.run(tmp_path, loop_scenes.four_bar(), name, **settings)
     t = np.linspace(0, run.end, 30)
-    np.testing.assert_allclose(run.joint_angle("j0", t), _one_coordinate(t), atol=1e-8)
+    np.testing.assert_allclose(run.joint_angle("j0", t), one_coordinate(t), atol=1e-8)
     assert np.ptp(run.energy(t).total) < 1e-8
     assert _widest(run) < 1e-9
 
@@ -103,7 +104,7 @@ def test_free_four_bar_against_one_coordinate(tmp_path: Path, name: str) -> None
 def test_generalized_alpha_is_of_second_order_in_loops(tmp_path: Path) -> None:
     """Crank angle of the free four-bar against the one-coordinate equation; steps of 4 and 2 ms. Loops stay closed."""
     t = np.array([0.3])
-    exact = _one_coordinate(np.array([0.0, *t]))[1:]
+    exact = one_coordinate(np.array([0.0, *t]))[1:]
     runs = [loop_scenes.run(tmp_path, loop_scenes.four_bar(), step=h, duration=0.3) for h in (4e-3, 2e-3)]
     errors = [abs(float((run.joint_angle("j0", t) - exact)[0])) for run in runs]
     assert 1.8 < np.log2(errors[0] / errors[1]) < 2.2
@@ -328,4 +329,4 @@ def test_scenes_of_the_folder_close(tmp_path: Path) -> None:
     run = simulate(load_scene(scenes.ROOT / "data/four_bar/rigid.toml", changes))
     coupler, _ = loop_scenes.four_bar_angles(np.radians(78.0))
     wanted = LENGTHS[0] * np.exp(1j * np.radians(78.0)) + LENGTHS[1] * np.exp(1j * coupler)
-    np.testing.assert_allclose(_complex(run.position("rocker_pin", 0.05)), wanted, atol=1e-12)
+    np.testing.assert_allclose(planar(run.position("rocker_pin", 0.05)), wanted, atol=1e-12)

@@ -53,7 +53,7 @@ class ClosedChain:
         self.efforts = LoopEfforts(tree, self.rows)
         self.tree: TreeFormulation = ActuatedTree(tree, self.efforts) if self.efforts.any else tree
         self.metres = metre_scales(tree)
-        self.reach = max(1e-3, *(float(np.linalg.norm(np.ptp(k.model.nodes, axis=0))) for k in self.mechanism.links))
+        self.reach = self.mechanism.reach
         self.row_metres = np.where(self.rows.turns, self.reach, 1.0)
 
     @property

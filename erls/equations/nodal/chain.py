@@ -21,6 +21,7 @@ from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.maths import motion_maps as motions
+from erls.maths.rotation_maps import exp
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -35,7 +36,7 @@ from erls.mechanism.rigid_dynamics import inverse_dynamics
 @dataclass(frozen=True)
 class Seat:
     """Where a joint sits: nodes (`GROUND` for the ground) and the pose of its frames there, about or along whose z axis
-    it moves.
+    it moves, unless by a rotation vector.
     """
 
     inner: int
@@ -117,10 +118,13 @@ class Chain:
 
     def resting(self, held: Mapping[int, float]) -> NodalSystem:
         """The same with some joints, by their numbers, held at a coordinate."""
-        joints = [
-            replace(joint, motion=_constant(held[k]), breakpoints=()) if k in held else joint
-            for k, joint in enumerate(self.full.rows.joints)
-        ]
+        joints = list(self.full.rows.joints)
+        for k, coordinate in held.items():
+            if joints[k].type == "spherical":  # with the next two, which are fixed
+                psi = np.array([held[k + i] for i in range(3)])
+                joints[k] = replace(joints[k], type="fixed", inner_frame=joints[k].inner_frame @ pose(exp(psi)))
+            elif joints[k].type != "fixed":
+                joints[k] = replace(joints[k], motion=_constant(coordinate), breakpoints=())
         full = NodalSystem(self.full.start.poses, self.full.elements, joints)
         if not self.closing:
             return full
@@ -192,7 +196,7 @@ def _seats(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[in
 
 def _to_z(freedom: Freedom) -> Array:
     """(4, 4) pose of axes whose z is that of a motion, in those of its joint."""
-    return pose(np.roll(np.eye(3), -(freedom.axis + 1), axis=0).T)
+    return np.eye(4) if freedom.vector else pose(np.roll(np.eye(3), -(freedom.axis + 1), axis=0).T)
 
 
 def _closing(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int], loop: Loop) -> Seat:
@@ -212,9 +216,12 @@ def _closing(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[
 
 
 def _joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
+    kinds = ["revolute" if joint.freedom.turns else "prismatic" for joint in mechanism.joints]
+    for k in mechanism.rotation_vectors:  # the first one turns for all three
+        kinds[k : k + 3] = "spherical", "fixed", "fixed"
     return [
-        _joint(joint.name, "revolute" if joint.freedom.turns else "prismatic", seat, joint.drive)
-        for joint, seat in zip(mechanism.joints, seats, strict=True)
+        _joint(joint.name, kind, seat, joint.drive)
+        for joint, kind, seat in zip(mechanism.joints, kinds, seats, strict=True)
     ]
 
 

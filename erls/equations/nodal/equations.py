@@ -8,6 +8,7 @@ integrator found with them: the rates of the nodes' twists and the multipliers.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from erls.equations.nodal.scatter import IntArray
 from erls.equations.nodal.statics import solve_statics
 from erls.errors import SimulationError
 from erls.maths import motion_maps as motions
+from erls.maths import rotation_maps as rotations
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
@@ -93,12 +95,18 @@ class Nodal:
         rates = [joint.rate for joint in self.mechanism.joints] if self._start is None else self._start.rates
         v = np.zeros((self.system.count, 6))
         moving: list[Array] = []  # links, in the world's axes, about its origin
-        seats = zip(self.mechanism.joints, rates, self.chain.seats, self.chain.nodes, strict=True)
-        for joint, rate, seat, nodes in seats:
-            carrier = np.eye(4) if seat.inner == GROUND else q.poses[seat.inner]
+        vectors = self.mechanism.rotation_vectors
+        for k, (joint, seat, nodes) in enumerate(
+            zip(self.mechanism.joints, self.chain.seats, self.chain.nodes, strict=True)
+        ):
             below = np.zeros(6) if joint.parent < 0 else moving[joint.parent]
-            screw = replace(joint.freedom, axis=Z).screw
-            moving.append(below + motions.adjoint(carrier @ seat.inner_frame) @ screw * rate)
+            inner, outer = self._frames_of(q, seat)
+            if k in vectors:
+                spin = rotations.tangent(self._vector(q, k)) @ np.array(rates[k : k + 3])
+                below = below + motions.adjoint(outer) @ np.concatenate([np.zeros(3), spin])
+            elif not joint.freedom.vector:
+                below = below + motions.adjoint(inner) @ replace(joint.freedom, axis=Z).screw * rates[k]
+            moving.append(below)
             v[nodes] = motions.adjoint_inverse(q.poses[nodes]) @ moving[-1]
         velocity = v.ravel()
         if self.chain.closing:  # links that bend at the start do not move as rigid ones do
@@ -127,10 +135,32 @@ class Nodal:
         q, velocity = self.configuration(y, v)
         found = [view.at(q.poses, self.chain.beams, q.bent) for view in self.views]
         _, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
-        angles, rates = y[self._joints], rates[: len(self.mechanism.joints)]
+        angles, rates = y[self._joints].copy(), rates[: len(self.mechanism.joints)].copy()
+        for k in self.mechanism.rotation_vectors:
+            psi = self._vector(q, k)
+            angles[k : k + 3] = psi
+            rates[k : k + 3] = rotations.tangent_inverse(psi) @ self._spin(q, velocity, k)
         return State(
             t, [x.frame for x in found], [x.modal for x in found], angles, angles, rates, [x.nodes for x in found]
         )
+
+    def _frames_of(self, q: Nodes, seat: Seat) -> tuple[Array, Array]:
+        """(4, 4) frames of a joint in the world: the inner and the outer one."""
+        carrier = np.eye(4) if seat.inner == GROUND else q.poses[seat.inner]
+        return carrier @ seat.inner_frame, q.poses[seat.outer] @ seat.outer_frame
+
+    def _vector(self, q: Nodes, number: int) -> Array:
+        """(3,) rotation vector of a joint, the number being that of its first component."""
+        inner, outer = self._frames_of(q, self.chain.seats[number])
+        return np.asarray(rotations.log(inner[:3, :3].T @ outer[:3, :3]))
+
+    def _spin(self, q: Nodes, velocity: Array, number: int) -> Array:
+        """(3,) angular velocity of the outer frame of a joint against the inner one, in the axes of the former."""
+        seat, spins = self.chain.seats[number], velocity.reshape(-1, 6)[:, 3:]
+        across = q.poses[seat.outer, :3, :3] @ spins[seat.outer]
+        if seat.inner != GROUND:
+            across = across - q.poses[seat.inner, :3, :3] @ spins[seat.inner]
+        return np.asarray(self._frames_of(q, seat)[1][:3, :3].T @ across)
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""
@@ -189,9 +219,16 @@ class Nodal:
         full = self.chain.full
         if self.chain.left_out:
             force = np.asarray(self.system.constraint_matrix(t, q).T @ multipliers).ravel()
-            multipliers = smallest_multipliers(full, t, q, force)
+            multipliers = smallest_multipliers(full, t, q, force, self._units)
         along = self.system.in_joints(t, q, velocity, a)
         return _Acting(q, full.rows.joint_of_row, full.constraint_matrix(t, q), multipliers, along)
+
+    @cached_property
+    def _units(self) -> Array:
+        """(m,) multiplier per newton of all conditions of loops, with arms as long as a link; 0 of the others."""
+        rows = self.chain.full.rows
+        units = np.where(rows.c.any(axis=1), 1.0, self.mechanism.reach)
+        return np.where(rows.joint_of_row < len(self.mechanism.joints), 0.0, units)
 
     @property
     def warnings(self) -> tuple[str, ...]:

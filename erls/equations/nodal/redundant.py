@@ -36,15 +36,29 @@ def without_redundant(system: NodalSystem) -> tuple[list[Joint], tuple[str, ...]
     return joints, tuple(system.constraint_names[row] for row in found)
 
 
-def smallest_multipliers(full: NodalSystem, t: float, q: Nodes, force: Array) -> Array:
-    """(m,) least multipliers of all conditions of ``full`` with Bᵀ λ = ``force`` (n,)."""
-    rows = full.constraint_matrix(t, q)
-    metres = metre_scales(full)
-    scales = Scales(metres, np.eye(1), rows)
-    matrix = (dense(rows) / metres * scales.constraint[:, None]).T
-    unknowns = np.linalg.lstsq(matrix, force / metres, rcond=1e-9)[0]
-    result: Array = np.asarray(unknowns, dtype=float) * scales.constraint
-    return result
+def smallest_multipliers(full: NodalSystem, t: float, q: Nodes, force: Array, units: Array | None = None) -> Array:
+    """(m,) multipliers of all conditions of ``full`` with Bᵀ λ = ``force`` (n,), the least ones in newtons.
+
+    Parameters
+    ----------
+    full : NodalSystem
+    t : float
+    q : Nodes
+    force : (n,) array
+    units : (m,) array, optional
+        Multiplier per newton of each condition; 0: it does not count how large that is. Unless given, all count.
+    """
+    rows, metres = full.constraint_matrix(t, q), metre_scales(full)
+    if units is None:
+        units = Scales(metres, np.eye(1), rows).constraint
+    counted, right = units > 0, force / metres
+    units = np.where(counted, units, 1.0)
+    matrix = (dense(rows) / metres * units[:, None]).T
+    others, unknowns = matrix[:, ~counted], np.zeros(len(units))
+    beside = np.linalg.qr(others, mode="complete")[0][:, others.shape[1] :].T  # what they cannot balance
+    unknowns[counted] = np.linalg.lstsq(beside @ matrix[:, counted], beside @ right, rcond=1e-9)[0]
+    unknowns[~counted] = np.linalg.lstsq(others, right - matrix @ unknowns, rcond=None)[0]
+    return np.asarray(unknowns * units)
 
 
 def refuse_open(full: NodalSystem, t: float, q: Nodes, left_out: tuple[str, ...]) -> None:
