@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +14,8 @@ from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest, Modes, work
-from erls.run.watches.base import Started
+from erls.run.watches.base import BodyPlan, Started
+from erls.run.watches.watching import Warnings, Watching
 from erls.scene.bodies.analyses import TANGENTS, AtRest, Buckling, Dynamics, Frequencies, StaticSteps
 from erls.scene.bodies.schema import BodyScene
 from erls.simulation.asked import Asked
@@ -34,9 +34,8 @@ def run_bodies(scene: BodyScene, asked: Asked) -> BodyMotion | BodyRest:
     assembly = assemble(scene)
     analysis = scene.record.simulation
     if isinstance(analysis, Dynamics):
-        run: BodyMotion | BodyRest = _motion(scene, assembly, analysis, asked)
-    else:
-        run = _rest(scene, assembly, analysis)
+        return _motion(scene, assembly, analysis, asked)
+    run = _rest(scene, assembly, analysis)
     for text in run.warnings:
         asked.tell(f"warning: {text}")
     if run.failure is not None:
@@ -53,23 +52,22 @@ def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, asked: Ask
         iteration_matrix=analysis.iteration_matrix,
         residual_tolerance=analysis.residual_tolerance,
     )
-    begun, watches = time.perf_counter(), asked.watches()
+    begun, warnings = time.perf_counter(), Warnings(asked.tell)
+    warnings(_redundancy(assembly))
+    watching = Watching(BodyPlan(scene), warnings, asked.watches())
 
     def run_of(found: ConstrainedSolution) -> BodyMotion:
-        warnings = (*_redundancy(assembly), *found.warnings)
-        return BodyMotion(scene, assembly, time.perf_counter() - begun, warnings, found)
+        return BodyMotion(scene, assembly, time.perf_counter() - begun, tuple(warnings.texts), found)
 
-    def observe(t: float, knots: Callable[[], ConstrainedSolution]) -> None:
-        for watch in watches:
-            for note in watch.during(t, knots).notes:
-                asked.tell(note)
-
-    for watch in watches:
-        watch.begins(Started(analysis.duration, run_of))
+    watching.begins(Started(analysis.duration, run_of))
     times = (0.0, analysis.duration)
     system = assembly.system
-    run = run_of(lie_generalized_alpha(system, times, system.start, assembly.velocity, options, observe))  # type: ignore[arg-type]
-    if assembly.left_out and run.failure is None:
+    found = watching.ended(
+        lie_generalized_alpha(system, times, system.start, assembly.velocity, options, watching.observe)
+    )
+    assert isinstance(found, ConstrainedSolution)
+    run = watching.judged(run_of(found))
+    if assembly.left_out:
         looks = run.spread(21)
         for t, poses in zip(looks.tolist(), run.poses(looks), strict=True):
             refuse_open(assembly.full, t, replace(system.start, poses=poses), assembly.left_out)

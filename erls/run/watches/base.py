@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from erls.equations.formulation import Formulation
 from erls.equations.registry import TREES
@@ -33,6 +33,7 @@ from erls.integrate.base import Solution
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
 from erls.run.record import Run
+from erls.scene.bodies.schema import BodyScene
 from erls.scene.chain import Scene
 from erls.scene.settings import Simulation
 
@@ -94,6 +95,13 @@ class Plan:
 
 
 @dataclass(frozen=True)
+class BodyPlan:
+    """The same of a scene of bodies and beams."""
+
+    scene: BodyScene
+
+
+@dataclass(frozen=True)
 class Started:
     """A run of any kind of scene: how long it will be [s]; ``run_of`` makes a run of knots so far."""
 
@@ -127,7 +135,16 @@ class Ended:
 
 
 class Watch:
-    """Looks at a run; what a watch does not override finds nothing."""
+    """Looks at a run; what a watch does not override finds nothing.
+
+    Attributes
+    ----------
+    of_bodies : bool
+        Whether it looks at motions of bodies and beams as well: it then asks its runs for nothing but their solution,
+        and looks neither before them nor when they begin.
+    """
+
+    of_bodies: ClassVar[bool] = False
 
     @staticmethod
     def concerns(plan: Plan) -> bool:

@@ -9,6 +9,8 @@ from erls.run.watches.base import NOTHING, Ended, Finding, Knots, Watch
 class Integration(Watch):
     """Passes on what stands in a `Solution`."""
 
+    of_bodies = True
+
     def __init__(self) -> None:
         self._first = True
 

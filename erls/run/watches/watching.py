@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache
+from typing import TypeVar
 
 from erls.integrate.base import Solution, StopRun
+from erls.run.bodies.motion import BodyMotion
 from erls.run.chain.run import ChainRun
 from erls.run.events import cut
-from erls.run.watches.base import Begun, Ended, Finding, Knots, Plan, Watch
+from erls.run.watches.base import Begun, BodyPlan, Ended, Finding, Knots, Plan, Started, Watch
 from erls.run.watches.registry import WATCHES
+
+AnyRun = TypeVar("AnyRun", ChainRun, BodyMotion)
 
 
 class Warnings:
@@ -48,26 +52,33 @@ class Watching:
 
     Parameters
     ----------
-    plan : Plan
+    plan : Plan or BodyPlan
     warnings : Warnings
         Of this run.
     more : sequence of Watch
         What the caller of a simulation looks with, after those of the registry.
     """
 
-    def __init__(self, plan: Plan, warnings: Warnings, more: Sequence[Watch] = ()) -> None:
+    def __init__(self, plan: Plan | BodyPlan, warnings: Warnings, more: Sequence[Watch] = ()) -> None:
         self._plan, self._warnings = plan, warnings
-        self._watches = [*(watch() for watch in WATCHES if watch.concerns(plan)), *more]
+        known = [w for w in WATCHES if (w.of_bodies if isinstance(plan, BodyPlan) else w.concerns(plan))]
+        self._own: list[Watch] = [watch() for watch in known]
+        self._more = list(more)
+
+    @property
+    def _watches(self) -> list[Watch]:
+        return [*self._own, *self._more]
 
     def before(self) -> None:
         """Before anything is computed."""
-        for watch in self._watches:
-            self._tell(watch.before(self._plan))
+        if isinstance(self._plan, Plan):
+            for watch in self._watches:
+                self._tell(watch.before(self._plan))
 
-    def begins(self, begun: Begun) -> None:
+    def begins(self, begun: Started) -> None:
         """When the equations of motion and their start stand."""
-        for watch in self._watches:
-            self._tell(watch.begins(begun))
+        for watch in self._watches if isinstance(begun, Begun) else self._more:
+            self._tell(watch.begins(begun))  # type: ignore[arg-type]
 
     def observe(self, t: float, knots: Knots) -> Sequence[float]:
         """The `erls.integrate.base.Observer` of the run.
@@ -100,7 +111,7 @@ class Watching:
                 solution = cut(solution, finding.end)
         return solution
 
-    def judged(self, run: ChainRun) -> ChainRun:
+    def judged(self, run: AnyRun) -> AnyRun:
         """The run with all that there is to say about it.
 
         Raises
@@ -108,14 +119,15 @@ class Watching:
         SimulationError
             It failed, or a watch finds it wrong; ``run`` of the error is the run.
         """
-        ended, errors, failure = Ended(run), [], None
+        ended, errors, failure = Ended(run), [], None  # type: ignore[arg-type]  # see `Watch.of_bodies`
         for watch in self._watches:
             finding = watch.after(ended)
             self._tell(finding)
             if finding.error is not None:
                 errors.append(finding.error)
             failure = failure or finding.failure
-        run = replace(run, second_order_error=sum(errors) if errors else None, warnings=tuple(self._warnings.texts))
+        more = {"second_order_error": sum(errors)} if errors else {}
+        run = replace(run, warnings=tuple(self._warnings.texts), **more)  # type: ignore[arg-type]
         failure = failure or run.failure
         if failure is not None:
             failure.run = run
