@@ -18,6 +18,9 @@ from test_trees import two_arms
 from erls.equations.formulation import Formulation, LoopFormulation
 from erls.equations.nodal.equations import Nodal
 from erls.equations.registry import formulate
+from erls.errors import Cause
+from erls.integrate.base import Solution, Work
+from erls.integrate.nodal_chain import closed
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.without_effects import with_rigid
@@ -148,6 +151,18 @@ def test_driven_four_bar_keeps_to_the_closed_form(tmp_path: Path) -> None:
     pairs += list(zip(run.reaction("j1", late), other.reaction("j1", late), strict=True))
     for mine, theirs in pairs:
         np.testing.assert_allclose(mine, theirs, atol=4e-5 * max(0.1, float(np.abs(theirs).max())))
+
+
+def test_conditions_that_were_left_out_are_looked_at(tmp_path: Path) -> None:
+    """A rocker that leaves the plane, which no condition in use forbids, is a failure; in the plane it is none."""
+    nodal, _ = _both(scenes.mechanism(scenes.write_toml(tmp_path / "loop.toml", loop_scenes.four_bar())))
+    assert isinstance(nodal, Nodal)
+    y, v = nodal.initial_state()
+    places = np.array([y, y])
+    for shift, cause in ((0.0, None), (1e-3, Cause.REDUNDANT_CONSTRAINTS)):
+        places[1, 24 + 1] = y[24 + 1] + shift  # of the third node, along the axes of the joints
+        found = closed(nodal, Solution(np.array([0.0, 1.0]), places, np.array([v, v]), 0 * places, Work()))
+        assert (found.failure and found.failure.cause) is cause
 
 
 def test_free_four_bar_is_of_second_order(tmp_path: Path) -> None:
