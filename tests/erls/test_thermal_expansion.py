@@ -180,15 +180,16 @@ def test_the_shipped_bimetal_bends_as_timoshenko_says(name: str) -> None:
     assert aluminium[0] == pytest.approx(-steel[0], rel=1e-6)
 
 
-SWING = {"shape": "polynomial", "from_deg": 0.0, "to_deg": 40.0, "duration": 0.2, "degree": 5}
+SWING = {"shape": "polynomial", "from_deg": 0.0, "to_deg": 0.1, "duration": 0.05, "degree": 5}
 
 
 def swung(folder: Path, simulation: dict[str, Any], start: str = "static", **changes: Any) -> ChainRun:
-    """An L on a motor, with a free arm behind, under weight; ``changes`` of the L."""
+    """An arm on a motor and an L behind it on a free joint, without weight; ``changes`` of the L."""
     scenes.l_link(folder, 2, **{**WARM, **changes})
     scenes.arm_link(folder, **WARM)
     data = {
-        "simulation": {"duration": 0.2, "step": 5e-4, **simulation},
+        "gravity": [0.0, 0.0, 0.0],
+        "simulation": {"duration": 0.05, "step": 5e-4, **simulation},
         "initial": {"deformation": start},
         "base": {"rotation_deg": [-90.0, 0.0, 0.0]},
         "joints": [
@@ -204,11 +205,11 @@ def swung(folder: Path, simulation: dict[str, Any], start: str = "static", **cha
 
 
 def test_formulations_agree_in_motion(tmp_path: Path) -> None:
-    """A swing of warm links from their static start: what warmth changes by 0.7 mm is the same to 1 % of it.
+    """A small swing of warm links from their static start: what warmth changes, 0.65 mm, is the same to 1e-3 of it.
 
-    Linear links differ to second order in their deflections of some millimetres.
+    What is left is of second order: expansion times deflection, which linear links do not know.
     """
-    t = np.linspace(0.0, 0.2, 41)
+    t = np.linspace(0.0, 0.05, 26)
     warm, cold = (
         {
             name: swung(tmp_path, FORMULATIONS[name], **extra).position("tip", t)
@@ -221,16 +222,18 @@ def test_formulations_agree_in_motion(tmp_path: Path) -> None:
     assert largest > 0.9 * STRAIN * np.hypot(0.5, 0.5)
     for name, found in change.items():
         off = np.linalg.norm(found - change["nodal"], axis=1).max()
-        assert off < 0.01 * largest, (name, off / largest)
+        assert off < 1e-3 * largest, (name, off / largest)
 
 
-@pytest.mark.parametrize("name", ["erls", "stiffened", "minimum-norm", "ffr", "mean-axis", "absolute", "nodal"])
-def test_energy_is_conserved(tmp_path: Path, name: str) -> None:
-    """A link that is warmed all at once vibrates about its new length; elastic energy counts from there."""
+@pytest.mark.parametrize("name", ["erls", "stiffened", "ffr", "mean-axis", "nodal"])
+def test_sudden_warmth_conserves_energy(tmp_path: Path, name: str) -> None:
+    """A chain that is warmed all at once vibrates about its new length.
+
+    What is off falls with the square of the step: 8e-3 of the energy at 10 us in ERLS, 7e-4 at 2.5 us.
+    """
     scenes.arm_link(tmp_path, **WARM)
-    settings = {**FORMULATIONS[name], "duration": 1e-3, "step": 1e-5}
-    start = {"initial": {"deformation": "zero"}}
-    run = made(two_arms(tmp_path, {**settings, "spectral_radius": 1.0}, driven=False, **start))
+    settings = {**FORMULATIONS[name], "duration": 1e-3, "step": 1e-5 if name == "nodal" else 2.5e-6}
+    run = made(two_arms(tmp_path, {**settings, "spectral_radius": 1.0}, driven=False, initial={"deformation": "zero"}))
     energy = run.energy(np.linspace(0.0, run.end, 21))
     assert energy.kinetic.max() > 0.1 * energy.elastic[0]
     np.testing.assert_allclose(energy.total, energy.total[0], atol=1e-3 * energy.elastic[0])
@@ -247,7 +250,10 @@ KINDS = {
 @pytest.mark.parametrize("stiffened", [False, True])
 @pytest.mark.parametrize("name", KINDS)
 def test_stiffness_acts_about_the_expanded_link(tmp_path: Path, name: str, stiffened: bool) -> None:
-    """R(q) warm is R(q) cold with Γ (q - q₀) for Γ q, whatever else acts; a cold link keeps every digit."""
+    """Warm links have Γ (q - q₀) for Γ q, in the energy ½ Γ (q - q₀)² for ½ Γ q², and nothing else differs.
+
+    What has no temperature keeps every digit.
+    """
     cold = chain_cases.mechanism(tmp_path, "axes that part")
     if stiffened:
         cold = replace(cold, effects=ALL)
@@ -261,6 +267,12 @@ def test_stiffness_acts_about_the_expanded_link(tmp_path: Path, name: str, stiff
     pushed[-len(rest) :] -= stiffness * rest
     np.testing.assert_allclose(found[1], pushed, atol=1e-12 * np.abs(pushed).max())
     np.testing.assert_array_equal(found[2], found[0])
+    energies = [s.energy(at.t, at.y, at.v) for s in systems]
+    q = at.y[-len(rest) :]
+    assert energies[1].elastic == pytest.approx(float(stiffness @ (q - rest) ** 2 / 2), rel=1e-12)
+    for part in ("kinetic", "gravity", "springs"):
+        assert getattr(energies[1], part) == getattr(energies[0], part)
+    assert energies[2] == energies[0]
     assert "thermal_expansion" in present(warm)
     assert "thermal_expansion" not in present(cold)
 
