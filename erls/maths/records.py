@@ -1,7 +1,8 @@
 """Typed records in flat memory: constants and working memory of equations, with named fields instead of offsets.
 
 A record is a NamedTuple whose fields are annotated `int`, `float`, `Vector`, `Matrix`, `Stack` or `Pile` (arrays of
-one to four axes), `Indices` or `Pairs` (whole numbers, of one and two axes). Compiled functions are handed flat arrays,
+one to four axes), `Indices` or `Pairs` (whole numbers, of one and two axes); or, where it is working memory, with the
+shape itself, ``Annotated[Array, "6 6+n"]``, of which `room` makes zeros. Compiled functions are handed flat arrays,
 since those alone fit every system behind one function pointer; where they begin they make records of them, which are
 views: nothing is copied. A table in ``integers`` says where in the flat numbers each array lies and what its shape is;
 it is made here from the record's declaration, as is the function that reads it.
@@ -38,13 +39,27 @@ R = TypeVar("R", bound=NamedTuple)
 
 def _axes(kind: Any) -> int | None:
     """Axes of an array, 0 of a real number, None of an integer."""
-    return None if kind is int else 0 if kind is float else int(kind.__metadata__[0])
+    if kind in (int, float):
+        return None if kind is int else 0
+    said = kind.__metadata__[0]
+    return len(said.split()) if isinstance(said, str) else int(said)
 
 
 def _fields(record: type[Any]) -> list[tuple[str, int | None, bool]]:
     """Name, axes, and whether it lies in the integers, of each field."""
     hints = get_type_hints(record, include_extras=True)
     return [(name, _axes(kind), kind in (Indices, Pairs)) for name, kind in hints.items()]
+
+
+def room(record: type[R], **sizes: int) -> R:
+    """A record of zeros: working memory whose fields are annotated with their shapes, in these sizes."""
+
+    def axis(said: str) -> int:
+        return sum(int(part) if part.isdigit() else sizes[part] for part in said.split("+"))
+
+    hints: dict[str, Any] = get_type_hints(record, include_extras=True)
+    make: Callable[..., R] = record
+    return make(*(np.zeros([axis(said) for said in kind.__metadata__[0].split()]) for kind in hints.values()))
 
 
 def table_size(record: type[Any]) -> int:

@@ -2,11 +2,9 @@
 
 With q the modal coordinates of a link, ν = [v; ω] the twist of its frame, s = q̇ + ρ ν and the inertia invariants m, X,
 Z (`fe_import.modal.inertia`), the inertia forces fall into what always acts (m with itself) and five parts that may
-be left
-out; their formulas are those of `erls.equations.erls.paper.link_inertia`. Adding an effect means one line here and
-one block
-where it acts: in `erls.equations` for what enters the equations, in `erls.mechanism.without_effects` for what is data
-of the mechanism.
+be left out; their formulas are those of `erls.equations.erls.paper.forces`. Adding an effect means one line here and
+one block where it acts: in `erls.equations` for what enters the equations, in `erls.mechanism.without_effects` for what
+is data of the mechanism.
 """
 
 from __future__ import annotations

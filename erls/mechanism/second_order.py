@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from erls.maths.se3 import pose
 from erls.maths.so3 import Array, cross_all, skew
 from fe_import.modal.inertia import mass_properties
 from fe_import.modal.model import ModalModel
@@ -87,6 +88,17 @@ class LinkSecondOrder:
         found[:3] -= lift[:3] - np.einsum("ij,jab->iab", skew(arm), lift[3:])
         found[3:] -= lift[3:]
         return found
+
+    def interface(self, interface: InterfaceNode, frame: Array) -> Array:
+        """(6, m, m) second-order displacement and rotation vector of a frame that moves rigidly with an interface, as
+        `erls.mechanism.links.Link.interface_shape`.
+        """
+        arm = pose(position=-interface.position) @ frame
+        offset, back = arm[:3, 3], arm[:3, :3].T
+        moved = self.node(interface.node)
+        _, phi = _rigid_shape(self.model, interface.node)
+        u = moved[:3] - np.einsum("ij,jab->iab", skew(offset), moved[3:]) + twice_turned(phi, offset)
+        return np.concatenate([np.einsum("ij,jab->iab", back, part) for part in (u, moved[3:])])
 
     @cached_property
     def _inboard(self) -> Array:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from dense_link import DenseLink
 from effect_scenes import random_chain
 
 import erls
 from erls.equations.erls.formulation import Erls
-from erls.equations.erls.paper.link_inertia import LinkInertia
 from erls.equations.ffr.body_frame import elastic_basis
 from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.standard_data import StandardData
@@ -93,7 +93,7 @@ def test_inertia_forces_are_the_sum_of_the_effects_that_are_on(chain: Mechanism,
     link = chain.links[2]
     state = _state(len(link.invariants.m))
     parts = _parts(link.invariants, state)
-    inertia, bare = LinkInertia(link.invariants, on), LinkInertia(link.invariants, frozenset())
+    inertia, bare = DenseLink(link.invariants, on), DenseLink(link.invariants, frozenset())
     forces = np.concatenate(inertia.forces(*state))
     scale = np.abs(forces).max()
     _close(forces, np.concatenate(bare.forces(*state)) + sum(parts[name] for name in on), scale)
@@ -111,7 +111,7 @@ def test_standard_data_hold_the_same_effects(chain: Mechanism, on: frozenset[str
     link = chain.links[1]
     for body_frame in ("tangent", "mean-axis"):
         basis = elastic_basis(link, body_frame)
-        inertia, data = LinkInertia(link.invariants, on), StandardData(link.invariants, basis, on)
+        inertia, data = DenseLink(link.invariants, on), StandardData(link.invariants, basis, on)
         twist, rate, *fields = _state(basis.shape[1])
         wrench, modal = inertia.forces(twist, rate, *(basis @ x for x in fields))
         expected = np.concatenate([wrench, basis.T @ modal])
@@ -129,7 +129,7 @@ def test_what_is_off_is_not_computed(chain: Mechanism, off: frozenset[str], spoi
     bad = InertiaInvariants(**{**values, spoilt: np.full_like(values[spoilt], np.nan)})
     on = frozenset(INERTIA) - off
     state = _state(len(link.invariants.m))
-    for inertia in (LinkInertia(bad, on), StandardData(bad, np.eye(len(values["m"])), on)):
+    for inertia in (DenseLink(bad, on), StandardData(bad, np.eye(len(values["m"])), on)):
         assert all(np.isfinite(part).all() for part in inertia.forces(*state))
         assert np.isfinite(inertia.mass_matrix(state[2])).all()
         assert np.isfinite(inertia.kinetic_energy(state[0], *state[2:4]))

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scenes
+from dense_link import DenseLink
 
-from erls.equations.erls.paper.link_inertia import LinkInertia, moment_about
 from erls.maths.so3 import skew
 from erls.mechanism.links import payload_invariants, rigid_model
 from fe_import.description.link import load_link
@@ -43,7 +43,7 @@ def test_kinetic_energy_is_that_of_the_nodes(link: tuple[FEModel, ModalModel]) -
     """T = ½ wᵀ M w with nodal velocities w = v + ω × (x + u) + u̇, and ω + φ̇ + ω × φ for rotations, to rounding."""
     model, modal = link
     twist, _, q, qd, _ = _state(modal.modes)
-    inertia = LinkInertia(modal.invariants)
+    inertia = DenseLink(modal.invariants)
     w = np.zeros(model.mass.shape[0])
     for node, x in enumerate(modal.nodes):
         shift, turn = modal.node_shape(node)
@@ -60,7 +60,7 @@ def test_forces_are_boltzmann_hamel_of_the_energy(link: tuple[FEModel, ModalMode
     """d/dt ∂T/∂ν + ad* and d/dt ∂T/∂q̇ - ∂T/∂q by differences of T."""
     _, modal = link
     twist, rate, q, qd, qdd = _state(modal.modes)
-    inertia = LinkInertia(modal.invariants)
+    inertia = DenseLink(modal.invariants)
     n = modal.modes
 
     def gradient(f: object, x: np.ndarray) -> np.ndarray:
@@ -88,7 +88,7 @@ def test_mass_matrix_agrees_with_forces(link: tuple[FEModel, ModalModel]) -> Non
     """The forces are linear in the accelerations with the mass matrix as factor."""
     _, modal = link
     twist, rate, q, qd, qdd = _state(modal.modes)
-    inertia = LinkInertia(modal.invariants)
+    inertia = DenseLink(modal.invariants)
     with_rate = np.concatenate(inertia.forces(twist, rate, q, qd, qdd))
     without = np.concatenate(inertia.forces(twist, 0 * rate, q, qd, 0 * qdd))
     product = inertia.mass_matrix(q) @ np.concatenate([rate, qdd])
@@ -99,7 +99,7 @@ def test_power_balance(link: tuple[FEModel, ModalModel]) -> None:
     """The forces do work at the rate at which T grows: Fᵀ(ν, q̇) = Ṫ."""
     _, modal = link
     twist, rate, q, qd, qdd = _state(modal.modes)
-    inertia = LinkInertia(modal.invariants)
+    inertia = DenseLink(modal.invariants)
     wrench, forces = inertia.forces(twist, rate, q, qd, qdd)
 
     def energy(t: float) -> float:
@@ -113,7 +113,7 @@ def test_gravity_is_the_gradient_of_its_energy(link: tuple[FEModel, ModalModel])
     """Modal force and wrench of gravity from -∂V; V is linear in q and in the translation."""
     _, modal = link
     q = _state(modal.modes)[2]
-    inertia = LinkInertia(modal.invariants)
+    inertia = DenseLink(modal.invariants)
     g = np.array([1.0, -2.0, -9.0])
     wrench, forces = inertia.gravity(g, q)
     steps = STEP * np.eye(modal.modes)
@@ -142,7 +142,7 @@ def test_rigid_model_is_a_rigid_body() -> None:
     np.testing.assert_allclose(properties.centre_of_mass, centre, atol=1e-12)
     np.testing.assert_allclose(properties.inertia, inertia_about_centre, atol=1e-12)
     twist, rate = rng.standard_normal(6), rng.standard_normal(6)
-    wrench, _ = LinkInertia(model.invariants).forces(twist, rate, *np.zeros((3, 6)))
+    wrench, _ = DenseLink(model.invariants).forces(twist, rate, *np.zeros((3, 6)))
     v, w, a, dw = twist[:3], twist[3:], rate[:3] + np.cross(twist[3:], twist[:3]), rate[3:]
     force = mass * (a + np.cross(dw, centre) + np.cross(w, np.cross(w, centre)))
     moment = inertia_about_centre @ dw + np.cross(w, inertia_about_centre @ w) + np.cross(centre, force)
@@ -154,7 +154,7 @@ def test_massless_rigid_link_is_legal() -> None:
     """A massless link still has six rigid-body modes that move its nodes."""
     model = rigid_model("r", 0.0, np.zeros(3), np.zeros((3, 3)), {"a": np.zeros(3), "b": np.array([1.0, 0, 0])})
     assert np.linalg.matrix_rank(np.vstack(model.node_shape(1))) == 6
-    assert not LinkInertia(model.invariants).mass_matrix(np.zeros(6)).any()
+    assert not DenseLink(model.invariants).mass_matrix(np.zeros(6)).any()
 
 
 def test_payload_moves_with_its_node(link: tuple[FEModel, ModalModel]) -> None:
@@ -170,10 +170,4 @@ def test_payload_moves_with_its_node(link: tuple[FEModel, ModalModel]) -> None:
     velocity = twist[:3] + np.cross(twist[3:], arm + u) + ud
     rotation = twist[3:] + turn @ qd + np.cross(twist[3:], turn @ q)
     expected = 0.5 * mass * velocity @ velocity + 0.5 * rotation @ spin @ rotation
-    assert LinkInertia(extra).kinetic_energy(twist, q, qd) == pytest.approx(expected, rel=1e-9)
-
-
-def test_moment_about_a_point() -> None:
-    """A force alone, seen from elsewhere."""
-    found = moment_about(np.array([0, 0, 2.0, 0, 0, 0]), np.array([3.0, 0, 0]))
-    np.testing.assert_allclose(found, [0, 0, 2, 0, 6, 0])
+    assert DenseLink(extra).kinetic_energy(twist, q, qd) == pytest.approx(expected, rel=1e-9)

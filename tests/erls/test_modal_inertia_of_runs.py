@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 import stiffened_cases
 
+from erls.equations.erls.formulation import Erls
 from erls.equations.erls.paper.dense_chain import DenseChain as Judge
 from erls.equations.registry import formulate
+from erls.errors import Cause, SceneError
 from erls.scene.settings import Simulation
 
 
@@ -24,3 +26,12 @@ def test_runs_get_the_inertia_of_modes_that_they_ask_for(gauge: str, tmp_path: P
     found = formulate(asked, Simulation(duration=1.0, gauge=gauge)).energy(*state).kinetic
     assert found == pytest.approx(judge.energy(*state).kinetic, rel=1e-12)
     assert found != pytest.approx(Judge(plain, gauge).energy(*state).kinetic, rel=1e-6)
+
+
+def test_the_recursion_refuses_what_it_has_not(tmp_path: Path) -> None:
+    """Built by hand, not by the registry, which takes the dense form."""
+    plain = stiffened_cases.mechanism(tmp_path, stiffened_cases.CASES[0], frozen_values.SOURCE)
+    with pytest.raises(SceneError, match="no inertia of modes") as caught:
+        Erls(frozen_values.with_effects(plain, frozen_values.MODAL_INERTIA))
+    assert caught.value.cause is Cause.BAD_FIELD
+    assert "DenseChain" in str(caught.value)

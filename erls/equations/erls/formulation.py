@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, function_in
-from erls.equations.erls.pack import pack_chain, shapes, stiffened
+from erls.equations.erls.pack import pack_chain, shapes
 from erls.equations.erls.paper.compatibility import Compatibility
 from erls.equations.erls.paper.frames import displaced_frames
 from erls.equations.erls.paper.second_order_compatibility import second_order_compatibility
@@ -22,9 +22,11 @@ from erls.equations.erls.records import LINK_STATE, Chain, LinkState
 from erls.equations.formulation import Energy, Reaction, State
 from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
 from erls.equations.serial.joint_frames import FrameMotion
-from erls.equations.serial.node_reach import node_reach
+from erls.equations.serial.modal_inertia import stiffened
+from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.state_series import StateSeries
+from erls.errors import Cause, SceneError
 from erls.maths.records import python_reader
 from erls.maths.so3 import Array, skew
 from erls.mechanism.chain import Mechanism
@@ -40,11 +42,24 @@ class Erls(SerialFormulation):
     Parameters
     ----------
     mechanism : Mechanism
+
+    Raises
+    ------
+    SceneError
+        Effects that only the dense form has.
     """
 
     gauge = "joint-angle"
 
     def __init__(self, mechanism: Mechanism) -> None:
+        if "modal_inertia" in mechanism.effects:
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "the recursion of ERLS has no inertia of modes that changes with the deformation",
+                where="effects",
+                value="modal_inertia",
+                remedy="take DenseChain(mechanism, 'joint-angle'), as `erls.equations.registry` does, or leave it out",
+            )
         super().__init__(mechanism)
         self.stiffened = stiffened(mechanism)
 
@@ -78,10 +93,24 @@ class Erls(SerialFormulation):
         """Modules of what runs report: states and energies."""
         return tuple(dict.fromkeys(map(self._module, ("energy", "states"))))
 
-    @property
+    @cached_property
     def length_scales(self) -> Array:
         """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
-        return np.asarray(node_reach(self.mechanism, self.compatibility)[self.free])
+        system, (y, _) = self.compiled, self.undeformed_start()
+        states = self._links(system)
+        d = np.empty((6 * self.joints, self.elastic))
+        for i, v in enumerate(np.eye(self.size)[len(self.free_joints) :]):
+            residual(system, 0.0, y, v, np.zeros(0))
+            d[:, i] = np.concatenate(
+                [shape[:6] @ state.q_rate for shape, state in zip(self._shapes, states, strict=True)]
+            )
+        return np.asarray(reach_of_nodes(self.mechanism, d)[self.free])
+
+    def _links(self, system: CompiledSystem) -> list[LinkState]:
+        """Motion of the links and the forces on them, as the last evaluation left them."""
+        serial = _see_serial(system.reals, system.integers, int(system.integers[0]))
+        first = _see_chain(system.reals, system.integers, serial.own).states
+        return [_see_link(system.scratch, system.integers, first + k * LINK_STATE) for k in range(self.joints)]
 
     def series(self, t: Array, y: Array, v: Array) -> StateSeries:
         """States at (k,) times."""
@@ -120,18 +149,12 @@ class Erls(SerialFormulation):
         """Joint reactions that give these accelerations."""
         system = self._complete
         residual(system, t, y, v, a)
-        serial = _see_serial(system.reals, system.integers, int(system.integers[0]))
-        chain = _see_chain(system.reals, system.integers, serial.own)
-        found = [
-            (
-                _see_link(system.scratch, system.integers, chain.states + k * LINK_STATE).wrench.copy(),
-                _see_joint(system.scratch, system.integers, serial.joint_states + k * JOINT_STATE).forces.copy(),
-            )
-            for k in range(self.joints)
-        ]
-        state = self.state(t, y, v)
+        places = _see_serial(system.reals, system.integers, int(system.integers[0])).joint_states
+        state, links = self.state(t, y, v), self._links(system)
         result: list[Reaction] = []
-        for k, (link, (wrench, forces)) in enumerate(zip(self.mechanism.links, found, strict=True)):
+        for k, link in enumerate(self.mechanism.links):
+            wrench = links[k].wrench
+            forces = _see_joint(system.scratch, system.integers, places + k * JOINT_STATE).forces
             shape, _ = link.model.node_shape(link.inboard.node)
             place = link.inboard.position + shape @ state.modal[k]
             turn = state.poses[k][:3, :3]

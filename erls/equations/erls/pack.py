@@ -9,10 +9,9 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, function_in
 from erls.equations.erls import records as own
-from erls.equations.erls.paper.second_order_compatibility import frame_second_order
-from erls.equations.erls.paper.second_order_inertia import compliance
 from erls.equations.serial import elimination, pack, segments, stiffness
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
+from erls.equations.serial.modal_inertia import compliance, stiffened
 from erls.equations.serial.records import Serial
 from erls.maths.records import Memory
 from erls.maths.se3 import inverse, twist_transform
@@ -125,9 +124,9 @@ def _momenta(link: Link, modes: Array, axes: Array, turning: slice) -> tuple[Arr
 def _bow(before: Link, joint: Joint, modes: Array, turning: slice) -> Array:
     """(6, m, m) second-order displacement of the parent's interface, as motions of the parent's frame."""
     m = modes[:, turning].shape[1]
-    found = None if joint.seat is None else frame_second_order(before, joint.seat, joint.before)
-    if found is None:
+    if joint.seat is None or before.second_order is None:
         return np.zeros((6, m, m))
+    found = before.second_order.interface(joint.seat, joint.before)
     whole = np.einsum("ij,jab->iab", twist_transform(inverse(joint.before)), modes.T @ found @ modes)
     return np.asarray(whole[:, turning, turning])
 
@@ -177,13 +176,6 @@ def _end(link: Link, shape: Shapes, bends: bool, end: LoopEnd) -> own.End:
         shapes=np.vstack(node_shape6(link.model, end.node)) @ shape.modes,
         bows=bows,
         offset=pack.pose_numbers(end.frame),
-    )
-
-
-def stiffened(mechanism: Mechanism) -> bool:
-    """Whether second-order displacements enter the equations."""
-    return "geometric_stiffening" in mechanism.effects and any(
-        link.second_order is not None and link.elastic_modes for link in mechanism.links
     )
 
 
@@ -267,11 +259,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         condensed=pack.put_all(condensed, elimination.condensed(rooms)),
         factors=0,
         left=0,
-        first_order=int("inertia_first_order" in mechanism.effects),
-        second_order=int("inertia_second_order" in mechanism.effects),
-        coriolis=int("coriolis" in mechanism.effects),
-        centrifugal=int("centrifugal_load" in mechanism.effects),
-        softening=int("spin_softening" in mechanism.effects),
+        **pack.effect_flags(mechanism.effects),
         weight=int(bool(np.any(mechanism.gravity))),
         complete=int(complete),
         end_count=len(ends),

@@ -247,7 +247,6 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
     room = Room(np.zeros((size, size)), np.zeros(0))
     if linked:
         room = Room(np.zeros((0, 0)), np.zeros(len(factors.numbers)))
-    effects = mechanism.effects
     frames = Frames(
         bodies=_put(constants, bodies),
         body_states=_put(working, [body_state(sizes[k].modes, len(bodies[k].axes)) for k in links]),
@@ -263,11 +262,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         condensed=condensed_at,
         room=working.put(room),
         free=free,
-        first_order=int("inertia_first_order" in effects),
-        second_order=int("inertia_second_order" in effects),
-        coriolis=int("coriolis" in effects),
-        centrifugal=int("centrifugal_load" in effects),
-        softening=int("spin_softening" in effects),
+        **pack.effect_flags(mechanism.effects),
         weight=int(bool(np.any(mechanism.gravity))),
     )
     own = constants.put(frames)

@@ -2,7 +2,7 @@
 
 With K of `fe_import.modal.second_order` the kinetic energy of a link holds q̇_c K_cab q_a q̇_b, the velocity of second
 order times that of the elastic modes. What second-order momenta h = C q̇ contribute already, as those of a rigid-body
-motion (`erls.equations.erls.paper.second_order_inertia`), is taken off: k = K(q) q̇ - Φᵀm ρ M₀⁻¹ h. Then
+motion (`erls.equations.erls.paper.bent`), is taken off: k = K(q) q̇ - Φᵀm ρ M₀⁻¹ h. Then
 
     T₃ = q̇ₑ·k + ½ kᵀ σ⁻¹ k = ½ |q̇ₑ + σ⁻¹ k|² - ½ |q̇ₑ|²   (norms with σ)
 
@@ -22,11 +22,12 @@ from collections.abc import Set
 import numpy as np
 
 from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link
 from erls.mechanism.second_order import LinkSecondOrder
 from fe_import.modal.inertia import InertiaInvariants
 
-_NO_INERTIA = 1e-12  # of the largest: a thin link may have none about its axis
+_NO_INERTIA = 1e-12  # of the largest: a thin link may have none about its axis, a massless one has none at all
 
 
 class ModalInertia:
@@ -89,6 +90,18 @@ class ModalInertia:
         """T₃ at a state."""
         k = self._at(q) @ qd
         return float(qd[self.size - self.elastic :] @ k + k @ self.per_mass @ k / 2)
+
+
+def stiffened(mechanism: Mechanism) -> bool:
+    """Whether second-order displacements enter the equations."""
+    return "geometric_stiffening" in mechanism.effects and any(
+        link.second_order is not None and link.elastic_modes for link in mechanism.links
+    )
+
+
+def compliance(rigid_mass: Array) -> Array:
+    """(6, 6) M₀⁻¹ of an undeformed link; nothing along what has no inertia."""
+    return np.asarray(np.linalg.pinv(rigid_mass, rcond=_NO_INERTIA, hermitian=True))
 
 
 def modal_inertia(link: Link, effects: Set[str], basis: Array | None = None) -> ModalInertia | None:

@@ -4,16 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.equations.erls.paper.compatibility import Compatibility
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, poses
-
-
-def node_reach(mechanism: Mechanism, compatibility: Compatibility) -> Array:
-    """The same as `reach_of_nodes` from the compatibility of links."""
-    elastic = sum(link.elastic_modes for link in mechanism.links)
-    theta = np.array([joint.position for joint in mechanism.joints])
-    return reach_of_nodes(mechanism, compatibility.displacement(theta, np.zeros(elastic))[1])
 
 
 def reach_of_nodes(mechanism: Mechanism, d: Array) -> Array:

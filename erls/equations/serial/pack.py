@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -87,6 +87,18 @@ def modes_record(first: int, mass: Array, link: Link, decoupled: DecoupledModes)
     """Elastic coordinates of a link that begin at ``first``; ``mass`` (e, e)."""
     own = link.stiffness, link.damping, elastic_rest(link)
     return Modes(first, mass, *own, decoupled.vectors, decoupled.stiffness, decoupled.damping)
+
+
+def effect_flags(effects: Set[str]) -> dict[str, int]:
+    """Which parts of the inertia forces act (`erls.mechanism.effects`), 0 or 1, by the names of fields of records."""
+    names = {
+        "first_order": "inertia_first_order",
+        "second_order": "inertia_second_order",
+        "coriolis": "coriolis",
+        "centrifugal": "centrifugal_load",
+        "softening": "spin_softening",
+    }
+    return {field: int(name in effects) for field, name in names.items()}
 
 
 def put_all(memory: Memory, records: Sequence[Any]) -> int:

@@ -21,7 +21,8 @@ k = K(q) q̇, derived in `erls.equations.serial.modal_inertia`.
 
 from __future__ import annotations
 
-from erls.equations.erls.paper.records import BentBody, BentState, BodyState
+from erls.equations.erls.paper.bent_records import BentBody, BentState
+from erls.equations.erls.paper.records import BodyState
 from erls.maths.jit import part
 from erls.maths.products import (
     add_columns,

@@ -21,20 +21,14 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.erls.paper.pack import is_stiffened, pack_chain
-from erls.equations.erls.paper.records import (
-    BODY_STATE,
-    ROW_STATE,
-    Balance,
-    BodyState,
-    Elimination,
-    Paper,
-    RowState,
-)
+from erls.equations.erls.paper.compatibility_records import ROW_STATE, Elimination, RowState
+from erls.equations.erls.paper.pack import pack_chain
+from erls.equations.erls.paper.records import BODY_STATE, Balance, BodyState, Paper
 from erls.equations.formulation import Energy, Reaction, State
 from erls.equations.serial.displaced_frame import displaced_frame
 from erls.equations.serial.formulation import SerialFormulation
 from erls.equations.serial.joint_frames import FrameMotion, attached, carried
+from erls.equations.serial.modal_inertia import stiffened
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import Serial
 from erls.equations.serial.state_series import StateSeries
@@ -60,7 +54,7 @@ class DenseChain(SerialFormulation):
 
     def __init__(self, mechanism: Mechanism, gauge: str = "minimum-norm") -> None:
         super().__init__(mechanism)
-        self.gauge, self.stiffened = gauge, is_stiffened(mechanism)
+        self.gauge, self.stiffened = gauge, stiffened(mechanism)
 
     @cached_property
     def compiled(self) -> CompiledSystem:
@@ -70,9 +64,8 @@ class DenseChain(SerialFormulation):
     @property
     def length_scales(self) -> Array:
         """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
-        y, v = self.undeformed_start()
-        self.residual(0.0, y, v, v)
-        return np.asarray(reach_of_nodes(self.mechanism, self.elimination.d)[self.free])
+        found = self.elimination_at(0.0, *self.undeformed_start())
+        return np.asarray(reach_of_nodes(self.mechanism, found.d)[self.free])
 
     @property
     def _memory(self) -> tuple[Array, Any, Array]:
@@ -89,6 +82,11 @@ class DenseChain(SerialFormulation):
         """C, C_r⁺, D, G and n of the last evaluation."""
         _, integers, scratch = self._memory
         return _see_elimination(scratch, integers, self._places.elimination)
+
+    def elimination_at(self, t: float, y: Array, v: Array) -> Elimination:
+        """The same at a state, until the next evaluation."""
+        self.residual(t, y, v, np.zeros(0))
+        return self.elimination
 
     def link(self, k: int) -> BodyState:
         """Motion and forces of a link, of the last evaluation."""

@@ -19,19 +19,15 @@ from typing import Any
 
 import numpy as np
 
-from erls.equations.erls.paper.records import (
-    BODY,
-    BODY_STATE,
+from erls.equations.erls.paper.compatibility_records import (
     JOINT_ROWS,
     ROW_STATE,
     Elimination,
-    Paper,
-    read_body,
-    read_body_state,
     read_elimination,
     read_joint_rows,
     read_row_state,
 )
+from erls.equations.erls.paper.records import BODY, BODY_STATE, Paper, read_body, read_body_state
 from erls.equations.erls.paper.second_order_rows import fill_extra
 from erls.equations.serial.records import Serial
 from erls.maths.dense import backward, cholesky, forward
@@ -44,13 +40,10 @@ from erls.maths.products import (
     add_transposed_product,
     clear,
     clear_matrix,
-    copy_matrix,
     dot,
 )
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
-
-_REFINEMENTS = 2
 
 
 @part
@@ -114,34 +107,29 @@ def _put_rows(
 def fill_right_inverse(c: Elimination) -> int:
     """C_r⁺ = C_rᵀ (C_r C_rᵀ)⁻¹ (before eq. 11) and 1 - C_r⁺ C_r; 0, or 1 + a row that follows from those before it.
 
-    Newton's iteration X ← X (2 - C_r X) (G. Schulz, Z. Angew. Math. Mech. 13 (1933) 57) wins back the digits that the
-    square of C_r loses.
+    C_rᵀ = Q U, of which the first factors lack the digits that the square of C_r loses, and those of Q win them back
+    (Y. Yamamoto, Y. Nakatsukasa, Y. Yanagisawa, T. Fukaya, Electron. Trans. Numer. Anal. 44 (2015) 306).
     """
-    v = c.c_r.shape[0]
-    for i in range(v):
+    v, r = c.c_r.shape
+    for i in range(r):
         for j in range(v):
-            c.gram[i, j] = dot(c.c_r[i], c.c_r[j])
-    status = cholesky(c.gram, 0.0)
-    for i in range(v):
-        row = c.gram_inverse[i]
-        clear(row)
-        row[i] = 1.0
-        forward(c.gram, row)
-        backward(c.gram, row)
-    clear_matrix(c.plus)
-    add_transposed_product(c.c_r, c.gram_inverse, c.plus)
-    for _ in range(_REFINEMENTS):
-        clear_matrix(c.left)
-        add_scaled_product(-1.0, c.c_r, c.plus, c.left)
-        for i in range(v):
-            c.left[i, i] += 2.0
-        copy_matrix(c.plus, c.plus_spare)
-        clear_matrix(c.plus)
-        add_product(c.plus_spare, c.left, c.plus)
+            c.plus[i, j] = c.c_r[j, i]
+    status = 0
+    for gram in (c.gram, c.gram_again):
+        clear_matrix(gram)
+        add_transposed_product(c.plus, c.plus, gram)
+        found = cholesky(gram, 0.0)
+        status = status if status != 0 else found
+        for i in range(r):
+            forward(gram, c.plus[i])
     clear_matrix(c.null)
-    add_scaled_product(-1.0, c.plus, c.c_r, c.null)
-    for i in range(c.null.shape[0]):
-        c.null[i, i] += 1.0
+    if v < r:
+        for i in range(r):
+            for j in range(r):
+                c.null[i, j] = (1.0 if i == j else 0.0) - dot(c.plus[i], c.plus[j])
+    for i in range(r):
+        backward(c.gram_again, c.plus[i])
+        backward(c.gram, c.plus[i])
     return status
 
 

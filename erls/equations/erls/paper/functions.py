@@ -12,23 +12,18 @@ from erls.equations.erls.paper.bent import (
     fill_bend,
     subtract_bent_weight,
 )
+from erls.equations.erls.paper.bent_records import BENT_BODY, BENT_STATE, read_bent_body, read_bent_state
+from erls.equations.erls.paper.compatibility_records import ROW_STATE, read_elimination, read_row_state
 from erls.equations.erls.paper.forces import add_inertia_forces, fill_mass, fill_moments, subtract_weight
 from erls.equations.erls.paper.motion import move
 from erls.equations.erls.paper.records import (
-    BENT_BODY,
-    BENT_STATE,
     BODY,
     BODY_STATE,
-    ROW_STATE,
     Paper,
     read_balance,
-    read_bent_body,
-    read_bent_state,
     read_body,
     read_body_state,
-    read_elimination,
     read_paper,
-    read_row_state,
 )
 from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.feed_forward import feed_forward

@@ -6,23 +6,18 @@
 
 from __future__ import annotations
 
-from erls.equations.erls.paper.elimination import eliminate
-from erls.equations.erls.paper.records import (
-    BODY,
-    BODY_STATE,
+from erls.equations.erls.paper.compatibility_records import (
     JOINT_ROWS,
     ROW_STATE,
-    BodyState,
     Elimination,
     JointRows,
-    Paper,
     RowState,
-    read_body,
-    read_body_state,
     read_elimination,
     read_joint_rows,
     read_row_state,
 )
+from erls.equations.erls.paper.elimination import eliminate
+from erls.equations.erls.paper.records import BODY, BODY_STATE, BodyState, Paper, read_body, read_body_state
 from erls.equations.serial.joints import move_joint
 from erls.equations.serial.records import JOINT, JOINT_STATE, Serial, read_joint, read_joint_state
 from erls.maths.jit import part

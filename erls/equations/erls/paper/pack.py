@@ -2,52 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
-
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, acceleration_in
-from erls.equations.erls.paper.records import (
-    Balance,
-    BentBody,
-    Body,
-    BodyState,
-    JointRows,
-    Paper,
-    bent_state,
-    body_state,
-    elimination,
-    row_state,
-)
-from erls.equations.erls.paper.second_order_compatibility import frame_second_order
-from erls.equations.serial.modal_inertia import modal_inertia
-from erls.equations.serial.pack import joint_record, joint_states, rigid_links, step_parts
+from erls.equations.erls.paper.bent_records import BentBody, bent_state
+from erls.equations.erls.paper.compatibility_records import Elimination, JointRows, RowState
+from erls.equations.erls.paper.records import Balance, Body, BodyState, Paper
+from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
+from erls.equations.serial.pack import effect_flags, joint_record, joint_states, put_all, rigid_links, step_parts
 from erls.equations.serial.records import Joint, Modes, Serial
-from erls.maths.records import Memory
+from erls.maths.records import Memory, room
 from erls.maths.se3 import inverse, twist_cross
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link
 from erls.mechanism.thermal import elastic_rest
+from fe_import.modal.inertia import InertiaInvariants
 from fe_import.model import InterfaceNode
 
 GAUGES = ("joint-angle", "minimum-norm")
-_NO_INERTIA = 1e-12  # of the largest: a massless link has no direction to divide by
 _NONE = np.zeros((0, 0, 0))
 
 
-def is_stiffened(mechanism: Mechanism) -> bool:
-    """Whether links have displacements of second order."""
-    return "geometric_stiffening" in mechanism.effects and any(
-        link.second_order is not None and link.elastic_modes for link in mechanism.links
-    )
-
-
 def _frame_second_order(link: Link, interface: InterfaceNode, frame: Array) -> Array:
-    """See `frame_second_order`; of no entries where there is none."""
-    found = frame_second_order(link, interface, frame)
-    return _NONE if found is None else found
+    """`LinkSecondOrder.interface`; of no entries where there is none."""
+    found = _NONE if link.second_order is None else link.second_order.interface(interface, frame)
+    return found if found.any() else _NONE
 
 
 def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows]:
@@ -103,30 +83,28 @@ def _modes(mechanism: Mechanism, first: int) -> list[Modes]:
     return result
 
 
+def body_record(invariants: InertiaInvariants, parent: int = -1, elastic: int = 0) -> Body:
+    """Constants of a link behind ``parent`` whose elastic coordinates begin at ``elastic`` within q_d."""
+    n, rigid_mass, coupling = len(invariants.m), invariants.rigid_mass_matrix, invariants.m @ invariants.rigid
+    moment = rigid_mass[3:, :3]
+    return Body(
+        parent=parent,
+        elastic=elastic,
+        mass=float(np.trace(rigid_mass[:3, :3]) / 3),
+        first_moment=np.array([moment[2, 1], moment[0, 2], moment[1, 0]]),
+        first_shape=coupling[:, :3].T,
+        m=invariants.m,
+        rigid=invariants.rigid,
+        rigid_coupling=coupling,
+        rigid_mass=invariants.rigid.T @ coupling,
+        x=invariants.X,
+        z=np.asarray(invariants.Z).reshape(9, n, n),
+    )
+
+
 def _bodies(mechanism: Mechanism) -> list[Body]:
-    result, elastic = [], 0
-    for k, link in enumerate(mechanism.links):
-        invariants, n = link.invariants, len(link.invariants.m)
-        rigid_mass = invariants.rigid_mass_matrix
-        moment = rigid_mass[3:, :3]
-        coupling = invariants.m @ invariants.rigid
-        result.append(
-            Body(
-                parent=k - 1,
-                elastic=elastic,
-                mass=float(np.trace(rigid_mass[:3, :3]) / 3),
-                first_moment=np.array([moment[2, 1], moment[0, 2], moment[1, 0]]),
-                first_shape=coupling[:, :3].T,
-                m=invariants.m,
-                rigid=invariants.rigid,
-                rigid_coupling=coupling,
-                rigid_mass=invariants.rigid.T @ coupling,
-                x=invariants.X,
-                z=np.asarray(invariants.Z).reshape(9, n, n),
-            )
-        )
-        elastic += link.elastic_modes
-    return result
+    first = np.cumsum([0, *(link.elastic_modes for link in mechanism.links)]).tolist()
+    return [body_record(link.invariants, k - 1, first[k]) for k, link in enumerate(mechanism.links)]
 
 
 def _bent_body(mechanism: Mechanism, link: Link, curved: bool) -> BentBody:
@@ -137,7 +115,7 @@ def _bent_body(mechanism: Mechanism, link: Link, curved: bool) -> BentBody:
     turning = data.momentum[3:]
     modal = modal_inertia(link, mechanism.effects)
     return BentBody(
-        per_mass=np.asarray(np.linalg.pinv(link.invariants.rigid_mass_matrix, rcond=_NO_INERTIA, hermitian=True)),
+        per_mass=compliance(link.invariants.rigid_mass_matrix),
         coupling=data.momentum.transpose(0, 2, 1),
         odd=(turning - turning.transpose(0, 2, 1)) / 2,
         spin=data.spin.reshape(9, n, n),
@@ -150,41 +128,34 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
     """The functions of a chain in either gauge, with dense factors."""
     from erls.equations.erls.paper import functions  # here: it is compiled
 
-    curved = is_stiffened(mechanism)
+    curved = stiffened(mechanism)
     links, elastic = len(mechanism.links), sum(link.elastic_modes for link in mechanism.links)
     free = sum(not joint.drive.prescribed for joint in mechanism.joints)
     integers = [0]
     constants, working = Memory(integers), Memory(integers)
-    joints = _put(constants, _joints(mechanism, constants))
+    joints = put_all(constants, _joints(mechanism, constants))
     states = joint_states(working, links)
-    modes = _put(constants, _modes(mechanism, free))
+    modes = put_all(constants, _modes(mechanism, free))
     rigid, rigid_states = rigid_links(mechanism, constants, working)
     rows, bodies = joint_rows(mechanism, gauge, curved), _bodies(mechanism)
     bent = [_bent_body(mechanism, link, curved) for link in mechanism.links]
     size, count = links + elastic, sum(row.kept for row in rows)
-    effects = mechanism.effects
     paper = Paper(
         rows=count,
         elastic=elastic,
         free=free,
-        joint_rows=_put(constants, rows),
-        row_states=_put(working, [row_state(r.own.shape[1], r.previous.shape[1], size) for r in rows]),
-        bodies=_put(constants, bodies),
-        body_states=_put(working, [_state(body, links, size) for body in bodies]),
-        bent_bodies=_put(constants, bent),
-        bent_states=_put(
+        joint_rows=put_all(constants, rows),
+        row_states=put_all(working, [room(RowState, n=r.own.shape[1], n_p=r.previous.shape[1], z=size) for r in rows]),
+        bodies=put_all(constants, bodies),
+        body_states=put_all(working, [_state(body, links, size) for body in bodies]),
+        bent_bodies=put_all(constants, bent),
+        bent_states=put_all(
             working, [bent_state(b.coupling.shape[1], len(b.coupling) > 0, len(b.warp) > 0) for b in bent]
         ),
-        elimination=working.put(elimination(links, count, elastic)),
-        balance=working.put(
-            Balance(np.zeros(size), np.zeros((size, size)), np.zeros((free + elastic, free + elastic)))
-        ),
+        elimination=working.put(room(Elimination, L=links, r=6 * links, v=count, d=elastic, z=size)),
+        balance=working.put(room(Balance, z=size, f=free + elastic)),
         curved=int(curved),
-        first_order=int("inertia_first_order" in effects),
-        second_order=int("inertia_second_order" in effects),
-        coriolis=int("coriolis" in effects),
-        centrifugal=int("centrifugal_load" in effects),
-        softening=int("spin_softening" in effects),
+        **effect_flags(mechanism.effects),
     )
     own = constants.put(paper)
     feeds = int(any(joint.drive.feed_forward for joint in mechanism.joints))
@@ -205,13 +176,7 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
 
 def _state(body: Body, links: int, size: int) -> BodyState:
     """Memory of a link; its elastic coordinates move as they are."""
-    state = body_state(len(body.m), size)
+    state = room(BodyState, n=len(body.m), z=size)
     for i in range(len(body.m) - 6):
         state.moves[12 + i, links + body.elastic + i] = 1.0
     return state
-
-
-def _put(memory: Memory, records: Sequence[NamedTuple]) -> int:
-    """Place of the first of records of one kind."""
-    first, *_ = [memory.put(record) for record in records]
-    return first

@@ -24,18 +24,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from erls.equations.erls.paper.records import (
-    BODY_STATE,
+from erls.equations.erls.paper.compatibility_records import (
     JOINT_ROWS,
     ROW_STATE,
     Elimination,
     JointRows,
-    Paper,
     RowState,
-    read_body_state,
     read_joint_rows,
     read_row_state,
 )
+from erls.equations.erls.paper.records import BODY_STATE, Paper, read_body_state
 from erls.equations.serial.records import Serial
 from erls.maths.jit import part
 from erls.maths.products import add_rows, add_scaled_product, clear, clear_matrix, dot
