@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import chain_cases
@@ -10,22 +11,50 @@ import numpy as np
 import pytest
 import scenes
 import stiffened_cases
+from scipy.linalg import null_space
 
 from erls.equations.erls.paper.compatibility_records import Elimination
 from erls.equations.erls.paper.dense_chain import DenseChain
 from erls.equations.erls.paper.pack import GAUGES
+from erls.errors import SceneError
 from erls.maths.se3 import inverse
 from erls.mechanism.chain import Mechanism, poses
+from erls.mechanism.joint_types import Freedom, X, Y, Z
+from erls.mechanism.links import Link, rigid_model
 
 STEP = 1e-5  # central differences: truncation ~ STEP² = 1e-10, rounding ~ 1e-16 / STEP = 1e-11, both relative
 TIME = 0.3
 
 
-@pytest.fixture(scope="module", params=["revolute", "mixed", "prescribed"])
+@pytest.fixture(scope="module", params=["revolute", "mixed", "prescribed", "branches", "passing", "screws"])
 def chain(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
-    """Three flexible links; all revolute, or with a prismatic joint and both conventions, or one joint driven."""
-    folder = tmp_path_factory.mktemp("chain")
-    return scenes.mechanism(scenes.three_links(folder, request.param))
+    """Three flexible links; all revolute, or with a prismatic joint and both conventions, or one joint driven, or with
+    a massless link in the middle, or with joints that turn and slide at once or along x; or a tree of links.
+    """
+    folder, kind = tmp_path_factory.mktemp("chain"), request.param
+    if kind == "branches":
+        return chain_cases.mechanism(folder, kind)
+    like = {"passing": "revolute", "screws": "prescribed"}.get(kind, kind)
+    found = scenes.mechanism(scenes.three_links(folder, like))
+    if kind == "passing":
+        return _passing(found, 1.0)
+    if kind == "screws":
+        freedoms = Freedom(X, True), Freedom(Y, True, pitch=0.1), Freedom(X, False)
+        joints = zip(found.joints, freedoms, strict=True)
+        return replace(found, joints=tuple(replace(joint, freedom=freedom) for joint, freedom in joints))
+    return found
+
+
+def _passing(chain: Mechanism, size: float) -> Mechanism:
+    """With a rigid massless link in the middle, of whose modes the turning ones are measured in this size."""
+    old, seat = chain.links[1], chain.joints[2].seat
+    assert seat is not None
+    places = {"root": old.inboard.position, "tip": seat.position, "far": old.inboard.position + size}
+    model = rigid_model("passing", 0.0, np.zeros(3), np.zeros((3, 3)), places)
+    root, tip, _ = model.interface_nodes
+    link = Link("passing", model, model.invariants, root, np.zeros(0), np.zeros(0))
+    joints = (*chain.joints[:2], replace(chain.joints[2], seat=tip))
+    return replace(chain, links=(chain.links[0], link, chain.links[2]), joints=joints)
 
 
 def _random(dense: DenseChain, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -51,7 +80,7 @@ def test_displacements_satisfy_the_condition(chain: Mechanism, gauge: str) -> No
     q = np.concatenate([found.q_r, y[len(dense.free_joints) :]])
     assert np.abs(c @ q).max() <= 1e-13 * np.abs(c).max() * np.abs(q).max() * len(q)
     driven = sum(j.drive.prescribed for j in chain.joints)
-    assert c.shape[0] == (18 if gauge == "joint-angle" else 15 + driven)
+    assert c.shape[0] == (6 if gauge == "joint-angle" else 5) * dense.joints + (gauge != "joint-angle") * driven
 
 
 def test_links_stay_together(chain: Mechanism) -> None:
@@ -59,11 +88,13 @@ def test_links_stay_together(chain: Mechanism) -> None:
     dense = DenseChain(chain, "joint-angle")
     theta = _at(dense, TIME, *_random(dense)).place[: dense.joints]
     frames = poses(chain, theta)
-    for k in range(1, 3):
-        inner, outer = chain.links[k - 1], chain.links[k]
+    for k, below in enumerate(chain.parents):
+        if below < 0:
+            continue
+        inner, outer = chain.links[below], chain.links[k]
         joint = frames[k] @ inverse(chain.joints[k].after)
         moved = []
-        for link, node, number in ((inner, chain.joints[k].seat, k - 1), (outer, outer.inboard, k)):
+        for link, node, number in ((inner, chain.joints[k].seat, below), (outer, outer.inboard, k)):
             frame, q = frames[number], dense.link(number).q
             shift, turn = (frame[:3, :3] @ (s @ q) for s in link.model.node_shape(node.node))
             arm = joint[:3, 3] - (frame[:3, :3] @ node.position + frame[:3, 3])
@@ -79,13 +110,42 @@ def test_right_inverse_against_numpy(chain: Mechanism, gauge: str) -> None:
     dense = DenseChain(chain, gauge)
     y, v = _random(dense)
     found = _at(dense, TIME, y, v)
+    if not found.counts.all():  # of the norm of the others alone
+        return
     plus = np.linalg.pinv(found.c_r)
     rounding = 1e-15 * np.linalg.cond(found.c_r)
     np.testing.assert_allclose(found.plus, plus, atol=100 * rounding * np.abs(plus).max())
-    np.testing.assert_allclose(found.null, np.eye(18) - plus @ found.c_r, atol=100 * rounding)
-    assert np.linalg.matrix_rank(found.null, tol=1e-6) == 18 - len(found.c_r)
+    np.testing.assert_allclose(found.null, np.eye(len(plus)) - plus @ found.c_r, atol=100 * rounding)
+    assert np.linalg.matrix_rank(found.null, tol=1e-6) == len(plus) - len(found.c_r)
     q_r = -plus @ found.c_d @ y[len(dense.free_joints) :]
     np.testing.assert_allclose(found.q_r, q_r, atol=100 * rounding * np.abs(q_r).max())
+
+
+def test_massless_links_pass_motion_on(tmp_path: Path) -> None:
+    """Of all displacements that meet at the joints that with the smallest of the other links is taken: against NumPy,
+    and whatever the modes of a massless link are measured in; 1e-10, of the condition of the norm.
+    """
+    chain = scenes.mechanism(scenes.three_links(tmp_path))
+    others = np.r_[:6, 12:18]
+    values = []
+    for size in (1.0, 30.0):
+        dense = DenseChain(_passing(chain, size), "minimum-norm")
+        y, v = _random(dense)
+        found = _at(dense, TIME, y, v)
+        values.append((found.q_r[others], found.g[others], found.n[others], dense.residual(TIME, y, v, v)))
+        along = null_space(found.c_r[:, 6:12].T).T
+        smallest = -np.linalg.pinv(along @ found.c_r[:, others]) @ along @ found.c_d @ y[3:]
+        np.testing.assert_allclose(found.q_r[others], smallest, atol=1e-10 * np.abs(smallest).max())
+    for one, other in zip(*values, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-10 * np.abs(one).max())
+
+
+def test_screws_need_the_angle_of_the_joint(tmp_path: Path) -> None:
+    """No row of compatibility is along a free one."""
+    chain = scenes.mechanism(scenes.three_links(tmp_path))
+    screw = replace(chain.joints[1], freedom=Freedom(Z, True, pitch=0.1))
+    with pytest.raises(SceneError, match="turns and slides at once"):
+        _ = DenseChain(replace(chain, joints=(chain.joints[0], screw, chain.joints[2])), "minimum-norm").compiled
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -19,8 +19,8 @@ from erls.mechanism.chain import Mechanism
 
 SAME = 1e-10  # relative: sums in another order
 GAUGES = ("joint-angle", "minimum-norm")
-PLAIN, STIFFENED = ("chains", chain_cases.SERIAL), ("stiffened", stiffened_cases.SERIAL)
-MODAL = ("modal_inertia", stiffened_cases.CASES)
+PLAIN, STIFFENED = ("chains", chain_cases.CASES), ("stiffened", stiffened_cases.CASES)
+MODAL = ("modal_inertia", stiffened_cases.SERIAL)
 
 
 @cache
@@ -34,9 +34,15 @@ def _mechanism(folder: Path, kind: str, case: str) -> Mechanism:
     return frozen_values.with_effects(found, frozen_values.MODAL_INERTIA) if kind == "modal_inertia" else found
 
 
-@pytest.mark.parametrize("gauge", GAUGES)
 @pytest.mark.parametrize(
-    ("kind", "case"), [(kind, case) for kind, cases in (PLAIN, STIFFENED, MODAL) for case in cases]
+    ("kind", "case", "gauge"),
+    [
+        (kind, case, gauge)
+        for kind, cases in (PLAIN, STIFFENED, MODAL)
+        for case in cases
+        for gauge in GAUGES
+        if (case, gauge) != ("branches", "minimum-norm")
+    ],
 )
 def test_equations_are_those_of_the_tables(kind: str, case: str, gauge: str, tmp_path: Path) -> None:
     """Residual, matrices, accelerations, states, energies, reactions: the recursion's too, in the joint-angle gauge."""
@@ -52,6 +58,7 @@ AGREE = 1e-6
 ROUNDING = 3e-11  # of a residual, through the square of C_r
 DERIVED = [
     ("chains", "controllers", "minimum-norm"),
+    ("stiffened", "branches", "minimum-norm"),
     ("chains", "slides before a turn", "joint-angle"),
     ("modal_inertia", "arms, mixed", "minimum-norm"),
     ("modal_inertia", "prescribed in the middle", "joint-angle"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from erls.maths.records import Matrix, Stack, reader, table_size
+from erls.maths.records import Matrix, Stack, Vector, reader, table_size
 from erls.maths.so3 import Array
 
 
@@ -25,11 +25,13 @@ class JointRows(NamedTuple):
     free_row : int
         Row along the joint's freedom where it is left out (minimum-norm gauge); otherwise -1.
     slides : int
-        1 for a slide, 0 for a turn.
+        Whether the origin of the outer frame moves along the axis.
     kept : int
         Rows in use: six, or five.
-    bracket : (6, 6) array
-        ad ξ, with X(θ) = exp(-θ ad ξ).
+    turn, slide : (6, 6) arrays
+        ad ξ is their sum, with X(θ) = exp(-θ ad ξ): of the turn about the axis, and of the advance along it.
+    advance : (3,) array
+        How far the origin moves per unit of θ_k.
     own, previous : (6, n), (6, n_p) arrays
         A_k = S_k U_k and B_k: displacement and rotation of the joint's frames per modal coordinate.
     own_second, previous_second : (6, n, n), (6, n_p, n_p) arrays
@@ -41,7 +43,9 @@ class JointRows(NamedTuple):
     free_row: int
     slides: int
     kept: int
-    bracket: Matrix
+    turn: Matrix
+    slide: Matrix
+    advance: Vector
     own: Matrix
     previous: Matrix
     own_second: Stack
@@ -122,6 +126,10 @@ class Elimination(NamedTuple):
         Block rows of ∂C/∂θ_k and of ∂²C/∂θ_k², each by its own joint: no block row depends on another.
     gram, gram_again : (v, v) arrays
         Factors of C_r C_rᵀ, and of the same of what they leave of C_r.
+    counts : (r,) array
+        1, or 0 for the coordinates of massless links.
+    norm, rows : (h, h), (v, h) arrays
+        Where there are such links, h = r: factors of the norm, and C_r in the coordinates in which it is 1.
     plus : (r, v) array
         C_r⁺ = C_rᵀ (C_r C_rᵀ)⁻¹.
     null : (r, r) array
@@ -157,6 +165,9 @@ class Elimination(NamedTuple):
     second_d: Annotated[Array, "v d"]
     gram: Annotated[Array, "v v"]
     gram_again: Annotated[Array, "v v"]
+    counts: Annotated[Array, "r"]
+    norm: Annotated[Array, "h h"]
+    rows: Annotated[Array, "v h"]
     plus: Annotated[Array, "r v"]
     null: Annotated[Array, "r r"]
     d: Annotated[Array, "r d"]

@@ -8,7 +8,9 @@ Under the joint-angle gauge all six rows of a joint stand, C_r is square and G, 
 minimum-norm gauge the row along the joint's freedom is missing; there the paper's G = -C_r⁺ E (eq. 14) is not
 ∂(D q_d)/∂θ, since C_r⁺ depends on θ too. Its derivative is kept, so that energy is conserved: q_r = C_rᵀ μ is
 differentiated together with C q = 0, and what the former adds lies in the null space of C_r, onto which
-1 - C_r⁺ C_r projects; of a square C_r it is empty.
+1 - C_r⁺ C_r projects; of a square C_r it is empty. Massless links between others, which joints of several coordinates
+consist of, do not count in the norm: with P that takes them out, P q_r = C_rᵀ μ, and what is said of C_r⁺ and of the
+projector holds for the blocks of the inverse of [P, C_rᵀ; C_r, 0] that stand in their place.
 
 With second-order displacements C q + e(θ, q) = 0, `erls.equations.erls.paper.second_order_rows`.
 """
@@ -47,20 +49,28 @@ from fe_import.model import IntArray
 
 
 @part
-def fill_transforms(bracket: Array, slides: int, coordinate: Any, out: Array) -> None:
-    """X(θ) = exp(-θ ad ξ), X′ and X″ into ``out`` (3, 6, 6)."""
+def fill_transforms(turn: Array, slide: Array, coordinate: Any, out: Array) -> None:
+    """X(θ) = exp(-θ ad ξ), X′ and X″ into ``out`` (3, 6, 6), where ad ξ is the sum of a turn's and a slide's that share
+    their axis: ad³ = -ad of the former, ad² = 0 of the latter.
+    """
     s, c = np.sin(coordinate), np.cos(coordinate)
     for i in range(6):
         for j in range(6):
-            one, twice = 1.0 if i == j else 0.0, 0.0 * coordinate
+            total = (1.0 if i == j else 0.0) - s * turn[i, j]
             for m in range(6):
-                twice += bracket[i, m] * bracket[m, j]
-            if slides:  # ad ξ ad ξ = 0
-                out[0, i, j], out[1, i, j], out[2, i, j] = one - coordinate * bracket[i, j], -bracket[i, j], 0.0
-            else:  # ad ξ ad ξ ad ξ = -ad ξ
-                out[0, i, j] = one - s * bracket[i, j] + (1.0 - c) * twice
-                out[1, i, j] = -c * bracket[i, j] + s * twice
-                out[2, i, j] = s * bracket[i, j] + c * twice
+                total += (1.0 - c) * turn[i, m] * turn[m, j]
+            out[1, i, j] = total
+    for i in range(6):
+        for j in range(6):
+            out[0, i, j] = out[1, i, j]
+            for m in range(6):
+                out[0, i, j] -= coordinate * out[1, i, m] * slide[m, j]
+    for order in range(1, 3):
+        for i in range(6):
+            for j in range(6):
+                out[order, i, j] = 0.0
+                for m in range(6):
+                    out[order, i, j] -= (turn[i, m] + slide[i, m]) * out[order - 1, m, j]
 
 
 @part
@@ -74,7 +84,7 @@ def fill_compatibility(
     for k in range(serial.links):
         rows = read_joint_rows(reals, integers, paper.joint_rows + k * JOINT_ROWS)
         state = read_row_state(scratch, integers, paper.row_states + k * ROW_STATE)
-        fill_transforms(rows.bracket, rows.slides, c.place[k], state.transform)
+        fill_transforms(rows.turn, rows.slide, c.place[k], state.transform)
         own = read_body(reals, integers, paper.bodies + k * BODY)
         _put_rows(rows.own, 1.0, rows.free_row, rows.first, k, own.elastic, c.c_r, c.c_d)
         if rows.parent >= 0:
@@ -104,6 +114,48 @@ def _put_rows(
 
 
 @part
+def _fill_norm(c: Elimination) -> int:
+    """Factors of the norm, and C_r in its coordinates into ``rows``; 0, or 1 + a coordinate that no row holds.
+
+    Massless links do not count. As rows times q_r are given, their squares may be added to any norm.
+    """
+    v, r = c.c_r.shape
+    clear_matrix(c.norm)
+    for j in range(v):
+        row = c.c_r[j]
+        size = dot(row, row)
+        for i in range(r):
+            c.rows[j, i] = row[i]
+            for m in range(r):
+                c.norm[i, m] += row[i] * row[m] / size
+    for i in range(r):
+        c.norm[i, i] += c.counts[i]
+    status = cholesky(c.norm, 0.0)
+    for j in range(v):
+        forward(c.norm, c.rows[j])
+    return status
+
+
+@part
+def _from_norm(c: Elimination) -> None:
+    """C_r⁺ and the projector in the coordinates of the norm become those of q_r."""
+    v, r = c.c_r.shape
+    for j in range(v):
+        row = c.rows[j]
+        for i in range(r):
+            row[i] = c.plus[i, j]
+        backward(c.norm, row)
+        for i in range(r):
+            c.plus[i, j] = row[i]
+    for _ in range(2):  # from the right, then from the left of what is symmetric
+        for i in range(r):
+            backward(c.norm, c.null[i])
+        for i in range(r):
+            for j in range(i):
+                c.null[i, j], c.null[j, i] = c.null[j, i], c.null[i, j]
+
+
+@part
 def fill_right_inverse(c: Elimination) -> int:
     """C_r⁺ = C_rᵀ (C_r C_rᵀ)⁻¹ (before eq. 11) and 1 - C_r⁺ C_r; 0, or 1 + a row that follows from those before it.
 
@@ -111,10 +163,11 @@ def fill_right_inverse(c: Elimination) -> int:
     (Y. Yamamoto, Y. Nakatsukasa, Y. Yanagisawa, T. Fukaya, Electron. Trans. Numer. Anal. 44 (2015) 306).
     """
     v, r = c.c_r.shape
+    weighted = c.norm.shape[0] > 0
+    status = _fill_norm(c) if weighted else 0
     for i in range(r):
         for j in range(v):
-            c.plus[i, j] = c.c_r[j, i]
-    status = 0
+            c.plus[i, j] = c.rows[j, i] if weighted else c.c_r[j, i]
     for gram in (c.gram, c.gram_again):
         clear_matrix(gram)
         add_transposed_product(c.plus, c.plus, gram)
@@ -130,6 +183,8 @@ def fill_right_inverse(c: Elimination) -> int:
     for i in range(r):
         backward(c.gram_again, c.plus[i])
         backward(c.gram, c.plus[i])
+    if weighted:
+        _from_norm(c)
     return status
 
 
@@ -142,7 +197,9 @@ def _relate(serial: Serial, paper: Paper, reals: Array, integers: IntArray, c: E
     add_rows(c.first_r, c.q_r, 1.0, c.slope)
     add_rows(c.first_d, q_d, 1.0, c.slope)
     clear(c.mu)
-    add_columns(c.plus, c.q_r, 1.0, c.mu)
+    for r in range(len(c.q_r)):
+        c.spare_rigid[r] = c.counts[r] * c.q_r[r]
+    add_columns(c.plus, c.spare_rigid, 1.0, c.mu)
     clear_matrix(c.g)
     clear_matrix(c.turned)
     for k in range(links):
@@ -166,7 +223,7 @@ def _relate(serial: Serial, paper: Paper, reals: Array, integers: IntArray, c: E
     add_rows(c.second_r, c.q_r, 1.0, c.bend)
     add_rows(c.second_d, q_d, 1.0, c.bend)
     for r in range(len(c.q_r)):
-        c.spare_rigid[r] = c.qd_r[r] - dot(c.turned[r], c.rate[:links])
+        c.spare_rigid[r] = c.counts[r] * c.qd_r[r] - dot(c.turned[r], c.rate[:links])
     clear(c.mu_rate)
     add_columns(c.plus, c.spare_rigid, 1.0, c.mu_rate)
     clear(c.spare_rigid)

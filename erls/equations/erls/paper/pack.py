@@ -11,6 +11,7 @@ from erls.equations.erls.paper.records import Balance, Body, BodyState, Paper
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.pack import effect_flags, joint_record, joint_states, put_all, rigid_links, step_parts
 from erls.equations.serial.records import Joint, Modes, Serial
+from erls.errors import Cause, SceneError
 from erls.maths.records import Memory, room
 from erls.maths.se3 import inverse, twist_cross
 from erls.maths.so3 import Array
@@ -40,26 +41,58 @@ def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows
         ``"joint-angle"``: all six rows of a joint; ``"minimum-norm"``: five, six where its motion is prescribed.
     curved : bool
         Whether displacements of second order count.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: a screw in the minimum-norm gauge.
     """
     result: list[JointRows] = []
     first = 0
-    for k, (joint, link) in enumerate(zip(mechanism.joints, mechanism.links, strict=True)):
+    for joint, link in zip(mechanism.joints, mechanism.links, strict=True):
+        freedom, all_rows = joint.freedom, gauge == "joint-angle" or joint.drive.prescribed
+        if freedom.pitch and not all_rows:
+            raise SceneError(
+                Cause.BAD_FIELD,
+                f"joint {joint.name!r} turns and slides at once, along no single row of compatibility",
+                where="simulation.gauge",
+                value=gauge,
+                remedy="gauge = 'joint-angle'",
+            )
         own = link.interface_shape(link.inboard, inverse(joint.after))
         own_second = _frame_second_order(link, link.inboard, inverse(joint.after)) if curved else _NONE
         previous, previous_second = np.zeros((6, 0)), _NONE
-        if k > 0:
-            before = mechanism.links[k - 1]
-            assert joint.seat is not None
+        if joint.seat is not None:
+            before = mechanism.links[joint.parent]
             previous = before.interface_shape(joint.seat, joint.before)
             previous_second = _frame_second_order(before, joint.seat, joint.before) if curved else _NONE
-        all_rows = gauge == "joint-angle" or joint.drive.prescribed
-        free_row = -1 if all_rows else joint.freedom.row
-        count = 6 if all_rows else 5
-        bracket, slides = twist_cross(joint.freedom.screw), int(not joint.freedom.turns)
-        rows = JointRows(k - 1, first, free_row, slides, count, bracket, own, previous, own_second, previous_second)
+        rows = JointRows(
+            parent=joint.parent,
+            first=first,
+            free_row=-1 if all_rows else freedom.row,
+            slides=int(freedom.advance.any()),
+            kept=6 if all_rows else 5,
+            turn=twist_cross(np.concatenate([np.zeros(3), freedom.screw[3:]])),
+            slide=twist_cross(np.concatenate([freedom.advance, np.zeros(3)])),
+            advance=freedom.advance,
+            own=own,
+            previous=previous,
+            own_second=own_second,
+            previous_second=previous_second,
+        )
         result.append(rows)
-        first += count
+        first += rows.kept
     return result
+
+
+def _counts(mechanism: Mechanism) -> Array:
+    """(r,) 1, or 0 for rigid-body coordinates of links that only pass motion on: massless, rigid, bearing others."""
+    outermost = mechanism.outermost
+    passing = [
+        k not in outermost and not link.elastic_modes and not link.invariants.m.any()
+        for k, link in enumerate(mechanism.links)
+    ]
+    return np.repeat(1.0 - np.array(passing), 6)
 
 
 def _joints(mechanism: Mechanism, constants: Memory) -> list[Joint]:
@@ -104,7 +137,10 @@ def body_record(invariants: InertiaInvariants, parent: int = -1, elastic: int = 
 
 def _bodies(mechanism: Mechanism) -> list[Body]:
     first = np.cumsum([0, *(link.elastic_modes for link in mechanism.links)]).tolist()
-    return [body_record(link.invariants, k - 1, first[k]) for k, link in enumerate(mechanism.links)]
+    return [
+        body_record(link.invariants, joint.parent, first[k])
+        for k, (link, joint) in enumerate(zip(mechanism.links, mechanism.joints, strict=True))
+    ]
 
 
 def _bent_body(mechanism: Mechanism, link: Link, curved: bool) -> BentBody:
@@ -139,7 +175,8 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
     rigid, rigid_states = rigid_links(mechanism, constants, working)
     rows, bodies = joint_rows(mechanism, gauge, curved), _bodies(mechanism)
     bent = [_bent_body(mechanism, link, curved) for link in mechanism.links]
-    size, count = links + elastic, sum(row.kept for row in rows)
+    size, count, counts = links + elastic, sum(row.kept for row in rows), _counts(mechanism)
+    weighted = 0 if counts.all() or count == 6 * links else 6 * links  # a square C_r leaves nothing to choose
     paper = Paper(
         rows=count,
         elastic=elastic,
@@ -152,7 +189,9 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
         bent_states=put_all(
             working, [bent_state(b.coupling.shape[1], len(b.coupling) > 0, len(b.warp) > 0) for b in bent]
         ),
-        elimination=working.put(room(Elimination, L=links, r=6 * links, v=count, d=elastic, z=size)),
+        elimination=working.put(
+            room(Elimination, L=links, r=6 * links, v=count, d=elastic, z=size, h=weighted)._replace(counts=counts)
+        ),
         balance=working.put(room(Balance, z=size, f=free + elastic)),
         curved=int(curved),
         **effect_flags(mechanism.effects),

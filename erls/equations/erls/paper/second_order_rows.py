@@ -71,7 +71,7 @@ def _add_skews(a: Vector, b: Vector, factor: float, out: Array, row: int, column
 
 
 @part
-def _add_finite_motion(state: RowState, slides: int, free: bool, coordinate: Any, rate: Any) -> None:
+def _add_finite_motion(rows: JointRows, state: RowState, coordinate: Any, rate: Any) -> None:
     """j, its derivatives by the displacements of both frames and by θ, and the part of its second derivative in time
     that is quadratic in their rates.
     """
@@ -80,9 +80,9 @@ def _add_finite_motion(state: RowState, slides: int, free: bool, coordinate: Any
     u_in, phi_in = three(state.inner, 0), three(state.inner, 3)
     turning = three(state.inner_rate, 3)
     u, phi = three(state.outer, 0), three(state.outer, 3)
-    if slides:
-        zero = 0.0 * coordinate
-        along, unit, speed = (zero, zero, coordinate), (zero, zero, 1.0 + zero), (zero, zero, zero + rate)
+    if rows.slides:
+        unit = three(rows.advance, 0)
+        along, speed = scaled(coordinate, unit), scaled(rate, unit)
         arm = cross(phi_in, along)
         add(state.extra, 0, scaled(-0.5, cross(phi_in, arm)))
         _add_skew(arm, 0.5, state.by_inner, 0, 3)
@@ -90,15 +90,15 @@ def _add_finite_motion(state: RowState, slides: int, free: bool, coordinate: Any
         add(state.extra_angle, 0, scaled(-0.5, cross(phi_in, cross(phi_in, unit))))
         both = plus(cross(turning, cross(phi_in, speed)), cross(phi_in, cross(turning, speed)))
         add(state.extra_bias, 0, scaled(-1.0, plus(cross(turning, cross(turning, along)), both)))
-        if free:
-            apart = minus(u, u_in)
-            parting = minus(three(state.outer_rate, 0), three(state.inner_rate, 0))
-            add(state.extra, 0, scaled(-1.0, cross(phi_in, apart)))
-            _add_skew(apart, 1.0, state.by_inner, 0, 3)
-            _add_skew(phi_in, 1.0, state.by_inner, 0, 0)
-            _add_skew(phi_in, -1.0, state.by_outer, 0, 0)
-            add(state.extra_bias, 0, scaled(-2.0, cross(turning, parting)))
-    elif free:
+    if 0 <= rows.free_row < 3:
+        apart = minus(u, u_in)
+        parting = minus(three(state.outer_rate, 0), three(state.inner_rate, 0))
+        add(state.extra, 0, scaled(-1.0, cross(phi_in, apart)))
+        _add_skew(apart, 1.0, state.by_inner, 0, 3)
+        _add_skew(phi_in, 1.0, state.by_inner, 0, 0)
+        _add_skew(phi_in, -1.0, state.by_outer, 0, 0)
+        add(state.extra_bias, 0, scaled(-2.0, cross(turning, parting)))
+    elif rows.free_row >= 3:
         add(state.extra, 3, scaled(-0.5, cross(phi_in, phi)))
         _add_skew(phi, 0.5, state.by_inner, 3, 3)
         _add_skew(phi_in, -0.5, state.by_outer, 3, 3)
@@ -155,7 +155,7 @@ def _add_joint(
     add_rows(second, state.frame, rate * rate, state.inner_bias)
     add_rows(rows.own, own, 1.0, state.outer)
     add_rows(rows.own, own_rates, 1.0, state.outer_rate)
-    _add_finite_motion(state, rows.slides, rows.free_row >= 0, coordinate, rate)
+    _add_finite_motion(rows, state, coordinate, rate)
     add_scaled_product(1.0, state.by_outer, rows.own, state.extra_own)
     add_scaled_product(1.0, state.by_inner, state.moved, state.extra_previous)
     add_rows(state.by_inner, state.inner_bias, 1.0, state.extra_bias)
