@@ -20,41 +20,28 @@ from erls.errors import SceneError
 from erls.maths.se3 import inverse
 from erls.mechanism.chain import Mechanism, poses
 from erls.mechanism.joint_types import Freedom, X, Y, Z
-from erls.mechanism.links import Link, rigid_model
 
 STEP = 1e-5  # central differences: truncation ~ STEP² = 1e-10, rounding ~ 1e-16 / STEP = 1e-11, both relative
 TIME = 0.3
 
 
-@pytest.fixture(scope="module", params=["revolute", "mixed", "prescribed", "branches", "passing", "screws"])
+SEVERAL = "joints of several coordinates"
+
+
+@pytest.fixture(scope="module", params=["revolute", "mixed", "prescribed", "screws", "branches", SEVERAL])
 def chain(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
     """Three flexible links; all revolute, or with a prismatic joint and both conventions, or one joint driven, or with
-    a massless link in the middle, or with joints that turn and slide at once or along x; or a tree of links.
+    joints that turn and slide at once or along x; a tree of links; cylindrical, universal, planar and fixed joints.
     """
     folder, kind = tmp_path_factory.mktemp("chain"), request.param
-    if kind == "branches":
+    if kind in chain_cases.CASES:
         return chain_cases.mechanism(folder, kind)
-    like = {"passing": "revolute", "screws": "prescribed"}.get(kind, kind)
-    found = scenes.mechanism(scenes.three_links(folder, like))
-    if kind == "passing":
-        return _passing(found, 1.0)
+    found = scenes.mechanism(scenes.three_links(folder, "prescribed" if kind == "screws" else kind))
     if kind == "screws":
         freedoms = Freedom(X, True), Freedom(Y, True, pitch=0.1), Freedom(X, False)
         joints = zip(found.joints, freedoms, strict=True)
         return replace(found, joints=tuple(replace(joint, freedom=freedom) for joint, freedom in joints))
     return found
-
-
-def _passing(chain: Mechanism, size: float) -> Mechanism:
-    """With a rigid massless link in the middle, of whose modes the turning ones are measured in this size."""
-    old, seat = chain.links[1], chain.joints[2].seat
-    assert seat is not None
-    places = {"root": old.inboard.position, "tip": seat.position, "far": old.inboard.position + size}
-    model = rigid_model("passing", 0.0, np.zeros(3), np.zeros((3, 3)), places)
-    root, tip, _ = model.interface_nodes
-    link = Link("passing", model, model.invariants, root, np.zeros(0), np.zeros(0))
-    joints = (*chain.joints[:2], replace(chain.joints[2], seat=tip))
-    return replace(chain, links=(chain.links[0], link, chain.links[2]), joints=joints)
 
 
 def _random(dense: DenseChain, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -87,7 +74,7 @@ def test_links_stay_together(chain: Mechanism) -> None:
     """Independently of C: both sides of each joint are displaced alike, from node positions and rotations."""
     dense = DenseChain(chain, "joint-angle")
     theta = _at(dense, TIME, *_random(dense)).place[: dense.joints]
-    frames = poses(chain, theta)
+    frames, pairs = poses(chain, theta), []
     for k, below in enumerate(chain.parents):
         if below < 0:
             continue
@@ -99,7 +86,9 @@ def test_links_stay_together(chain: Mechanism) -> None:
             shift, turn = (frame[:3, :3] @ (s @ q) for s in link.model.node_shape(node.node))
             arm = joint[:3, 3] - (frame[:3, :3] @ node.position + frame[:3, 3])
             moved.append(np.concatenate([shift + np.cross(turn, arm), turn]))
-        np.testing.assert_allclose(moved[0], moved[1], atol=1e-13 * 100 * np.abs(moved[0]).max())
+        pairs.append(moved)
+    inner_moved, outer_moved = np.array(pairs).transpose(1, 0, 2)
+    np.testing.assert_allclose(inner_moved, outer_moved, atol=1e-13 * 100 * np.abs(outer_moved).max())
 
 
 @pytest.mark.parametrize("gauge", GAUGES)
@@ -121,23 +110,21 @@ def test_right_inverse_against_numpy(chain: Mechanism, gauge: str) -> None:
     np.testing.assert_allclose(found.q_r, q_r, atol=100 * rounding * np.abs(q_r).max())
 
 
-def test_massless_links_pass_motion_on(tmp_path: Path) -> None:
-    """Of all displacements that meet at the joints that with the smallest of the other links is taken: against NumPy,
-    and whatever the modes of a massless link are measured in; 1e-10, of the condition of the norm.
+def test_places_between_motions_do_not_count(tmp_path: Path) -> None:
+    """Of all displacements that meet at the joints that with the smallest of the links is taken, not of what lies
+    between the motions of a joint: against NumPy; to 1e-10, by the condition of the norm.
     """
-    chain = scenes.mechanism(scenes.three_links(tmp_path))
-    others = np.r_[:6, 12:18]
-    values = []
-    for size in (1.0, 30.0):
-        dense = DenseChain(_passing(chain, size), "minimum-norm")
-        y, v = _random(dense)
-        found = _at(dense, TIME, y, v)
-        values.append((found.q_r[others], found.g[others], found.n[others], dense.residual(TIME, y, v, v)))
-        along = null_space(found.c_r[:, 6:12].T).T
-        smallest = -np.linalg.pinv(along @ found.c_r[:, others]) @ along @ found.c_d @ y[3:]
-        np.testing.assert_allclose(found.q_r[others], smallest, atol=1e-10 * np.abs(smallest).max())
-    for one, other in zip(*values, strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-10 * np.abs(one).max())
+    chain = chain_cases.mechanism(tmp_path, SEVERAL)
+    dense = DenseChain(chain, "minimum-norm")
+    y, v = _random(dense)
+    found = _at(dense, TIME, y, v)
+    counts = np.repeat([not link.intermediate for link in chain.links], 6)
+    assert 0 < counts.sum() < len(counts)
+    along = null_space(found.c_r[:, ~counts].T).T
+    free = sum(not joint.drive.prescribed for joint in chain.joints)
+    assert len(along) == counts.sum() - free  # six conditions a joint, less its freedoms
+    smallest = -np.linalg.pinv(along @ found.c_r[:, counts]) @ along @ found.c_d @ y[len(dense.free_joints) :]
+    np.testing.assert_allclose(found.q_r[counts], smallest, atol=1e-10 * np.abs(smallest).max())
 
 
 def test_screws_need_the_angle_of_the_joint(tmp_path: Path) -> None:

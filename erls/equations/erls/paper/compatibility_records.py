@@ -127,9 +127,9 @@ class Elimination(NamedTuple):
     gram, gram_again : (v, v) arrays
         Factors of C_r C_rᵀ, and of the same of what they leave of C_r.
     counts : (r,) array
-        1, or 0 for the coordinates of massless links.
+        1, or 0 for the coordinates of links that are but places between two motions of a joint.
     norm, rows : (h, h), (v, h) arrays
-        Where there are such links, h = r: factors of the norm, and C_r in the coordinates in which it is 1.
+        Where there are any, h = r: factors of the norm, and C_r in the coordinates in which it is 1.
     plus : (r, v) array
         C_r⁺ = C_rᵀ (C_r C_rᵀ)⁻¹.
     null : (r, r) array

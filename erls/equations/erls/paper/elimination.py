@@ -8,8 +8,8 @@ Under the joint-angle gauge all six rows of a joint stand, C_r is square and G, 
 minimum-norm gauge the row along the joint's freedom is missing; there the paper's G = -C_r⁺ E (eq. 14) is not
 ∂(D q_d)/∂θ, since C_r⁺ depends on θ too. Its derivative is kept, so that energy is conserved: q_r = C_rᵀ μ is
 differentiated together with C q = 0, and what the former adds lies in the null space of C_r, onto which
-1 - C_r⁺ C_r projects; of a square C_r it is empty. Massless links between others, which joints of several coordinates
-consist of, do not count in the norm: with P that takes them out, P q_r = C_rᵀ μ, and what is said of C_r⁺ and of the
+1 - C_r⁺ C_r projects; of a square C_r it is empty. Massless links between the motions of a joint of several
+coordinates do not count in the norm: with P that takes them out, P q_r = C_rᵀ μ, and what is said of C_r⁺ and of the
 projector holds for the blocks of the inverse of [P, C_rᵀ; C_r, 0] that stand in their place.
 
 With second-order displacements C q + e(θ, q) = 0, `erls.equations.erls.paper.second_order_rows`.
@@ -117,7 +117,7 @@ def _put_rows(
 def _fill_norm(c: Elimination) -> int:
     """Factors of the norm, and C_r in its coordinates into ``rows``; 0, or 1 + a coordinate that no row holds.
 
-    Massless links do not count. As rows times q_r are given, their squares may be added to any norm.
+    Places between motions do not count. As rows times q_r are given, their squares may be added to any norm.
     """
     v, r = c.c_r.shape
     clear_matrix(c.norm)

@@ -85,16 +85,6 @@ def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows
     return result
 
 
-def _counts(mechanism: Mechanism) -> Array:
-    """(r,) 1, or 0 for rigid-body coordinates of links that only pass motion on: massless, rigid, bearing others."""
-    outermost = mechanism.outermost
-    passing = [
-        k not in outermost and not link.elastic_modes and not link.invariants.m.any()
-        for k, link in enumerate(mechanism.links)
-    ]
-    return np.repeat(1.0 - np.array(passing), 6)
-
-
 def _joints(mechanism: Mechanism, constants: Memory) -> list[Joint]:
     result, place = [], 0
     for joint in mechanism.joints:
@@ -175,7 +165,8 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
     rigid, rigid_states = rigid_links(mechanism, constants, working)
     rows, bodies = joint_rows(mechanism, gauge, curved), _bodies(mechanism)
     bent = [_bent_body(mechanism, link, curved) for link in mechanism.links]
-    size, count, counts = links + elastic, sum(row.kept for row in rows), _counts(mechanism)
+    size, count = links + elastic, sum(row.kept for row in rows)
+    counts = np.repeat([float(not link.intermediate) for link in mechanism.links], 6)
     weighted = 0 if counts.all() or count == 6 * links else 6 * links  # a square C_r leaves nothing to choose
     paper = Paper(
         rows=count,
