@@ -52,14 +52,19 @@ def _fields(record: type[Any]) -> list[tuple[str, int | None, bool]]:
 
 
 def room(record: type[R], **sizes: int) -> R:
-    """A record of zeros: working memory whose fields are annotated with their shapes, in these sizes."""
+    """Working memory: a record of zeros whose fields are annotated with their shapes, in these sizes.
 
-    def axis(said: str) -> int:
-        return sum(int(part) if part.isdigit() else sizes[part] for part in said.split("+"))
-
-    hints: dict[str, Any] = get_type_hints(record, include_extras=True)
+    Whole numbers are given beside the sizes, by the names of their fields.
+    """
     make: Callable[..., R] = record
-    return make(*(np.zeros([axis(said) for said in kind.__metadata__[0].split()]) for kind in hints.values()))
+    fields: dict[str, Any] = get_type_hints(record, include_extras=True)
+    return make(*(sizes[name] if kind is int else _zeros(kind, sizes) for name, kind in fields.items()))
+
+
+def _zeros(kind: Any, sizes: dict[str, int]) -> Array:
+    """Of the shape that an annotation tells: axes apart, each a sum of numbers and sizes."""
+    axes = [axis.split("+") for axis in kind.__metadata__[0].split()]
+    return np.zeros([sum(int(part) if part.isdigit() else sizes[part] for part in axis) for axis in axes])
 
 
 def table_size(record: type[Any]) -> int:

@@ -7,11 +7,11 @@ link's frame, a small motion [translation; rotation]. With e elastic modes n = 6
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from erls.maths.records import Matrix, Stack, Vector, reader, table_size
+from erls.maths.records import Matrix, Stack, Vector, reader, room, table_size
 from erls.maths.so3 import Array
 
 
@@ -125,61 +125,33 @@ class LinkState(NamedTuple):
         Z q of each pair of axes.
     """
 
-    u: Vector
-    u_rate: Vector
-    u_acceleration: Vector
-    twist: Vector
-    twist_rate: Vector
-    w: Vector
-    w_rate: Vector
-    down: Vector
-    wrench: Vector
-    force: Vector
-    momentum: Vector
-    point: Vector
-    other: Vector
-    moments: Vector
-    q: Vector
-    q_rate: Vector
-    q_acceleration: Vector
-    modal: Vector
-    speeds: Vector
-    turned: Matrix
-    turned_rate: Matrix
-    squared: Matrix
+    u: Annotated[Array, "6"]
+    u_rate: Annotated[Array, "6"]
+    u_acceleration: Annotated[Array, "6"]
+    twist: Annotated[Array, "6"]
+    twist_rate: Annotated[Array, "6"]
+    w: Annotated[Array, "6"]
+    w_rate: Annotated[Array, "6"]
+    down: Annotated[Array, "3"]
+    wrench: Annotated[Array, "6"]
+    force: Annotated[Array, "6"]
+    momentum: Annotated[Array, "6"]
+    point: Annotated[Array, "6"]
+    other: Annotated[Array, "6"]
+    moments: Annotated[Array, "6"]
+    q: Annotated[Array, "n"]
+    q_rate: Annotated[Array, "n"]
+    q_acceleration: Annotated[Array, "n"]
+    modal: Annotated[Array, "n"]
+    speeds: Annotated[Array, "n"]
+    turned: Annotated[Array, "A n"]
+    turned_rate: Annotated[Array, "A n"]
+    squared: Annotated[Array, "pairs n"]
 
 
 def link_state(modes: int, axes: int) -> LinkState:
     """Memory for a link."""
-    n, pairs = 6 + modes, axes * (axes + 1) // 2
-
-    def room(*shape: int) -> Array:
-        return np.zeros(shape)
-
-    return LinkState(
-        u=room(6),
-        u_rate=room(6),
-        u_acceleration=room(6),
-        twist=room(6),
-        twist_rate=room(6),
-        w=room(6),
-        w_rate=room(6),
-        down=room(3),
-        wrench=room(6),
-        force=room(6),
-        momentum=room(6),
-        point=room(6),
-        other=room(6),
-        moments=room(6),
-        q=room(n),
-        q_rate=room(n),
-        q_acceleration=room(n),
-        modal=room(n),
-        speeds=room(n),
-        turned=room(axes, n),
-        turned_rate=room(axes, n),
-        squared=room(pairs, n),
-    )
+    return room(LinkState, n=6 + modes, A=axes, pairs=axes * (axes + 1) // 2)
 
 
 class Bend(NamedTuple):
@@ -258,72 +230,39 @@ class BendState(NamedTuple):
         Arm at the joint's coordinate, and φ × d.
     """
 
-    e: Vector
-    e_rate: Vector
-    e_acceleration: Vector
-    carried: Vector
-    push: Vector
-    full: Vector
-    full_rate: Vector
-    added: Vector
-    added_rate: Vector
-    share: Vector
-    share_rate: Vector
-    moment: Vector
-    moment_rate: Vector
-    spin: Vector
-    spin_rate: Vector
-    weights: Vector
-    rows: Matrix
-    rows_rate: Matrix
-    bow: Matrix
-    bow_rate: Matrix
-    x: Vector
-    x_rate: Vector
-    x_acceleration: Vector
-    pulls: Matrix
-    turning: Matrix
-    d: Vector
-    b: Vector
-    spare: Vector
+    e: Annotated[Array, "6"]
+    e_rate: Annotated[Array, "6"]
+    e_acceleration: Annotated[Array, "6"]
+    carried: Annotated[Array, "6"]
+    push: Annotated[Array, "6"]
+    full: Annotated[Array, "6"]
+    full_rate: Annotated[Array, "6"]
+    added: Annotated[Array, "6"]
+    added_rate: Annotated[Array, "6"]
+    share: Annotated[Array, "6"]
+    share_rate: Annotated[Array, "6"]
+    moment: Annotated[Array, "3"]
+    moment_rate: Annotated[Array, "3"]
+    spin: Annotated[Array, "B"]
+    spin_rate: Annotated[Array, "B"]
+    weights: Annotated[Array, "6+B"]
+    rows: Annotated[Array, "6+B m"]
+    rows_rate: Annotated[Array, "6 m"]
+    bow: Annotated[Array, "6 p"]
+    bow_rate: Annotated[Array, "6 p"]
+    x: Annotated[Array, "m"]
+    x_rate: Annotated[Array, "m"]
+    x_acceleration: Annotated[Array, "m"]
+    pulls: Annotated[Array, "6 m"]
+    turning: Annotated[Array, "6 3"]
+    d: Annotated[Array, "3"]
+    b: Annotated[Array, "3"]
+    spare: Annotated[Array, "s"]
 
 
 def bend_state(kept: int, kept_before: int, axes: int) -> BendState:
     """Memory for a link with m = ``kept``, and its parent's."""
-
-    def room(*shape: int) -> Array:
-        return np.zeros(shape)
-
-    return BendState(
-        e=room(6),
-        e_rate=room(6),
-        e_acceleration=room(6),
-        carried=room(6),
-        push=room(6),
-        full=room(6),
-        full_rate=room(6),
-        added=room(6),
-        added_rate=room(6),
-        share=room(6),
-        share_rate=room(6),
-        moment=room(3),
-        moment_rate=room(3),
-        spin=room(3 * axes),
-        spin_rate=room(3 * axes),
-        weights=room(6 + 3 * axes),
-        rows=room(6 + 3 * axes, kept),
-        rows_rate=room(6, kept),
-        bow=room(6, kept_before),
-        bow_rate=room(6, kept_before),
-        x=room(kept),
-        x_rate=room(kept),
-        x_acceleration=room(kept),
-        pulls=room(6, kept),
-        turning=room(6, 3),
-        d=room(3),
-        b=room(3),
-        spare=room(max(kept, kept_before)),
-    )
+    return room(BendState, m=kept, p=kept_before, B=3 * axes, s=max(kept, kept_before))
 
 
 class Change(NamedTuple):
@@ -339,18 +278,16 @@ class Change(NamedTuple):
         Of (W, Ω) with q̇_d at given (W, Ω), and with the part of these that q̇_d makes.
     """
 
-    inertia: Matrix
-    map: Matrix
-    product: Matrix
-    coupling: Matrix
-    whole: Matrix
+    inertia: Annotated[Array, "9 9"]
+    map: Annotated[Array, "9 p"]
+    product: Annotated[Array, "9 p"]
+    coupling: Annotated[Array, "9 e"]
+    whole: Annotated[Array, "9 e"]
 
 
 def change(size: int, modes: int) -> Change:
     """Memory for a link with p = ``size``."""
-    return Change(
-        np.zeros((9, 9)), np.zeros((9, size)), np.zeros((9, size)), np.zeros((9, modes)), np.zeros((9, modes))
-    )
+    return room(Change, p=size, e=modes)
 
 
 class End(NamedTuple):

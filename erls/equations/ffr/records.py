@@ -10,11 +10,12 @@ N m, of lengths in m.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from erls.maths.records import Matrix, Stack, Vector, reader, table_size
+from erls.maths.records import Matrix, Stack, Vector, reader, room, table_size
+from erls.maths.so3 import Array
 
 
 class Frames(NamedTuple):
@@ -187,49 +188,29 @@ class BodyState(NamedTuple):
         Working memory.
     """
 
-    arrived: Vector
-    twist: Vector
-    twist_rate: Vector
-    gravity: Vector
-    wrench: Vector
-    borne: Vector
-    momentum: Vector
-    moment: Vector
-    inertia: Matrix
-    coupling: Matrix
-    arrival: Matrix
-    carried: Matrix
-    turned: Matrix
-    turned_rate: Matrix
-    squared: Vector
-    spare: Vector
-    spare_coupling: Matrix
-    spare_inertia: Matrix
+    arrived: Annotated[Array, "6"]
+    twist: Annotated[Array, "6"]
+    twist_rate: Annotated[Array, "6"]
+    gravity: Annotated[Array, "3"]
+    wrench: Annotated[Array, "6"]
+    borne: Annotated[Array, "6"]
+    momentum: Annotated[Array, "6"]
+    moment: Annotated[Array, "3"]
+    inertia: Annotated[Array, "6 6"]
+    coupling: Annotated[Array, "6 e"]
+    arrival: Annotated[Array, "6 6"]
+    carried: Annotated[Array, "6 e"]
+    turned: Annotated[Array, "c e"]
+    turned_rate: Annotated[Array, "c e"]
+    squared: Annotated[Array, "e"]
+    spare: Annotated[Array, "12"]
+    spare_coupling: Annotated[Array, "6 e"]
+    spare_inertia: Annotated[Array, "6 6"]
 
 
 def body_state(e: int, axes: int) -> BodyState:
     """Memory for a link with so many elastic coordinates and axes."""
-    six, square, rows = np.zeros(6), np.zeros((6, 6)), np.zeros((6, e))
-    return BodyState(
-        arrived=six,
-        twist=six,
-        twist_rate=six,
-        gravity=np.zeros(3),
-        wrench=six,
-        borne=six,
-        momentum=six,
-        moment=np.zeros(3),
-        inertia=square,
-        coupling=rows,
-        arrival=square,
-        carried=rows,
-        turned=np.zeros((axes, e)),
-        turned_rate=np.zeros((axes, e)),
-        squared=np.zeros(e),
-        spare=np.zeros(12),
-        spare_coupling=rows,
-        spare_inertia=square,
-    )
+    return room(BodyState, e=e, c=axes)
 
 
 class BentState(NamedTuple):
@@ -262,57 +243,33 @@ class BentState(NamedTuple):
         Working memory.
     """
 
-    twist: Vector
-    twist_rate: Vector
-    moment: Vector
-    moment_rate: Vector
-    square: Matrix
-    square_rate: Matrix
-    share: Vector
-    share_rate: Vector
-    factor: Matrix
-    arrival: Matrix
-    carried: Matrix
-    bending: Matrix
-    bending_rate: Matrix
-    spun: Matrix
-    skewed: Matrix
-    warp: Matrix
-    warp_rate: Matrix
-    twisted: Matrix
-    pushed: Vector
-    pushed_rate: Vector
-    lag: Vector
-    spare: Vector
+    twist: Annotated[Array, "6"]
+    twist_rate: Annotated[Array, "6"]
+    moment: Annotated[Array, "3"]
+    moment_rate: Annotated[Array, "3"]
+    square: Annotated[Array, "3 3"]
+    square_rate: Annotated[Array, "3 3"]
+    share: Annotated[Array, "6"]
+    share_rate: Annotated[Array, "6"]
+    factor: Annotated[Array, "6 6"]
+    arrival: Annotated[Array, "6 6"]
+    carried: Annotated[Array, "6 e"]
+    bending: Annotated[Array, "6 e"]
+    bending_rate: Annotated[Array, "6 e"]
+    spun: Annotated[Array, "9 e"]
+    skewed: Annotated[Array, "3 e"]
+    warp: Annotated[Array, "n n"]
+    warp_rate: Annotated[Array, "n n"]
+    twisted: Annotated[Array, "n n"]
+    pushed: Annotated[Array, "n"]
+    pushed_rate: Annotated[Array, "n"]
+    lag: Annotated[Array, "n"]
+    spare: Annotated[Array, "6"]
 
 
 def bent_state(e: int, warped: bool) -> BentState:
     """Memory for a link with so many elastic coordinates, with modal inertia or without."""
-    six, three, n = np.zeros(6), np.zeros(3), e if warped else 0
-    return BentState(
-        twist=six,
-        twist_rate=six,
-        moment=three,
-        moment_rate=three,
-        square=np.zeros((3, 3)),
-        square_rate=np.zeros((3, 3)),
-        share=six,
-        share_rate=six,
-        factor=np.zeros((6, 6)),
-        arrival=np.zeros((6, 6)),
-        carried=np.zeros((6, e)),
-        bending=np.zeros((6, e)),
-        bending_rate=np.zeros((6, e)),
-        spun=np.zeros((9, e)),
-        skewed=np.zeros((3, e)),
-        warp=np.zeros((n, n)),
-        warp_rate=np.zeros((n, n)),
-        twisted=np.zeros((n, n)),
-        pushed=np.zeros(n),
-        pushed_rate=np.zeros(n),
-        lag=np.zeros(n),
-        spare=six,
-    )
+    return room(BentState, e=e, n=e if warped else 0)
 
 
 class NodeState(NamedTuple):

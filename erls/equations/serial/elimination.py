@@ -14,9 +14,7 @@ bodies). What C has beside its diagonal in decoupled coordinates is left out. Nu
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Annotated, Any, NamedTuple
 
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import (
@@ -31,7 +29,7 @@ from erls.equations.serial.records import (
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
 from erls.maths.jit import part
 from erls.maths.products import add_rows, clear, copy_matrix, dot
-from erls.maths.records import Matrix, Vector, reader, table_size
+from erls.maths.records import reader, room, table_size
 from erls.maths.so3 import Array
 from erls.maths.symmetric import factor_symmetric, solve_symmetric
 from fe_import.model import IntArray
@@ -78,27 +76,27 @@ class Condensed(NamedTuple):
 
     parent: int
     first: int
-    compliance: Vector
-    whole: Matrix
-    diagonal: Vector
-    rows: Matrix
-    rows_solved: Matrix
-    coupling_solved: Matrix
-    bound: Matrix
-    yielding: Matrix
-    solver: Matrix
-    lead: Matrix
-    follow: Matrix
-    articulated: Matrix
-    subspace: Vector
-    push: Vector
-    along: Vector
-    forces: Vector
-    handed: Vector
-    moved: Vector
-    given: Vector
-    load: Vector
-    motion: Vector
+    compliance: Annotated[Array, "e"]
+    whole: Annotated[Array, "f f"]
+    diagonal: Annotated[Array, "f"]
+    rows: Annotated[Array, "n e"]
+    rows_solved: Annotated[Array, "n e"]
+    coupling_solved: Annotated[Array, "p e"]
+    bound: Annotated[Array, "n n"]
+    yielding: Annotated[Array, "n n"]
+    solver: Annotated[Array, "n n+n"]
+    lead: Annotated[Array, "n p"]
+    follow: Annotated[Array, "n p"]
+    articulated: Annotated[Array, "p p"]
+    subspace: Annotated[Array, "p"]
+    push: Annotated[Array, "p"]
+    along: Annotated[Array, "2"]
+    forces: Annotated[Array, "e"]
+    handed: Annotated[Array, "n"]
+    moved: Annotated[Array, "n"]
+    given: Annotated[Array, "n"]
+    load: Annotated[Array, "p"]
+    motion: Annotated[Array, "p"]
 
 
 def condensed(own: list[Segment]) -> list[Condensed]:
@@ -114,36 +112,7 @@ def condensed(own: list[Segment]) -> list[Condensed]:
 
 def _condensed(own: Segment, n: int, first: int) -> Condensed:
     p, e = own.coupling.shape
-    full = e if len(own.change) else 0
-
-    def room(*shape: int) -> Array:
-        return np.zeros(shape)
-
-    return Condensed(
-        parent=own.parent,
-        first=first,
-        compliance=room(e),
-        whole=room(full, full),
-        diagonal=room(full),
-        rows=room(n, e),
-        rows_solved=room(n, e),
-        coupling_solved=room(p, e),
-        bound=room(n, n),
-        yielding=room(n, n),
-        solver=room(n, 2 * n),
-        lead=room(n, p),
-        follow=room(n, p),
-        articulated=room(p, p),
-        subspace=room(p),
-        push=room(p),
-        along=room(2),
-        forces=room(e),
-        handed=room(n),
-        moved=room(n),
-        given=room(n),
-        load=room(p),
-        motion=room(p),
-    )
+    return room(Condensed, parent=own.parent, first=first, e=e, f=e if len(own.change) else 0, n=n, p=p)
 
 
 read_condensed = reader(Condensed)

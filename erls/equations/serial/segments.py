@@ -12,14 +12,12 @@ by link (`erls.equations.serial.elimination`); no equation of motion stands here
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
+from typing import Annotated, NamedTuple
 
 from erls.equations.serial.records import JOINT, MODES, Serial, read_joint, read_modes
 from erls.maths.jit import part, spliced
 from erls.maths.products import add_product, add_transposed_product, copy_matrix, dot
-from erls.maths.records import Matrix, Vector, reader, table_size
+from erls.maths.records import reader, room, table_size
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -54,37 +52,24 @@ class Segment(NamedTuple):
 
     parent: int
     ports: int
-    inertia: Matrix
-    coupling: Matrix
-    lead: Matrix
-    reach: Matrix
-    subspace: Vector
-    change: Matrix
-    partner: Matrix
-    composite: Matrix
-    bearing: Matrix
-    pull: Vector
-    spare: Matrix
-    spare_reach: Matrix
+    inertia: Annotated[Array, "p p"]
+    coupling: Annotated[Array, "p e"]
+    lead: Annotated[Array, "p p_before"]
+    reach: Annotated[Array, "p e_before"]
+    subspace: Annotated[Array, "p"]
+    change: Annotated[Array, "r e"]
+    partner: Annotated[Array, "r e"]
+    composite: Annotated[Array, "p p"]
+    bearing: Annotated[Array, "p e"]
+    pull: Annotated[Array, "p"]
+    spare: Annotated[Array, "p p_before"]
+    spare_reach: Annotated[Array, "p e_before"]
 
 
 def segment(parent: int, size: int, modes: int, size_before: int, modes_before: int, ports: int, extra: int) -> Segment:
     """Memory for a link with p = ``size`` and e = ``modes``; both of its parent, ``ports``, and r = ``extra``."""
-    return Segment(
-        parent=parent,
-        ports=ports,
-        inertia=np.zeros((size, size)),
-        coupling=np.zeros((size, modes)),
-        lead=np.zeros((size, size_before)),
-        reach=np.zeros((size, modes_before)),
-        subspace=np.zeros(size),
-        change=np.zeros((extra, modes)),
-        partner=np.zeros((extra, modes)),
-        composite=np.zeros((size, size)),
-        bearing=np.zeros((size, modes)),
-        pull=np.zeros(size),
-        spare=np.zeros((size, size_before)),
-        spare_reach=np.zeros((size, modes_before)),
+    return room(
+        Segment, parent=parent, ports=ports, p=size, e=modes, p_before=size_before, e_before=modes_before, r=extra
     )
 
 
