@@ -29,8 +29,11 @@ def _plain(address: int, *arguments: Any) -> Any:
     return _known[address](*arguments)
 
 
-def caller(signature: Any) -> Callable[..., Any]:
-    """``call(address, *arguments)`` in compiled functions and, with ``ERLS_JIT=0``, in plain Python."""
+def caller(signature: Any, kernel: str = "") -> Callable[..., Any]:
+    """``call(address, *arguments)`` in compiled functions and, with ``ERLS_JIT=0``, in plain Python.
+
+    Where the address is always that of one kernel, `erls.maths.jit.any_scalar` is told which, ``module:name``.
+    """
     if not ENABLED:
         return _plain
     from numba.core import types
@@ -52,5 +55,6 @@ def caller(signature: Any) -> Callable[..., Any]:
     def call(typing_context: Any, address: Any, *arguments: Any) -> Any:
         return signature.return_type(every.int64, every.StarArgTuple(signature.args)), generate
 
-    found: Callable[..., Any] = intrinsic(call)
-    return found
+    found: Any = intrinsic(call)
+    found.stands_for = kernel
+    return found  # type: ignore[no-any-return]

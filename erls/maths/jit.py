@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar, cast
@@ -173,9 +174,23 @@ def plain(function: F) -> F:
 def any_scalar(function: F) -> F:
     """A kernel for other numbers than those of its signature: compiled on demand for what it is given, complex ones."""
     source: Any = getattr(function, "py_func", function)
-    own = {name: any_scalar(source.__globals__[name]) for name in _called(source) if source.__globals__[name] in _fixed}
+    known = {name: source.__globals__.get(name) for name in source.__code__.co_names}
+    own = {name: any_scalar(found) for name, found in known.items() if hasattr(found, "py_func") and found in _fixed}
+    by_address = {name: getattr(found, "stands_for", "") for name, found in known.items()}
+    own |= {name: _direct(said) for name, said in by_address.items() if said}
     twin = FunctionType(source.__code__, {**source.__globals__, **own}, source.__name__, source.__defaults__)
     return cast(F, _njit(twin, _nrt=False)) if ENABLED else function
+
+
+def _direct(kernel: str) -> Any:
+    """What takes the place of a call by address of this kernel, ``module:name``."""
+    module, _, name = kernel.partition(":")
+    function = any_scalar(getattr(import_module(module), name))
+
+    def call(_address: int, *arguments: Any) -> Any:
+        return function(*arguments)
+
+    return _njit(call, _nrt=False, cache=False) if ENABLED else call
 
 
 def _called(source: Any) -> list[str]:

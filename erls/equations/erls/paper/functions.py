@@ -15,7 +15,6 @@ from erls.equations.erls.paper.bent import (
 from erls.equations.erls.paper.bent_records import BENT_BODY, BENT_STATE, read_bent_body, read_bent_state
 from erls.equations.erls.paper.compatibility_records import ROW_STATE, read_elimination, read_row_state
 from erls.equations.erls.paper.forces import add_inertia_forces, fill_mass, fill_moments, subtract_weight
-from erls.equations.erls.paper.motion import move
 from erls.equations.erls.paper.records import (
     BODY,
     BODY_STATE,
@@ -38,11 +37,14 @@ from erls.equations.serial.records import (
     read_modes,
     read_serial,
 )
+from erls.maths.calls import caller
 from erls.maths.jit import kernel, part
 from erls.maths.products import add_columns, add_product, add_transposed_product, clear, clear_matrix, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_force_cross, transform_force_back
 from fe_import.model import IntArray
+
+call_move = caller(contract.ACCELERATION, "erls.equations.erls.paper.motion:move")  # which is compiled once for all
 
 
 @part
@@ -108,7 +110,7 @@ def residual(
     force = read_balance(scratch, integers, paper.balance).force
     if serial.feeds:
         feed_forward(serial, reals, integers, scratch, t)
-    move(serial, paper, reals, integers, scratch, t, y, v, a)
+    call_move(paper.move, reals, integers, scratch, t, y, v, a)
     clear(force)
     for k in range(serial.links):
         _load_link(paper, reals, integers, scratch, k)
@@ -169,7 +171,7 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
     paper = read_paper(reals, integers, serial.own)
     c = read_elimination(scratch, integers, paper.elimination)
     every = read_balance(scratch, integers, paper.balance).mass
-    move(serial, paper, reals, integers, scratch, t, y, c.rest, c.rest[:0])
+    call_move(paper.move, reals, integers, scratch, t, y, c.rest, c.rest[:0])
     clear_matrix(every)
     for k in range(serial.links):
         _weigh_link(paper, reals, integers, scratch, k)
@@ -193,7 +195,7 @@ def stiffness_and_damping(
     balance = read_balance(scratch, integers, paper.balance)
     if serial.feeds:
         feed_forward(serial, reals, integers, scratch, t)
-    move(serial, paper, reals, integers, scratch, t, y, v, v[:0])
+    call_move(paper.move, reals, integers, scratch, t, y, v, v[:0])
     for which in range(2):
         every = balance.mass
         clear_matrix(every)

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from erls.equations import compiled_system as contract
 from erls.equations.erls.paper.compatibility_records import (
     JOINT_ROWS,
     ROW_STATE,
@@ -17,10 +18,10 @@ from erls.equations.erls.paper.compatibility_records import (
     read_row_state,
 )
 from erls.equations.erls.paper.elimination import eliminate
-from erls.equations.erls.paper.records import BODY, BODY_STATE, BodyState, Paper, read_body, read_body_state
+from erls.equations.erls.paper.records import BODY, BODY_STATE, BodyState, Paper, read_body, read_body_state, read_paper
 from erls.equations.serial.joints import move_joint
-from erls.equations.serial.records import JOINT, JOINT_STATE, Serial, read_joint, read_joint_state
-from erls.maths.jit import part
+from erls.equations.serial.records import JOINT, JOINT_STATE, Serial, read_joint, read_joint_state, read_serial
+from erls.maths.jit import kernel, part
 from erls.maths.products import add_columns, add_product, add_rows, clear, clear_matrix, copy, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_motion_cross, rotate_back, transform_motion
@@ -112,12 +113,11 @@ def _turn_joint(rows: JointRows, state: RowState, own: BodyState, before: BodySt
     state.gradient[k] += slope
 
 
-@part
-def move(
-    serial: Serial, paper: Paper, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array,
-    a: Array,
-) -> int:  # fmt: skip
+@kernel(contract.ACCELERATION, counted=False)
+def move(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array) -> int:
     """Motion of joints and links; accelerations are zero where ``a`` is empty. The status is that of `eliminate`."""
+    serial = read_serial(reals, integers, integers[0])
+    paper = read_paper(reals, integers, serial.own)
     c, links = read_elimination(scratch, integers, paper.elimination), serial.links
     for k in range(links):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)

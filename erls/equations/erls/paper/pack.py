@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import CompiledSystem, acceleration_in
 from erls.equations.erls.paper.bent_records import BentBody, bent_state
 from erls.equations.erls.paper.compatibility_records import Elimination, JointRows, RowState
@@ -12,6 +13,8 @@ from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiff
 from erls.equations.serial.pack import effect_flags, joint_record, joint_states, put_all, rigid_links, step_parts
 from erls.equations.serial.records import Joint, Modes, Serial
 from erls.errors import Cause, SceneError
+from erls.maths.calls import address_of
+from erls.maths.jit import compiling_beside
 from erls.maths.records import Memory, room
 from erls.maths.se3 import inverse, twist_cross
 from erls.maths.so3 import Array
@@ -152,7 +155,9 @@ def _bent_body(mechanism: Mechanism, link: Link, curved: bool) -> BentBody:
 
 def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
     """The functions of a chain in either gauge, with dense factors."""
-    from erls.equations.erls.paper import functions  # here: it is compiled
+    with compiling_beside("erls.equations.erls.paper.motion"):
+        from erls.equations.erls.paper import functions  # here: it is compiled
+    from erls.equations.erls.paper.motion import move
 
     curved = stiffened(mechanism)
     links, elastic = len(mechanism.links), sum(link.elastic_modes for link in mechanism.links)
@@ -184,6 +189,9 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
             room(Elimination, L=links, r=6 * links, v=count, d=elastic, z=size, h=weighted)._replace(counts=counts)
         ),
         balance=working.put(room(Balance, z=size, f=free + elastic)),
+        move=address_of(move, contract.ACCELERATION),
+        residual=address_of(functions.residual, contract.RESIDUAL),
+        mass_matrix=address_of(functions.mass_matrix, contract.MASS_MATRIX),
         curved=int(curved),
         **effect_flags(mechanism.effects),
     )

@@ -23,6 +23,8 @@ class Paper(NamedTuple):
         Places of the first ones.
     elimination, balance : int
         Places of `Elimination` and `Balance`.
+    move, residual, mass_matrix : int
+        Addresses of the functions: what calls them is compiled without them.
     curved : int
         Whether compatibility is of second order.
     """
@@ -38,6 +40,9 @@ class Paper(NamedTuple):
     bent_states: int
     elimination: int
     balance: int
+    move: int
+    residual: int
+    mass_matrix: int
     curved: int
     first_order: int
     second_order: int
