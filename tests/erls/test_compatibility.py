@@ -127,8 +127,11 @@ def test_places_between_motions_do_not_count(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.q_r[counts], smallest, atol=1e-10 * np.abs(smallest).max())
 
 
-def test_screws_need_the_angle_of_the_joint(tmp_path: Path) -> None:
-    """No row of compatibility is along a free one."""
+def test_joints_without_a_row_are_refused(tmp_path: Path) -> None:
+    """No row of compatibility is along a free screw, and three coordinates together move a rotation vector."""
+    turning = chain_cases.mechanism(tmp_path, "rotation vectors")
+    with pytest.raises(SceneError, match="turns by a rotation vector"):
+        _ = DenseChain(turning, "joint-angle").compiled
     chain = scenes.mechanism(scenes.three_links(tmp_path))
     screw = replace(chain.joints[1], freedom=Freedom(Z, True, pitch=0.1))
     with pytest.raises(SceneError, match="turns and slides at once"):

@@ -19,7 +19,8 @@ from erls.mechanism.chain import Mechanism
 
 SAME = 1e-10  # relative: sums in another order
 GAUGES = ("joint-angle", "minimum-norm")
-PLAIN, STIFFENED = ("chains", chain_cases.CASES), ("stiffened", stiffened_cases.CASES)
+KNOWN = [name for name in stiffened_cases.CASES if name != "rotation vectors"]
+PLAIN, STIFFENED = ("chains", [name for name in KNOWN if name in chain_cases.CASES]), ("stiffened", KNOWN)
 MODAL = ("modal_inertia", stiffened_cases.SERIAL)
 
 

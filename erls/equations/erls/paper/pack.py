@@ -19,6 +19,7 @@ from erls.maths.records import Memory, room
 from erls.maths.se3 import inverse, twist_cross
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.joints import Joint as MechanismJoint
 from erls.mechanism.links import Link
 from erls.mechanism.thermal import elastic_rest
 from fe_import.modal.inertia import InertiaInvariants
@@ -48,20 +49,14 @@ def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows
     Raises
     ------
     SceneError
-        BAD_FIELD: a screw in the minimum-norm gauge.
+        BAD_FIELD: a rotation vector, or a screw in the minimum-norm gauge.
     """
     result: list[JointRows] = []
     first = 0
     for joint, link in zip(mechanism.joints, mechanism.links, strict=True):
         freedom, all_rows = joint.freedom, gauge == "joint-angle" or joint.drive.prescribed
-        if freedom.pitch and not all_rows:
-            raise SceneError(
-                Cause.BAD_FIELD,
-                f"joint {joint.name!r} turns and slides at once, along no single row of compatibility",
-                where="simulation.gauge",
-                value=gauge,
-                remedy="gauge = 'joint-angle'",
-            )
+        if freedom.vector or (freedom.pitch and not all_rows):
+            raise _no_row(joint, gauge)
         own = link.interface_shape(link.inboard, inverse(joint.after))
         own_second = _frame_second_order(link, link.inboard, inverse(joint.after)) if curved else _NONE
         previous, previous_second = np.zeros((6, 0)), _NONE
@@ -86,6 +81,16 @@ def joint_rows(mechanism: Mechanism, gauge: str, curved: bool) -> list[JointRows
         result.append(rows)
         first += rows.kept
     return result
+
+
+def _no_row(joint: MechanismJoint, gauge: str) -> SceneError:
+    """No row of compatibility is along the freedom of a joint, or its coordinate is not all that moves it."""
+    if joint.freedom.vector:
+        message, remedy = "turns by a rotation vector, of which the dense form knows nothing", "joints of one turn each"
+    else:
+        message, remedy = "turns and slides at once, along no single row of compatibility", "gauge = 'joint-angle'"
+    message = f"joint {joint.name!r} {message}"
+    return SceneError(Cause.BAD_FIELD, message, where="simulation.gauge", value=gauge, remedy=remedy)
 
 
 def _joints(mechanism: Mechanism, constants: Memory) -> list[Joint]:
