@@ -24,9 +24,10 @@ from erls.integrate.lobatto import lobatto
 
 def _damping(chain: Erls, whole: np.ndarray) -> np.ndarray:
     """The damping matrix without what couples coordinates that diagonalize mass and stiffness of a link."""
-    result = whole.copy()
+    result, first = whole.copy(), len(chain.free_joints)
     for k, link in enumerate(chain.mechanism.links):
-        places = len(chain.free_joints) + np.arange(chain.elastic)[chain.compatibility.layout.elastic_of[k]]
+        places = first + np.arange(link.elastic_modes)
+        first += link.elastic_modes
         part = np.ix_(places, places)
         modes = combined_modes(link, chain.mechanism.joints[k])
         own_mass = (modes.T @ link.invariants.m @ modes)[6:, 6:]
