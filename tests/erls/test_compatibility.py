@@ -28,7 +28,7 @@ TIME = 0.3
 SEVERAL = "joints of several coordinates"
 
 
-@pytest.fixture(scope="module", params=["revolute", "mixed", "prescribed", "screws", "branches", SEVERAL])
+@pytest.fixture(scope="module", params=["revolute", "mixed", "prescribed", "driven screw", "branches", SEVERAL])
 def chain(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
     """Three flexible links; all revolute, or with a prismatic joint and both conventions, or one joint driven, or with
     joints that turn and slide at once or along x; a tree of links; cylindrical, universal, planar and fixed joints.
@@ -36,8 +36,8 @@ def chain(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     folder, kind = tmp_path_factory.mktemp("chain"), request.param
     if kind in chain_cases.CASES:
         return chain_cases.mechanism(folder, kind)
-    found = scenes.mechanism(scenes.three_links(folder, "prescribed" if kind == "screws" else kind))
-    if kind == "screws":
+    found = scenes.mechanism(scenes.three_links(folder, "prescribed" if kind == "driven screw" else kind))
+    if kind == "driven screw":
         freedoms = Freedom(X, True), Freedom(Y, True, pitch=0.1), Freedom(X, False)
         joints = zip(found.joints, freedoms, strict=True)
         return replace(found, joints=tuple(replace(joint, freedom=freedom) for joint, freedom in joints))
