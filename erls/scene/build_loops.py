@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,8 @@ from erls.scene.build_joints import angle, joint_forces, reflected_inertia
 from erls.scene.chain import Scene
 from erls.scene.joints import Loop as LoopRecord
 from fe_import.files.toml import choose
+
+_RIGHT = 1e-9  # cosine
 
 
 def build_loops(scene: Scene, mechanism: Mechanism) -> tuple[Loop, ...]:
@@ -51,7 +54,7 @@ def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Pla
         axis = (frames[number] @ inverse(mechanism.joints[number].after))[:3, 2]
     else:
         axis = np.array(record.axis) / np.linalg.norm(record.axis)
-    turn = _along(axis)
+    turn = _along(axis) if record.second_axis is None else two_axes(axis, record.second_axis, f"{place}.second_axis")
     outer = LoopEnd(number, node, pose(frames[number][:3, :3].T @ turn))
     if record.to_link:
         other = names.index(record.to_link)
@@ -106,6 +109,26 @@ def _node(mechanism: Mechanism, number: int, name: str, where: str) -> int:
             remedy="close the loop at an interface of the link",
         )
     return known[name]
+
+
+def two_axes(first: Array, second: Sequence[float], where: str) -> Array:
+    """(3, 3) frame of a universal joint: x along a unit vector, y along the second axis.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: they are not at right angles.
+    """
+    across = np.array(second) / np.linalg.norm(np.array(second))
+    if abs(first @ across) > _RIGHT:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "the axes of a universal joint must be at right angles",
+            where=where,
+            value=second,
+            remedy="turn one of them",
+        )
+    return np.stack([first, across, np.cross(first, across)], axis=1)
 
 
 def _along(axis: Array) -> Array:

@@ -251,7 +251,14 @@ def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
         raise bad(f"{place}.axis", f"a {loop.type} joint needs its axis", None, "give its direction in the world")
     if loop.axis is not None and not kind.axes:
         raise bad(f"{place}.axis", f"a {loop.type} joint has no axis", loop.axis, "remove it")
+    if (loop.second_axis is not None) != (kind.axes == 2):
+        message = "its second axis" if kind.axes == 2 else "no second axis"
+        remedy = "give its direction in the world" if kind.axes == 2 else "remove it"
+        raise bad(f"{place}.second_axis", f"a {loop.type} joint has {message}", loop.second_axis, remedy)
+    if kind.axes == 2 and loop.axis is None:
+        raise bad(f"{place}.axis", f"a {loop.type} joint needs both axes", None, "give its direction in the world")
     directed(f"{place}.axis", loop.axis)
+    directed(f"{place}.second_axis", loop.second_axis)
     if kind.one is None:
         plain = type(loop)(name=loop.name, link=loop.link, node=loop.node)
         for field in _ACTING:

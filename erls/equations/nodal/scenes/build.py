@@ -23,13 +23,13 @@ from erls.maths.groups import R3_SO3, SE3
 from erls.maths.motion_maps import inverse
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, fixed_axes
-from erls.mechanism.joint_types import JOINT_TYPES
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import build_loads
 from erls.scene.bodies.analyses import Dynamics
 from erls.scene.bodies.schema import GROUND as GROUND_NAME
 from erls.scene.bodies.schema import Beam as BeamRecord
 from erls.scene.bodies.schema import BodyScene, BodySceneRecord, Connection, Load
+from erls.scene.build_loops import two_axes
 from fe_import.elements.sections import section_constants
 from fe_import.models.model import inertia_matrix
 
@@ -183,17 +183,8 @@ def _joint_axes(record: Connection, place: str) -> Array:
     if record.axis is None:
         return np.eye(3)
     first = np.array(record.axis) / np.linalg.norm(record.axis)
-    if JOINT_TYPES[record.type].axes == 2:
-        second = np.array(record.second_axis) / np.linalg.norm(np.array(record.second_axis))
-        if abs(first @ second) > 1e-9:
-            raise SceneError(
-                Cause.BAD_FIELD,
-                "the axes of a universal joint must be at right angles",
-                where=f"{place}.second_axis",
-                value=record.second_axis,
-                remedy="turn one of them",
-            )
-        return np.stack([first, second, np.cross(first, second)], axis=1)
+    if record.second_axis is not None:
+        return two_axes(first, record.second_axis, f"{place}.second_axis")
     across = np.cross(first, np.eye(3)[int(np.abs(first).argmin())])
     across /= np.linalg.norm(across)
     return np.stack([across, np.cross(first, across), first], axis=1)
