@@ -218,7 +218,7 @@ def _check_compound(scene: SceneRecord, place: str) -> None:
     screw = next((joint for joint in scene.joints if joint.type == "screw"), None)
     vector = next((j for j in scene.joints if any(f.vector for f in joint_coordinates(j).values())), None)
     for field, joint, found, remedy in (
-        ("gauge", compound, s.gauge == "minimum-norm", "use gauge = 'joint-angle'"),
+        ("gauge", vector, s.gauge == "minimum-norm", "use gauge = 'joint-angle'"),
         ("gauge", screw, s.gauge == "minimum-norm", "use gauge = 'joint-angle'"),
         ("coordinates", screw, s.coordinates == "absolute", "use coordinates = 'independent'"),
         ("formulation", screw, s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
