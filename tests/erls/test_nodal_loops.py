@@ -18,7 +18,7 @@ from test_trees import two_arms
 from erls.equations.formulation import Formulation, LoopFormulation
 from erls.equations.nodal.equations import Nodal
 from erls.equations.registry import formulate
-from erls.errors import Cause
+from erls.errors import Cause, SceneError
 from erls.integrate.base import Solution, Work
 from erls.integrate.nodal_chain import closed
 from erls.maths.so3 import Array
@@ -104,7 +104,13 @@ def test_a_rigid_tree_begins_as_that_of_erls(tmp_path: Path) -> None:
     _compare(*_both(scenes.mechanism(scenes.write_toml(path, data))))
 
 
-@pytest.mark.parametrize("case", chain_cases.CASES)
+def test_screws_are_refused(tmp_path: Path) -> None:
+    """By name of the joint."""
+    with pytest.raises(SceneError, match="joint 'a': type"):
+        _both(chain_cases.mechanism(tmp_path, "screws"))
+
+
+@pytest.mark.parametrize("case", [name for name in chain_cases.CASES if name != "screws"])
 def test_rigid_trees_begin_as_those_of_erls(tmp_path: Path, case: str) -> None:
     """Branches, everything that acts in joints, and joints of several coordinates: massless links between their
     motions, or a spherical joint at once, whose coordinates nodes do not have.

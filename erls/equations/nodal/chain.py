@@ -20,6 +20,7 @@ from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies
+from erls.errors import Cause, SceneError
 from erls.maths import motion_maps as motions
 from erls.maths.rotation_maps import exp
 from erls.maths.se3 import inverse, pose
@@ -217,6 +218,15 @@ def _closing(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[
 
 def _joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
     kinds = ["revolute" if joint.freedom.turns else "prismatic" for joint in mechanism.joints]
+    for joint in mechanism.joints:
+        if joint.freedom.pitch:
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "nodes are held by conditions that are linear in their poses, and a screw has none",
+                where=f"joint {joint.name!r}: type",
+                value="screw",
+                remedy="use formulation erls or ffr",
+            )
     for k in mechanism.rotation_vectors:  # the first one turns for all three
         kinds[k : k + 3] = "spherical", "fixed", "fixed"
     return [
