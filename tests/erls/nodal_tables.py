@@ -20,7 +20,7 @@ from erls.equations.nodal.actuators import Actuator, Actuators
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.beam import Beam, Beams
 from erls.equations.nodal.chain import ChainSystem
-from erls.equations.nodal.joints import CONDITIONS, GROUND, Joint
+from erls.equations.nodal.joints import GROUND, Joint
 from erls.equations.nodal.loads import NodalLoad, NodalLoads
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.equations.nodal.springs import Spring, Springs
@@ -120,9 +120,12 @@ def acting(limit: float) -> ChainSystem:
     return ChainSystem(poses, [RigidBodies(bodies, nodal_cases.WEIGHT)], groups, joints)
 
 
+KINDS = ("fixed", "revolute", "prismatic", "cylindrical", "universal", "spherical")
+"""Joints whose values are frozen."""
+
 CASES: dict[str, Callable[[], NodalSystem]] = {
     **{f"everything {g}": partial(nodal_cases.system, g) for g in nodal_cases.GROUPS},
-    **{f"{kind} {g}": partial(tied, kind, g) for kind in CONDITIONS for g in nodal_cases.GROUPS},
+    **{f"{kind} {g}": partial(tied, kind, g) for kind in KINDS for g in nodal_cases.GROUPS},
     **{f"springs {g}": partial(sprung, g) for g in nodal_cases.GROUPS},
     "actuators": partial(acting, np.inf),
     "actuators at their limit": partial(acting, 0.5),

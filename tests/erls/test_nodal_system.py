@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg as la
+from nodal_tables import KINDS
 
 from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.joints import CONDITIONS, GROUND, Joint
+from erls.equations.nodal.joints import GROUND, Joint
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.equations.nodal.scatter import DENSE_UP_TO
@@ -17,6 +18,7 @@ from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths import motion_maps as motions
 from erls.maths.groups import R3_SO3, SE3, Group
 from erls.maths.so3 import Array
+from erls.mechanism.joint_types import HOLDING_TYPES
 
 GROUPS = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
 G = np.array([0.3, -0.2, -9.81])
@@ -55,7 +57,7 @@ def _random(kind: str, group: Group, seed: int, motion: bool = False) -> NodalSy
 
 
 @pytest.mark.parametrize("group", GROUPS)
-@pytest.mark.parametrize("kind", CONDITIONS)
+@pytest.mark.parametrize("kind", HOLDING_TYPES)
 def test_derivatives_against_differences(kind: str, group: str) -> None:
     """B, Φ̈ − B a, Φ_t, stiffness and damping, far from closed joints: central differences with step 1e-5, 1e-7."""
     system = _random(kind, GROUPS[group], 4, motion=kind in ("revolute", "prismatic"))
@@ -122,7 +124,7 @@ def test_both_groups_describe_one_system() -> None:
     np.testing.assert_allclose(world.constraint_matrix(0, q) @ to_world, local.constraint_matrix(0, q), atol=1e-13)
 
 
-@pytest.mark.parametrize("kind", CONDITIONS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_joints_allow_their_motions_only(kind: str) -> None:
     """The null space of B at a closed joint is spanned by the free twists; a long way along one keeps Φ = 0."""
     system = NodalSystem(
