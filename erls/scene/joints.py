@@ -236,7 +236,7 @@ class Loop(Acting, frozen=True):
         Direction in the world at the initial joint coordinates, fixed to both sides from then on; that of the joint
         which carries the link unless given.
     second_axis : (3,) floats, optional
-        The axis of a universal joint that is fixed to ``link``; ``axis``, at a right angle to it, is fixed to the other.
+        Of a universal joint, fixed to ``link``; ``axis``, at a right angle to it, is fixed to the other side.
     coordinate, coordinate_deg : float, optional
         Its coordinate at the initial joint coordinates [rad or m], or in degrees; unless given 0 if it turns, or the
         distance along the axis of ``node`` from where it meets the other side if it slides.
