@@ -142,6 +142,42 @@ def add_scaled_product(factor: Any, a: Array, b: Array, out: Array) -> None:
                 row[j] += weight * other[j]
 
 
+@reordered
+def add_inner_products(factor: Any, a: Array, b: Array, out: Array) -> None:
+    """Add to ``out`` [i, j] the factor times the product of row i of ``a`` (m, k) and row j of ``b`` (n, k).
+
+    Three rows by three at once: each number that is read serves three products.
+    """
+    m, n = a.shape[0], b.shape[0]
+    for i in range(0, m - 2, 3):
+        p, q, r = a[i], a[i + 1], a[i + 2]
+        for j in range(0, n - 2, 3):
+            u, v, w = b[j], b[j + 1], b[j + 2]
+            pu = pv = pw = qu = qv = qw = ru = rv = rw = 0.0
+            for k in range(len(p)):
+                pu += p[k] * u[k]
+                pv += p[k] * v[k]
+                pw += p[k] * w[k]
+                qu += q[k] * u[k]
+                qv += q[k] * v[k]
+                qw += q[k] * w[k]
+                ru += r[k] * u[k]
+                rv += r[k] * v[k]
+                rw += r[k] * w[k]
+            out[i, j] += factor * pu
+            out[i, j + 1] += factor * pv
+            out[i, j + 2] += factor * pw
+            out[i + 1, j] += factor * qu
+            out[i + 1, j + 1] += factor * qv
+            out[i + 1, j + 2] += factor * qw
+            out[i + 2, j] += factor * ru
+            out[i + 2, j + 1] += factor * rv
+            out[i + 2, j + 2] += factor * rw
+    for i in range(m):
+        for j in range(n - n % 3 if i < m - m % 3 else 0, n):
+            out[i, j] += factor * dot(a[i], b[j])
+
+
 @part
 def clear_matrix(a: Array) -> None:
     """Zeros."""

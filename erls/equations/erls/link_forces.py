@@ -19,6 +19,8 @@ has second-order displacements, ν + M₀⁻¹ (C q̇ + H ν) takes the place of
 
 from __future__ import annotations
 
+from typing import Any
+
 from erls.equations.erls.records import Chain, Link, LinkState
 from erls.maths.jit import inlined, part
 from erls.maths.products import add_columns, add_symmetric, clear, dot, pass_columns
@@ -42,15 +44,15 @@ def deform(chain: Chain, link: Link, state: LinkState) -> None:
             add_columns(link.x[a, skip:], state.q[skip:], 1.0, state.turned[a])
     if chain.second_order:
         for pair in range(axes * (axes + 1) // 2):
-            _square(link, state, pair, skip)
+            state.moments[pair] = _square(link.z[pair], state.q, skip, state.squared[pair])
 
 
 @part
-def _square(link: Link, state: LinkState, pair: int, skip: int) -> None:
-    squared = state.squared[pair]
+def _square(z: Array, q: Array, skip: int, squared: Array) -> Any:
+    """Z q, and qᵀ Z q."""
     clear(squared)
-    add_symmetric(link.z[pair], state.q, skip, squared)
-    state.moments[pair] = dot(squared[skip:], state.q[skip:])
+    add_symmetric(z, q, skip, squared)
+    return dot(squared[skip:], q[skip:])
 
 
 @inlined
@@ -80,14 +82,14 @@ def link_forces(chain: Chain, link: Link, state: LinkState, twist: Array, rate: 
     for i in range(6):
         wrench[i], qdd[i] = modal[i], w_rate[i]
     clear(momentum)
-    add_columns(link.mass[:, :6], w, 1.0, momentum)
-    for j in range(6, n):
+    for j in range(n if not ground or chain.complete or chain.bends >= 0 else 0):  # otherwise nobody asks for it
+        speed = w[j] if j < 6 else qd[j]
         for i in range(6):
-            momentum[i] += link.mass[j, i] * qd[j]
+            momentum[i] += link.mass[j, i] * speed
 
     if chain.second_order or chain.softening:
         for pair in range(axes * (axes + 1) // 2):
-            _square(link, state, pair, skip)
+            state.moments[pair] = _square(link.z[pair], state.q, skip, state.squared[pair])
     for a in range(axes):
         axis, xq, xqd = link.axes[a], state.turned[a], state.turned_rate[a]
         omega, alpha = dot3(axis, twist[3:]), dot3(axis, rate[3:])

@@ -41,7 +41,7 @@ from erls.equations.serial.records import (
 )
 from erls.equations.serial.segments import SEGMENT, Segment, fill_mass_matrix, read_segment
 from erls.maths.jit import inlined, kernel, part, spliced
-from erls.maths.products import add_product, add_transposed_product, clear, copy_matrix
+from erls.maths.products import add_columns, add_product, add_transposed_product, clear, copy_matrix
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_motion_cross, dot3, transform_motion
 from fe_import.model import IntArray
@@ -75,10 +75,7 @@ def _linear_inertia(chain: Chain, link: Link, state: LinkState, own: Segment, de
 def _turn_row(row: Array, decoupled: Array, out: Array) -> None:
     """A row over elastic coordinates, over decoupled ones."""
     clear(out)
-    for i in range(len(row)):
-        weight, vector = row[i], decoupled[i]
-        for j in range(len(out)):
-            out[j] += weight * vector[j]
+    add_columns(decoupled, row, 1.0, out)
 
 
 @inlined
@@ -87,7 +84,7 @@ def _couple(
 ) -> None:
     """B over (w, ω), rows of ω from number ``first`` on."""
     e = coupling.shape[1]
-    for i in range(first):
+    for i in range(6, first):
         for j in range(e):
             coupling[i, j] = 0.0
     for i in range(6):
@@ -110,7 +107,6 @@ def _curved_inertia(
     """Inertia, coupling, ``change`` and ``partner`` of a link whose inertia has second-order terms."""
     p, e, spins = len(own.pull), own.coupling.shape[1], bend.axes
     last = p - len(spins)
-    curve_inertia(bend, state, bent)
     _pull(bend, bent)
     _own_inertia(chain, link.mass, link.axes, state.turned, state.moments, work.inertia)
     _couple(chain, link, state, decoupled, False, 6, work.coupling)
@@ -298,19 +294,24 @@ def _turn_along(bend: Bend, state: LinkState, bent: BendState, screw: Array, own
 @part
 def set_segments(
     serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, turns: bool,
-    bends: Any,
+    placed: bool, bends: Any,
 ) -> None:  # fmt: skip
-    """Segments of all links, over their elastic coordinates, or over decoupled ones where ``turns``."""
-    place_frames(serial, chain, reals, integers, scratch, t, y, y, y[0:0])
-    if bends is not None:
-        bend_frames(serial, chain, reals, integers, scratch, False)
+    """Segments of all links, over their elastic coordinates, or over decoupled ones where ``turns``.
+
+    ``placed``: the forces out of balance were asked for at this place just before, which deformed the links.
+    """
+    if not placed:
+        place_frames(serial, chain, reals, integers, scratch, t, y, y, y[0:0])
+        if bends is not None:
+            bend_frames(serial, chain, reals, integers, scratch, False)
     for k in range(serial.links):
         link = read_link(reals, integers, chain.links + k * LINK)
         state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
         own = read_segment(scratch, integers, chain.segments + k * SEGMENT)
         motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
         decoupled = read_modes(reals, integers, serial.modes + k * MODES).decoupled
-        deform(chain, link, state)
+        if not placed:
+            deform(chain, link, state)
         axes = link.axes
         if bends is not None:
             bend = read_bend(reals, integers, chain.bends + k * BEND)
@@ -318,6 +319,8 @@ def set_segments(
             axes = bend.axes
             if bend.curved:
                 work = read_change(scratch, integers, chain.changes + k * CHANGE)
+                if not placed:
+                    curve_inertia(bend, state, bent)
                 _curved_inertia(chain, link, bend, state, bent, own, work, decoupled, turns)
             else:
                 _linear_inertia(chain, link, state, own, decoupled, turns)
@@ -346,7 +349,7 @@ def fill(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, o
     """M; ``bends`` as in `erls.equations.erls.residual`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
-    set_segments(serial, chain, reals, integers, scratch, t, y, False, bends)
+    set_segments(serial, chain, reals, integers, scratch, t, y, False, False, bends)
     fill_mass_matrix(serial, chain.segments, reals, integers, scratch, out)
 
 

@@ -19,26 +19,22 @@ from fe_import.model import IntArray
 @part
 def factor_links(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, alpha: Any, beta: Any,
-    factors: Any, definite: bool, bends: Any,
+    factors: Any, accelerates: bool, bends: Any,
 ) -> int:  # fmt: skip
     """Factors of M + α C + β K; 0, or 1 + the number of a coordinate that nothing resists.
 
-    ``definite`` where the matrix should be positive definite; ``bends`` is None where links have no second-order
-    displacements.
+    ``accelerates`` after the forces out of balance at this state, for accelerations: the matrix should be positive
+    definite. ``bends`` is None where links have no second-order displacements.
     """
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
-    if serial.feeds:
+    if serial.feeds and not accelerates:
         feed_forward(serial, reals, integers, scratch, t)
-    status = set_compliance(
-        serial, chain.condensed, reals, integers, scratch, t, y, v, alpha, beta, factors
-    )
+    status = set_compliance(serial, chain.condensed, reals, integers, scratch, t, y, v, alpha, beta, factors)
     if status != 0:
         return int(status)
-    set_segments(serial, chain, reals, integers, scratch, t, y, True, bends)
-    return int(
-        eliminate(serial, chain.segments, chain.condensed, reals, integers, scratch, factors, definite)
-    )
+    set_segments(serial, chain, reals, integers, scratch, t, y, True, accelerates, bends)
+    return int(eliminate(serial, chain.segments, chain.condensed, reals, integers, scratch, factors, accelerates))
 
 
 @part

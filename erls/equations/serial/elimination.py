@@ -8,13 +8,16 @@ on it,
     x = W⁻¹ (b - Bᵀ g - Nᵀ F),   m = L g + N x,   so   (1 + G H̃) m = A g + N W⁻¹ b - G h,
 
 G = N W⁻¹ Nᵀ and A = L - N W⁻¹ Bᵀ: m = Φ g + ..., and without its elastic coordinates the parent has the inertia
-I - B W⁻¹ Bᵀ + Aᵀ H̃ Φ on g. Then its joint goes (R. Featherstone, Rigid Body Dynamics Algorithms, ch. 7: articulated
-bodies). What C has beside its diagonal in decoupled coordinates is left out. Numbers α, β may be complex.
+I - B W⁻¹ Bᵀ + Aᵀ H̃ Φ on g. Only s of the n numbers m, the ports, feel x: they stand first, and that alone is solved.
+Then its joint goes (R. Featherstone, Rigid Body Dynamics Algorithms, ch. 7: articulated bodies).
+What C has beside its diagonal in decoupled coordinates is left out. Numbers α, β may be complex.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import (
@@ -27,9 +30,18 @@ from erls.equations.serial.records import (
     read_modes,
 )
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
-from erls.maths.jit import part
-from erls.maths.products import add_rows, clear, copy_matrix, dot
-from erls.maths.records import reader, room, table_size
+from erls.maths.jit import inlined, part, spliced
+from erls.maths.products import (
+    add_columns,
+    add_inner_products,
+    add_rows,
+    clear,
+    clear_matrix,
+    copy,
+    copy_matrix,
+    dot,
+)
+from erls.maths.records import Matrix, Vector, reader, table_size
 from erls.maths.so3 import Array
 from erls.maths.symmetric import factor_symmetric, solve_symmetric
 from fe_import.model import IntArray
@@ -38,28 +50,33 @@ _SINGULAR = 1e-14  # inertia along a joint against what it was before the elimin
 
 
 class Condensed(NamedTuple):
-    """A link in elimination: p numbers of motion, e elastic coordinates, n numbers of motion of the links on it.
+    """A link in elimination: p numbers of motion, e elastic coordinates, n numbers of motion of the links on it, the s
+    ports among them first.
 
     Attributes
     ----------
-    parent, first : int
-        Of the segment; where the motion of the link stands among those on its parent.
+    parent, ports : int
+        Of the segment.
+    first, rest : int
+        Where its motion stands among those on its parent: number i at first + i if it is a port, otherwise rest + i.
     compliance : (e,) array
         Inverse of the diagonal 1 + α C_d + β K_d.
     whole, diagonal : (e, e), (e,) arrays
         Factors of W where it is no diagonal; otherwise (0, 0).
-    rows, rows_solved : (n, e) arrays
-        N and N W⁻¹.
+    rows, rows_solved : (s, e) arrays
+        N and N W⁻¹ of the ports.
     coupling_solved : (p, e) array
         B W⁻¹.
     bound : (n, n) array
         H̃ of the links on it.
-    yielding : (n, n) array
-        G.
-    solver : (n, 2 n) array
-        Right half: (1 + G H̃)⁻¹.
-    lead, follow : (n, p) arrays
-        A and Φ.
+    yielding, softened : (s, s), (s, n) arrays
+        G, and G H̃.
+    square, solver : (s, s) arrays
+        Spare, and (1 + G H̃)⁻¹ of the ports.
+    lead, follow, borne : (p, n) arrays
+        A, Φ and H̃ Φ, transposed.
+    remaining : (p, s) array
+        Spare.
     articulated : (p, p) array
         Inertia on g; at last without its joint, H̃.
     subspace, push : (p,) arrays
@@ -75,44 +92,89 @@ class Condensed(NamedTuple):
     """
 
     parent: int
+    ports: int
     first: int
-    compliance: Annotated[Array, "e"]
-    whole: Annotated[Array, "f f"]
-    diagonal: Annotated[Array, "f"]
-    rows: Annotated[Array, "n e"]
-    rows_solved: Annotated[Array, "n e"]
-    coupling_solved: Annotated[Array, "p e"]
-    bound: Annotated[Array, "n n"]
-    yielding: Annotated[Array, "n n"]
-    solver: Annotated[Array, "n n+n"]
-    lead: Annotated[Array, "n p"]
-    follow: Annotated[Array, "n p"]
-    articulated: Annotated[Array, "p p"]
-    subspace: Annotated[Array, "p"]
-    push: Annotated[Array, "p"]
-    along: Annotated[Array, "2"]
-    forces: Annotated[Array, "e"]
-    handed: Annotated[Array, "n"]
-    moved: Annotated[Array, "n"]
-    given: Annotated[Array, "n"]
-    load: Annotated[Array, "p"]
-    motion: Annotated[Array, "p"]
+    rest: int
+    compliance: Vector
+    whole: Matrix
+    diagonal: Vector
+    rows: Matrix
+    rows_solved: Matrix
+    coupling_solved: Matrix
+    bound: Matrix
+    yielding: Matrix
+    softened: Matrix
+    square: Matrix
+    solver: Matrix
+    lead: Matrix
+    follow: Matrix
+    borne: Matrix
+    remaining: Matrix
+    articulated: Matrix
+    subspace: Vector
+    push: Vector
+    along: Vector
+    forces: Vector
+    handed: Vector
+    moved: Vector
+    given: Vector
+    load: Vector
+    motion: Vector
 
 
 def condensed(own: list[Segment]) -> list[Condensed]:
     """Memory for all links."""
-    on = [0] * len(own)  # numbers of motion of the links on each
-    firsts: list[int] = []
+    ports, others = [0] * len(own), [0] * len(own)  # numbers of motion of the links on each
+    places: list[tuple[int, int]] = []
     for link in own:
-        firsts.append(on[link.parent] if link.parent >= 0 else 0)
+        places.append((ports[link.parent], others[link.parent]) if link.parent >= 0 else (0, 0))
         if link.parent >= 0:
-            on[link.parent] += len(link.pull)
-    return [_condensed(link, n, first) for link, n, first in zip(own, on, firsts, strict=True)]
+            ports[link.parent] += link.ports
+            others[link.parent] += len(link.pull) - link.ports
+    return [
+        _condensed(link, s, rest, first, ports[link.parent] + place - link.ports)
+        for link, s, rest, (first, place) in zip(own, ports, others, places, strict=True)
+    ]
 
 
-def _condensed(own: Segment, n: int, first: int) -> Condensed:
+def _condensed(own: Segment, s: int, others: int, first: int, rest: int) -> Condensed:
     p, e = own.coupling.shape
-    return room(Condensed, parent=own.parent, first=first, e=e, f=e if len(own.change) else 0, n=n, p=p)
+    n, full = s + others, e if len(own.change) else 0
+
+    def room(*shape: int) -> Array:
+        return np.zeros(shape)
+
+    return Condensed(
+        parent=own.parent,
+        ports=own.ports,
+        first=first,
+        rest=rest,
+        compliance=room(e),
+        whole=room(full, full),
+        diagonal=room(full),
+        rows=room(s, e),
+        rows_solved=room(s, e),
+        coupling_solved=room(p, e),
+        bound=room(n, n),
+        yielding=room(s, s),
+        softened=room(s, n),
+        square=room(s, s),
+        solver=room(s, s),
+        lead=room(p, n),
+        follow=room(p, n),
+        borne=room(p, n),
+        remaining=room(p, s),
+        articulated=room(p, p),
+        subspace=room(p),
+        push=room(p),
+        along=room(2),
+        forces=room(e),
+        handed=room(n),
+        moved=room(n),
+        given=room(n),
+        load=room(p),
+        motion=room(p),
+    )
 
 
 read_condensed = reader(Condensed)
@@ -120,14 +182,12 @@ CONDENSED = table_size(Condensed)
 
 
 @part
-def invert(a: Array) -> float:
-    """Replace the right half of a (n, 2 n) by the inverse of the left one; -1.0 where a real determinant is
-    negative.
-    """
+def invert(a: Array, out: Array) -> float:
+    """The inverse of ``a`` (n, n), which is lost; -1.0 where a real determinant is negative."""
     n, sign = a.shape[0], 1.0
     for i in range(n):
         for j in range(n):
-            a[i, n + j] = 1.0 if i == j else 0.0
+            out[i, j] = 1.0 if i == j else 0.0
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
@@ -135,18 +195,22 @@ def invert(a: Array) -> float:
                 pivot = i
         if pivot != k:
             sign = -sign
-            for j in range(k, 2 * n):
+            for j in range(n):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+                out[k, j], out[pivot, j] = out[pivot, j], out[k, j]
         if a[k, k].real < 0.0:
             sign = -sign
-        row, inverse = a[k], 1.0 / a[k, k]
-        for j in range(k + 1, 2 * n):
+        row, result, inverse = a[k], out[k], 1.0 / a[k, k]
+        for j in range(n):
             row[j] *= inverse
+            result[j] *= inverse
         for i in range(n):
-            factor, other = a[i, k], a[i]
+            factor, other, changed = a[i, k], a[i], out[i]
             if i != k:
-                for j in range(k + 1, 2 * n):
+                for j in range(k + 1, n):
                     other[j] -= factor * row[j]
+                for j in range(n):
+                    changed[j] -= factor * result[j]
     return sign
 
 
@@ -160,13 +224,13 @@ def _quadratic(matrix: Array, x: Array) -> Any:
 
 
 @part
-def _solve_modes(work: Condensed, x: Array) -> None:
+def _solve_modes(whole: Array, compliance: Array, x: Array) -> None:
     """Replace forces (e,) on decoupled coordinates by W⁻¹ times them."""
-    if work.whole.shape[0] > 0:
-        solve_symmetric(work.whole, x)
+    if whole.shape[0] > 0:
+        solve_symmetric(whole, x)
     else:
         for m in range(len(x)):
-            x[m] *= work.compliance[m]
+            x[m] *= compliance[m]
 
 
 @part
@@ -184,54 +248,43 @@ def _set_whole(own: Segment, work: Condensed, definite: bool) -> int:
     return int(factor_symmetric(work.whole, work.diagonal, definite))
 
 
-@part
+@spliced
 def condense(own: Segment, work: Condensed) -> float:
     """Take the elastic coordinates of a link out of its ``articulated`` inertia; the sign of `invert`.
 
     L, N and H̃ of the links on it stand in ``lead``, ``rows`` and ``bound`` already, W in ``compliance`` or ``whole``.
     """
-    n, p = work.rows.shape[0], len(work.load)
+    n, p, s = len(work.moved), len(work.load), work.rows.shape[0]
     copy_matrix(own.coupling, work.coupling_solved)
     for i in range(p):
-        _solve_modes(work, work.coupling_solved[i])
-        for j in range(p):
-            work.articulated[i, j] = own.inertia[i, j] - dot(work.coupling_solved[i], own.coupling[j])
-    if n == 0:
-        return 1.0
-    copy_matrix(work.rows, work.rows_solved)
-    for i in range(n):
-        _solve_modes(work, work.rows_solved[i])
-        for j in range(i + 1):
-            work.yielding[i, j] = work.yielding[j, i] = dot(work.rows_solved[i], work.rows[j])
-        for j in range(p):
-            work.lead[i, j] -= dot(work.rows_solved[i], own.coupling[j])
-    work.solver[:, :] = 0.0
-    for i in range(n):
-        row = work.solver[i]
-        row[i] = 1.0
-        for m in range(n):
-            weight, other = work.yielding[i, m], work.bound[m]
-            for j in range(n):
-                row[j] += weight * other[j]
-    sign = invert(work.solver)
-    work.follow[:, :] = 0.0
-    for i in range(n):
-        row = work.follow[i]
-        for m in range(n):
-            weight, other = work.solver[i, n + m], work.lead[m]
-            for j in range(p):
-                row[j] += weight * other[j]
-    for m in range(n):  # Aᵀ H̃ Φ, row after row of H̃ Φ
-        row = work.motion
-        clear(row)
-        for j in range(n):
-            weight, other = work.bound[m, j], work.follow[j]
-            for i in range(p):
-                row[i] += weight * other[i]
+        _solve_modes(work.whole, work.compliance, work.coupling_solved[i])
+    copy_matrix(own.inertia, work.articulated)
+    add_inner_products(-1.0, work.coupling_solved, own.coupling, work.articulated)
+    sign = 1.0
+    if n > 0:
+        copy_matrix(work.rows, work.rows_solved)
+        for i in range(s):
+            _solve_modes(work.whole, work.compliance, work.rows_solved[i])
+        clear_matrix(work.yielding)
+        clear_matrix(work.softened)
+        clear_matrix(work.follow)
+        clear_matrix(work.borne)
+        add_inner_products(1.0, work.rows_solved, work.rows, work.yielding)
+        add_inner_products(-1.0, own.coupling, work.rows_solved, work.lead)
+        add_inner_products(1.0, work.yielding, work.bound, work.softened)
+        for i in range(s):
+            for j in range(s):
+                work.square[i, j] = work.softened[i, j] + (1.0 if i == j else 0.0)
+        sign = invert(work.square, work.solver)
         for i in range(p):
-            weight, result = work.lead[m, i], work.articulated[i]
-            for j in range(p):
-                result[j] += weight * row[j]
+            row, remaining = work.lead[i], work.remaining[i]
+            for j in range(s):
+                remaining[j] = row[j] - dot(row[s:], work.softened[j, s:])
+            for j in range(s, n):
+                work.follow[i, j] = row[j]
+        add_inner_products(1.0, work.remaining, work.solver, work.follow)
+        add_inner_products(1.0, work.follow, work.bound, work.borne)
+        add_inner_products(1.0, work.lead, work.borne, work.articulated)
     return sign
 
 
@@ -248,12 +301,16 @@ def set_compliance(
         work = read_condensed(factors, integers, condensed + k * CONDENSED)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
+        work.along[1] = 0.0
+        if alpha == 0.0 and beta == 0.0:
+            for i in range(len(work.compliance)):
+                work.compliance[i] = 1.0
+            continue
         for i in range(len(work.compliance)):
             whole = 1.0 + alpha * modes.decoupled_damping[i] + beta * modes.decoupled_stiffness[i]
             if not whole.real > 0.0:
                 return int(modes.first + i + 1)
             work.compliance[i] = 1.0 / whole
-        work.along[1] = 0.0
         if joint.place >= 0 and joint.acts:
             feed = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).feed[0]
             stiffness, damping = gains(joint, reals, integers, t, y[joint.place], v[joint.place], feed)
@@ -279,8 +336,11 @@ def eliminate(
         work.bound[:, :] = 0.0
         if work.parent >= 0:
             before = read_condensed(factors, integers, condensed + work.parent * CONDENSED)
-            copy_matrix(own.lead, before.lead[work.first :])
-            copy_matrix(own.reach, before.rows[work.first :])
+            for i in range(len(work.load)):
+                place = place_of(work, i)
+                for j in range(own.lead.shape[1]):
+                    before.lead[j, place] = own.lead[i, j]
+            copy_matrix(own.reach[: work.ports], before.rows[work.first :])
     for k in range(serial.links - 1, -1, -1):
         own = read_segment(scratch, integers, segments + k * SEGMENT)
         work = read_condensed(factors, integers, condensed + k * CONDENSED)
@@ -304,22 +364,30 @@ def eliminate(
             if not (abs(along) > _SINGULAR * resisting and (along.real > 0.0 or not definite)):
                 return int(joint.place + 1)
             work.along[0] = along
-            for i in range(len(work.push)):
+            for i in range(len(work.push) if work.parent >= 0 else 0):
+                row, weight = work.articulated[i], work.push[i] / along
                 for j in range(len(work.push)):
-                    work.articulated[i, j] -= work.push[i] * (work.push[j] / along)
+                    row[j] -= weight * work.push[j]
         if work.parent >= 0:
             bound = read_condensed(factors, integers, condensed + work.parent * CONDENSED).bound
             for i in range(len(work.load)):
+                row = bound[place_of(work, i)]
                 for j in range(len(work.load)):
-                    bound[work.first + i, work.first + j] = work.articulated[i, j]
+                    row[place_of(work, j)] = work.articulated[i, j]
     return 0
 
 
-@part
+@inlined
+def place_of(work: Condensed, i: int) -> int:
+    """Where number i of the motion of a link stands among those on its parent."""
+    return (work.first if i < work.ports else work.rest) + i
+
+
+@spliced
 def _borne(own: Segment, work: Condensed) -> Any:
     """Inertia along a joint of what its link bears, were nothing elastic; before `condense`."""
-    for i in range(len(work.given)):
-        work.given[i] = dot(work.lead[i], own.subspace)
+    clear(work.given)
+    add_columns(work.lead, own.subspace, 1.0, work.given)
     return abs(_quadratic(work.bound, work.given))
 
 
@@ -338,7 +406,7 @@ def substitute(serial: Serial, condensed: int, reals: Array, integers: IntArray,
         if work.parent >= 0:
             handed = read_condensed(factors, integers, condensed + work.parent * CONDENSED).handed
             for i in range(len(work.load)):
-                handed[work.first + i] = work.load[i]
+                handed[place_of(work, i)] = work.load[i]
     for k in range(serial.links):
         work = read_condensed(factors, integers, condensed + k * CONDENSED)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
@@ -347,7 +415,7 @@ def substitute(serial: Serial, condensed: int, reals: Array, integers: IntArray,
         if work.parent >= 0:
             moved = read_condensed(factors, integers, condensed + work.parent * CONDENSED).moved
             for i in range(len(work.motion)):
-                work.motion[i] = moved[work.first + i]
+                work.motion[i] = moved[place_of(work, i)]
         if place >= 0:
             b[place] = (b[place] - dot(work.push, work.motion)) / work.along[0]
             for i in range(len(work.motion)):
@@ -355,44 +423,41 @@ def substitute(serial: Serial, condensed: int, reals: Array, integers: IntArray,
         _answer(work, modes.decoupled, b[modes.first : modes.first + len(work.forces)])
 
 
-@part
+@spliced
 def _collect(work: Condensed, decoupled: Array, b: Array) -> None:
     """``load`` by the forces on elastic coordinates and by ``handed``; ``forces`` on decoupled ones, W⁻¹ times them.
 
     ``moved`` is what they make of m at g = 0.
     """
-    n, e = len(work.moved), len(b)
+    s = work.rows.shape[0]
+    given = work.given[:s]
     clear(work.forces)
-    for i in range(e):  # Vᵀ b
-        row, weight = decoupled[i], b[i]
-        for j in range(e):
-            work.forces[j] += weight * row[j]
     clear(work.load)
+    clear(given)
+    clear(work.moved)
+    add_columns(decoupled, b, 1.0, work.forces)
     add_rows(work.coupling_solved, work.forces, 1.0, work.load)
-    clear(work.given)
-    add_rows(work.rows_solved, work.forces, 1.0, work.given)
-    add_rows(work.yielding, work.handed, -1.0, work.given)
-    for i in range(n):
-        work.moved[i] = dot(work.solver[i, n:], work.given)
-    for i in range(n):  # Aᵀ (H̃ m + h)
-        weight, row = work.handed[i] + dot(work.bound[i], work.moved), work.lead[i]
-        for j in range(len(row)):
-            work.load[j] += weight * row[j]
-    _solve_modes(work, work.forces)
+    add_rows(work.rows_solved, work.forces, 1.0, given)
+    add_rows(work.yielding, work.handed[:s], -1.0, given)
+    add_rows(work.solver, given, 1.0, work.moved[:s])
+    _pull(work)
+    add_rows(work.lead, work.given, 1.0, work.load)
+    _solve_modes(work.whole, work.compliance, work.forces)
 
 
-@part
+@inlined
+def _pull(work: Condensed) -> None:
+    """H̃ m + h, with which the links on it pull at a link, into ``given``."""
+    copy(work.handed, work.given)
+    add_rows(work.bound, work.moved, 1.0, work.given)
+
+
+@spliced
 def _answer(work: Condensed, decoupled: Array, b: Array) -> None:
     """Elastic coordinates of a link whose ``motion`` is known, decoupled into ``forces``, and its own into ``b``."""
-    n, e = len(work.moved), len(b)
-    add_rows(work.follow, work.motion, 1.0, work.moved)
-    for i in range(len(work.motion)):
-        row, weight = work.coupling_solved[i], work.motion[i]
-        for m in range(e):
-            work.forces[m] -= weight * row[m]
-    for i in range(n):
-        row, weight = work.rows_solved[i], work.handed[i] + dot(work.bound[i], work.moved)
-        for m in range(e):
-            work.forces[m] -= weight * row[m]
+    add_columns(work.follow, work.motion, 1.0, work.moved)
+    _pull(work)
+    add_columns(work.coupling_solved, work.motion, -1.0, work.forces)
+    add_columns(work.rows_solved, work.given[: work.rows.shape[0]], -1.0, work.forces)
     clear(b)
     add_rows(decoupled, work.forces, 1.0, b)
