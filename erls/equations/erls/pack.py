@@ -9,7 +9,8 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, function_in
 from erls.equations.erls import records as own
-from erls.equations.serial import elimination, pack, segments, stiffness
+from erls.equations.serial import pack, segments, stiffness
+from erls.equations.serial.condensed import condensed as elimination_memory
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.modal_inertia import compliance, stiffened
 from erls.equations.serial.records import Serial
@@ -256,7 +257,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         else -1,
         segments=pack.put_all(scratch, rooms),
         changes=pack.put_all(scratch, [own.change(sizes[k], modes[k]) for k in range(count)]) if bends else -1,
-        condensed=pack.put_all(condensed, elimination.condensed(rooms)),
+        condensed=pack.put_all(condensed, elimination_memory(rooms)),
         factors=0,
         left=0,
         **pack.effect_flags(mechanism.effects),

@@ -26,7 +26,7 @@ class Chain(NamedTuple):
         Places of the first `Bend` and `BendState`; -1 without second-order displacements.
     segments, changes, condensed : int
         Places of the first records of `erls.equations.serial.segments`, of `erls.equations.erls.segments.Change` and of
-        `erls.equations.serial.elimination`.
+        `erls.equations.serial.condensed`.
     factors, left : int
         Where in working memory the factors of an acceleration lie, and what it leaves of the forces.
     first_order, second_order, coriolis, centrifugal, softening : int

@@ -23,8 +23,8 @@ from erls.equations.ffr.records import (
 from erls.equations.ffr.residual import residual
 from erls.equations.ffr.standard_data import StandardData
 from erls.equations.serial import pack
+from erls.equations.serial.condensed import condensed
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
-from erls.equations.serial.elimination import condensed
 from erls.equations.serial.modal_inertia import modal_inertia
 from erls.equations.serial.records import Serial
 from erls.equations.serial.segments import segment

@@ -15,10 +15,9 @@ What C has beside its diagonal in decoupled coordinates is left out. Numbers α,
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
+from erls.equations.serial.condensed import CONDENSED, Condensed, read_condensed
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import (
     JOINT,
@@ -41,144 +40,11 @@ from erls.maths.products import (
     copy_matrix,
     dot,
 )
-from erls.maths.records import Matrix, Vector, reader, table_size
 from erls.maths.so3 import Array
 from erls.maths.symmetric import factor_symmetric, solve_symmetric
 from fe_import.model import IntArray
 
 _SINGULAR = 1e-14  # inertia along a joint against what it was before the elimination of the rest
-
-
-class Condensed(NamedTuple):
-    """A link in elimination: p numbers of motion, e elastic coordinates, n numbers of motion of the links on it, the s
-    ports among them first.
-
-    Attributes
-    ----------
-    parent, ports : int
-        Of the segment.
-    first, rest : int
-        Where its motion stands among those on its parent: number i at first + i if it is a port, otherwise rest + i.
-    compliance : (e,) array
-        Inverse of the diagonal 1 + α C_d + β K_d.
-    whole, diagonal : (e, e), (e,) arrays
-        Factors of W where it is no diagonal; otherwise (0, 0).
-    rows, rows_solved : (s, e) arrays
-        N and N W⁻¹ of the ports.
-    coupling_solved : (p, e) array
-        B W⁻¹.
-    bound : (n, n) array
-        H̃ of the links on it.
-    yielding, softened : (s, s), (s, n) arrays
-        G, and G H̃.
-    square, solver : (s, s) arrays
-        Spare, and (1 + G H̃)⁻¹ of the ports.
-    lead, follow, borne : (p, n) arrays
-        A, Φ and H̃ Φ, transposed.
-    remaining : (p, s) array
-        Spare.
-    articulated : (p, p) array
-        Inertia on g; at last without its joint, H̃.
-    subspace, push : (p,) arrays
-        S of the segment, and articulated inertia times S.
-    along : (2,) array
-        Inertia along the joint, and what stiffness and damping add to it.
-    forces : (e,) array
-        Forces on decoupled coordinates, then these themselves.
-    handed, moved, given : (n,) arrays
-        h; m; spare.
-    load, motion : (p,) arrays
-        Force of the link on its parent at m = 0; g.
-    """
-
-    parent: int
-    ports: int
-    first: int
-    rest: int
-    compliance: Vector
-    whole: Matrix
-    diagonal: Vector
-    rows: Matrix
-    rows_solved: Matrix
-    coupling_solved: Matrix
-    bound: Matrix
-    yielding: Matrix
-    softened: Matrix
-    square: Matrix
-    solver: Matrix
-    lead: Matrix
-    follow: Matrix
-    borne: Matrix
-    remaining: Matrix
-    articulated: Matrix
-    subspace: Vector
-    push: Vector
-    along: Vector
-    forces: Vector
-    handed: Vector
-    moved: Vector
-    given: Vector
-    load: Vector
-    motion: Vector
-
-
-def condensed(own: list[Segment]) -> list[Condensed]:
-    """Memory for all links."""
-    ports, others = [0] * len(own), [0] * len(own)  # numbers of motion of the links on each
-    places: list[tuple[int, int]] = []
-    for link in own:
-        places.append((ports[link.parent], others[link.parent]) if link.parent >= 0 else (0, 0))
-        if link.parent >= 0:
-            ports[link.parent] += link.ports
-            others[link.parent] += len(link.pull) - link.ports
-    return [
-        _condensed(link, s, rest, first, ports[link.parent] + place - link.ports)
-        for link, s, rest, (first, place) in zip(own, ports, others, places, strict=True)
-    ]
-
-
-def _condensed(own: Segment, s: int, others: int, first: int, rest: int) -> Condensed:
-    p, e = own.coupling.shape
-    n, full = s + others, e if len(own.change) else 0
-
-    def room(*shape: int) -> Array:
-        return np.zeros(shape)
-
-    return Condensed(
-        parent=own.parent,
-        ports=own.ports,
-        first=first,
-        rest=rest,
-        compliance=room(e),
-        whole=room(full, full),
-        diagonal=room(full),
-        rows=room(s, e),
-        rows_solved=room(s, e),
-        coupling_solved=room(p, e),
-        bound=room(n, n),
-        yielding=room(s, s),
-        softened=room(s, n),
-        square=room(s, s),
-        solver=room(s, s),
-        lead=room(p, n),
-        follow=room(p, n),
-        borne=room(p, n),
-        remaining=room(p, s),
-        articulated=room(p, p),
-        subspace=room(p),
-        push=room(p),
-        along=room(2),
-        forces=room(e),
-        handed=room(n),
-        moved=room(n),
-        given=room(n),
-        load=room(p),
-        motion=room(p),
-    )
-
-
-read_condensed = reader(Condensed)
-CONDENSED = table_size(Condensed)
 
 
 @part
