@@ -287,14 +287,13 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     serial = serial._replace(own=constants.put(chain))
     integers[0] = constants.put(serial)
     own_name = "erls.equations.erls"
-    balance, inertia, solving = (
-        (f"{own_name}.stiffened_chain", f"{own_name}.stiffened_chain", f"{own_name}.stiffened_solve")
-        if bends
-        else (f"{own_name}.residual", f"{own_name}.segments", f"{own_name}.solve")
-    )
+    kind = "stiffened_" if bends else ""
+    balance, inertia = ("stiffened_chain", "stiffened_chain") if bends else ("residual", "segments")
     factoring = None
     if size > dense and max((each.mixing for each in decoupled), default=0.0) < MIXING:
-        factor, factor_complex = (function_in(solving, name)() for name in ("factor", "factor_complex"))
+        factor, factor_complex = (
+            function_in(f"{own_name}.{kind}factors", name)() for name in ("factor", "factor_complex")
+        )
         solve, solve_complex = (function_in(f"{own_name}.solve", name)() for name in ("solve", "solve_complex"))
         factoring = Factoring(room, factor, solve, factor_complex, solve_complex)
     return CompiledSystem(
@@ -302,10 +301,10 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         reals=constants.numbers,
         integers=np.array(integers, dtype=np.int64),
         scratch=np.concatenate([scratch.numbers, np.zeros(room + (size if bends else 0))]),
-        residual=function_in(balance, "residual")(),
-        mass_matrix=function_in(inertia, "mass_matrix")(),
+        residual=function_in(f"{own_name}.{balance}", "residual")(),
+        mass_matrix=function_in(f"{own_name}.{inertia}", "mass_matrix")(),
         stiffness_and_damping=stiffness.stiffness_and_damping,
-        load_acceleration=function_in(solving, "acceleration"),
+        load_acceleration=function_in(f"{own_name}.{kind}acceleration", "acceleration"),
         factoring=factoring,
-        load_frames=function_in(f"{own_name}.{'stiffened_ends' if bends else 'ends'}", "frames"),
+        load_frames=function_in(f"{own_name}.{kind}ends", "frames"),
     )

@@ -239,7 +239,7 @@ def eliminate(
             for i in range(len(work.load)):
                 row = bound[place_of(work, i)]
                 for j in range(len(work.load)):
-                    row[place_of(work, j)] = work.articulated[i, j]
+                    row[place_of(work, j)] = (work.articulated[i, j] + work.articulated[j, i]) / 2
     return 0
 
 

@@ -1,11 +1,11 @@
-"""Accelerations, and (M + α C + β K) x = b, of a chain whose links have second-order displacements."""
+"""Factors of M + α C + β K of a chain whose links have second-order displacements."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from erls.equations import compiled_system as contract
-from erls.equations.erls.solve import accelerate, factor_links
+from erls.equations.erls.link_by_link import factor_links
 from erls.maths.jit import kernel
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -27,9 +27,3 @@ def factor_complex(
 ) -> int:  # fmt: skip
     """With complex numbers."""
     return int(factor_links(reals, integers, scratch, t, y, v, alpha, beta, factors, False, True))
-
-
-@kernel(contract.ACCELERATION, counted=False)
-def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> int:
-    """M⁻¹ f."""
-    return int(accelerate(reals, integers, scratch, t, y, v, out, True))
