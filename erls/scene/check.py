@@ -223,7 +223,6 @@ def _check_compound(scene: SceneRecord, place: str) -> None:
         ("coordinates", screw, s.coordinates == "absolute", "use coordinates = 'independent'"),
         ("formulation", screw, s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
         ("coordinates", compound, s.coordinates == "absolute", "use coordinates = 'independent'"),
-        ("formulation", vector, s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
         ("bandwidth", vector, s.bandwidth is not None, "remove the bandwidth, so that all modes are integrated"),
     ):
         if joint is not None and found:
