@@ -13,15 +13,12 @@ Rules for adding a formulation:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-from erls.equations.serial.joint_frames import FrameMotion
 from erls.equations.system import SecondOrderSystem
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.loops import LoopEnd
 from fe_import.model import IntArray
 
 
@@ -89,6 +86,26 @@ class LoopForce:
     force: Array
     moment: Array
     place: Array
+
+
+@dataclass(frozen=True)
+class FrameMotion:
+    """A frame that links carry.
+
+    Attributes
+    ----------
+    pose : (4, 4) array
+        In the world.
+    rows : (6, joints + elastic) array
+        Of its twist over the rates of (θ, elastic).
+    twist, bias : (6,) arrays
+        In its own axes, and its derivative at zero accelerations of what is free.
+    """
+
+    pose: Array
+    rows: Array
+    twist: Array
+    bias: Array
 
 
 class Formulation(Protocol):
@@ -161,10 +178,8 @@ class TreeFormulation(Formulation, SecondOrderSystem, Protocol):
     free: IntArray
     free_joints: IntArray
 
-    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
-        """Frames on displaced nodes of links: rows over the rates of (θ, elastic), accelerations of prescribed joints
-        within the bias.
-        """
+    def frames(self, t: float, y: Array, v: Array) -> list[FrameMotion]:
+        """Frames on displaced nodes that the loops of the mechanism hold, as `erls.mechanism.loops.loop_ends`."""
 
     def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
         """Joint reactions that give accelerations ``a``; the effort of a prescribed motion included."""

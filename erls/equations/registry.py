@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from erls.equations.formulation import Formulation, TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
-from erls.equations.loops.start import ClosedStart, closed_start
+from erls.equations.loops.closed_start import ClosedStart, closed_start
 from erls.equations.substructures import Substructured
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import is_split, split

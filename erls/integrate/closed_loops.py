@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.equations.loops.closed_chain import OPEN, ClosedChain
+from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.loops.tied import OPEN
 from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Integrator, Observer, Options, Solution
@@ -18,7 +19,6 @@ from erls.integrate.registry import integrator_named
 from erls.maths.so3 import Array
 
 if TYPE_CHECKING:
-    from erls.equations.compiled_system import CompiledSystem
     from erls.equations.stepped import Stepped
 
 NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
@@ -30,13 +30,11 @@ class TiedCoordinates:
     """The coordinates of a chain with the conditions of its loops; a `ConstrainedSystem`."""
 
     def __init__(self, chain: ClosedChain) -> None:
-        self.chain, self.tree, self.kept = chain, chain.tree, chain.kept
+        self.chain, self.kept = chain, chain.kept
         self.size, self.constraints = chain.size, len(chain.kept)
         self.constraint_names = tuple(chain.rows.names[k] for k in chain.kept)
         self.length_scales, self.breakpoints = chain.metres, chain.breakpoints
         self._still = np.zeros(chain.size)
-        # of a chain whose nodes have no kernels
-        self._compiled: CompiledSystem | None = None if chain.efforts.any else chain.bare.compiled
 
     def compose(self, q: Array, increment: Array) -> Array:
         """q + increment."""
@@ -48,21 +46,17 @@ class TiedCoordinates:
 
     def residual(self, t: float, q: Array, v: Array, a: Array) -> Array:
         """(n,) of the chain."""
-        if (compiled := self._compiled) is None:
-            return self.tree.residual(t, q, v, a)
-        out = np.empty(self.size)
-        compiled.residual(compiled.reals, compiled.integers, compiled.scratch, t, q, v, a, out)
-        return out
+        return self.chain.loops.forces(t, q, v, a)
 
     def mass_matrix(self, t: float, q: Array) -> Array:
         """(n, n) of the chain."""
-        return self.tree.mass_matrix(t, q)
+        return self.chain.loops.masses(t, q)
 
     def stiffness_and_damping(
         self, t: float, q: Array, v: Array, a: Array, multipliers: Array
     ) -> tuple[Array, Array]:
         """Those of the chain."""
-        return self.tree.stiffness_and_damping(t, q, v)
+        return self.chain.loops.matrices(t, q, v)
 
     def constraint(self, t: float, q: Array) -> Array:
         """(m,) Φ."""
@@ -70,7 +64,7 @@ class TiedCoordinates:
 
     def constraint_matrix(self, t: float, q: Array) -> Array:
         """(m, n) Φ_y."""
-        return np.asarray(self.chain.closure(t, q, self._still).rows[self.kept][:, self.tree.free])
+        return np.asarray(self.chain.closure(t, q, self._still).rows[self.kept][:, self.chain.bare.free])
 
     def constraint_rate(self, t: float, q: Array) -> Array:
         """(m,) Φ_t."""
@@ -92,14 +86,11 @@ class TiedCoordinates:
         return q, v, a
 
     @property
-    def compiled(self) -> Stepped | None:
-        """By kernels, for a chain in compiled form."""
-        chain = self.chain.compiled
-        if chain is None:
-            return None
+    def compiled(self) -> Stepped:
+        """By kernels."""
         from erls.equations.loops.steps import stepped  # here: it imports the compiler
 
-        return stepped(chain, self._refuse_open)
+        return stepped(self.chain.loops, self._refuse_open)
 
     def _refuse_open(self, t: float, q: Array, v: Array) -> None:
         self.chain.refuse_open(t, self.chain.closure(t, q, v))
@@ -170,12 +161,10 @@ class Watch:
         return None if self.observer is None else self.observer(t, knots)
 
     def _suspects(self, found: Solution) -> list[int]:
-        """Numbers of new knots to look at: the last one; of many compiled steps those that are open or lock."""
+        """Numbers of new knots that are open or lock."""
         chain = self.chain
-        if chain.compiled is None:
-            return [len(found.t) - 1]
         first = int(np.searchsorted(found.t, self.good))
-        gaps, stiffest = chain.compiled.watched(found.t[first:], found.y[first:])
+        gaps, stiffest = chain.loops.watched(found.t[first:], found.y[first:])
         suspect = (gaps > OPEN * chain.reach) | (stiffest < AT * chain.stiffest_at_start)
         return [first + int(k) for k in np.flatnonzero(suspect)]
 

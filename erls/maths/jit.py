@@ -10,7 +10,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
@@ -170,27 +170,45 @@ def plain(function: F) -> F:
     return cast(F, FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__))
 
 
+def any_scalar(function: F, called: Mapping[Any, Any] | None = None) -> F:
+    """A kernel for other numbers than those of its signature: compiled on demand for what it is given, complex ones.
+
+    Parameters
+    ----------
+    function : callable
+    called : mapping, optional
+        What it calls by address, by what calls it (`erls.maths.calls.caller`): an address leads to real numbers only.
+    """
+    return cast(F, _any_scalar(function, tuple((called or {}).items())))
+
+
 @cache
-def any_scalar(function: F) -> F:
-    """A kernel for other numbers than those of its signature: compiled on demand for what it is given, complex ones."""
+def _any_scalar(function: Any, called: tuple[tuple[Any, Any], ...]) -> Any:
+    if not ENABLED:
+        return function
     source: Any = getattr(function, "py_func", function)
-    known = {name: source.__globals__.get(name) for name in source.__code__.co_names}
-    own = {name: any_scalar(found) for name, found in known.items() if hasattr(found, "py_func") and found in _fixed}
-    by_address = {name: getattr(found, "stands_for", "") for name, found in known.items()}
-    own |= {name: _direct(said) for name, said in by_address.items() if said}
+    own: dict[str, Any] = {}
+    for name in source.__code__.co_names:
+        found = source.__globals__.get(name)
+        if hasattr(found, "py_func") and found in _fixed:
+            own[name] = _any_scalar(found, called)
+        elif said := getattr(found, "stands_for", ""):
+            module, _, kernel_name = said.partition(":")
+            own[name] = _past_address(_any_scalar(getattr(import_module(module), kernel_name), called))
+        for caller, target in called:
+            if found is caller:
+                own[name] = _past_address(_any_scalar(target, called))
     twin = FunctionType(source.__code__, {**source.__globals__, **own}, source.__name__, source.__defaults__)
-    return cast(F, _njit(twin, _nrt=False)) if ENABLED else function
+    return _njit(twin, _nrt=False, cache=not called)  # on disk nothing tells what was called
 
 
-def _direct(kernel: str) -> Any:
-    """What takes the place of a call by address of this kernel, ``module:name``."""
-    module, _, name = kernel.partition(":")
-    function = any_scalar(getattr(import_module(module), name))
+def _past_address(function: Any) -> Any:
+    """The function with an address before its arguments, which says nothing."""
 
-    def call(_address: int, *arguments: Any) -> Any:
+    def call(address, *arguments):  # type: ignore[no-untyped-def]
         return function(*arguments)
 
-    return _njit(call, _nrt=False, cache=False) if ENABLED else call
+    return _njit(call, _nrt=False, cache=False)
 
 
 def _called(source: Any) -> list[str]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from erls.maths.coefficients import Three, angle_of
 from erls.maths.jit import part
-from erls.maths.vectors import Rotation, Vector, cross, dot, plus, scaled
+from erls.maths.vectors import Rotation, Vector, cross, dot, plus, product, scaled
 
 Quaternion: TypeAlias = tuple[float, float, float, float]
 
@@ -35,6 +35,16 @@ def exponential(psi: Vector, c1: float, c2: float) -> Rotation:
     d, e, f = c2 * x * y, c2 * y * z, c2 * z * x
     u, v, w = c1 * x, c1 * y, c1 * z
     return 1 - b - c, d - w, f + v, d + w, 1 - a - c, e - u, f - v, e + u, 1 - a - b
+
+
+@part
+def turned_further(r: Rotation, psi: Vector, c1: float, c2: float) -> Rotation:
+    """R exp(ψ̃), orthogonal to rounding however often it is turned."""
+    r = product(r, exponential(psi, c1, c2))
+    x, y, z = (r[0], r[3], r[6]), (r[1], r[4], r[7]), (r[2], r[5], r[8])
+    xx, yy, zz = 1.5 - 0.5 * dot(x, x), 1.5 - 0.5 * dot(y, y), 1.5 - 0.5 * dot(z, z)
+    xy, yz, zx = -0.5 * dot(x, y), -0.5 * dot(y, z), -0.5 * dot(z, x)
+    return product(r, (xx, xy, zx, xy, yy, yz, zx, yz, zz))
 
 
 @part

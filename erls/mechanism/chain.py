@@ -177,14 +177,3 @@ def kinematics(mechanism: Mechanism, theta: Array, rates: Array) -> Kinematics:
         result.twists.append(twist)
         result.biases.append(transform @ bias - twist_cross(screw * rate) @ twist + more)
     return result
-
-
-def jacobians(mechanism: Mechanism, found: Kinematics) -> list[Array]:
-    """(6, n) Jacobian of every link's twist with respect to the joint rates."""
-    count = len(found.screws)
-    result: list[Array] = []
-    for k, joint in enumerate(mechanism.joints):
-        current = np.zeros((6, count)) if joint.parent < 0 else found.transforms[k] @ result[joint.parent]
-        current[:, k] = found.screws[k]
-        result.append(current)
-    return result

@@ -32,6 +32,7 @@ from erls.equations.quasi_static.static_modes import StaticModes
 from erls.equations.registry import TREES
 from erls.errors import SimulationError
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.loops import Loop, loop_ends
 from erls.scene.chain import Simulation
 
 FOLDER = Path(__file__).parents[1] / "data" / "frozen"
@@ -169,14 +170,23 @@ def _of_loops(system: ClosedChain, at: State) -> Values:
     """Conditions of loops, frames that they tie, forces that they carry."""
     closure = system.closure(at.t, at.y, at.v)
     found = {f"loop {name}": getattr(closure, name) for name in ("violation", "rate", "bias", "rows")}
-    ends = [end for loop in system.mechanism.loops for end in (loop.inner, loop.outer) if end.link is not None]
+    order = _inner_first(system.mechanism.loops)
     for part in ("pose", "rows", "twist", "bias"):
-        frames = system.bare.frames(at.t, at.y, at.v, ends)
-        found[f"frame {part}"] = np.array([getattr(frame, part) for frame in frames])
+        frames = system.bare.frames(at.t, at.y, at.v)
+        found[f"frame {part}"] = np.array([getattr(frames[k], part) for k in order])
     forces = system.loop_forces(at.t, at.y, at.v)
     for part in ("force", "moment"):
         found[f"loop {part}s"] = np.array([getattr(force, part) for force in forces])
     return found
+
+
+def _inner_first(loops: Iterable[Loop]) -> list[int]:
+    """Places among `loop_ends`, which has the outer end of a loop first, in the order of the tables."""
+    order: list[int] = []
+    for loop in loops:
+        here = [len(order) + k for k in range(len(loop_ends([loop])))]
+        order += reversed(here)
+    return order
 
 
 def closed(at: State, frozen: Values) -> State:

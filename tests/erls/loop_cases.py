@@ -91,7 +91,7 @@ def states(closed: ClosedChain, name: str) -> list[chain_cases.State]:
 def steps(
     closed: ClosedChain, y: np.ndarray, v: np.ndarray, duration: float, step: float, compiled: bool
 ) -> ConstrainedSolution:
-    """Generalized-α by kernels or by NumPy."""
+    """Generalized-α by kernels or with dense factors."""
     options = ConstrainedOptions(step=step, compiled=compiled)
     return lie_generalized_alpha(TiedCoordinates(closed), (0.0, duration), y, v, options)
 

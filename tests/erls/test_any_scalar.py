@@ -11,14 +11,19 @@ from typing import Any
 
 import chain_cases
 import ffr_cases
+import loop_cases
+import loop_scenes
 import numpy as np
 import pytest
 import stiffened_cases
+from chain_cases import State
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.erls.formulation import Erls
 from erls.equations.erls.pack import pack_chain
 from erls.equations.ffr.formulation import Ffr
+from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.loops.compiled import CompiledLoops
 from erls.maths.jit import any_scalar
 from erls.mechanism.thermal import elastic_rest
 
@@ -44,6 +49,32 @@ def _real(system: CompiledSystem, t: float, arguments: list[np.ndarray], reals: 
     out = np.zeros(system.size)
     system.residual(reals, system.integers, system.scratch, t, *arguments, out)
     return out
+
+
+def _loops(folder: Path, name: str, form: str) -> tuple[CompiledSystem, State]:
+    closed = ClosedChain(loop_scenes.tree(loop_cases.mechanism(folder, name), form))
+    assert closed.compiled is not None
+    return closed.compiled, loop_cases.states(closed, name)[1]
+
+
+@pytest.mark.parametrize(("name", "form"), [("controlled turn", "erls"), ("two loops", "ffr")])
+def test_complex_steps_through_loops(name: str, form: str, tmp_path: Path) -> None:
+    """Of a residual whose tree is called by address; to 1e-6 along random directions of all states together."""
+    system, at = _loops(tmp_path, name, form)
+    assert isinstance(system, CompiledLoops)
+    residual = any_scalar(system.residual, system.called)
+    arguments, rng = [at.y, at.v, at.a], np.random.default_rng(4)
+    whole = system.reals.astype(complex)
+    for _ in range(3):
+        ways = [scale * rng.uniform(-1, 1, system.size) for scale in (1e-3, 1.0, 1.0)]
+        shifted = [x + 1j * STEP * way for x, way in zip(arguments, ways, strict=True)]
+        found = _complex(system, residual, at.t, shifted, whole)
+        size, sides = 1e-4, []
+        for k in (2, 1, -1, -2):
+            moved = [x + k * size * way for x, way in zip(arguments, ways, strict=True)]
+            sides.append(_real(system, at.t, moved, system.reals))
+        slope = (8 * (sides[1] - sides[2]) - sides[0] + sides[3]) / (12 * size)
+        assert np.abs(found - slope).max() <= AGREE * np.abs(slope).max()
 
 
 @pytest.mark.parametrize(("cases", "name"), CASES, ids=[name for _, name in CASES])

@@ -10,7 +10,7 @@ import pytest
 import scenes
 
 import erls
-from erls.equations.erls.paper.compatibility import GAUGES
+from erls.equations.erls.paper.pack import GAUGES
 from erls.errors import Cause, SimulationError
 from erls.mechanism.links import link_mass_properties
 

@@ -14,9 +14,11 @@ import erls
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.body_frame import BODY_FRAMES
 from erls.equations.ffr.formulation import Ffr
-from erls.equations.ffr.interface_motion import InterfaceMotion, turn_factors
+from erls.equations.ffr.nodes import move_node, place_node
+from erls.equations.ffr.records import Node, NodeState, node_state
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.errors import Cause, SimulationError
+from erls.maths.jit import plain
 from erls.maths.so3 import Array, skew
 from erls.mechanism.links import link_mass_properties
 from erls.mechanism.rigid_dynamics import inverse_dynamics
@@ -44,28 +46,27 @@ def _random(equations: Ffr | Erls, seed: int = 2) -> tuple[Array, Array, Array]:
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-3, 0.3, 0.7, 0.71, 2.5])
-def test_interface_motion_against_differences(size: float) -> None:
+def test_nodes_move_against_differences(size: float) -> None:
     """Pose = exp(φ) and u; twist and its rate are the derivatives of the pose; both branches of the factors."""
     rng = np.random.default_rng(4)
     rotation, translation = rng.uniform(-1, 1, (2, 3, 5))
     eta, rate = rng.uniform(-1, 1, (2, 5))
     eta *= size / np.linalg.norm(rotation @ eta)
-    motion = InterfaceMotion(np.array([0.1, 0.2, 0.3]), translation, rotation)
-    found = motion.at(eta, rate)
-    np.testing.assert_allclose(found.pose[:3, :3], la.expm(skew(rotation @ eta)), atol=1e-14)
-    h = 1e-5
-    before, after = (motion.at(eta + s * h * rate, rate) for s in (-1, 1))
-    turn = found.pose[:3, :3].T @ (after.pose - before.pose)[:3] / (2 * h)
-    twist = found.jacobian @ rate
-    np.testing.assert_allclose(turn[:, 3], twist[:3], atol=1e-9)
-    np.testing.assert_allclose(turn[:, :3], skew(twist[3:]), atol=1e-9)
-    np.testing.assert_allclose((after.jacobian - before.jacobian) @ rate / (2 * h), found.bias, atol=1e-9)
+    node = Node(0, 1, np.array([0.1, 0.2, 0.3]), np.vstack([translation, rotation]), np.zeros((0, 0)))
 
+    def moved(eta: Array) -> NodeState:
+        state = NodeState(*(np.array(part) for part in node_state(5, False)))
+        plain(place_node)(node, state, eta)
+        plain(move_node)(node, state, rate, np.zeros(0))
+        return state
 
-def test_turn_factors_meet() -> None:
-    """Series and closed form agree where one follows the other."""
-    np.testing.assert_allclose(turn_factors(0.5 - 1e-12), turn_factors(0.5 + 1e-12), rtol=1e-11)
-    assert turn_factors(0.0) == (1 / 2, -1 / 24, 1 / 6, -1 / 120)
+    found, h = moved(eta), 1e-5
+    before, after = (moved(eta + s * h * rate) for s in (-1, 1))
+    turn, change = found.pose[:9].reshape(3, 3), (after.pose - before.pose) / (2 * h)
+    np.testing.assert_allclose(turn, la.expm(skew(rotation @ eta)), atol=1e-14)
+    np.testing.assert_allclose(turn.T @ change[9:], found.twist[:3], atol=1e-9)
+    np.testing.assert_allclose(turn.T @ change[:9].reshape(3, 3), skew(found.twist[3:]), atol=1e-9)
+    np.testing.assert_allclose((after.twist - before.twist) / (2 * h), found.twist_rate, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)

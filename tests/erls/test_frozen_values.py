@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ ALL = [(table, case) for table, content in TABLES.items() for case in content.ca
 TREES = [(table, case) for table, case in ALL if "quasi" not in table and "loops" not in table]
 CONSERVED = [(table, case) for table, case in TREES if "without" not in case and "only" not in case]
 """Where every effect comes with all its forces."""
+CLOSED = [(table, case) for table, case in ALL if "loops" in table]
 
 
 @pytest.fixture(scope="module")
@@ -78,9 +80,17 @@ def _power(system: Any, at: State) -> tuple[float, float]:
     """Power of drives, dampers, friction and of what is out of balance [W]; and the sum of their terms' moduli."""
     mechanism, state = system.mechanism, system.state(at.t, at.y, at.v)
     parts = [float(x) for x in at.v * system.residual(at.t, at.y, at.v, at.a)]
-    reactions = system.reactions_at(at.t, at.y, at.v, at.a)
-    for joint, reaction, angle, rate in zip(mechanism.joints, reactions, state.angles, state.rates, strict=True):
-        parts.append(reaction.effort * rate)
+    moving = [*zip(mechanism.joints, state.angles, state.rates, strict=True)]
+    if isinstance(system, ClosedChain):
+        efforts = [reaction.effort for reaction in system.reactions(at.t, at.y, at.v)]
+        for k, loop in enumerate(mechanism.loops):
+            if loop.freedom is not None:
+                moving.append((loop.freedom, *system.loop_motion(at.t, at.y, at.v, k)))
+                efforts.append(system.loop_effort(at.t, at.y, at.v, k))
+    else:
+        efforts = [reaction.effort for reaction in system.reactions_at(at.t, at.y, at.v, at.a)]
+    for (joint, angle, rate), effort in zip(moving, efforts, strict=True):
+        parts.append(effort * rate)
         if joint.drive.prescribed:  # its effort is that of the motor alone
             parts.append(joint.forces.force(angle, rate) * rate)
         parts.append(joint.forces.stiffness * (angle - joint.forces.rest) * rate)  # a spring stores it
@@ -107,6 +117,30 @@ def test_energy_changes_by_the_power_of_all_forces(
         change = (16 * better[1] - better[0]) / 15
         power, size = _power(system, at)
         assert change == pytest.approx(power, abs=1e-9 * size)
+
+
+@pytest.mark.parametrize(("table", "case"), CLOSED)
+def test_energy_of_loops_changes_by_the_power_of_all_forces(
+    table: str, case: str, tables: dict[str, Any], tmp_path: Path
+) -> None:
+    """Reactions of loops do no work beside that of motors: the energy of the chain, which changes by the power of what
+    is out of balance in it (above), and of springs and rotors in closing joints, by the efforts that runs report.
+    """
+    system = TABLES[table].build(tmp_path, case)
+    for at, frozen in _read(tables, table, case):
+        here = frozen_values.closed(at, frozen)
+        a, multipliers, found = system.accelerations(here.t, here.y, here.v)
+        here = replace(here, a=a)
+        change, size = _power(system.bare, here)
+        # closing by a square of conditions leaves rates open, and every further one moves them by as much
+        left = multipliers * found.rate
+        change += float(left.sum())
+        for loop, moves, acts in zip(system.mechanism.loops, found.moves, found.efforts, strict=True):
+            if (free := loop.freedom) is not None:
+                turning = float(moves[free.freedom.row, system.bare.free] @ here.a) + acts.turning
+                pull = free.forces.stiffness * (acts.coordinate - free.forces.rest) + free.rotor_inertia * turning
+                change += pull * acts.rate
+        assert change == pytest.approx(_power(system, here)[0], abs=1e-9 * size + 10 * np.abs(left).sum())
 
 
 @pytest.mark.parametrize(("table", "case"), TREES)

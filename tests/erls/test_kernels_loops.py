@@ -1,61 +1,55 @@
-"""Compiled closed chains: against the NumPy equations, against the same source uncompiled, and in runs."""
+"""Compiled closed chains: against dense solutions, against the same source uncompiled, and in runs."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import loop_cases
 import loop_scenes
 import numpy as np
 import pytest
-import stiffened_cases
-from chain_cases import evaluate
+from chain_cases import State, evaluate
 from twins import distance, uncompiled
 
-from erls.equations.erls.formulation import Erls
-from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.loops.closed_chain import DECAY, ClosedChain
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Options, Solution
 from erls.integrate.closed_loops import Watch, loop_integrator
 
-LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
+SOME = dict.fromkeys(loop_scenes.FORMULATIONS, ("controlled turn", "driven slide", "spherical", "two loops"))
+SOME["erls"] = tuple(loop_cases.CASES)
+DENSE = 1e-10  # relative: two orders of summation, through about a hundred terms
 LIKE_TWIN = 1e-11  # relative: sums in another order, through matrices of a condition of about 1e3
 
 
-def _plain(closed: ClosedChain) -> ClosedChain:
-    """The same equations without their compiled form."""
-    result = ClosedChain(closed.bare)
-    result.compiled = None
-    return result
+def _acting(closed: ClosedChain, at: State) -> tuple[np.ndarray, np.ndarray]:
+    """Mass matrix and M a - f at a = 0 of the chain, with rotors and forces along closing joints put in by hand."""
+    tree, found = closed.bare, closed.closure(at.t, at.y, at.v)
+    mass, force = tree.mass_matrix(at.t, at.y), tree.residual(at.t, at.y, at.v, np.zeros(closed.size))
+    for loop, moves, acts in zip(closed.mechanism.loops, found.moves, found.efforts, strict=True):
+        if (free := loop.freedom) is not None:
+            row = moves[free.freedom.row, tree.free]
+            mass = mass + free.rotor_inertia * np.outer(row, row)
+            force = force + row * (free.rotor_inertia * acts.turning - acts.force)
+    return mass, force
 
 
-@pytest.mark.parametrize("name", loop_cases.CASES)
-def test_kernels_equal_the_numpy_equations(name: str, tmp_path: Path) -> None:
-    """Residual (joints and modes apart), matrices, acceleration, the nearest closed state.
-
-    That comes from the square of the conditions, so it loses twice the digits of their condition number.
-    """
-    closed = loop_cases.chain(tmp_path, name)
-    plain = _plain(closed)
+@pytest.mark.parametrize(("form", "name"), [(form, name) for form in loop_scenes.FORMULATIONS for name in SOME[form]])
+def test_accelerations_solve_the_whole_system(form: str, name: str, tmp_path: Path) -> None:
+    """[M, Φᵀ; Φ, 0] solved at once, over the equations of every formulation."""
+    closed = ClosedChain(loop_scenes.tree(loop_cases.mechanism(tmp_path, name), form))
+    at = loop_cases.states(closed, name)[1]
     assert closed.compiled is not None
-    f = len(closed.bare.free_joints)
-    for at in loop_cases.states(closed, name):
-        found = evaluate(closed.compiled, at)
-        residual = plain.residual(at.t, at.y, at.v, at.a)
-        assert distance(found["residual"][:f], residual[:f]) <= LIKE_NUMPY
-        assert distance(found["residual"][f:], residual[f:]) <= LIKE_NUMPY
-        assert distance(found["mass"], plain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
-        stiffness, damping = plain.stiffness_and_damping(at.t, at.y, at.v)
-        assert distance(found["stiffness"], stiffness) <= LIKE_NUMPY
-        assert distance(found["damping"], damping) <= LIKE_NUMPY
-        assert distance(found["acceleration"], plain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY
-        ours, theirs = closed.closed(at.t, at.y, at.v), plain.closed(at.t, at.y, at.v)
-        gaps = [np.abs(plain.openings(plain.closure(at.t, *state))).max() for state in (ours, theirs)]
-        assert gaps[0] <= max(1e-12, 10 * gaps[1])
-        lost = np.linalg.cond(plain.scaled_rows(plain.closure(at.t, *theirs), plain.kept)) ** 2
-        for place, other in zip(ours, theirs, strict=True):
-            np.testing.assert_allclose(place * closed.metres, other * closed.metres, rtol=0, atol=1e-10 + 1e-16 * lost)
+    found, closure, n = evaluate(closed.compiled, at), closed.closure(at.t, at.y, at.v), closed.size
+    mass, force = _acting(closed, at)
+    rows = closure.rows[closed.kept][:, closed.bare.free]
+    wanted = (closure.bias + 2 * DECAY * closure.rate + DECAY**2 * closure.violation)[closed.kept]
+    whole = np.block([[mass, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
+    scale = 1 / np.sqrt(np.concatenate([np.diag(mass), np.diag(rows @ np.linalg.solve(mass, rows.T))]))
+    solved = scale * np.linalg.solve(scale[:, None] * whole * scale, -scale * np.concatenate([force, wanted]))
+    assert distance(found["mass"], mass) <= DENSE
+    assert distance(found["acceleration"] * closed.metres, solved[:n] * closed.metres) <= DENSE
+    assert distance(found["residual"], mass @ at.a + force + rows.T @ solved[n:]) <= DENSE
 
 
 def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
@@ -64,12 +58,12 @@ def test_kernels_equal_their_uncompiled_twin(tmp_path: Path) -> None:
     assert set(twin) == set(found)
     for key, values in found.items():
         # all but masses have been solved for, as accelerations of open chains
-        limit = LIKE_TWIN if key.endswith("mass") else LIKE_NUMPY
+        limit = LIKE_TWIN if key.endswith("mass") else DENSE
         assert distance(values, twin[key]) <= limit, key
 
 
 @pytest.mark.parametrize("name", ["torque on a slide", "controlled turn", "two loops"])
-def test_compiled_steps_are_those_of_numpy(name: str, tmp_path: Path) -> None:
+def test_compiled_steps_are_those_of_single_steps(name: str, tmp_path: Path) -> None:
     """Generalized-α: the same knots and the same work over breakpoints of drives; loops closed as well."""
     closed = loop_cases.chain(tmp_path, name)
     y, v = closed.initial_state()
@@ -103,12 +97,12 @@ def test_compiled_steps_fail_alike(tmp_path: Path) -> None:
 
 
 def test_lobatto_runs_compiled_loops(tmp_path: Path) -> None:
-    """A run in compiled chunks is that of the NumPy equations: knots to a tenth of the tolerance 1e-5 m."""
+    """A run in compiled chunks is that of single steps: knots to a tenth of the tolerance 1e-5 m."""
     closed = loop_cases.chain(tmp_path, "torque on a slide")
     y, v = closed.initial_state()
-    fast, slow = (
-        loop_integrator("lobatto")(chain, (0.0, 0.04), y, v, Options()) for chain in (closed, _plain(closed))
-    )
+    plain = ClosedChain(closed.bare)
+    plain.compiled = None
+    fast, slow = (loop_integrator("lobatto")(chain, (0.0, 0.04), y, v, Options()) for chain in (closed, plain))
     assert fast.failure is slow.failure is None
     assert fast.work.rhs_calls == pytest.approx(slow.work.rhs_calls, rel=0.05)
     ends = [closed.closed(0.04, s.y[-1], s.v[-1])[0] * closed.metres for s in (fast, slow)]
@@ -146,25 +140,3 @@ def test_a_lock_ends_compiled_chunks_there(tmp_path: Path) -> None:
         watch(3.0, lambda: knots)
     assert caught.value.cause == Cause.LOOP_OPEN
     assert watch.good == knots.t[2]
-
-
-def test_no_compiled_form_over_other_chains(tmp_path: Path) -> None:
-    """The minimum-norm gauge has none, so its loops have none; an empty one has nothing to compile."""
-    assert loop_scenes.chain(tmp_path, loop_scenes.four_bar(), "minimum-norm").compiled is None
-
-
-@pytest.mark.parametrize("name", ["driven slide", "two loops"])
-def test_loops_with_stiffening_run_compiled(name: str, tmp_path: Path) -> None:
-    """Second-order displacements of links in loops: residual, matrices and acceleration as those of NumPy."""
-    mechanism = replace(loop_cases.mechanism(tmp_path, name), effects=stiffened_cases.STIFFENED)
-    closed = ClosedChain(Erls(mechanism))
-    plain = _plain(closed)
-    assert closed.compiled is not None
-    for at in loop_cases.states(closed, name):
-        found = evaluate(closed.compiled, at)
-        assert distance(found["residual"], plain.residual(at.t, at.y, at.v, at.a)) <= LIKE_NUMPY
-        assert distance(found["mass"], plain.mass_matrix(at.t, at.y)) <= LIKE_NUMPY
-        stiffness, damping = plain.stiffness_and_damping(at.t, at.y, at.v)
-        assert distance(found["stiffness"], stiffness) <= LIKE_NUMPY
-        assert distance(found["damping"], damping) <= LIKE_NUMPY
-        assert distance(found["acceleration"], plain.acceleration(at.t, at.y, at.v)) <= LIKE_NUMPY

@@ -182,10 +182,10 @@ def test_implicit_methods_know_what_acts_in_closing_joints(tmp_path: Path) -> No
     y, _ = chain.initial_state()
     rng = np.random.default_rng(2)
     v, way = rng.uniform(-1, 1, (2, chain.size))
-    (k, c), (k0, c0) = (one.tree.stiffness_and_damping(0.1, y, v) for one in (chain, bare))
+    (k, c), (k0, c0) = (one.loops.matrices(0.1, y, v) for one in (chain, bare))
 
     def acts(y: Array, v: Array, a: Array) -> Array:
-        return np.asarray(chain.tree.residual(0.1, y, v, a) - bare.tree.residual(0.1, y, v, a))
+        return np.asarray(chain.loops.forces(0.1, y, v, a) - bare.loops.forces(0.1, y, v, a))
 
     h, still = 1e-6, np.zeros(chain.size)
     slowed = (acts(y, v + h * way, still) - acts(y, v - h * way, still)) / (2 * h)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ import scenes
 
 from erls.equations.formulation import TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
-from erls.equations.loops.rows import LoopRows
+from erls.equations.loops.tied import Tied
 from erls.errors import Cause, SimulationError
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, fixed_axes, skew
+from erls.mechanism.chain import Mechanism
 from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES
 from erls.mechanism.links import link_mass_properties
 from erls.mechanism.loops import Loop, LoopEnd
@@ -33,20 +35,26 @@ def _random(tree: TreeFormulation) -> tuple[Array, Array]:
     return y, v
 
 
-def _ends(tree: TreeFormulation) -> list[LoopEnd]:
-    links = tree.mechanism.links
-    return [LoopEnd(k, link.model.interface_nodes[1].node, OFFSET) for k, link in enumerate(links)]
+def _ends(mechanism: Mechanism) -> list[LoopEnd]:
+    return [LoopEnd(k, link.model.interface_nodes[1].node, OFFSET) for k, link in enumerate(mechanism.links)]
+
+
+def _held(mechanism: Mechanism, name: str) -> TreeFormulation:
+    """Equations of the chain, loops holding the end of every link."""
+    ground = LoopEnd(None, 0, OFFSET)
+    loops = [Loop(str(k), JOINT_TYPES["spherical"], ground, end) for k, end in enumerate(_ends(mechanism))]
+    return loop_scenes.tree(replace(mechanism, loops=tuple(loops)), name)
 
 
 @pytest.mark.parametrize("name", loop_scenes.FORMULATIONS)
 def test_frames_move_with_their_twists(tmp_path: Path, name: str) -> None:
     """Twist = derivative of the pose, rows · rates beside prescribed joints, bias = derivative of the twist; 1e-7."""
-    tree = loop_scenes.tree(scenes.mechanism(scenes.three_links(tmp_path, "prescribed")), name)
+    tree = _held(scenes.mechanism(scenes.three_links(tmp_path, "prescribed")), name)
     y, v = _random(tree)
     t, still = 0.2, np.zeros(tree.size)
-    found = tree.frames(t, y, v, _ends(tree))
-    at_rest = tree.frames(t, y, still, _ends(tree))
-    ahead, behind = (tree.frames(t + s * STEP, y + s * STEP * v, v, _ends(tree)) for s in (1, -1))
+    found = tree.frames(t, y, v)
+    at_rest = tree.frames(t, y, still)
+    ahead, behind = (tree.frames(t + s * STEP, y + s * STEP * v, v) for s in (1, -1))
     for one, rest, after, before in zip(found, at_rest, ahead, behind, strict=True):
         size = 1e-7 * max(1.0, float(np.abs(one.bias).max()))
         turning = one.pose[:3, :3].T @ (after.pose - before.pose)[:3] / (2 * STEP)
@@ -60,10 +68,10 @@ def test_frames_move_with_their_twists(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", loop_scenes.FORMULATIONS)
 def test_frames_sit_where_runs_draw_the_nodes(tmp_path: Path, name: str) -> None:
     """Origin = drawn node plus the arm turned by its rotation, to second order in that rotation."""
-    tree = loop_scenes.tree(scenes.mechanism(scenes.three_links(tmp_path)), name)
+    tree = _held(scenes.mechanism(scenes.three_links(tmp_path)), name)
     y, v = _random(tree)
     state = tree.state(0.0, y, v)
-    for k, frame in enumerate(tree.frames(0.0, y, v, _ends(tree))):
+    for k, frame in enumerate(tree.frames(0.0, y, v)):
         model, world = tree.mechanism.links[k].model, state.poses[k]
         node = model.interface_nodes[1].node
         translation, rotation = model.node_shape(node)
@@ -77,20 +85,20 @@ def test_frames_sit_where_runs_draw_the_nodes(tmp_path: Path, name: str) -> None
 @pytest.mark.parametrize("kind", HOLDING_TYPES)
 def test_conditions_against_differences(tmp_path: Path, kind: str) -> None:
     """Φ̇ and Φ̈ of each kind of closing joint, between two links and to the ground; names for every row. 1e-6."""
-    tree = loop_scenes.tree(scenes.mechanism(scenes.three_links(tmp_path, "mixed")), "ffr")
-    ends = _ends(tree)
-    ground = LoopEnd(None, 0, OFFSET)
-    loops = [Loop("a", JOINT_TYPES[kind], ends[0], ends[2]), Loop("b", JOINT_TYPES[kind], ground, ends[1])]
-    rows = LoopRows(tree, loops)
+    mechanism = scenes.mechanism(scenes.three_links(tmp_path, "mixed"))
+    ends, ground = _ends(mechanism), LoopEnd(None, 0, OFFSET)
+    loops = Loop("a", JOINT_TYPES[kind], ends[0], ends[2]), Loop("b", JOINT_TYPES[kind], ground, ends[1])
+    tree = loop_scenes.tree(replace(mechanism, loops=loops), "ffr")
+    tied = Tied(tree)
     y, v = _random(tree)
-    found = rows.closure(0.0, y, v)
-    ahead, behind = (rows.closure(0.0, y + s * STEP * v, v) for s in (1, -1))
+    found = tied.closure(0.0, y, v)
+    ahead, behind = (tied.closure(0.0, y + s * STEP * v, v) for s in (1, -1))
     np.testing.assert_allclose((ahead.violation - behind.violation) / (2 * STEP), found.rate, atol=1e-7)
     np.testing.assert_allclose((ahead.rate - behind.rate) / (2 * STEP), found.bias, atol=1e-6)
     np.testing.assert_allclose(found.rows[:, tree.free] @ v, found.rate, atol=1e-12)
     freedoms = {"revolute": 1, "prismatic": 1, "cylindrical": 2, "spherical": 3, "fixed": 0, "line": 4}
     freedoms |= {"planar": 3, "universal": 2}
-    assert len(found.violation) == len(rows.names) == 2 * (6 - freedoms[kind])
+    assert len(found.violation) == len(tied.rows.names) == 2 * (6 - freedoms[kind])
 
 
 def _soft(folder: Path, data: dict[str, Any], softness: float, names: tuple[str, ...]) -> dict[str, Any]:
@@ -194,7 +202,7 @@ def test_static_start_that_no_link_can_carry(tmp_path: Path) -> None:
     assert caught.value.cause == Cause.NO_EQUILIBRIUM
 
 
-@pytest.mark.parametrize("name", ["erls", "ffr"])
+@pytest.mark.parametrize("name", loop_scenes.FORMULATIONS)
 def test_work_on_flexible_loops_is_their_energy(tmp_path: Path, name: str) -> None:
     """Dense: torque of the crank times rate over 20 ms against kinetic, elastic and gravity energy, 1e-7 of it."""
     data = _soft(tmp_path, loop_scenes.four_bar(), 5.0, ("coupler",))

@@ -12,27 +12,21 @@ from erls.equations import compiled_system as contract
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import (
     BEND_STATE,
-    END,
-    END_STATE,
     LINK,
     LINK_STATE,
     Chain,
     read_bend_state,
     read_chain,
-    read_end,
-    read_end_state,
     read_link,
     read_link_state,
 )
 from erls.equations.erls.residual import hand_back, push_joint
 from erls.equations.erls.second_order import bend_frames
-from erls.equations.serial.displaced_node import move_node
+from erls.equations.serial.ends import END, END_STATE, column_of, move_end, read_end, read_end_state
 from erls.equations.serial.records import (
-    JOINT,
     JOINT_STATE,
     MODES,
     Serial,
-    read_joint,
     read_joint_state,
     read_modes,
     read_serial,
@@ -40,7 +34,7 @@ from erls.equations.serial.records import (
 from erls.maths.jit import kernel, part, spliced
 from erls.maths.products import clear, copy
 from erls.maths.so3 import Array
-from erls.maths.spatial import add_motion_cross, compose_poses, transform_force_back, transform_motion
+from erls.maths.spatial import compose_poses, transform_force_back
 from fe_import.model import IntArray
 
 
@@ -52,20 +46,8 @@ def _move_end(
     end = read_end(reals, integers, chain.ends + number * END)
     moved = read_end_state(scratch, integers, chain.end_states + number * END_STATE)
     state = read_link_state(scratch, integers, chain.states + end.link * LINK_STATE)
-    twist, rate, pose = found[12:18], found[18:24], found[:12]
-    move_node(
-        end.position, end.shapes, end.bows, state.q, state.q_rate, state.q_acceleration, moved.pose, moved.twist,
-        moved.twist_rate, moved.rows, moved.displacement,
-    )  # fmt: skip
-    transform_motion(moved.pose, state.twist, twist)
-    transform_motion(moved.pose, state.twist_rate, rate)
-    add_motion_cross(twist, moved.twist, 1.0, rate)
-    for i in range(6):
-        twist[i] += moved.twist[i]
-        rate[i] += moved.twist_rate[i]
-    transform_motion(end.offset, twist, twist)
-    transform_motion(end.offset, rate, rate)
-    compose_poses(moved.pose, end.offset, pose)
+    pose = found[:12]
+    move_end(end, moved, state.q, state.q_rate, state.q_acceleration, state.twist, state.twist_rate, found[:24])
     k = end.link
     while k >= 0:
         copy(pose, moved.spare)
@@ -108,10 +90,7 @@ def _put_row(
         first = read_modes(reals, integers, serial.modes + k * MODES).first
         for j in range(len(modal) - 6):
             row[first + j] = modal[6 + j]
-        place = read_joint(reals, integers, serial.joints + k * JOINT).place
-        if place < 0:
-            place = n + _prescribed_before(serial, reals, integers, k)
-        row[place] = push_joint(serial, chain, reals, integers, scratch, k, bends)
+        row[column_of(serial, reals, integers, k, n)] = push_joint(serial, chain, reals, integers, scratch, k, bends)
         parent = read_link(reals, integers, chain.links + k * LINK).parent
         if parent >= 0:
             hand_back(serial, chain, reals, integers, scratch, k, bends)
@@ -126,16 +105,6 @@ def _clear_forces(chain: Chain, integers: IntArray, scratch: Array, k: int, bend
     clear(state.modal)
     if bends is not None:
         clear(read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).push)
-
-
-@part
-def _prescribed_before(serial: Serial, reals: Array, integers: IntArray, k: int) -> int:
-    """How many prescribed joints have smaller numbers."""
-    count = 0
-    for j in range(k):
-        if read_joint(reals, integers, serial.joints + j * JOINT).place < 0:
-            count += 1
-    return count
 
 
 @spliced

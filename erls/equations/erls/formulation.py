@@ -7,7 +7,6 @@ the same equations, in the notation of the paper, is `erls.equations.erls.paper`
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -15,22 +14,17 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, function_in
 from erls.equations.erls.pack import pack_chain, shapes
-from erls.equations.erls.paper.compatibility import Compatibility
-from erls.equations.erls.paper.frames import displaced_frames
-from erls.equations.erls.paper.second_order_compatibility import second_order_compatibility
 from erls.equations.erls.records import LINK_STATE, Chain, LinkState
-from erls.equations.formulation import Energy, Reaction, State
+from erls.equations.formulation import Energy, State
 from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
-from erls.equations.serial.joint_frames import FrameMotion
 from erls.equations.serial.modal_inertia import stiffened
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.state_series import StateSeries
 from erls.errors import Cause, SceneError
 from erls.maths.records import python_reader
-from erls.maths.so3 import Array, skew
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.loops import LoopEnd
 
 _see_serial, _see_chain = python_reader(Serial), python_reader(Chain)
 _see_link, _see_joint = python_reader(LinkState), python_reader(JointState)
@@ -69,15 +63,9 @@ class Erls(SerialFormulation):
         return pack_chain(self.mechanism)
 
     @cached_property
-    def _complete(self) -> CompiledSystem:
+    def complete(self) -> CompiledSystem:
         """The same with complete wrenches."""
         return pack_chain(self.mechanism, dense=self.size, complete=True)
-
-    @cached_property
-    def compatibility(self) -> Compatibility:
-        """The dense elimination of rigid-body coordinates, for what is asked of it seldom."""
-        found = second_order_compatibility if self.stiffened else Compatibility
-        return found(self.mechanism, self.gauge)
 
     @cached_property
     def _shapes(self) -> list[Array]:
@@ -141,34 +129,14 @@ class Erls(SerialFormulation):
         energy(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), out)
         return Energy(*out.tolist())
 
-    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
-        """Frames on displaced nodes of links, with rows over (θ, q_d); see `TreeFormulation`."""
-        return displaced_frames(self, t, y, v, ends)
-
-    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
-        """Joint reactions that give these accelerations."""
-        system = self._complete
-        residual(system, t, y, v, a)
+    def borne(self, k: int) -> tuple[Array, Array]:
+        """What a residual left; see `SerialFormulation.borne`."""
+        system = self.complete
         places = _see_serial(system.reals, system.integers, int(system.integers[0])).joint_states
-        state, links = self.state(t, y, v), self._links(system)
-        result: list[Reaction] = []
-        for k, link in enumerate(self.mechanism.links):
-            wrench = links[k].wrench
-            forces = _see_joint(system.scratch, system.integers, places + k * JOINT_STATE).forces
-            shape, _ = link.model.node_shape(link.inboard.node)
-            place = link.inboard.position + shape @ state.modal[k]
-            turn = state.poses[k][:3, :3]
-            effort = forces[0] if self.mechanism.joints[k].drive.prescribed else forces[1]
-            moment = wrench[3:] - skew(place) @ wrench[:3]
-            result.append(Reaction(turn @ wrench[:3], turn @ moment, float(effort)))
-        return result
+        joint = _see_joint(system.scratch, system.integers, places + k * JOINT_STATE)
+        return self._links(system)[k].wrench, joint.forces
 
-    def describe(self) -> dict[str, Any]:
-        """Names and sizes for reports."""
-        return {
-            "formulation": "erls",
-            "gauge": self.gauge,
-            "joints": self.joints,
-            "elastic_coordinates": self.elastic,
-            "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
-        }
+    @property
+    def kind(self) -> dict[str, Any]:
+        """Name of the formulation and of its gauge."""
+        return {"formulation": "erls", "gauge": self.gauge}

@@ -12,6 +12,7 @@ from erls.equations.erls import records as own
 from erls.equations.serial import pack, segments, stiffness
 from erls.equations.serial.condensed import condensed as elimination_memory
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
+from erls.equations.serial.ends import end_state
 from erls.equations.serial.modal_inertia import compliance, stiffened
 from erls.equations.serial.records import Serial
 from erls.maths.records import Memory
@@ -19,8 +20,8 @@ from erls.maths.se3 import inverse, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joints import Joint
-from erls.mechanism.links import Link, node_shape6
-from erls.mechanism.loops import LoopEnd, loop_ends
+from erls.mechanism.links import Link
+from erls.mechanism.loops import loop_ends
 
 _PARALLEL = 1e-13  # sine of the angle between axes that count as one
 DENSE = 40  # coordinates up to which dense factors cost less than elimination link by link
@@ -165,21 +166,6 @@ def _bend(mechanism: Mechanism, k: int, found: list[Shapes], axes: Array) -> own
     )
 
 
-def _end(link: Link, shape: Shapes, bends: bool, end: LoopEnd) -> own.End:
-    """Constants of a frame that a loop holds."""
-    n, second = shape.modes.shape[1], link.second_order if bends else None
-    bows = np.zeros((0, n, n))
-    if second is not None:
-        bows = shape.modes.T @ second.node(end.node) @ shape.modes
-    return own.End(
-        link=end.link or 0,
-        position=link.model.nodes[end.node],
-        shapes=np.vstack(node_shape6(link.model, end.node)) @ shape.modes,
-        bows=bows,
-        offset=pack.pose_numbers(end.frame),
-    )
-
-
 def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False) -> CompiledSystem:
     """The compiled form of a chain in the joint-angle gauge.
 
@@ -264,8 +250,8 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         weight=int(bool(np.any(mechanism.gravity))),
         complete=int(complete),
         end_count=len(ends),
-        ends=pack.put_all(constants, [_end(links[k], found[k], bends, end) for k, end in ends]),
-        end_states=pack.put_all(scratch, [own.end_state(6 + modes[k]) for k, _ in ends]),
+        ends=pack.put_all(constants, [pack.end_record(links[k], found[k].modes, bends, end) for k, end in ends]),
+        end_states=pack.put_all(scratch, [end_state(6 + modes[k]) for k, _ in ends]),
     )
     rigid, rigid_state = pack.rigid_links(mechanism, constants, scratch)
     serial = Serial(

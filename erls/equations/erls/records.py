@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-import numpy as np
-
 from erls.maths.records import Matrix, Stack, Vector, reader, room, table_size
 from erls.maths.so3 import Array
 
@@ -290,51 +288,6 @@ def change(size: int, modes: int) -> Change:
     return room(Change, p=size, e=modes)
 
 
-class End(NamedTuple):
-    """A frame that a loop holds on a link.
-
-    Attributes
-    ----------
-    link : int
-    position : (3,) array
-        Of its node, in the link's frame.
-    shapes : (6, n) array
-        Displacement and rotation vector of the node per (u, q_d).
-    bows : (6, n, n) array
-        Ψ of ½ qᵀ Ψ q, which they gain by second order; no rows where they gain nothing.
-    offset : (12,) array
-        Pose of the frame from the node.
-    """
-
-    link: int
-    position: Vector
-    shapes: Matrix
-    bows: Stack
-    offset: Vector
-
-
-class EndState(NamedTuple):
-    """Working memory of such a frame: its node in the link's frame, by pose (12,), twist and its derivative (6,), rows
-    (6, n) of the twist over the rates of (u, q_d); displacement (6,) of the node, forces (6,) on it; a spare pose.
-    """
-
-    pose: Vector
-    twist: Vector
-    twist_rate: Vector
-    rows: Matrix
-    displacement: Vector
-    force: Vector
-    spare: Vector
-
-
-def end_state(size: int) -> EndState:
-    """Memory for a frame on a link with n = ``size``."""
-    six = [np.zeros(6) for _ in range(4)]
-    return EndState(np.zeros(12), six[0], six[1], np.zeros((6, size)), six[2], six[3], np.zeros(12))
-
-
-read_end, read_end_state = reader(End), reader(EndState)
-END, END_STATE = table_size(End), table_size(EndState)
 read_chain, read_link, read_link_state = reader(Chain), reader(Link), reader(LinkState)
 read_bend, read_bend_state = reader(Bend), reader(BendState)
 LINK, LINK_STATE = table_size(Link), table_size(LinkState)

@@ -8,31 +8,23 @@ data as in `Ffr`, without its velocity transformation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.equations.ffr.formulation import Ffr
-from erls.equations.ffr.interface_motion import InterfaceMotion, node_motion
-from erls.equations.ffr.joint_conditions import (
-    FrameMotion,
-    JointMotion,
-    carried_frame,
-    joint_conditions,
-    joint_motion,
-    less_motion,
-)
-from erls.equations.ffr.joint_effort import JointEfforts
-from erls.equations.ffr.second_order import SecondOrderData
-from erls.equations.ffr.standard_data import StandardData
+from erls.equations.ffr.formulation import Ffr, body_moments
 from erls.equations.formulation import Energy, Reaction, State
-from erls.equations.serial.modal_inertia import modal_inertia
+from erls.equations.system import metre_scales
 from erls.maths import motion_maps
 from erls.maths.se3 import inverse, pose
-from erls.maths.so3 import Array, cross, skew
-from erls.mechanism.links import Link
-from fe_import.model import InterfaceNode
+from erls.maths.so3 import Array, cross
+
+if TYPE_CHECKING:
+    from erls.equations.loops.compiled import CompiledLoops
+    from erls.equations.loops.rows import Closure
+    from erls.equations.stepped import Stepped
 
 
 @dataclass(frozen=True)
@@ -54,38 +46,37 @@ class ConstrainedFfr:
     """
 
     def __init__(self, reduced: Ffr) -> None:
-        self.reduced, self.mechanism = reduced, reduced.mechanism
-        self.modes, self.efforts = reduced.modes, JointEfforts(reduced.mechanism)
-        bodies = zip(self.mechanism.links, reduced.bases, reduced.given.data, strict=True)
-        self.data = [self._data(link, basis, linear) for link, basis, linear in bodies]
-        links, joints = self.mechanism.links, self.mechanism.joints
-        self.links = len(links)
+        self.reduced, self.mechanism, self.modes = reduced, reduced.mechanism, reduced.modes
+        self.links = len(self.mechanism.links)
         self.twists = [slice(6 * k, 6 * k + 6) for k in range(self.links)]  # within v
         self.elastic = slice(6 * self.links, 6 * self.links + reduced.elastic)
-        self.conditions = [joint_conditions(joint) for joint in joints]
-        ends = np.cumsum([len(c.names) for c in self.conditions])
-        self.rows = [slice(int(e) - len(c.names), int(e)) for e, c in zip(ends, self.conditions, strict=True)]
-        self.along = [5 if joint.freedom.turns else 2 for joint in joints]
-        self._inner: list[tuple[InterfaceMotion, Array] | None] = []
-        self._outer: list[tuple[InterfaceMotion, Array]] = []
-        for k, (joint, link) in enumerate(zip(joints, links, strict=True)):
-            parent = joint.seat
-            self._inner.append(None if parent is None else self._node(joint.parent, parent, joint.before))
-            self._outer.append(self._node(k, link.inboard, inverse(joint.after)))
 
-    def _data(self, link: Link, basis: Array, linear: StandardData) -> StandardData:
-        if not self.reduced.stiffened or not link.elastic_modes or link.second_order is None:
-            return linear
-        return SecondOrderData(linear, link.second_order, basis, modal_inertia(link, self.mechanism.effects, basis))
+    @cached_property
+    def tied(self) -> CompiledLoops:
+        """The equations."""
+        from erls.equations.ffr.absolute import pack_absolute  # here: it imports the compiler
 
-    def _node(self, k: int, interface: InterfaceNode, frame: Array) -> tuple[InterfaceMotion, Array]:
-        """Interface node of link ``k``, and the offset from it of a joint frame given in the mesh frame."""
-        motion = node_motion(self.mechanism.links[k], interface.node, self.reduced.bases[k], self.reduced.stiffened)
-        return motion, pose(position=-interface.position) @ frame
+        return pack_absolute(self.reduced.given, metre_scales(self))
 
     @property
-    def compiled(self) -> None:
-        """Plain Python."""
+    def compiled(self) -> Stepped:
+        """The same as steps take it."""
+        from erls.equations.ffr.absolute import stepped
+
+        return stepped(self.tied, self._packed, self._unpacked)
+
+    def _packed(self, q: Configuration) -> Array:
+        """Numbers of a configuration, see `erls.equations.ffr.floating`."""
+        poses = np.concatenate([q.poses[:, :3, :3].reshape(self.links, 9), q.poses[:, :3, 3]], axis=1)
+        return np.concatenate([poses.ravel(), q.eta, q.angles])
+
+    def _unpacked(self, numbers: Array) -> Configuration:
+        poses, ends = numbers[: 12 * self.links].reshape(self.links, 12), 12 * self.links + self.reduced.elastic
+        world = [pose(found[:9].reshape(3, 3), found[9:]) for found in poses]
+        return Configuration(np.stack(world), numbers[12 * self.links : ends].copy(), numbers[ends:].copy())
+
+    def _closure(self, t: float, q: Configuration, v: Array) -> Closure:
+        return self.tied.closure(t, self._packed(q), v)
 
     @property
     def size(self) -> int:
@@ -95,13 +86,12 @@ class ConstrainedFfr:
     @property
     def constraints(self) -> int:
         """Number of constraints."""
-        return self.rows[-1].stop
+        return self.tied.conditions
 
     @property
     def constraint_names(self) -> tuple[str, ...]:
         """Joint and direction of each constraint."""
-        joints = zip(self.mechanism.joints, self.conditions, strict=True)
-        return tuple(f"joint {joint.name!r}, {name}" for joint, found in joints for name in found.names)
+        return tuple(f"joint{name.removeprefix('loop')}" for name in self.tied.given.rows.names)
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -131,18 +121,14 @@ class ConstrainedFfr:
 
     def compose(self, q: Configuration, increment: Array) -> Configuration:
         """q ∘ exp(increment)."""
-        poses = q.poses @ motion_maps.exp(increment[: self.elastic.start].reshape(-1, 6))
-        moved = Configuration(poses, q.eta + increment[self.elastic], q.angles)
-        still = np.zeros(self.size)
-        angles = [self._angle(k, self._joint(k, moved, still)[2].pose, q.angles[k]) for k in range(len(q.angles))]
-        return Configuration(moved.poses, moved.eta, np.array(angles))
+        from erls.equations.ffr import absolute
 
-    def _angle(self, k: int, relative: Array, near: float) -> float:
-        """Joint coordinate at a relative pose, on the turn next to ``near``."""
-        if not self.mechanism.joints[k].freedom.turns:
-            return float(relative[2, 3])
-        angle = float(np.arctan2(relative[1, 0] - relative[0, 1], relative[0, 0] + relative[1, 1]))
-        return angle + 2 * np.pi * round((near - angle) / (2 * np.pi))
+        system, out = self.tied, np.empty(len(self._packed(q)))
+        absolute.compose(
+            system.reals, system.integers, system.scratch, self.length_scales, self._packed(q), increment, out
+        )
+        efforts = self.tied.closure(0.0, out, np.zeros(self.size)).efforts
+        return replace(self._unpacked(out), angles=np.array([effort.coordinate for effort in efforts]))
 
     def tangent(self, increment: Array) -> Array:
         """(n, n) variation of q ∘ exp(increment) per variation of the increment."""
@@ -152,150 +138,54 @@ class ConstrainedFfr:
             result[at, at] = block
         return result
 
-    def _joint(self, k: int, q: Configuration, v: Array) -> tuple[FrameMotion, FrameMotion, JointMotion]:
-        """Motion of joint ``k``: its inner and outer frame, and the latter relative to the former."""
-
-        def frame(number: int, carrier: tuple[InterfaceMotion, Array]) -> FrameMotion:
-            at = self.modes[number]
-            rate = v[self.elastic][at]
-            return carried_frame(q.poses[number], v[self.twists[number]], *carrier, q.eta[at], rate)
-
-        carrier = self._inner[k]
-        ground = FrameMotion(self.mechanism.joints[k].before, np.zeros((6, 0)), np.zeros(6), np.zeros(6))
-        inner = ground if carrier is None else frame(self.mechanism.joints[k].parent, carrier)
-        outer = frame(k, self._outer[k])
-        return inner, outer, joint_motion(inner, outer)
-
-    def _condition(self, k: int, t: float, found: JointMotion) -> tuple[JointMotion, Array]:
-        """The motion that the rows keep at zero, and what of its twist time alone gives."""
-        joint = self.mechanism.joints[k]
-        if not joint.drive.prescribed:
-            return found, np.zeros(6)
-        return less_motion(joint.freedom, found, joint.drive.reference(t))  # type: ignore[arg-type]
-
-    def _relative_rows(self, k: int, inner: FrameMotion, outer: FrameMotion, transform: Array) -> Array:
-        """(6, n) relative twist of joint ``k`` over all velocities."""
-        result = np.zeros((6, self.size))
-        elastic = result[:, self.elastic]
-        result[:, self.twists[k]] = outer.rows[:, :6]
-        elastic[:, self.modes[k]] = outer.rows[:, 6:]
-        parent = self.mechanism.joints[k].parent
-        if parent >= 0:
-            rows = transform @ inner.rows
-            result[:, self.twists[parent]] = -rows[:, :6]
-            elastic[:, self.modes[parent]] = -rows[:, 6:]
-        return result
-
-    def _efforts(self, t: float, q: Configuration, v: Array) -> list[tuple[float, float, Array, float]]:
-        """Force and rotor of every joint that has any, its row over v, and the bias of its acceleration."""
-        joints = [self._joint(k, q, v) for k in range(len(self.along))]
-        rates = np.array([found[2].twist[at] for found, at in zip(joints, self.along, strict=True)])
-        forces = self.efforts.at(t, q.angles, rates)
-        return [
-            (float(forces[k]), float(self.efforts.rotors[k]), rows[at], float(relative.bias[at]))
-            for k, (at, (inner, outer, relative)) in enumerate(zip(self.along, joints, strict=True))
-            for rows in [self._relative_rows(k, inner, outer, relative.transform)]
-        ]
-
     def residual(self, t: float, q: Configuration, v: Array, a: Array) -> Array:
         """(n,) M a - f, without the forces of the constraints."""
-        result = np.empty(self.size)
-        elastic, rates, accelerations = result[self.elastic], v[self.elastic], a[self.elastic]
-        elastic[:] = self.reduced.elastic_forces(q.eta) + self.reduced.damping * rates
-        for world, move, at, data in zip(q.poses, self.twists, self.modes, self.data, strict=True):
-            wrench, forces = data.forces(v[move], a[move], q.eta[at], rates[at], accelerations[at])
-            weight, elastic_weight = data.weight(world[:3, :3].T @ self.mechanism.gravity, q.eta[at])
-            result[move] = wrench - weight
-            elastic[at] += forces - elastic_weight
-        if self.efforts.any:
-            for force, rotor, row, bias in self._efforts(t, q, v):
-                result += row * (rotor * (row @ a + bias) - force)
-        return result
+        return self.tied.forces(t, self._packed(q), v, a)
 
     def mass_matrix(self, t: float, q: Configuration) -> Array:
         """(n, n) symmetric, positive semi-definite."""
-        result = np.zeros((self.size, self.size))
-        for move, at, data in zip(self.twists, self.modes, self.data, strict=True):
-            place = np.r_[move, self.elastic.start + at.start : self.elastic.start + at.stop]
-            result[np.ix_(place, place)] = data.mass_matrix(q.eta[at])
-        if self.efforts.rotors.any():
-            for _, rotor, row, _ in self._efforts(t, q, np.zeros(self.size)):
-                result += rotor * np.outer(row, row)
-        return result
+        return self.tied.masses(t, self._packed(q))
 
     def stiffness_and_damping(
         self, t: float, q: Configuration, v: Array, a: Array, multipliers: Array
     ) -> tuple[Array, Array]:
         """Modal stiffness and damping, joint springs, dampers, friction and controller gains."""
-        stiffness, damping = np.zeros((2, self.size, self.size))
-        at = np.arange(self.elastic.start, self.elastic.stop)
-        stiffness[at, at], damping[at, at] = self.reduced.stiffness, self.reduced.damping
-        if self.efforts.any:
-            rows = [row for _, _, row, _ in self._efforts(t, q, v)]
-            gains = self.efforts.gains(t, q.angles, np.array([r @ v for r in rows]))
-            for row, k, c in zip(rows, *gains, strict=True):
-                stiffness += k * np.outer(row, row)
-                damping += c * np.outer(row, row)
-        return stiffness, damping
+        return self.tied.matrices(t, self._packed(q), v)
 
     def constraint(self, t: float, q: Configuration) -> Array:
         """(m,) Φ: misalignment of the joint frames [m, rad]."""
-        still, result = np.zeros(self.size), np.empty(self.constraints)
-        for k, (at, conditions) in enumerate(zip(self.rows, self.conditions, strict=True)):
-            result[at] = conditions.violation(self._condition(k, t, self._joint(k, q, still)[2])[0].pose)
-        return result
+        return self._closure(t, q, np.zeros(self.size)).violation
 
     def constraint_matrix(self, t: float, q: Configuration) -> Array:
         """(m, n) B."""
-        still, result = np.zeros(self.size), np.empty((self.constraints, self.size))
-        for k, (at, conditions) in enumerate(zip(self.rows, self.conditions, strict=True)):
-            inner, outer, found = self._joint(k, q, still)
-            gradient = conditions.gradient(self._condition(k, t, found)[0].pose)
-            result[at] = gradient @ self._relative_rows(k, inner, outer, found.transform)
-        return result
+        return self._closure(t, q, np.zeros(self.size)).rows
 
     def constraint_rate(self, t: float, q: Configuration) -> Array:
         """(m,) Φ_t."""
-        still, result = np.zeros(self.size), np.zeros(self.constraints)
-        for k in self.reduced.prescribed_joints.tolist():
-            left, timed = self._condition(k, t, self._joint(k, q, still)[2])
-            result[self.rows[k]] = self.conditions[k].gradient(left.pose) @ timed
-        return result
+        return self._closure(t, q, np.zeros(self.size)).rate
 
     def constraint_bias(self, t: float, q: Configuration, v: Array) -> Array:
         """(m,) Φ̈ - B a."""
-        result = np.empty(self.constraints)
-        for k, (at, conditions) in enumerate(zip(self.rows, self.conditions, strict=True)):
-            left, _ = self._condition(k, t, self._joint(k, q, v)[2])
-            result[at] = conditions.gradient(left.pose) @ left.bias + conditions.curvature(left.pose, left.twist)
-        return result
+        return self._closure(t, q, v).bias
 
     def stored(self, t: float, q: Configuration, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Position and rotation matrix of every frame, η, joint angles; with first and second derivatives."""
-        places: list[Array] = []
-        rates: list[Array] = []
-        accelerations: list[Array] = []
-        for world, at in zip(q.poses, self.twists, strict=True):
-            turn, turning = world[:3, :3], skew(v[at][3:])
-            slide = a[at][:3] + cross(v[at][3:], v[at][:3])
-            places += [world[:3, 3], turn.ravel()]
-            rates += [turn @ v[at][:3], (turn @ turning).ravel()]
-            accelerations += [turn @ slide, (turn @ (turning @ turning + skew(a[at][3:]))).ravel()]
-        joints = self._efforts(t, q, v)
-        places += [q.eta, q.angles]
-        rates += [v[self.elastic], np.array([row @ v for _, _, row, _ in joints])]
-        accelerations += [a[self.elastic], np.array([row @ a + bias for _, _, row, bias in joints])]
-        return np.concatenate(places), np.concatenate(rates), np.concatenate(accelerations)
+        """Rotation matrix and position of every frame, η, joint angles; with first and second derivatives."""
+        from erls.equations.ffr import absolute
+
+        system, numbers = self.tied, self._packed(q)
+        knot = np.empty((3, len(numbers)))
+        absolute.settle(system.reals, system.integers, system.scratch, t, numbers, v, a, knot)
+        return knot[0], knot[1], knot[2]
 
     def from_stored(self, stored: Array, rate: Array) -> tuple[Configuration, Array]:
         """Configuration and velocity from what `stored` gives, interpolated or not; rotations made orthogonal."""
         poses, velocity = [], np.empty(self.size)
         for k, at in enumerate(self.twists):
-            x, entries = stored[12 * k : 12 * k + 3], stored[12 * k + 3 : 12 * k + 12].reshape(3, 3)
+            entries, x = stored[12 * k : 12 * k + 9].reshape(3, 3), stored[12 * k + 9 : 12 * k + 12]
             left, _, right = np.linalg.svd(entries)
             turn = left @ right
-            turning = turn.T @ rate[12 * k + 3 : 12 * k + 12].reshape(3, 3)
-            velocity[at][:3] = turn.T @ rate[12 * k : 12 * k + 3]
+            turning = turn.T @ rate[12 * k : 12 * k + 9].reshape(3, 3)
+            velocity[at][:3] = turn.T @ rate[12 * k + 9 : 12 * k + 12]
             velocity[at][3:] = (turning - turning.T)[[2, 0, 1], [1, 2, 0]] / 2
             poses.append(pose(turn, x))
         ends = 12 * self.links, 12 * self.links + self.reduced.elastic
@@ -305,34 +195,35 @@ class ConstrainedFfr:
     def state(self, t: float, q: Configuration, v: Array) -> State:
         """Floating frames, modal coordinates and joint angles, as in `Ffr`."""
         modal = [basis @ q.eta[at] for basis, at in zip(self.reduced.bases, self.modes, strict=True)]
-        rates = np.array([row @ v for _, _, row, _ in self._efforts(t, q, v)])
+        rates = np.array([effort.rate for effort in self._closure(t, q, v).efforts])
         return State(t, list(q.poses), modal, q.angles, q.angles, rates)
 
     def energy(self, t: float, q: Configuration, v: Array) -> Energy:
         """Energies of a state."""
-        kinetic = gravity = springs = 0.0
-        for world, move, at, data in zip(q.poses, self.twists, self.modes, self.data, strict=True):
-            kinetic += data.kinetic_energy(v[move], q.eta[at], v[self.elastic][at])
-            gravity += data.gravity_energy(self.mechanism.gravity, world, q.eta[at])
-        for joint, angle, (_, rotor, row, _) in zip(
-            self.mechanism.joints, q.angles, self._efforts(t, q, v), strict=True
-        ):
-            kinetic += 0.5 * rotor * float(row @ v) ** 2
-            springs += 0.5 * joint.forces.stiffness * float(angle - joint.forces.rest) ** 2
-        return Energy(kinetic, self.reduced.elastic_energy(q.eta), gravity, springs)
+        kinetic = float(v @ self.mass_matrix(t, q) @ v) / 2
+        self.residual(t, q, v, np.zeros(0))
+        gravity = 0.0
+        for world, (mass, moment) in zip(q.poses, body_moments(self.tied, self.links), strict=True):
+            gravity -= float(self.mechanism.gravity @ (mass * world[:3, 3] + world[:3, :3] @ moment))
+        springs = sum(
+            joint.forces.stiffness * float(angle - joint.forces.rest) ** 2 / 2
+            for joint, angle in zip(self.mechanism.joints, q.angles, strict=True)
+        )
+        return Energy(kinetic, self.reduced.elastic_energy(q.eta), gravity, float(springs))
 
     def reactions(self, t: float, q: Configuration, v: Array, a: Array, multipliers: Array) -> list[Reaction]:
         """Joint reactions from multipliers, forces and rotors, at the displaced inboard nodes."""
+        found, loops = self._closure(t, q, v), self.tied.given.rows.loops
         result: list[Reaction] = []
-        efforts = self._efforts(t, q, v)
-        for k, (at, conditions) in enumerate(zip(self.rows, self.conditions, strict=True)):
-            _, outer, found = self._joint(k, q, v)
-            wrench = -conditions.gradient(self._condition(k, t, found)[0].pose).T @ multipliers[at]
-            force, rotor, row, bias = efforts[k]
-            prescribed = self.mechanism.joints[k].drive.prescribed
-            effort = float(wrench[self.along[k]]) if prescribed else force
-            wrench[self.along[k]] += force - rotor * float(row @ a + bias)
-            arm = inverse(self._outer[k][1])[:3, 3]  # of the node, in the joint frame
-            turn = outer.pose[:3, :3]
+        wrenches = self.tied.given.rows.wrenches(found, multipliers)
+        for k, (loop, wrench, outer, acts) in enumerate(
+            zip(loops, wrenches, found.outer, found.efforts, strict=True)
+        ):
+            assert loop.freedom is not None
+            along = loop.freedom.freedom.row
+            effort = float(wrench[along]) if loop.prescribed else acts.force
+            turning = float(found.moves[k][along] @ a) + acts.turning
+            wrench[along] += acts.force - loop.freedom.rotor_inertia * turning
+            arm, turn = inverse(loop.outer.frame)[:3, 3], outer[:3, :3]  # of the node, in the joint frame
             result.append(Reaction(turn @ wrench[:3], turn @ (wrench[3:] - cross(arm, wrench[:3])), effort))
         return result

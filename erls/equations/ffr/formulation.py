@@ -6,7 +6,6 @@ coordinates follow from time.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,21 +14,21 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, function_in
 from erls.equations.ffr.body_frame import elastic_basis
-from erls.equations.ffr.motion_rows import frame_rows, node_motion
+from erls.equations.ffr.motion_rows import frame_rows
 from erls.equations.ffr.pack import Given, pack_frames
-from erls.equations.ffr.records import BODY_STATE, BodyState, Frames
+from erls.equations.ffr.records import BODY, BODY_STATE, Body, BodyState, Frames
 from erls.equations.ffr.standard_data import StandardData
-from erls.equations.formulation import Energy, Reaction, State
+from erls.equations.formulation import Energy, State
 from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
-from erls.equations.serial.joint_frames import FrameMotion, attached, carried
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.state_series import StateSeries
 from erls.maths.records import python_reader
-from erls.maths.so3 import Array, cross
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.loops import LoopEnd
+from erls.mechanism.loops import loop_ends
 
 _read_serial, _read_frames = python_reader(Serial), python_reader(Frames)
+_read_body = python_reader(Body)
 _read_body_state, _read_joint_state = python_reader(BodyState), python_reader(JointState)
 
 
@@ -63,7 +62,6 @@ class Ffr(SerialFormulation):
         sizes = [link.elastic_modes for link in mechanism.links]
         ends = np.cumsum(sizes)
         self.modes = [slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)]  # within η
-        self._tied: dict[tuple[tuple[int, int], ...], CompiledSystem] = {}
 
     @cached_property
     def given(self) -> Given:
@@ -72,18 +70,18 @@ class Ffr(SerialFormulation):
             StandardData(link.invariants, basis, self.mechanism.effects)
             for link, basis in zip(self.mechanism.links, self.bases, strict=True)
         ]
-        return Given(self.mechanism, self.bases, data, self.body_frame != "tangent", self.stiffened)
+        ends = loop_ends(self.mechanism.loops)
+        return Given(self.mechanism, self.bases, data, self.body_frame != "tangent", self.stiffened, ends)
 
     @cached_property
     def compiled(self) -> CompiledSystem:
         """The equations."""
         return pack_frames(self.given)
 
-    def _complete(self, *nodes: tuple[int, int]) -> CompiledSystem:
-        """The same with complete wrenches, and with the motion of more nodes, given by link and number."""
-        if nodes not in self._tied:
-            self._tied[nodes] = pack_frames(replace(self.given, every_axis=True, others=nodes), self.size)
-        return self._tied[nodes]
+    @cached_property
+    def complete(self) -> CompiledSystem:
+        """The same with complete wrenches."""
+        return pack_frames(replace(self.given, every_axis=True), self.size)
 
     @property
     def reporting(self) -> tuple[str, ...]:
@@ -156,45 +154,26 @@ class Ffr(SerialFormulation):
         places = [frames.body_states + k * BODY_STATE for k in range(self.joints)]
         return [_read_body_state(system.scratch, system.integers, place) for place in places]
 
-    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
-        """Frames on displaced nodes of links, with rows over (θ, η); see `TreeFormulation`."""
-        nodes = [(int(end.link or 0), end.node) for end in ends]
-        system, state = self._complete(*nodes), self.state(t, y, v)
-        system.mass_matrix(
-            system.reals, system.integers, system.scratch, t, contiguous(y), np.empty((self.size, self.size))
-        )
-        residual(system, t, y, v, np.zeros(0))
-        rows, bodies = frame_rows(system, self.joints, self.modes), self._bodies(system)
-        result: list[FrameMotion] = []
-        for number, ((k, _), end) in enumerate(zip(nodes, ends, strict=True)):
-            local = node_motion(system, 2 * self.joints + number, self.joints, self.modes[k], self.elastic)
-            link = FrameMotion(state.poses[k], rows[k], bodies[k].twist, bodies[k].twist_rate)
-            result.append(attached(carried(link, local), end.frame))
-        return result
-
-    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
-        """Joint reactions that give these accelerations."""
-        system, state = self._complete(), self.state(t, y, v)
-        residual(system, t, y, v, a)
+    def borne(self, k: int) -> tuple[Array, Array]:
+        """What a residual left; see `SerialFormulation.borne`."""
+        system = self.complete
         serial = _read_serial(system.reals, system.integers, int(system.integers[0]))
-        result: list[Reaction] = []
-        for k, (link, body) in enumerate(zip(self.mechanism.links, self._bodies(system), strict=True)):
-            place = serial.joint_states + k * JOINT_STATE
-            forces = _read_joint_state(system.scratch, system.integers, place).forces
-            shape, _ = link.model.node_shape(link.inboard.node)
-            node = link.inboard.position + shape @ state.modal[k]
-            turn, wrench = state.poses[k][:3, :3], body.wrench
-            effort = forces[0] if self.mechanism.joints[k].drive.prescribed else forces[1]
-            moment = wrench[3:] - cross(node, wrench[:3])
-            result.append(Reaction(turn @ wrench[:3], turn @ moment, float(effort)))
-        return result
+        place = serial.joint_states + k * JOINT_STATE
+        return self._bodies(system)[k].wrench, _read_joint_state(system.scratch, system.integers, place).forces
 
-    def describe(self) -> dict[str, Any]:
-        """Names and sizes for reports."""
-        return {
-            "formulation": "ffr",
-            "body_frame": self.body_frame,
-            "joints": self.joints,
-            "elastic_coordinates": self.elastic,
-            "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
-        }
+    @property
+    def kind(self) -> dict[str, Any]:
+        """Name of the formulation and of its floating frames."""
+        return {"formulation": "ffr", "body_frame": self.body_frame}
+
+
+def body_moments(system: CompiledSystem, links: int) -> list[tuple[float, Array]]:
+    """Mass and first moment (3,) of every deformed link in its floating frame, after a residual under gravity."""
+    serial = _read_serial(system.reals, system.integers, int(system.integers[0]))
+    frames = _read_frames(system.reals, system.integers, serial.own)
+    result: list[tuple[float, Array]] = []
+    for k in range(links):
+        body = _read_body(system.reals, system.integers, frames.bodies + k * BODY)
+        state = _read_body_state(system.scratch, system.integers, frames.body_states + k * BODY_STATE)
+        result.append((body.mass, state.moment))
+    return result

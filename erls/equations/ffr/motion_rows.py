@@ -1,7 +1,4 @@
-"""Frames on displaced nodes of links, with rows over the rates of all joint and elastic coordinates.
-
-After a mass matrix, whose segments give the rows, and a residual at zero accelerations, which gives the motion.
-"""
+"""Rows of the twists of floating frames over the rates of all joint and elastic coordinates, after a mass matrix."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.ffr import records
-from erls.equations.serial.joint_frames import FrameMotion
 from erls.equations.serial.records import Modes, Serial
 from erls.equations.serial.segments import SEGMENT, Segment
 from erls.maths.records import python_reader
@@ -17,7 +13,6 @@ from erls.maths.so3 import Array
 
 read_serial, read_modes, read_segment = python_reader(Serial), python_reader(Modes), python_reader(Segment)
 read_frames, read_body_state = python_reader(records.Frames), python_reader(records.BodyState)
-read_node, read_node_state = python_reader(records.Node), python_reader(records.NodeState)
 
 
 def frame_rows(system: CompiledSystem, joints: int, modes: list[slice]) -> list[Array]:
@@ -49,18 +44,3 @@ def frame_rows(system: CompiledSystem, joints: int, modes: list[slice]) -> list[
         moved[:, joints + at.start : joints + at.stop] += state.carried
         result.append(moved)
     return result
-
-
-def node_motion(system: CompiledSystem, number: int, joints: int, at: slice, elastic: int) -> FrameMotion:
-    """Motion of a node in its floating frame; its link's elastic coordinates stand ``at`` these within η."""
-    serial = read_serial(system.reals, system.integers, int(system.integers[0]))
-    frames = read_frames(system.reals, system.integers, serial.own)
-    state = read_node_state(system.scratch, system.integers, frames.node_states + number * records.NODE_STATE)
-    node = read_node(system.reals, system.integers, frames.nodes + number * records.NODE)
-    pose, rows = np.eye(4), np.zeros((6, joints + elastic))
-    if not node.moves:
-        pose[:3, 3] = node.position
-        return FrameMotion(pose, rows, np.zeros(6), np.zeros(6))
-    pose[:3, :3], pose[:3, 3] = state.pose[:9].reshape(3, 3), state.pose[9:]
-    rows[:, joints + at.start : joints + at.stop] = state.moves
-    return FrameMotion(pose, rows, state.twist.copy(), state.twist_rate.copy())

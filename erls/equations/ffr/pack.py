@@ -8,11 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from erls.equations.compiled_system import CompiledSystem, Factoring, acceleration_in
+from erls.equations.compiled_system import CompiledSystem, Factoring, acceleration_in, function_in
 from erls.equations.ffr.mass import mass_matrix
 from erls.equations.ffr.records import (
     BentBody,
     Body,
+    End,
+    EndRoom,
     Frames,
     Node,
     Room,
@@ -34,6 +36,7 @@ from erls.maths.se3 import pose, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import node_shape6
+from erls.mechanism.loops import LoopEnd
 from fe_import.model import InterfaceNode
 
 DENSE = 60  # coordinates up to which dense factors cost less than elimination link by link
@@ -54,10 +57,10 @@ class Given:
         Whether inboard nodes move in the floating frames.
     stiffened : bool
         Whether links have second-order displacements.
+    ends : list of (link, LoopEnd)
+        Frames that loops hold, or whatever else ties links.
     every_axis : bool
         Count all moments on frames that turn about one axis only, which no joint feels.
-    others : tuple of (link, node)
-        Nodes beside the interfaces whose motion is asked for.
     """
 
     mechanism: Mechanism
@@ -65,8 +68,8 @@ class Given:
     data: list[StandardData]
     floats: bool
     stiffened: bool
+    ends: list[tuple[int, LoopEnd]]
     every_axis: bool = False
-    others: tuple[tuple[int, int], ...] = ()
 
     @property
     def parents(self) -> list[int]:
@@ -88,6 +91,12 @@ def node_record(given: Given, k: int, node: int) -> Node:
         assert link.second_order is not None
         second = (basis.T @ link.second_order.node(node) @ basis).transpose(2, 0, 1).reshape(e, 6 * e)
     return Node(k, int(e > 0), link.model.nodes[node], shapes, second)
+
+
+def _end(node: Node, number: int, end: LoopEnd) -> End:
+    """A frame that a loop holds; a node that rests in its floating frame has its place within the offset."""
+    offset = end.frame if node.moves else pose(position=node.position) @ end.frame
+    return End(node.link, number, pack.pose_numbers(offset))
 
 
 _RESTING = Node(-1, 0, np.zeros(3), np.zeros((6, 0)), np.zeros((0, 0)))
@@ -235,7 +244,8 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
     modes = [pack.modes_record(int(firsts[k]), given.data[k].elastic, mechanism.links[k], decoupled[k]) for k in links]
     rigid_links, rigid_states = pack.rigid_links(mechanism, constants, working)
     pairs = [node for found in nodes for node in (found.base, found.inner)]
-    pairs += [node_record(given, k, node) for k, node in given.others]
+    ends, own_nodes = given.ends, len(pairs)
+    pairs += [node_record(given, k, end.node) for k, end in ends]
     sizes = _sizes(given, bodies, nodes)
     none = _Sizes(0, 0, 0)
     segments = []
@@ -243,22 +253,27 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         before = sizes[parents[k]] if parents[k] >= 0 else none
         six = 6 if parents[k] >= 0 else 0
         segments.append(segment(parents[k], 6, sizes[k].modes, six, before.modes, sizes[k].ports, sizes[k].extra))
-    condensed_at = _put(factors, condensed(segments) if linked else [])
+    condensed_at = pack.put_all(factors, condensed(segments) if linked else [])
     room = Room(np.zeros((size, size)), np.zeros(0))
     if linked:
         room = Room(np.zeros((0, 0)), np.zeros(len(factors.numbers)))
     frames = Frames(
-        bodies=_put(constants, bodies),
-        body_states=_put(working, [body_state(sizes[k].modes, len(bodies[k].axes)) for k in links]),
-        nodes=_put(constants, pairs),
-        node_states=_put(working, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in pairs]),
-        node_count=len(pairs),
-        bent_bodies=_put(constants, [_bent_body(given, k) for k in links]),
-        bent_states=_put(
+        bodies=pack.put_all(constants, bodies),
+        body_states=pack.put_all(working, [body_state(sizes[k].modes, len(bodies[k].axes)) for k in links]),
+        nodes=pack.put_all(constants, pairs),
+        node_states=pack.put_all(working, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in pairs]),
+        node_count=own_nodes,
+        end_count=len(ends),
+        ends=pack.put_all(
+            constants, [_end(pairs[own_nodes + i], own_nodes + i, end) for i, (_, end) in enumerate(ends)]
+        ),
+        end_room=working.put(EndRoom(np.zeros(12), np.zeros(6), np.zeros(6))),
+        bent_bodies=pack.put_all(constants, [_bent_body(given, k) for k in links]),
+        bent_states=pack.put_all(
             working, [bent_state(sizes[k].modes if b.bent else 0, bool(b.warped)) for k, b in enumerate(bodies)]
         ),
-        segments=_put(working, segments),
-        decoupled=_put(working, segments if linked else []),
+        segments=pack.put_all(working, segments),
+        decoupled=pack.put_all(working, segments if linked else []),
         condensed=condensed_at,
         room=working.put(room),
         free=free,
@@ -269,9 +284,9 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
     integers[0] = constants.put(
         Serial(
             links=len(mechanism.links),
-            joints=_put(constants, joints),
+            joints=pack.put_all(constants, joints),
             joint_states=pack.joint_states(working, len(joints)),
-            modes=_put(constants, modes),
+            modes=pack.put_all(constants, modes),
             feeds=int(rigid_links >= 0),
             rigid_links=rigid_links,
             rigid_states=rigid_states,
@@ -301,10 +316,5 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         stiffness_and_damping=stiffness_and_damping,
         load_acceleration=acceleration_in(accelerate),
         factoring=factoring,
+        load_frames=function_in("erls.equations.ffr.ends", "frames"),
     )
-
-
-def _put(memory: Memory, records: Sequence[NamedTuple]) -> int:
-    """Place of the first of records of one kind."""
-    places = [memory.put(record) for record in records]
-    return places[0] if places else 0

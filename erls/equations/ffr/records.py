@@ -24,8 +24,11 @@ class Frames(NamedTuple):
     Attributes
     ----------
     bodies, body_states, nodes, node_states : int
-        Places of the first ones; of nodes two for each link, then any others that are asked for.
+        Places of the first ones; of nodes two for each link, then those that loops hold.
     node_count : int
+        Without those that loops hold.
+    end_count, ends, end_room : int
+        Frames that loops hold, the place of the first `End`, and of the `EndRoom`.
     bent_bodies, bent_states : int
         Places of the first ones; empty records of links without second-order displacements.
     segments, decoupled, condensed : int
@@ -41,6 +44,9 @@ class Frames(NamedTuple):
     nodes: int
     node_states: int
     node_count: int
+    end_count: int
+    ends: int
+    end_room: int
     bent_bodies: int
     bent_states: int
     segments: int
@@ -317,6 +323,22 @@ def node_state(e: int, bent: bool) -> NodeState:
     return NodeState(rest, rest, three, three, np.eye(3), three, six, six, rows, slope, slope, rows)
 
 
+class End(NamedTuple):
+    """A frame that a loop holds on a link, at ``offset`` (12,) from its node, whose number is ``node``."""
+
+    link: int
+    node: int
+    offset: Vector
+
+
+class EndRoom(NamedTuple):
+    """Working memory for these frames: a pose (12,), a force (6,) and a spare (6,)."""
+
+    pose: Vector
+    force: Vector
+    spare: Vector
+
+
 class Room(NamedTuple):
     """Memory for accelerations: a matrix (n, n) for dense factors, or numbers (f,) for factors link by link."""
 
@@ -326,6 +348,6 @@ class Room(NamedTuple):
 
 read_frames, read_body, read_bent_body, read_node = reader(Frames), reader(Body), reader(BentBody), reader(Node)
 read_body_state, read_bent_state, read_node_state = reader(BodyState), reader(BentState), reader(NodeState)
-read_room = reader(Room)
-BODY, BENT_BODY, NODE = table_size(Body), table_size(BentBody), table_size(Node)
+read_room, read_end, read_end_room = reader(Room), reader(End), reader(EndRoom)
+BODY, BENT_BODY, NODE, END = table_size(Body), table_size(BentBody), table_size(Node), table_size(End)
 BODY_STATE, BENT_STATE, NODE_STATE = table_size(BodyState), table_size(BentState), table_size(NodeState)

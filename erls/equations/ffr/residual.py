@@ -5,6 +5,8 @@ Recursive Newton-Euler; what it leaves in the records (poses, twists, wrenches, 
 
 from __future__ import annotations
 
+from typing import Any
+
 from erls.equations import compiled_system as contract
 from erls.equations.ffr.inertia import link_forces
 from erls.equations.ffr.motion import move_frames
@@ -16,6 +18,7 @@ from erls.equations.ffr.records import (
     BODY_STATE,
     NODE,
     NODE_STATE,
+    Frames,
     read_bent_body,
     read_bent_state,
     read_body,
@@ -30,6 +33,7 @@ from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
     MODES,
+    Serial,
     read_joint,
     read_joint_state,
     read_modes,
@@ -43,12 +47,55 @@ from fe_import.model import IntArray
 
 
 @part
-def _pull_node(
+def pull_node(
     rows: Array, pose: Array, tangent: Array, wrench: Array, factor: float, spare: Array, forces: Array
 ) -> None:
     """Add to the forces on η the factor times what a wrench on a node, in its axes, does there."""
     from_node_axes(pose, tangent, wrench, spare)
     add_columns(rows, spare, factor, forces)
+
+
+@part
+def pass_joint(
+    serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, k: int, forces: Array
+) -> Any:
+    """Force along a joint by the wrench on a link's floating frame, which goes to the frame behind the joint.
+
+    What it does on the way to the link's elastic coordinates is added to ``forces`` on all coordinates.
+    """
+    state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
+    inner = read_node(reals, integers, frames.nodes + (2 * k + 1) * NODE)
+    borne = state.borne
+    for i in range(6):
+        borne[i] = state.wrench[i]
+    if inner.moves:
+        moved = read_node_state(scratch, integers, frames.node_states + (2 * k + 1) * NODE_STATE)
+        modes = read_modes(reals, integers, serial.modes + k * MODES)
+        pulled = forces[modes.first : modes.first + len(modes.stiffness)]
+        transform_force_back(moved.back, borne, borne)
+        pull_node(moved.rows, moved.pose, moved.tangent, borne, -1.0, state.spare[:6], pulled)
+    return dot6(read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).screw, borne)
+
+
+@part
+def hand_back(
+    serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, k: int, parent: int, forces: Array
+) -> None:
+    """The wrench on the frame behind a joint goes on to the floating frame of the parent, after `pass_joint`."""
+    state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
+    before = read_body_state(scratch, integers, frames.body_states + parent * BODY_STATE)
+    base = read_node(reals, integers, frames.nodes + 2 * k * NODE)
+    passed = state.spare[6:]
+    pose = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose
+    transform_force_back(pose, state.borne, passed)
+    if base.moves:
+        moved = read_node_state(scratch, integers, frames.node_states + 2 * k * NODE_STATE)
+        modes = read_modes(reals, integers, serial.modes + parent * MODES)
+        pulled = forces[modes.first : modes.first + len(modes.stiffness)]
+        pull_node(moved.rows, moved.pose, moved.tangent, passed, 1.0, state.spare[:6], pulled)
+        transform_force_back(moved.pose, passed, passed)
+    for i in range(6):
+        before.wrench[i] += passed[i]
 
 
 @kernel(contract.RESIDUAL, counted=False)
@@ -73,37 +120,16 @@ def residual(
         q, rates, accelerations = y[first:last], v[first:last], a[first:last] if len(a) > 0 else a
         link_forces(frames, body, bent, modes, state, bending, q, rates, accelerations, out[first:last])
     for k in range(serial.links - 1, -1, -1):
-        body = read_body(reals, integers, frames.bodies + k * BODY)
-        state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         moved = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
-        base = read_node(reals, integers, frames.nodes + 2 * k * NODE)
-        base_state = read_node_state(scratch, integers, frames.node_states + 2 * k * NODE_STATE)
-        inner = read_node(reals, integers, frames.nodes + (2 * k + 1) * NODE)
-        inner_state = read_node_state(scratch, integers, frames.node_states + (2 * k + 1) * NODE_STATE)
-        borne, spare = state.borne, state.spare[:6]
-        for i in range(6):
-            borne[i] = state.wrench[i]
-        if inner.moves:
-            modes = read_modes(reals, integers, serial.modes + k * MODES)
-            pulled = out[modes.first : modes.first + len(modes.stiffness)]
-            transform_force_back(inner_state.back, borne, borne)
-            _pull_node(inner_state.rows, inner_state.pose, inner_state.tangent, borne, -1.0, spare, pulled)
         turning, forces = moved.coordinate, moved.forces
         forces[1] = 0.0
         if joint.acts:
             forces[1] = effort(joint, reals, integers, t, turning[0], turning[1], moved.feed[0])
-        forces[0] = dot6(moved.screw, borne) + joint.rotor * turning[2] - forces[1]
+        along = pass_joint(serial, frames, reals, integers, scratch, k, out)
+        forces[0] = along + joint.rotor * turning[2] - forces[1]
         if joint.place >= 0:
             out[joint.place] = forces[0]
-        if body.parent >= 0:
-            before = read_body_state(scratch, integers, frames.body_states + body.parent * BODY_STATE)
-            passed = state.spare[6:]
-            transform_force_back(moved.pose, borne, passed)
-            if base.moves:
-                modes = read_modes(reals, integers, serial.modes + body.parent * MODES)
-                pulled = out[modes.first : modes.first + len(modes.stiffness)]
-                _pull_node(base_state.rows, base_state.pose, base_state.tangent, passed, 1.0, spare, pulled)
-                transform_force_back(base_state.pose, passed, passed)
-            for i in range(6):
-                before.wrench[i] += passed[i]
+        parent = read_body(reals, integers, frames.bodies + k * BODY).parent
+        if parent >= 0:
+            hand_back(serial, frames, reals, integers, scratch, k, parent, out)

@@ -174,6 +174,15 @@ def _weights(
             add_columns(bending.warp, bent.per_modal[i], 1.0, partner)
 
 
+@spliced
+def free_segment(body: Body, bent: BentBody, bending: BentState, state: BodyState, own: Segment) -> None:
+    """I, B, E and F over the twist of the floating frame itself."""
+    for i in range(6):
+        for j in range(6):
+            state.arrival[i, j] = 1.0 if i == j else 0.0
+    _weights(body, bent, bending, state, own, 0)
+
+
 @part
 def _combine(rows: Array, vectors: Array, out: Array) -> None:
     """Rows over elastic coordinates become rows over decoupled ones."""

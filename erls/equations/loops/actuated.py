@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
+from erls.equations.loops.closure import fed
 from erls.equations.loops.records import (
     CLOSING_JOINT,
     COORDINATE,
@@ -13,6 +14,7 @@ from erls.equations.loops.records import (
     TURNING,
     call_closure,
     call_mass_matrix,
+    call_masses,
     call_residual,
     call_stiffness_and_damping,
     read_closing_joint,
@@ -36,7 +38,7 @@ def forces(
     call_residual(loops.residual, reals, integers, scratch, t, y, v, a, out)
     if not loops.active:
         return
-    n = len(y)
+    n = len(v)
     for number in range(loops.loops):
         joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
         if joint.joint >= 0:
@@ -69,7 +71,7 @@ def masses(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array,
         joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
         if joint.joint >= 0:
             moves = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE).moves
-            add_outer(moves[joint.along, : len(y)], read_joint(reals, integers, joint.joint).rotor, out)
+            add_outer(moves[joint.along, : len(out)], read_joint(reals, integers, joint.joint).rotor, out)
 
 
 @kernel(contract.STIFFNESS_AND_DAMPING, counted=False)
@@ -78,7 +80,7 @@ def matrices(
 ) -> None:
     """M into the room, stiffness and damping of the tree, with what acts along closing joints."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, read_loop_room(scratch, integers, loops.room).mass)
+    call_masses(loops.masses, reals, integers, scratch, t, y, read_loop_room(scratch, integers, loops.room).mass)
     call_stiffness_and_damping(loops.stiffness_and_damping, reals, integers, scratch, t, y, v, k, c)
     if not loops.active:
         return
@@ -86,8 +88,9 @@ def matrices(
         joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
         if joint.joint >= 0:
             state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
-            row, found = state.moves[joint.along, : len(y)], state.effort
+            row, found = state.moves[joint.along, : len(v)], state.effort
             acting = read_joint(reals, integers, joint.joint)
-            stiffness, damping = gains(acting, reals, integers, t, found[COORDINATE], found[RATE], 0.0 * found[RATE])
+            feed = fed(scratch, integers, joint, found[RATE])
+            stiffness, damping = gains(acting, reals, integers, t, found[COORDINATE], found[RATE], feed)
             add_outer(row, stiffness, k)
             add_outer(row, damping, c)

@@ -15,7 +15,6 @@ from erls.equations.loops.records import (
     PUSH,
     RATE,
     TURNING,
-    WANTED,
     ClosingJoint,
     LoopRoom,
     Loops,
@@ -26,8 +25,8 @@ from erls.equations.loops.records import (
     read_loop_state,
     read_loops,
 )
-from erls.equations.serial.joints import effort, wanted
-from erls.equations.serial.records import read_joint
+from erls.equations.serial.joints import effort
+from erls.equations.serial.records import read_joint, read_joint_state
 from erls.equations.serial.time_curves import curve
 from erls.maths.coefficients import angle_of
 from erls.maths.jit import kernel, part, spliced
@@ -149,10 +148,19 @@ def pull_back(force: Array, moves: Array, out: Array) -> None:
                 out[j] += weight * row[j]
 
 
+@part
+def fed(scratch: Array, integers: IntArray, joint: ClosingJoint, like: Any) -> Any:
+    """Feed-forward along a closing joint."""
+    if joint.feeding < 0:
+        return 0.0 * like
+    return 0.0 * like + read_joint_state(scratch, integers, joint.feeding).feed[0]
+
+
 @spliced
 def _act(
-    loops: Loops, reals: Array, integers: IntArray, joint: ClosingJoint, t: float, y: Array, state: LoopState
-) -> None:
+    loops: Loops, reals: Array, integers: IntArray, scratch: Array, joint: ClosingJoint, t: float, y: Array,
+    state: LoopState,
+) -> None:  # fmt: skip
     """Coordinate of a closing joint, and what acts along it."""
     pose, found = state.pose, state.effort
     value = pose[11]
@@ -168,11 +176,11 @@ def _act(
         value = angle + 2 * np.pi * np.floor((turned - angle).real / (2 * np.pi) + 0.5)
     found[COORDINATE], found[RATE] = joint.zero + value, state.twist[joint.along]
     found[TURNING] = state.twist_rate[joint.along]
-    found[PUSH] = found[WANTED] = 0.0
+    found[PUSH] = 0.0
     if joint.joint >= 0:
         forces = read_joint(reals, integers, joint.joint)
-        found[PUSH] = effort(forces, reals, integers, t, found[COORDINATE], found[RATE], 0.0 * value)
-        found[WANTED] = wanted(forces, reals, integers, t, found[COORDINATE], found[RATE], 0.0 * value)
+        feed = fed(scratch, integers, joint, value)
+        found[PUSH] = effort(forces, reals, integers, t, found[COORDINATE], found[RATE], feed)
 
 
 @spliced
@@ -191,7 +199,7 @@ def _close(
         if loops.used[at] >= 0:
             pull_back(gradient, state.moves, room.gradient[loops.used[at]])
     if joint.along >= 0:
-        _act(loops, reals, integers, joint, t, y, state)
+        _act(loops, reals, integers, scratch, joint, t, y, state)
 
 
 @kernel(CLOSURE, counted=False)

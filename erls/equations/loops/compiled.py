@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,16 +13,107 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.loops import actuated, nearest, system
 from erls.equations.loops import records as own
 from erls.equations.loops.closure import closure
-from erls.equations.serial.joint_frames import Conditions
+from erls.equations.loops.rows import Closure, Effort, LoopRows
 from erls.equations.serial.pack import force_record, pose_numbers, put_all
 from erls.equations.serial.time_curves import put_curve
 from erls.maths.calls import address_of
-from erls.maths.records import Memory
+from erls.maths.records import Memory, python_reader
+from erls.maths.se3 import pose
 from erls.maths.so3 import Array
+from erls.mechanism.curves import Curve
 from erls.mechanism.loops import Loop, loop_ends
+from fe_import.model import IntArray
 
-if TYPE_CHECKING:
-    from erls.equations.loops.closed_chain import ClosedChain
+_see_room, _see_state = python_reader(own.LoopRoom), python_reader(own.LoopState)
+
+
+class Carrier(Protocol):
+    """What carries the frames that loops hold: a tree of links, or links that float freely.
+
+    Attributes
+    ----------
+    size, joints : int
+        Numbers of velocities, and of joints, among which ``free_joints`` are not prescribed.
+    free : int array
+        Places of the velocities among the rates of (θ, elastic).
+    """
+
+    joints: int
+    free: IntArray
+    free_joints: IntArray
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def compiled(self) -> CompiledSystem | None: ...
+
+
+class Turns(NamedTuple):
+    """How often closing joints have turned: c coordinates of which the turns of l joints are sums.
+
+    Attributes
+    ----------
+    signs : (l, c) array
+        By which they add.
+    start : (l,) array
+        Sums where closing joints have not turned.
+    places : (c,) int array
+        Of the coordinates in y, -1 where ``motions`` prescribe them.
+    motions : list of Curve or None
+    """
+
+    signs: Array
+    start: Array
+    places: IntArray
+    motions: list[Curve | None]
+
+
+@dataclass(frozen=True)
+class Given:
+    """What is packed.
+
+    Attributes
+    ----------
+    tree : Carrier
+    rows : LoopRows
+    kept : (r,) int array
+        Rows in use.
+    metres : (n,) array
+        Per unit of each coordinate.
+    row_metres : (m,) array
+        Per unit of each condition.
+    reach : float
+        Size of the mechanism [m].
+    decay : float
+        Of what conditions are violated by [1/s].
+    open : float
+        What a loop that has come apart is open by [m].
+    turns : Turns
+    feeding : tuple of int
+        Places of the `erls.equations.serial.records.JointState` whose feed-forward acts in each closing joint, where
+        any does.
+    """
+
+    tree: Carrier
+    rows: LoopRows
+    kept: IntArray
+    metres: Array
+    row_metres: Array
+    reach: float
+    decay: float
+    open: float
+    turns: Turns
+    feeding: tuple[int, ...] = ()
+
+    @property
+    def active(self) -> bool:
+        """Whether any force that is no reaction, or rotor, acts along a closing joint."""
+        return any(loop.freedom is not None and loop.freedom.active for loop in self.rows.loops)
+
+
+def _numbers(y: Array) -> Array:
+    return np.ascontiguousarray(y, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -30,59 +122,138 @@ class CompiledLoops(CompiledSystem):
 
     Attributes
     ----------
-    conditions, kept : int
-        Of its loops, and how many of them are in use.
+    given : Given
     """
 
-    conditions: int
-    kept: int
+    given: Given
+
+    @property
+    def called(self) -> dict[Any, Any]:
+        """What is called by address, by what calls it: for `erls.maths.jit.any_scalar`."""
+        tree = self.given.tree.compiled
+        assert tree is not None
+        return {
+            own.call_frames: tree.frames,
+            own.call_residual: tree.residual,
+            own.call_mass_matrix: tree.mass_matrix,
+            own.call_stiffness_and_damping: tree.stiffness_and_damping,
+            own.call_closure: closure,
+            own.call_forces: actuated.forces,
+            own.call_masses: actuated.masses,
+            own.call_matrices: actuated.matrices,
+        }
+
+    @property
+    def conditions(self) -> int:
+        """How many conditions there are."""
+        return len(self.given.rows.names)
+
+    @property
+    def kept(self) -> int:
+        """How many of them are in use."""
+        return len(self.given.kept)
+
+    @cached_property
+    def _places(self) -> own.Loops:
+        return own.see_loops(self.reals, self.integers, int(self.integers[-1]))
+
+    @property
+    def _arrays(self) -> tuple[Array, IntArray, Array]:
+        return self.reals, self.integers, self.scratch
+
+    @property
+    def room(self) -> own.LoopRoom:
+        """What the last evaluation left."""
+        return _see_room(self.scratch, self.integers, self._places.room)
+
+    def closure(self, t: float, y: Array, v: Array) -> Closure:
+        """Conditions of the loops, and what acts along them, at a state."""
+        closure(*self._arrays, t, _numbers(y), _numbers(v))
+        tree, room = self.given.tree, self.room
+        prescribed = np.setdiff1d(np.arange(tree.joints), tree.free_joints)
+        order = np.argsort([*tree.free, *prescribed])  # columns of (θ, elastic)
+        placed = iter(room.frames)
+        states = [
+            _see_state(self.scratch, self.integers, self._places.states + k * own.LOOP_STATE)
+            for k in range(len(self.given.rows.loops))
+        ]
+        outer: list[Array] = []
+        for loop in self.given.rows.loops:
+            found = loop.outer.frame
+            if loop.outer.link is not None:
+                numbers = next(placed)
+                found = pose(numbers[:9].reshape(3, 3), numbers[9:12])
+            if loop.inner.link is not None:
+                next(placed)
+            outer.append(found)
+        moves = [state.moves[:, order] for state in states]
+        gradients = [state.gradients.copy() for state in states]
+        return Closure(
+            room.violation.copy(),
+            room.rate.copy(),
+            room.bias.copy(),
+            np.concatenate([gradient @ move for gradient, move in zip(gradients, moves, strict=True)]),
+            gradients,
+            outer,
+            moves,
+            [state.left[:9].reshape(3, 3).copy() for state in states],
+            [Effort(*state.effort.tolist()) for state in states],
+        )
 
     def closed(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
         """The nearest state, in metres, that closes the loops; the same one where there is none nearby."""
         place, rate = np.array(y, dtype=float), np.array(v, dtype=float)
-        if nearest.close(self.reals, self.integers, self.scratch, t, place, rate):
+        if nearest.close(*self._arrays, t, place, rate):
             return y, v
         return place, rate
+
+    def forces(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        """(n,) M a - f of the tree, with what acts along closing joints."""
+        out = np.empty(self.size)
+        actuated.forces(*self._arrays, t, _numbers(y), _numbers(v), _numbers(a), out)
+        return out
+
+    def masses(self, t: float, y: Array) -> Array:
+        """(n, n) mass matrix of the tree, with rotors in closing joints."""
+        out = np.empty((self.size, self.size))
+        self.mass_matrix(*self._arrays, t, _numbers(y), out)
+        return out
+
+    def matrices(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """(n, n) stiffness and damping of the tree, with what acts along closing joints."""
+        both = np.empty((2, self.size, self.size))
+        closure(*self._arrays, t, _numbers(y), _numbers(v))
+        actuated.matrices(*self._arrays, t, _numbers(y), _numbers(v), both[0], both[1])
+        return both[0], both[1]
 
     def watched(self, times: Array, places: Array) -> tuple[Array, Array]:
         """At each of ``places`` (k, n) the largest opening [m] and the smallest singular value of the conditions."""
         gaps, squares = np.empty(len(times)), np.empty((len(times), self.kept, self.kept))
         states = times, np.ascontiguousarray(places)
-        nearest.watch(self.reals, self.integers, self.scratch, *states, gaps, squares)
+        nearest.watch(*self._arrays, *states, gaps, squares)
         if not self.kept:
             return gaps, np.ones(len(times))
         return gaps, np.sqrt(np.maximum(np.linalg.eigvalsh(squares)[:, 0], 0.0))
 
 
-def compile_loops(closed: ClosedChain, tree: CompiledSystem, numbers: tuple[float, float]) -> CompiledLoops:
-    """The compiled form of a closed chain.
-
-    Parameters
-    ----------
-    closed : ClosedChain
-    tree : CompiledSystem
-        Its tree, without what acts in closing joints.
-    numbers : tuple of float
-        Decay of violations [1/s]; what a loop that has come apart is open by [m].
-    """
-    mechanism, free = closed.mechanism, closed.bare.free_joints.tolist()
-    loops, joints = mechanism.loops, mechanism.joints
-    n, m, r = tree.size, len(closed.rows.names), len(closed.kept)
-    columns, ends = n + len(joints) - len(free), loop_ends(loops)
+def compile_loops(given: Given) -> CompiledLoops:
+    """The compiled form of a closed chain."""
+    carrier, rows, loops, tree = given.tree, given.rows, given.rows.loops, given.tree.compiled
+    assert tree is not None
+    n, m, r = tree.size, len(rows.names), len(given.kept)
+    columns, ends = n + carrier.joints - len(carrier.free_joints), loop_ends(loops)
     integers = [int(i) for i in tree.integers]
     constants, scratch = Memory(integers, tree.reals), Memory(integers, tree.scratch)
     used = np.full(m, -1)
-    used[closed.kept] = np.arange(r)
+    used[given.kept] = np.arange(r)
     whole = own.Loops(
         loops=len(loops),
         conditions=m,
         kept=r,
-        active=int(closed.efforts.any),
+        active=int(given.active),
         rotors=int(any(loop.freedom is not None and loop.freedom.rotor_inertia for loop in loops)),
-        first=put_all(constants, [_joint(constants, closed, k, loop) for k, loop in enumerate(loops)]),
-        states=put_all(
-            scratch, [own.loop_state(columns, int(np.count_nonzero(closed.rows.owner == k))) for k in range(len(loops))]
-        ),
+        first=put_all(constants, [_joint(constants, given, k, loop) for k, loop in enumerate(loops)]),
+        states=put_all(scratch, [own.loop_state(columns, len(found)) for found in rows.conditions]),
         room=scratch.put(own.room(len(ends), columns, n, m, r)),
         frames=address_of(tree.frames, contract.FRAMES),
         residual=address_of(tree.residual, contract.RESIDUAL),
@@ -92,16 +263,14 @@ def compile_loops(closed: ClosedChain, tree: CompiledSystem, numbers: tuple[floa
         forces=address_of(actuated.forces, contract.RESIDUAL),
         masses=address_of(actuated.masses, contract.MASS_MATRIX),
         matrices=address_of(actuated.matrices, contract.STIFFNESS_AND_DAMPING),
-        reach=closed.reach,
-        decay=numbers[0],
-        open=numbers[1],
-        metres=closed.metres,
-        scales=closed.row_metres,
+        reach=given.reach,
+        decay=given.decay,
+        open=given.open,
+        metres=given.metres,
+        scales=given.row_metres,
         used=used,
-        joints=np.array([free.index(k) if k in free else -1 for k in range(len(joints))]),
-        motions=np.array(
-            [-1 if k in free else put_curve(constants, joint.drive.motion) for k, joint in enumerate(joints)]
-        ),
+        joints=given.turns.places,
+        motions=np.array([put_curve(constants, motion) for motion in given.turns.motions], dtype=np.int64),
     )
     integers.append(constants.put(whole))
     return CompiledLoops(
@@ -113,34 +282,34 @@ def compile_loops(closed: ClosedChain, tree: CompiledSystem, numbers: tuple[floa
         mass_matrix=system.mass_matrix,
         stiffness_and_damping=system.stiffness_and_damping,
         load_acceleration=lambda: system.acceleration,
-        conditions=m,
-        kept=r,
+        given=given,
     )
 
 
-def _joint(memory: Memory, closed: ClosedChain, number: int, loop: Loop) -> own.ClosingJoint:
+def _joint(memory: Memory, given: Given, number: int, loop: Loop) -> own.ClosingJoint:
     """Record of a loop, whose curves and forces are put into memory."""
     ends = loop.outer, loop.inner
-    before = len(loop_ends(closed.mechanism.loops[:number]))
+    before = len(loop_ends(given.rows.loops[:number]))
     second = before + int(loop.outer.link is not None)
     places = [-1 if end.link is None else place for end, place in zip(ends, (before, second), strict=True)]
-    signs, free = closed.efforts.signs[number], loop.freedom
-    found = Conditions(closed.rows.kinds[number])
-    joint = -1
+    free, found, joint = loop.freedom, given.rows.conditions[number], -1
+    feeding = given.feeding[number] if given.feeding else -1
     if free is not None and free.active:
         motion = None if loop.prescribed else free.drive.motion
-        joint = memory.put(force_record(memory, free.forces, free.drive, free.rotor_inertia, motion))
+        record = force_record(memory, free.forces, free.drive, free.rotor_inertia, motion)
+        joint = memory.put(record._replace(feeds=int(feeding >= 0)))
     return own.ClosingJoint(
         outer=places[0],
         inner=places[1],
-        first=int(np.flatnonzero(closed.rows.owner == number)[0]),
+        first=int(np.flatnonzero(given.rows.owner == number)[0]),
         motion=-1 if free is None or not loop.prescribed else put_curve(memory, free.drive.motion),
         along=-1 if free is None else free.freedom.row,
         joint=joint,
         zero=0.0 if free is None else free.zero,
-        turned=float(signs @ closed.efforts.start),
-        signs=signs,
+        feeding=feeding,
+        turned=float(given.turns.start[number]),
+        signs=given.turns.signs[number],
         ground=np.stack([pose_numbers(end.frame) for end in ends]),
-        lines=found.lines,
-        entries=found.entries,
+        lines=np.array([row.line for row in found]),
+        entries=np.array([row.entries for row in found]),
     )

@@ -23,11 +23,14 @@ if ENABLED:
 
     CLOSURE = _t.void(contract.REALS, contract.INTEGERS, contract.REALS, _t.float64, contract.REALS, contract.REALS)
 
+# one for each function, so that they can be exchanged one by one (`erls.maths.jit.any_scalar`)
 call_closure, call_frames = caller(CLOSURE), caller(contract.FRAMES)
-call_residual, call_mass_matrix = caller(contract.RESIDUAL), caller(contract.MASS_MATRIX)
+call_residual, call_forces = caller(contract.RESIDUAL), caller(contract.RESIDUAL)
+call_mass_matrix, call_masses = caller(contract.MASS_MATRIX), caller(contract.MASS_MATRIX)
 call_stiffness_and_damping = caller(contract.STIFFNESS_AND_DAMPING)
+call_matrices = caller(contract.STIFFNESS_AND_DAMPING)
 
-COORDINATE, RATE, TURNING, PUSH, WANTED = range(5)  # of `LoopState.effort`
+COORDINATE, RATE, TURNING, PUSH = range(4)  # of `LoopState.effort`
 
 
 class Loops(NamedTuple):
@@ -54,8 +57,9 @@ class Loops(NamedTuple):
         Metres per unit of each condition.
     used : (m,) int array
         Number of each condition among those in use, -1 when left out.
-    joints, motions : (joints,) int arrays
-        Place of each joint's coordinate in y, -1 where it is prescribed: then place of its curve.
+    joints, motions : (c,) int arrays
+        Places in y of the coordinates that tell how often closing joints have turned, -1 where one is prescribed: then
+        place of its curve.
     """
 
     loops: int
@@ -99,12 +103,14 @@ class ClosingJoint(NamedTuple):
         Component of the twist that the coordinate moves, -1 without.
     joint : int
         Place of the `erls.equations.serial.records.Joint` whose forces act along it, -1 without.
+    feeding : int
+        Place of the `erls.equations.serial.records.JointState` whose feed-forward acts as well, -1 without.
     zero : float
         Coordinate where the frames coincide.
     turned : float
         Σ signs · joint coordinates at the start.
-    signs : (joints,) array
-        By which joints' turns add to its own.
+    signs : (c,) array
+        By which these add to its own turns.
     ground : (2, 12) array
         Poses of the outer and the inner frame where they stand on the ground.
     lines, entries : (c, 3), (c, 3, 3) arrays
@@ -118,6 +124,7 @@ class ClosingJoint(NamedTuple):
     motion: int
     along: int
     joint: int
+    feeding: int
     zero: float
     turned: float
     signs: Vector
@@ -139,8 +146,8 @@ class LoopState(NamedTuple):
         Twist over velocities.
     gradients : (c, 6) array
         Of conditions over the twist.
-    effort : (5,) array
-        Coordinate, rate, its derivative at zero accelerations, force along it, what its drive asks for.
+    effort : (4,) array
+        Coordinate, rate, its derivative at zero accelerations, force along it.
     spare : (6,) array
     """
 
@@ -201,7 +208,7 @@ def loop_state(columns: int, conditions: int) -> LoopState:
     pose, left = np.zeros(12), np.zeros(12)
     six = [np.zeros(6) for _ in range(5)]
     moves, gradients = np.zeros((6, columns)), np.zeros((conditions, 6))
-    return LoopState(pose, six[0], six[1], left, six[2], six[3], moves, gradients, np.zeros(5), six[4])
+    return LoopState(pose, six[0], six[1], left, six[2], six[3], moves, gradients, np.zeros(4), six[4])
 
 
 def room(ends: int, columns: int, n: int, m: int, r: int) -> LoopRoom:

@@ -7,17 +7,14 @@ joints keep them before all others.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from erls.equations.loops.rows import Closure
+from erls.equations.loops.tied import Tied
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
-
-if TYPE_CHECKING:
-    from erls.equations.loops.closed_chain import ClosedChain
 
 _CLOSED = 1e-11  # of the size of the mechanism
 _DEPENDENT = 1e-6  # share of a joint's motion that others cannot make up for: below, it does not decide anything
@@ -42,46 +39,7 @@ class Start:
     following: IntArray
 
 
-@dataclass(frozen=True)
-class ClosedStart:
-    """How the joints of rigid links begin in closed loops, for formulations without joint coordinates of their own.
-
-    Attributes
-    ----------
-    positions, rates : (joints,) arrays
-        [rad, rad/s or m, m/s]
-    coordinates : (loops,) array
-        Of closing joints with one coordinate, turns counted; 0 of the others.
-    held : tuple of int
-        Joints that keep what they are given, prescribed ones included.
-    """
-
-    positions: Array
-    rates: Array
-    coordinates: Array
-    held: tuple[int, ...]
-
-
-def closed_start(chain: ClosedChain) -> ClosedStart:
-    """The start of a chain of rigid links.
-
-    Raises
-    ------
-    SimulationError
-        LOOP_OPEN: the links do not reach.
-    """
-    found = chain.start
-    rate = start_velocity(chain, found.y)
-    state = chain.tree.state(0.0, found.y, rate)
-    rates, free = state.rates.copy(), chain.tree.free_joints
-    loops = [k for k, loop in enumerate(chain.mechanism.loops) if loop.freedom is not None]
-    coordinates = np.zeros(len(chain.mechanism.loops))
-    coordinates[loops] = [chain.loop_motion(0.0, found.y, rate, k)[0] for k in loops]
-    held = np.setdiff1d(np.arange(len(rates)), free[found.following])
-    return ClosedStart(state.angles.copy(), rates, coordinates, tuple(held.tolist()))
-
-
-def find_start(chain: ClosedChain) -> Start:
+def find_start(chain: Tied) -> Start:
     """Close the loops on the undeformed chain.
 
     Raises
@@ -89,9 +47,9 @@ def find_start(chain: ClosedChain) -> Start:
     SimulationError
         LOOP_OPEN: the links do not reach; names the loop and says how far it is from closing.
     """
-    count = len(chain.tree.free_joints)
+    count = len(chain.bare.free_joints)
     given = np.zeros(chain.size)
-    given[:count] = [chain.mechanism.joints[k].position for k in chain.tree.free_joints]
+    given[:count] = [chain.mechanism.joints[k].position for k in chain.bare.free_joints]
     every = np.arange(count)
     best: tuple[float, str] = (np.inf, "")
     for some in (True, False):
@@ -120,41 +78,40 @@ def find_start(chain: ClosedChain) -> Start:
     )
 
 
-def start_velocity(chain: ClosedChain, y: Array) -> Array:
-    """(n,) given rates, joints that follow adapted, elastic coordinates as little as may be."""
+def start_velocity(chain: Tied, y: Array, following: IntArray) -> Array:
+    """(n,) given rates, joints that follow adapted to them; links do not change their shapes."""
     v = np.zeros(chain.size)
-    joints = chain.tree.free_joints
+    joints = chain.bare.free_joints
     v[: len(joints)] = [chain.mechanism.joints[k].rate for k in joints]
-    following = chain.start.following
     found = chain.closure(0.0, y, v)
     rows = _joint_rows(chain, y)[:, following]
     v[following] -= np.linalg.lstsq(rows, chain.row_metres * found.rate, rcond=_DEPENDENT)[0] / chain.metres[following]
-    return chain.closed(0.0, y, v)[1]
+    return v
 
 
-def _nudges(chain: ClosedChain, size: float) -> Array:
-    joints = [chain.mechanism.joints[k] for k in chain.tree.free_joints]
+def _nudges(chain: Tied, size: float) -> Array:
+    joints = [chain.mechanism.joints[k] for k in chain.bare.free_joints]
     unit = np.array([1.0 if joint.freedom.turns else chain.reach for joint in joints])
     return np.asarray(size * unit * np.cos(2 * np.pi * _ALTERNATE * np.arange(len(unit))))
 
 
-def _spread(chain: ClosedChain) -> Array:
+def _spread(chain: Tied) -> Array:
     """(n,) a displacement to a general position, where joints depend on each other only if they always do."""
     result = np.zeros(chain.size)
-    result[: len(chain.tree.free_joints)] = _nudges(chain, 0.05)
+    result[: len(chain.bare.free_joints)] = _nudges(chain, 0.05)
     return result
 
 
-def _joint_rows(chain: ClosedChain, y: Array) -> Array:
+def _joint_rows(chain: Tied, y: Array) -> Array:
     """(m, joints) conditions over the free joints, in metres per metre."""
     found = chain.closure(0.0, y, np.zeros(chain.size))
     rows = chain.scaled_rows(found, np.arange(len(chain.row_metres)))
-    return np.asarray(rows[:, : len(chain.tree.free_joints)])
+    return np.asarray(rows[:, : len(chain.bare.free_joints)])
 
 
-def _following(chain: ClosedChain, rows: Array) -> IntArray:
+def _following(chain: Tied, rows: Array) -> IntArray:
     """Joints whose motion decides that of the loops: from the outer end inward, free ones first."""
-    joints = [chain.mechanism.joints[k] for k in chain.tree.free_joints]
+    joints = [chain.mechanism.joints[k] for k in chain.bare.free_joints]
     order = sorted(range(len(joints)), key=lambda k: (joints[k].drive.kind != "free", -k))
     basis = np.zeros((len(rows), 0))
     result: list[int] = []
@@ -169,7 +126,7 @@ def _following(chain: ClosedChain, rows: Array) -> IntArray:
     return np.array(sorted(result), dtype=np.int64)
 
 
-def _gap(chain: ClosedChain, found: Closure) -> tuple[float, str]:
+def _gap(chain: Tied, found: Closure) -> tuple[float, str]:
     """Largest opening [m] and its name; a joint that is back to front is open by the size of the mechanism."""
     wrong = chain.rows.upside_down(found)
     if wrong:
@@ -178,7 +135,7 @@ def _gap(chain: ClosedChain, found: Closure) -> tuple[float, str]:
     return float(gaps.max()), chain.rows.names[int(gaps.argmax())]
 
 
-def _closed(chain: ClosedChain, guess: Array, moving: IntArray) -> Array:
+def _closed(chain: Tied, guess: Array, moving: IntArray) -> Array:
     """(n,) the joints ``moving`` turned until the loops are closed as well as may be."""
     from scipy.optimize import least_squares  # here: slow to import
 

@@ -2,53 +2,51 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from erls.equations.loops.tied import Tied
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
-
-if TYPE_CHECKING:
-    from erls.equations.loops.closed_chain import ClosedChain
 
 _ITERATIONS = 20
 _TOLERANCE = 1e-10  # of the deflection; one more step of quadratic convergence would reach rounding
 _ROUNDING = 1e-13  # of the size of a link
 
 
-def closed_equilibrium(chain: ClosedChain, y: Array, held: IntArray) -> Array:
+def closed_equilibrium(chain: Tied, y: Array, held: IntArray, kept: IntArray) -> Array:
     """(n,) equilibrium under gravity, springs and drives.
 
     Parameters
     ----------
-    chain : ClosedChain
+    chain : Tied
     y : (n,) array
         Loops closed, links undeformed.
     held : int array
         Free joints, by their place in y, whose physical angles keep their values.
+    kept : int array
+        Rows of the conditions that do not follow from others.
 
     Raises
     ------
     SimulationError
         NO_EQUILIBRIUM: the links are too soft for small displacements to carry the load.
     """
-    n, still, kept, free = chain.size, np.zeros(chain.size), chain.kept, chain.tree.free
-    numbers = chain.tree.free_joints[held]
-    angles = chain.tree.state(0.0, y, still).angles[numbers]
+    n, still, free = chain.size, np.zeros(chain.size), chain.bare.free
+    numbers = chain.bare.free_joints[held]
+    angles = chain.bare.state(0.0, y, still).angles[numbers]
     metres = chain.metres
 
     def state(trial: Array) -> tuple[Array, Array, Array]:
         """Forces, conditions of loops and held joints, and the rows of the former conditions."""
         found = chain.closure(0.0, trial, still)
-        turned = chain.tree.state(0.0, trial, still).angles[numbers] - angles
+        turned = chain.bare.state(0.0, trial, still).angles[numbers] - angles
         conditions = np.concatenate([found.violation[kept], turned])
-        return chain.tree.residual(0.0, trial, still, still), conditions, found.rows[kept][:, free]
+        return chain.whole.forces(0.0, trial, still, still), conditions, found.rows[kept][:, free]
 
     y = y.copy()
     multipliers = np.zeros(0)
-    deflection, joints = 0.0, len(chain.tree.free_joints)
+    deflection, joints = 0.0, len(chain.bare.free_joints)
     for _ in range(_ITERATIONS):
         forces, conditions, rows = state(y)
         stiffness, slopes = np.empty((n, n)), np.empty((len(conditions), n))

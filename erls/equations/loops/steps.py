@@ -14,8 +14,8 @@ from erls.equations.compiled_system import Array, Factoring, IntArray
 from erls.equations.loops.compiled import CompiledLoops
 from erls.equations.loops.nearest import largest_gap
 from erls.equations.loops.records import (
-    call_residual,
-    call_stiffness_and_damping,
+    call_forces,
+    call_matrices,
     read_loop_room,
     read_loops,
 )
@@ -43,8 +43,8 @@ def residual(
     """[M a - f + Φ_yᵀ λ; Φ], and the norms of both terms; ``a`` holds [a; λ]."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     room = read_loop_room(scratch, integers, loops.room)
-    n, r = len(y), loops.kept
-    call_residual(loops.forces, reals, integers, scratch, t, y, v, a[:n], out[:n])
+    n, r = len(v), loops.kept
+    call_forces(loops.forces, reals, integers, scratch, t, y, v, a[:n], out[:n])
     gradient, reaction, metres = room.gradient, room.reduced, loops.metres
     for i in range(n):
         reaction[i] = 0.0
@@ -83,9 +83,9 @@ def factor(
     """
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     room = read_loop_room(scratch, integers, loops.room)
-    n, r = len(y), loops.kept
+    n, r = len(v), loops.kept
     metres, gradient, mass, stiffness, damping = loops.metres, room.gradient, room.mass, room.factor, room.damping
-    call_stiffness_and_damping(loops.matrices, reals, integers, scratch, t, y, v, stiffness, damping)
+    call_matrices(loops.matrices, reals, integers, scratch, t, y, v, stiffness, damping)
     heaviest = 0.0
     for i in range(n):
         heaviest = max(heaviest, mass[i, i] / (metres[i] * metres[i]))

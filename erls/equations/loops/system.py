@@ -8,9 +8,9 @@ from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.loops.records import (
     call_closure,
-    call_mass_matrix,
-    call_residual,
-    call_stiffness_and_damping,
+    call_forces,
+    call_masses,
+    call_matrices,
     read_loop_room,
     read_loops,
 )
@@ -26,8 +26,8 @@ def residual(
     """M (a - ÿ) with the accelerations ÿ of the closed chain; NaN where it locks or has no mass."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     room = read_loop_room(scratch, integers, loops.room)
-    call_residual(loops.forces, reals, integers, scratch, t, y, v, scratch[0:0], out)
-    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, room.mass)
+    call_forces(loops.forces, reals, integers, scratch, t, y, v, scratch[0:0], out)
+    call_masses(loops.masses, reals, integers, scratch, t, y, room.mass)
     n = len(y)
     if spread_rows(room.mass, room.factor, room.gradient, room.spread, room.flexible) != 0:
         for i in range(n):
@@ -50,8 +50,8 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
     """M of the chain and of rotors in closing joints."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     if loops.rotors:
-        call_closure(loops.closure, reals, integers, scratch, t, y, y)  # the rates do not matter
-    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, out)
+        call_closure(loops.closure, reals, integers, scratch, t, y, y[: len(out)])  # the rates do not matter
+    call_masses(loops.masses, reals, integers, scratch, t, y, out)
 
 
 @kernel(contract.ACCELERATION, counted=False)
@@ -59,8 +59,8 @@ def acceleration(reals: Array, integers: IntArray, scratch: Array, t: float, y: 
     """Accelerations with decay of what loops are open by; NaN where they lock."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     room = read_loop_room(scratch, integers, loops.room)
-    call_residual(loops.forces, reals, integers, scratch, t, y, v, scratch[0:0], out)
-    call_mass_matrix(loops.masses, reals, integers, scratch, t, y, room.mass)
+    call_forces(loops.forces, reals, integers, scratch, t, y, v, scratch[0:0], out)
+    call_masses(loops.masses, reals, integers, scratch, t, y, room.mass)
     n = len(y)
     status = spread_rows(room.mass, room.factor, room.gradient, room.spread, room.flexible)
     if status > 0:
@@ -88,7 +88,7 @@ def stiffness_and_damping(
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     room = read_loop_room(scratch, integers, loops.room)
     call_closure(loops.closure, reals, integers, scratch, t, y, v)
-    call_stiffness_and_damping(loops.matrices, reals, integers, scratch, t, y, v, k, c)
+    call_matrices(loops.matrices, reals, integers, scratch, t, y, v, k, c)
     n, r, decay = len(y), loops.kept, loops.decay
     if spread_rows(room.mass, room.factor, room.gradient, room.spread, room.flexible) != 0:
         for i in range(n):

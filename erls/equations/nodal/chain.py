@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from erls.equations.loops.start import ClosedStart
+from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.nodal.actuators import Actuator, Actuators
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.beam import Beams

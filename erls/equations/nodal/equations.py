@@ -15,8 +15,8 @@ import numpy as np
 
 from erls.equations.consistency import consistent_acceleration, consistent_velocity
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
+from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.loops.failures import warnings_of
-from erls.equations.loops.start import ClosedStart
 from erls.equations.nodal.chain import Chain, Seat, build_chain
 from erls.equations.nodal.joints import GROUND
 from erls.equations.nodal.link_state import LinkView

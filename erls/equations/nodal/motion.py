@@ -10,8 +10,8 @@ from erls.equations.compiled_system import Array
 from erls.equations.nodal.contract import Model, Work
 from erls.maths.coefficients import stumpff
 from erls.maths.jit import inlined
-from erls.maths.rotations import exponential, value
-from erls.maths.vectors import cross, dot, minus, nine, plus, product, put, three, times, turned, vector
+from erls.maths.rotations import turned_further, value
+from erls.maths.vectors import cross, dot, minus, nine, plus, put, three, times, turned, vector
 
 
 @inlined
@@ -24,11 +24,7 @@ def compose(model: Model, start: Array, increment: Array, out: Array) -> None:
         if model.local:
             u = times(turn, value(c[1], c[2], psi, u))
         place = plus(vector(start, node, 0), u)
-        r = product(turn, exponential(psi, c[0], c[1]))
-        x, y, z = (r[0], r[3], r[6]), (r[1], r[4], r[7]), (r[2], r[5], r[8])
-        xx, yy, zz = 1.5 - 0.5 * dot(x, x), 1.5 - 0.5 * dot(y, y), 1.5 - 0.5 * dot(z, z)
-        xy, yz, zx = -0.5 * dot(x, y), -0.5 * dot(y, z), -0.5 * dot(z, x)
-        r = product(r, (xx, xy, zx, xy, yy, yz, zx, yz, zz))
+        r = turned_further(turn, psi, c[0], c[1])
         for i in range(3):
             out[node, i] = place[i]
         for i in range(9):

@@ -7,18 +7,21 @@ follow from time.
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.formulation import Reaction, TreeFormulation
+from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.equations.serial.singular import singular_mass
 from erls.maths.jit import plain
-from erls.maths.so3 import Array
+from erls.maths.se3 import pose
+from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.loops import loop_ends
 from erls.mechanism.thermal import elastic_rest
 
 
@@ -118,6 +121,60 @@ class SerialFormulation(TreeFormulation):
         """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
         y, v = self.undeformed_start()
         return (held_equilibrium(self, y, self.free_joints) if self.mechanism.static_start else y), v
+
+    def frames(self, t: float, y: Array, v: Array) -> list[FrameMotion]:
+        """Frames that the loops of the mechanism hold; see `TreeFormulation`."""
+        system, ends = self.compiled, loop_ends(self.mechanism.loops)
+        if not ends:
+            return []
+        assert system.frames is not None
+        found = np.empty((len(ends), 24 + 6 * (self.joints + self.elastic)))
+        system.frames(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), found)
+        result: list[FrameMotion] = []
+        for numbers in found:
+            rows = np.empty((6, self.joints + self.elastic))
+            rows[:, [*self.free, *self.prescribed_joints]] = numbers[24:].reshape(rows.shape)
+            at = pose(numbers[:9].reshape(3, 3), numbers[9:12])
+            result.append(FrameMotion(at, rows, numbers[12:18], numbers[18:24]))
+        return result
+
+    @property
+    def complete(self) -> CompiledSystem:
+        """The equations with wrenches that are complete in all components, for reactions."""
+        return self.compiled
+
+    @abstractmethod
+    def borne(self, k: int) -> tuple[Array, Array]:
+        """What a residual of `complete` left of link ``k``: the wrench (6,) on its frame of all that it bears, itself
+        included, and the forces (2,) along its joint, of `erls.equations.serial.records.JointState`.
+        """
+
+    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
+        """Joint reactions that give these accelerations."""
+        state = self.state(t, y, v)
+        residual(self.complete, t, y, v, a)
+        result: list[Reaction] = []
+        for k, (joint, link) in enumerate(zip(self.mechanism.joints, self.mechanism.links, strict=True)):
+            wrench, forces = self.borne(k)
+            place = link.inboard.position + link.model.node_shape(link.inboard.node)[0] @ state.modal[k]
+            turn, moment = state.poses[k][:3, :3], wrench[3:] - cross(place, wrench[:3])
+            effort = forces[0] if joint.drive.prescribed else forces[1]
+            result.append(Reaction(turn @ wrench[:3], turn @ moment, float(effort)))
+        return result
+
+    @property
+    @abstractmethod
+    def kind(self) -> dict[str, Any]:
+        """Name of the formulation and of its variant, for reports."""
+
+    def describe(self) -> dict[str, Any]:
+        """Names and sizes for reports."""
+        return {
+            **self.kind,
+            "joints": self.joints,
+            "elastic_coordinates": self.elastic,
+            "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
+        }
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions at a state."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.serial.decoupled_modes import DecoupledModes
+from erls.equations.serial.ends import End
 from erls.equations.serial.records import Joint, JointState, Modes, RigidLink, RigidState
 from erls.equations.serial.time_curves import put_curve
 from erls.maths.records import Memory
@@ -18,7 +19,8 @@ from erls.mechanism.drives import Drive
 from erls.mechanism.joint_types import Freedom
 from erls.mechanism.joints import Joint as MechanismJoint
 from erls.mechanism.joints import JointForces
-from erls.mechanism.links import Link
+from erls.mechanism.links import Link, node_shape6
+from erls.mechanism.loops import LoopEnd
 from erls.mechanism.thermal import elastic_rest
 
 
@@ -112,6 +114,22 @@ def joint_states(scratch: Memory, count: int) -> int:
     sizes = {"coordinate": 3, "pose": 12, "screw": 6, "twist": 6, "twist_rate": 6, "feed": 1, "forces": 2}
     room = JointState(**{name: np.zeros(size) for name, size in sizes.items()})
     return put_all(scratch, [room] * count)
+
+
+def end_record(link: Link, modes: Array | None, curved: bool, end: LoopEnd) -> End:
+    """A frame that a loop holds; coordinates of its link move it by ``modes`` (m, n), or are modal coordinates."""
+    n = len(link.invariants.m) if modes is None else modes.shape[1]
+    turned = np.eye(n) if modes is None else modes
+    bows = np.zeros((0, n, n))
+    if curved and link.second_order is not None:
+        bows = turned.T @ link.second_order.node(end.node) @ turned
+    return End(
+        link=end.link or 0,
+        position=link.model.nodes[end.node],
+        shapes=np.vstack(node_shape6(link.model, end.node)) @ turned,
+        bows=bows,
+        offset=pose_numbers(end.frame),
+    )
 
 
 def rigid_links(mechanism: Mechanism, constants: Memory, scratch: Memory) -> tuple[int, int]:

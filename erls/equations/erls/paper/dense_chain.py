@@ -14,7 +14,6 @@ friction and rotor act on the physical angle, θ plus what the links' displaceme
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -24,19 +23,15 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.erls.paper.compatibility_records import ROW_STATE, Elimination, RowState
 from erls.equations.erls.paper.pack import pack_chain
 from erls.equations.erls.paper.records import BODY_STATE, Balance, BodyState, Paper
-from erls.equations.formulation import Energy, Reaction, State
-from erls.equations.serial.displaced_frame import displaced_frame
+from erls.equations.formulation import Energy, State
 from erls.equations.serial.formulation import SerialFormulation
-from erls.equations.serial.joint_frames import FrameMotion, attached, carried
 from erls.equations.serial.modal_inertia import stiffened
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import Serial
 from erls.equations.serial.state_series import StateSeries
 from erls.maths.records import python_reader
-from erls.maths.so3 import Array, skew
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.links import node_shape6
-from erls.mechanism.loops import LoopEnd
 
 _see_serial, _see_paper, _see_balance = python_reader(Serial), python_reader(Paper), python_reader(Balance)
 _see_elimination, _see_link, _see_joint = python_reader(Elimination), python_reader(BodyState), python_reader(RowState)
@@ -137,53 +132,16 @@ class DenseChain(SerialFormulation):
             springs=float(springs),
         )
 
-    def frames(self, t: float, y: Array, v: Array, ends: Sequence[LoopEnd]) -> list[FrameMotion]:
-        """Frames on displaced nodes of links, with rows over (θ, q_d); see `TreeFormulation`."""
-        self.residual(t, y, v, np.zeros(0))
-        driven = self.elimination.acceleration.copy()  # of prescribed joints
-        result: list[FrameMotion] = []
-        for k, node, offset in ((int(end.link or 0), end.node, end.frame) for end in ends):
-            link, model = self.link(k), self.mechanism.links[k].model
-            second = self.mechanism.links[k].second_order if self.stiffened else None
-            bias = link.bias + link.moves @ driven
-            local = displaced_frame(
-                model.nodes[node],
-                *node_shape6(model, node),
-                link.q,
-                link.velocity[6:],
-                bias[6:],
-                link.moves[6:],
-                None if second is None else second.node(node),
-            )
-            rigid = FrameMotion(_pose(link.world), link.moves[:6].copy(), link.velocity[:6].copy(), bias[:6])
-            result.append(attached(carried(rigid, local), offset))
-        return result
-
-    def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
-        """Joint reactions that give these accelerations."""
-        self.residual(t, y, v, a)
+    def borne(self, k: int) -> tuple[Array, Array]:
+        """What a residual left; see `SerialFormulation.borne`."""
         _, integers, scratch = self._memory
         balance = _see_balance(scratch, integers, self._places.balance)
-        result: list[Reaction] = []
-        for k, link in enumerate(self.mechanism.links):
-            found = self.link(k)
-            node = link.inboard.position + link.model.node_shape(link.inboard.node)[0] @ found.q
-            force, turn = found.borne[:3], _pose(found.world)[:3, :3]
-            moment = found.borne[3:] - skew(node) @ force
-            prescribed = self.mechanism.joints[k].drive.prescribed
-            effort = balance.force[k] if prescribed else self.joint(k).turn[3]
-            result.append(Reaction(turn @ force, turn @ moment, float(effort)))
-        return result
+        return self.link(k).borne, np.array([balance.force[k], self.joint(k).turn[3]])
 
-    def describe(self) -> dict[str, Any]:
-        """Names and sizes for reports."""
-        return {
-            "formulation": "erls",
-            "gauge": self.gauge,
-            "joints": self.joints,
-            "elastic_coordinates": self.elastic,
-            "highest_frequency_hz": float(np.sqrt(self.stiffness.max(initial=0.0)) / (2 * np.pi)),
-        }
+    @property
+    def kind(self) -> dict[str, Any]:
+        """Name of the formulation and of its gauge."""
+        return {"formulation": "erls", "gauge": self.gauge}
 
 
 def _pose(world: Array) -> Array:

@@ -5,12 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from erls.equations import compiled_system as contract
-from erls.equations.compiled_system import CompiledSystem, acceleration_in
+from erls.equations.compiled_system import CompiledSystem, acceleration_in, function_in
 from erls.equations.erls.paper.bent_records import BentBody, bent_state
 from erls.equations.erls.paper.compatibility_records import Elimination, JointRows, RowState
 from erls.equations.erls.paper.records import Balance, Body, BodyState, Paper
+from erls.equations.serial.ends import end_state
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
-from erls.equations.serial.pack import effect_flags, joint_record, joint_states, put_all, rigid_links, step_parts
+from erls.equations.serial.pack import (
+    effect_flags,
+    end_record,
+    joint_record,
+    joint_states,
+    put_all,
+    rigid_links,
+    step_parts,
+)
 from erls.equations.serial.records import Joint, Modes, Serial
 from erls.errors import Cause, SceneError
 from erls.maths.calls import address_of
@@ -21,6 +30,7 @@ from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joints import Joint as MechanismJoint
 from erls.mechanism.links import Link
+from erls.mechanism.loops import loop_ends
 from erls.mechanism.thermal import elastic_rest
 from fe_import.modal.inertia import InertiaInvariants
 from fe_import.model import InterfaceNode
@@ -178,6 +188,7 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
     size, count = links + elastic, sum(row.kept for row in rows)
     counts = np.repeat([float(not link.intermediate) for link in mechanism.links], 6)
     weighted = 0 if counts.all() or count == 6 * links else 6 * links  # a square C_r leaves nothing to choose
+    ends = loop_ends(mechanism.loops)
     paper = Paper(
         rows=count,
         elastic=elastic,
@@ -197,6 +208,9 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
         move=address_of(move, contract.ACCELERATION),
         residual=address_of(functions.residual, contract.RESIDUAL),
         mass_matrix=address_of(functions.mass_matrix, contract.MASS_MATRIX),
+        end_count=len(ends),
+        ends=put_all(constants, [end_record(mechanism.links[k], None, curved, end) for k, end in ends]),
+        end_states=put_all(working, [end_state(6 + mechanism.links[k].elastic_modes) for k, _ in ends]),
         curved=int(curved),
         **effect_flags(mechanism.effects),
     )
@@ -214,6 +228,7 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
         mass_matrix=functions.mass_matrix,
         stiffness_and_damping=functions.stiffness_and_damping,
         load_acceleration=acceleration_in("erls.equations.erls.paper.acceleration"),
+        load_frames=function_in("erls.equations.erls.paper.ends", "frames"),
     )
 
 

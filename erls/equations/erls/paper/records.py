@@ -25,6 +25,8 @@ class Paper(NamedTuple):
         Places of `Elimination` and `Balance`.
     move, residual, mass_matrix : int
         Addresses of the functions: what calls them is compiled without them.
+    end_count, ends, end_states : int
+        Frames that loops hold (`erls.equations.serial.ends`), and places of the first ones.
     curved : int
         Whether compatibility is of second order.
     """
@@ -43,6 +45,9 @@ class Paper(NamedTuple):
     move: int
     residual: int
     mass_matrix: int
+    end_count: int
+    ends: int
+    end_states: int
     curved: int
     first_order: int
     second_order: int

@@ -1,0 +1,186 @@
+"""Links in floating frames that no joint holds, in absolute coordinates, as the functions of a compiled system.
+
+A configuration q (c,) is the pose (12,) of every floating frame in the world, the elastic coordinates of all links and
+the coordinates of all joints, which only count turns; velocities v (n,) are the twists of the frames, in their own
+axes, and the rates of the elastic coordinates. Joints are conditions upon them (`erls.equations.loops`).
+"""
+
+from __future__ import annotations
+
+from erls.equations import compiled_system as contract
+from erls.equations.ffr.bent import bend, bend_rates
+from erls.equations.ffr.inertia import inertia_blocks, link_forces
+from erls.equations.ffr.nodes import move_node, place_node, to_node_axes
+from erls.equations.ffr.records import (
+    BENT_BODY,
+    BENT_STATE,
+    BODY,
+    BODY_STATE,
+    END,
+    NODE,
+    NODE_STATE,
+    Frames,
+    read_bent_body,
+    read_bent_state,
+    read_body,
+    read_body_state,
+    read_end,
+    read_frames,
+    read_node,
+    read_node_state,
+)
+from erls.equations.ffr.segments import free_segment
+from erls.equations.serial.ends import carry_end
+from erls.equations.serial.feed_forward import feed_forward
+from erls.equations.serial.records import MODES, Serial, read_modes, read_serial
+from erls.equations.serial.segments import SEGMENT, read_segment
+from erls.maths.jit import kernel, part, spliced
+from erls.maths.products import clear
+from erls.maths.so3 import Array
+from erls.maths.spatial import compose_poses, rotate_back, transform_motion
+from fe_import.model import IntArray
+
+
+@part
+def elastic_at(serial: Serial, frames: Frames, reals: Array, integers: IntArray, k: int) -> int:
+    """Place of a link's elastic coordinates among those of all links."""
+    return int(read_modes(reals, integers, serial.modes + k * MODES).first - frames.free)
+
+
+@part
+def _bend_link(
+    serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, k: int, q: Array, rates: Array
+) -> None:
+    """Second-order displacements of a link."""
+    if read_body(reals, integers, frames.bodies + k * BODY).bent:
+        bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+        bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+        bend(bent, bending, q)
+        bend_rates(bent, bending, rates)
+
+
+@kernel(contract.RESIDUAL, counted=False)
+def residual(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
+) -> None:
+    """M a - f of links that nothing holds; an empty ``a`` stands for zeros."""
+    serial = read_serial(reals, integers, integers[0])
+    frames, links = read_frames(reals, integers, serial.own), serial.links
+    for k in range(links):
+        body = read_body(reals, integers, frames.bodies + k * BODY)
+        state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
+        bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+        bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+        modes = read_modes(reals, integers, serial.modes + k * MODES)
+        e, at = len(modes.stiffness), elastic_at(serial, frames, reals, integers, k)
+        q, first = y[12 * links + at : 12 * links + at + e], 6 * links + at
+        for i in range(6):
+            state.twist[i] = v[6 * k + i]
+            state.twist_rate[i] = a[6 * k + i] if len(a) > 0 else 0.0
+        rotate_back(y[12 * k : 12 * k + 12], serial.gravity, state.gravity)
+        _bend_link(serial, frames, reals, integers, scratch, k, q, v[first : first + e])
+        moved = a[first : first + e] if len(a) > 0 else a
+        link_forces(
+            frames, body, bent, modes, state, bending, q, v[first : first + e], moved, out[first : first + e]
+        )
+        for i in range(6):
+            out[6 * k + i] = state.wrench[i]
+
+
+@kernel(contract.MASS_MATRIX, counted=False)
+def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
+    """M: a block of every link."""
+    serial = read_serial(reals, integers, integers[0])
+    frames, links = read_frames(reals, integers, serial.own), serial.links
+    out[:, :] = 0.0
+    for k in range(links):
+        body = read_body(reals, integers, frames.bodies + k * BODY)
+        state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
+        bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+        bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+        own = read_segment(scratch, integers, frames.segments + k * SEGMENT)
+        modes = read_modes(reals, integers, serial.modes + k * MODES)
+        e, at = len(modes.stiffness), elastic_at(serial, frames, reals, integers, k)
+        q, first = y[12 * links + at : 12 * links + at + e], 6 * links + at
+        _bend_link(serial, frames, reals, integers, scratch, k, q, q)
+        inertia_blocks(frames, body, state, q)
+        free_segment(body, bent, bending, state, own)
+        for i in range(6):
+            for j in range(6):
+                out[6 * k + i, 6 * k + j] = own.inertia[i, j]
+            for j in range(e):
+                out[6 * k + i, first + j] = out[first + j, 6 * k + i] = own.coupling[i, j]
+        for i in range(e):
+            for j in range(e):
+                total = modes.mass[i, j]
+                for r in range(own.change.shape[0]):
+                    total += (own.change[r, i] * own.partner[r, j] + own.partner[r, i] * own.change[r, j]) / 2
+                out[first + i, first + j] = total
+
+
+@kernel(contract.STIFFNESS_AND_DAMPING, counted=False)
+def stiffness_and_damping(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, k: Array, c: Array
+) -> None:
+    """Of the links' modes."""
+    serial = read_serial(reals, integers, integers[0])
+    frames = read_frames(reals, integers, serial.own)
+    k[:, :] = 0.0
+    c[:, :] = 0.0
+    for number in range(serial.links):
+        modes = read_modes(reals, integers, serial.modes + number * MODES)
+        first = 6 * serial.links + elastic_at(serial, frames, reals, integers, number)
+        for i in range(len(modes.stiffness)):
+            k[first + i, first + i], c[first + i, first + i] = modes.stiffness[i], modes.damping[i]
+
+
+@spliced
+def _put_end(
+    serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, number: int, y: Array, v: Array,
+    found: Array,
+) -> None:  # fmt: skip
+    """Pose, twist, its derivative and rows of a frame on a node."""
+    end, n, links = read_end(reals, integers, frames.ends + number * END), len(v), serial.links
+    node = read_node(reals, integers, frames.nodes + end.node * NODE)
+    moved = read_node_state(scratch, integers, frames.node_states + end.node * NODE_STATE)
+    state = read_body_state(scratch, integers, frames.body_states + end.link * BODY_STATE)
+    modes = read_modes(reals, integers, serial.modes + end.link * MODES)
+    k, e = end.link, len(modes.stiffness)
+    at = elastic_at(serial, frames, reals, integers, k)
+    first, x, none = 6 * links + at, state.spare[:6], state.spare[6:]
+    clear(none)
+    if node.moves:
+        place_node(node, moved, y[12 * links + at : 12 * links + at + e])
+        move_node(node, moved, v[first : first + e], y[0:0])
+    carry_end(moved.pose, moved.twist, moved.twist_rate, end.offset, v[6 * k : 6 * k + 6], none, found[:24])
+    pose = state.spare  # 12 numbers
+    for i in range(12):
+        pose[i] = found[i]
+    compose_poses(y[12 * k : 12 * k + 12], pose, found[:12])
+    clear(found[24:])
+    for j in range(6):
+        clear(x)
+        x[j] = 1.0
+        transform_motion(moved.pose, x, x)
+        transform_motion(end.offset, x, x)
+        for i in range(6):
+            found[24 + i * n + 6 * k + j] = x[i]
+    if node.moves:
+        for j in range(e):
+            for i in range(6):
+                x[i] = moved.rows[i, j]
+            to_node_axes(moved.pose, moved.tangent, x)
+            transform_motion(end.offset, x, x)
+            for i in range(6):
+                found[24 + i * n + first + j] = x[i]
+
+
+@kernel(contract.FRAMES, counted=False)
+def frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array) -> None:
+    """Motion of the frames that joints hold, and what drives feed forward at this time."""
+    serial = read_serial(reals, integers, integers[0])
+    own = read_frames(reals, integers, serial.own)
+    if serial.feeds:
+        feed_forward(serial, reals, integers, scratch, t)
+    for number in range(own.end_count):
+        _put_end(serial, own, reals, integers, scratch, number, y, v, out[number])
