@@ -6,5 +6,6 @@ velocities and accelerations outward, and their transposes for wrenches inward. 
 to the number of links. Mass matrices and solutions link by link come from what `segments` says of each link.
 
 `records` says what is kept of a link, `pack` puts it into memory, `motion` and `nodes` go outward, `inertia` and `bent`
-hold the forces of a link, `residual` goes inward.
+hold the forces of a link, `residual` goes inward, `ends` moves the frames that loops hold. In absolute coordinates
+(`constrained`, `absolute`) links float freely (`floating`), and joints close like those of loops.
 """
