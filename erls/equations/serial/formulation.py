@@ -14,10 +14,8 @@ import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
-from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.equations.serial.singular import singular_mass
-from erls.maths.jit import plain
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
@@ -83,10 +81,6 @@ class SerialFormulation(TreeFormulation):
             system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), both[0], both[1]
         )
         return both[0], both[1]
-
-    def elastic_forces(self, q: Array) -> Array:
-        """(elastic,) what links do against elastic coordinates."""
-        return np.asarray(plain(elastic_force)(self.stiffness, q, self.rest))
 
     def elastic_energy(self, q: Array) -> float:
         """Of elastic coordinates [J]."""
