@@ -9,7 +9,7 @@ from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, SceneRecord
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_names, check_tables, directed, not_negative
-from erls.scene.joints import Coordinate, Joint, Loop
+from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping, check_temperature
 from fe_import.files.toml import choose
@@ -75,11 +75,18 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         if scene.simulation.coordinates != "independent":
             message, right = "loops tie independent coordinates", "remove it, or the loops"
             raise bad(f"{file}: simulation.coordinates", message, scene.simulation.coordinates, right)
-        for kind in ("joints", "loops"):
-            for k, item in enumerate(getattr(scene, kind)):
-                if getattr(item.drive, "feed_forward", False):
-                    message = "the inverse dynamics of the chain does not know its loops"
-                    raise bad(f"{file}: {kind}[{k}].drive.feed_forward", message, True, "set it to false")
+        for k, joint in enumerate(scene.joints):
+            _check_feed_forward(joint, f"{file}: joints[{k}]")
+            for name, coordinate in joint.coordinates.items():
+                _check_feed_forward(coordinate, f"{file}: joints[{k}].coordinates.{name}")
+        for k, loop in enumerate(scene.loops):
+            _check_feed_forward(loop, f"{file}: loops[{k}]")
+
+
+def _check_feed_forward(acting: Acting, place: str) -> None:
+    if getattr(acting.drive, "feed_forward", False):
+        message = "the inverse dynamics of the tree does not know its loops"
+        raise bad(f"{place}.drive.feed_forward", message, True, "set it to false")
 
 
 def _check_place(scene: SceneRecord, k: int, place: str) -> None:

@@ -31,7 +31,7 @@ _see_link, _see_joint = python_reader(LinkState), python_reader(JointState)
 
 
 class Erls(SerialFormulation):
-    """Equations of motion of a serial chain in the joint-angle gauge; a `TreeFormulation`.
+    """Equations of motion of a tree of links in the joint-angle gauge; a `TreeFormulation`.
 
     Parameters
     ----------

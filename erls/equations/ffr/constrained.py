@@ -37,7 +37,7 @@ class Configuration:
 
 
 class ConstrainedFfr:
-    """Constrained equations of motion of a serial chain; a `ConstrainedSystem`.
+    """Constrained equations of motion of a tree of links; a `ConstrainedSystem`.
 
     Parameters
     ----------

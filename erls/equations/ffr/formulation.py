@@ -45,7 +45,7 @@ class Motion:
 
 
 class Ffr(SerialFormulation):
-    """Equations of motion of a serial chain; a `TreeFormulation`.
+    """Equations of motion of a tree of links; a `TreeFormulation`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What formulations of a serial chain in independent coordinates share: coordinates, and calls of what is compiled.
+"""What formulations of a tree of links in independent coordinates share: coordinates, and calls of what is compiled.
 
 Independent coordinates y = (free joint coordinates, elastic coordinates of all links); prescribed joint coordinates
 follow from time.

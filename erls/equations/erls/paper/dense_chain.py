@@ -38,7 +38,7 @@ _see_elimination, _see_link, _see_joint = python_reader(Elimination), python_rea
 
 
 class DenseChain(SerialFormulation):
-    """Equations of motion of a serial chain; a `Formulation`.
+    """Equations of motion of a tree of links; a `Formulation`.
 
     Parameters
     ----------
