@@ -28,6 +28,7 @@ MIXED: dict[str, set[int]] = {  # links without second-order data
 }
 RIGID = {"rigid first link": {"a"}, "rigid middle link": {"b"}, "rigid last link": {"c"}}
 CASES = (*chain_cases.CASES, *ARMS, *MIXED, *RIGID)
+DENSE = tuple(name for name in CASES if name != "rotation vectors")
 SERIAL = tuple(name for name in CASES if name not in chain_cases.CASES or name in chain_cases.SERIAL)
 
 

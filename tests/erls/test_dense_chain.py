@@ -19,7 +19,7 @@ from erls.mechanism.chain import Mechanism
 
 SAME = 1e-10  # relative: sums in another order
 GAUGES = ("joint-angle", "minimum-norm")
-KNOWN = [name for name in stiffened_cases.CASES if name != "rotation vectors"]
+KNOWN = stiffened_cases.DENSE
 PLAIN, STIFFENED = ("chains", [name for name in KNOWN if name in chain_cases.CASES]), ("stiffened", KNOWN)
 MODAL = ("modal_inertia", stiffened_cases.SERIAL)
 
