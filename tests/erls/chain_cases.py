@@ -121,8 +121,9 @@ CASES: dict[str, tuple[list[dict[str, Any]], set[str], bool]] = {
 
 NOT_SERIAL = ("branches", "joints of several coordinates", "rotation vectors", "screws")
 SERIAL = [name for name in CASES if name not in NOT_SERIAL]
-DENSE = [name for name in CASES if name != "rotation vectors"]  # which the dense form refuses
 """Chains of joints of one coordinate in which every link stands on the one before."""
+DENSE = [name for name in CASES if name != "rotation vectors"]
+"""What the dense form of the paper knows."""
 
 
 @dataclass(frozen=True)
