@@ -104,7 +104,7 @@ def test_prescribed_motion_and_its_torque(group: str) -> None:
     np.testing.assert_allclose(found.t[jump], 0.1, rtol=1e-14)
     s = np.array([_ramp(t)[0] for t in found.t])
     np.testing.assert_allclose(found.y[:, :3], 0.5 * np.stack([np.cos(s), 0 * s, -np.sin(s)], axis=1), atol=1e-12)
-    torque = found.multipliers[:, system.constraint_names.index("joint 'drive': no turn about z")]
+    torque = found.multipliers[:, system.constraint_names.index("joint 'drive': rotation about z")]
     inertia = 0.1 + 2 * 0.25
     push = np.where(np.arange(len(s)) > jump[0], 3.0, 0.0)
     right = inertia * push - 2 * 9.81 * 0.5 * np.cos(s)
@@ -120,7 +120,7 @@ def test_prescribed_slide() -> None:
     system, q = _driven(lambda t: (0.1 * t * t, 0.2 * t, 0.2), kind="prismatic")
     found = lie_generalized_alpha(system, (0, 0.2), q, np.zeros(6), ConstrainedOptions(step=1e-2))
     np.testing.assert_allclose(found.y[:, 1], 0.1 * found.t**2, atol=1e-13)
-    force = found.multipliers[:, system.constraint_names.index("joint 'drive': no shift along z")]
+    force = found.multipliers[:, system.constraint_names.index("joint 'drive': translation along z")]
     np.testing.assert_allclose(force, 2 * 0.2, atol=1e-7)  # rounding of positions over β h²
 
 

@@ -251,11 +251,6 @@ def test_run_files_reload(tmp_path: Path) -> None:
     assert again.formulation.describe()["elements"] == 6
 
 
-def _loop(folder: Path) -> Path:
-    loop = {"name": "shut", "link": "l", "node": "tip", "type": "spherical"}
-    return scenes.l_scene(folder, loops=[loop])
-
-
 def _between(folder: Path) -> Path:
     point = {"name": "middle", "link": "l", "node": "root-elbow/1"}
     return scenes.l_scene(folder, points=[point], payloads=[{"point": "middle", "mass": 0.1}])
@@ -265,13 +260,12 @@ def _between(folder: Path) -> Path:
     ("scene", "changes", "words"),
     [
         (lambda folder: scenes.ROOT / "data" / "l_shape" / "solid.toml", (), ("link 'l'", "beams")),
-        (_loop, (), ("loop 'shut'", "link 'l'")),
         (scenes.l_scene, ("links.l.damping.ratio=0.01",), ("link 'l'", "damp")),
         (_between, ("simulation.elements_per_member=3",), ("link 'l'", "between the nodes")),
         (scenes.l_scene, ("simulation.elements_per_member=0",), ("elements_per_member",)),
         (scenes.l_scene, ('simulation.integrator="radau"',), ("simulation.integrator",)),
     ],
-    ids=["solid", "loop", "damping", "payload", "elements", "integrator"],
+    ids=["solid", "damping", "payload", "elements", "integrator"],
 )
 def test_what_it_refuses(tmp_path: Path, scene: Any, changes: tuple[str, ...], words: tuple[str, ...]) -> None:
     """One message that names the link."""
