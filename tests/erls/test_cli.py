@@ -229,7 +229,7 @@ def test_info(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene, _ = run_json(capsys, "info", "d.dat")
     assert (scene["file"], scene["joints"][0]["name"], scene["simulation"]["duration"]) == ("scene", "shoulder", 0.01)
     out = run(capsys, "info", "d.dat")[0]
-    assert "shoulder  revolute   free         l     link.toml" in out
+    assert "shoulder  revolute   free         l  link.toml" in out
     assert "points: elbow, tip" in out
 
     stored, _ = run_json(capsys, "info", "a.dat")
