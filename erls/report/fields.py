@@ -152,7 +152,9 @@ def documentation(record: Record) -> tuple[str, list[tuple[list[str], str]]]:
     if sorted(described) != sorted(record.__struct_fields__):
         wrong = set(described) ^ set(record.__struct_fields__)
         raise LookupError(f"{record.__module__}.{record.__qualname__}: descriptions do not fit fields: {wrong}")
-    return _plain(told), entries
+    # what must be given comes first, as it does in the records
+    required = {f.name for f in msgspec.structs.fields(record) if f.required}
+    return _plain(told), sorted(entries, key=lambda entry: entry[0][0] not in required)
 
 
 def _described(record: Record, names: list[str], text: str) -> str:

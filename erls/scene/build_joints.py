@@ -16,10 +16,10 @@ from erls.mechanism.drives import build_drive
 from erls.mechanism.joint_types import JOINT_TYPES, Freedom
 from erls.mechanism.joints import Joint, JointForces
 from erls.mechanism.place import Place
-from erls.scene.chain import Base, Scene, SceneRecord
-from erls.scene.joints import Branch, Coordinate, Loop
+from erls.scene.chain import Scene, SceneRecord
+from erls.scene.joints import Coordinate, Loop
 from erls.scene.joints import Joint as JointRecord
-from erls.scene.links import MeshPose
+from erls.scene.records import Pose
 
 GROUND = "ground"
 
@@ -68,7 +68,7 @@ def build_joints(scene: Scene) -> list[list[Joint]]:
     return result
 
 
-def _pose(record: Base | Branch | MeshPose) -> Array:
+def _pose(record: Pose) -> Array:
     return pose(fixed_axes(*np.radians(record.rotation_deg)), np.array(record.position))
 
 

@@ -6,24 +6,13 @@ from dataclasses import dataclass
 
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
-from erls.scene.records import Record, SceneFile, SceneTables
+from erls.scene.records import Pose, Record, SceneFile, SceneTables
 from erls.scene.settings import Simulation
 from fe_import.description.records import Inertia, Vector
 
 
-class Base(Record, frozen=True):
-    """Pose of the first Denavit-Hartenberg frame in the world.
-
-    Attributes
-    ----------
-    position : (3,) floats
-        Of its origin [m].
-    rotation_deg : (3,) floats
-        About fixed x, then y, then z [deg].
-    """
-
-    position: Vector = (0.0, 0.0, 0.0)
-    rotation_deg: Vector = (0.0, 0.0, 0.0)
+class Base(Pose, frozen=True):
+    """Pose of the first Denavit-Hartenberg frame in the world."""
 
 
 class Point(Record, frozen=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.mechanism.drives import DriveRecord, FreeDrive
-from erls.scene.records import Record
+from erls.scene.records import Pose, Record
 from fe_import.description.records import Inertia, Vector
 
 
@@ -102,7 +102,21 @@ class Rotor(Record, frozen=True):
 
 
 class Acting(Record, frozen=True, kw_only=True):
-    """What acts along the coordinate of a joint: drive, spring, damper and friction, as `Joint` and `Loop` say."""
+    """What acts along a coordinate of a joint.
+
+    Attributes
+    ----------
+    drive : DriveRecord
+        What moves it; nothing unless given.
+    stiffness : float
+        Of a spring along it [N m/rad or N/m].
+    rest, rest_deg : float, optional
+        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
+    damping : float
+        Viscous damping [N m s/rad or N s/m].
+    friction : Friction, optional
+        Coulomb friction; none unless given.
+    """
 
     drive: DriveRecord = FreeDrive()
     stiffness: float = 0.0
@@ -119,16 +133,6 @@ class Coordinate(Acting, frozen=True):
     ----------
     initial : JointInitial
         Coordinate and rate at time 0.
-    drive : DriveRecord
-        What moves it; nothing unless given.
-    stiffness : float
-        Of a spring along it [N m/rad or N/m].
-    rest, rest_deg : float, optional
-        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
-    damping : float
-        Viscous damping [N m s/rad or N s/m].
-    friction : Friction, optional
-        Coulomb friction; none unless given.
     motor : Rotor
         Rotor inertia.
     """
@@ -137,20 +141,9 @@ class Coordinate(Acting, frozen=True):
     motor: Rotor = Rotor()
 
 
-class Branch(Record, frozen=True):
+class Branch(Pose, frozen=True):
     """Pose of the frame from which the Denavit-Hartenberg row of a joint starts, in the mesh frame of the link that it
-    stands on; on the ground, in the base frame.
-
-    Attributes
-    ----------
-    position : (3,) floats
-        Of its origin [m].
-    rotation_deg : (3,) floats
-        About fixed x, then y, then z [deg].
-    """
-
-    position: Vector = (0.0, 0.0, 0.0)
-    rotation_deg: Vector = (0.0, 0.0, 0.0)
+    stands on; on the ground, in the base frame."""
 
 
 class Joint(Acting, frozen=True):
@@ -184,16 +177,6 @@ class Joint(Acting, frozen=True):
         The link that it carries; that of the same number unless given.
     initial : JointInitial
         Coordinate and rate at time 0.
-    drive : DriveRecord
-        What moves it; nothing unless given.
-    stiffness : float
-        Of a spring in the joint [N m/rad or N/m].
-    rest, rest_deg : float, optional
-        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
-    damping : float
-        Viscous damping [N m s/rad or N s/m].
-    friction : Friction, optional
-        Coulomb friction; none unless given.
     motor : Motor
         Rotor inertia, and the mass of the motor.
     """
@@ -240,16 +223,6 @@ class Loop(Acting, frozen=True):
     coordinate, coordinate_deg : float, optional
         Its coordinate at the initial joint coordinates [rad or m], or in degrees; unless given 0 if it turns, or the
         distance along the axis of ``node`` from where it meets the other side if it slides.
-    drive : DriveRecord
-        What moves it; nothing unless given.
-    stiffness : float
-        Of a spring in the joint [N m/rad or N/m].
-    rest, rest_deg : float, optional
-        Coordinate at which that spring is free of force [rad or m], or in degrees; 0 unless given.
-    damping : float
-        Viscous damping [N m s/rad or N s/m].
-    friction : Friction, optional
-        Coulomb friction; none unless given.
     motor : Rotor
         Rotor inertia.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from erls.scene.records import Record
+from erls.scene.records import Pose, Record
 from fe_import.description.records import Damping, Inertia, Vector
 
 
@@ -30,21 +30,15 @@ class RigidBody(Record, frozen=True):
     inertia: Inertia = (0.0, 0.0, 0.0)
 
 
-class MeshPose(Record, frozen=True):
+class MeshPose(Pose, frozen=True):
     """Pose of the link's mesh frame.
 
     Attributes
     ----------
-    position : (3,) floats
-        Of its origin [m].
-    rotation_deg : (3,) floats
-        About fixed x, then y, then z [deg].
     frame : str
         In which frame: the link's Denavit-Hartenberg frame, ``dh``, or the frame of its inboard joint, ``joint``.
     """
 
-    position: Vector = (0.0, 0.0, 0.0)
-    rotation_deg: Vector = (0.0, 0.0, 0.0)
     frame: str = "dh"
 
 

@@ -17,6 +17,21 @@ class Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Base of all records."""
 
 
+class Pose(Record, frozen=True):
+    """Where a frame stands in another.
+
+    Attributes
+    ----------
+    position : (3,) floats
+        Of its origin [m].
+    rotation_deg : (3,) floats
+        About fixed x, then y, then z [deg].
+    """
+
+    position: Vector = (0.0, 0.0, 0.0)
+    rotation_deg: Vector = (0.0, 0.0, 0.0)
+
+
 class Stepping(Record, frozen=True):
     """Of every motion: how long it is [s], step [s], and numerical damping ρ∞ of generalized-α."""
 
