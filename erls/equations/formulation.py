@@ -147,7 +147,7 @@ class LoopFormulation(Formulation, Protocol):
         """What every closing joint does to its link."""
 
     def loop_motion(self, t: float, y: Array, v: Array, loop: int) -> tuple[float, float]:
-        """Coordinate of a revolute or prismatic closing joint, and its rate."""
+        """Coordinate of a closing joint that has one, and its rate."""
 
     def loop_effort(self, t: float, y: Array, v: Array, loop: int) -> float:
         """Force of drive, spring, damper and friction along it; for a prescribed motion what its motor must give."""

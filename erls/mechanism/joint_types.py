@@ -2,15 +2,15 @@
 
 A joint holds an outer frame on an inner one, D = (Q, p) being the pose of the outer frame in the inner one. It leaves
 free a product of one-parameter motions, exp(s₁ θ₁) exp(s₂ θ₂) …, whose order is that of its `freedoms`; and it forbids
-what its conditions say, each linear in the entries of p and Q: c · p + ⟨C, Q⟩ = 0, in the axes of the inner frame.
-Chains move along the freedoms; loops, absolute coordinates and nodes of elements hold the conditions. A new joint is
-one line of `JOINT_TYPES`.
+what its conditions say, in the axes of the inner frame: c · p + ⟨C, Q⟩ - h ψ(Q) = 0, linear in the entries of p and Q
+but for the turn ψ about z of a thread (`erls.maths.screws`). Chains move along the freedoms; loops, absolute
+coordinates and nodes of elements hold the conditions. A new joint is one line of `JOINT_TYPES`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -92,12 +92,25 @@ class Freedom:
         return np.asarray(self.poses(np.array([float(coordinate)]))[0])
 
 
-class Condition(NamedTuple):
-    """What stays zero: c · p + ⟨C, Q⟩, with ``line`` c (3,) and ``entries`` C (3, 3)."""
+@dataclass(frozen=True)
+class Condition:
+    """What stays zero: c · p + ⟨C, Q⟩ - h ψ(Q), with ψ the turn about z (`erls.maths.screws`).
+
+    Attributes
+    ----------
+    name : str
+        What tells it from the others of its joint.
+    line, entries : (3,), (3, 3) arrays
+        c and C.
+    pitch : float
+        h [m/rad]; 0 leaves what is linear. The value is that to the nearest turn of the thread, so that no turns need
+        to be counted: poses at whole leads 2π h from each other, at the same ψ, all belong to one thread.
+    """
 
     name: str
     line: Array
     entries: Array
+    pitch: float = 0.0
 
 
 def _fixed_point(axis: int) -> Condition:
@@ -125,20 +138,27 @@ _STRAIGHT = tuple(_fixed_turn(axis) for axis in (X, Y, Z))
 _PARALLEL = (_normal(f"{ROTATION} x", Y, Z, -1.0), _normal(f"{ROTATION} y", X, Z))
 
 
+# where a turn about z takes the outer origin
+_THREAD = Condition("advance along z", np.eye(3)[Z], np.zeros((3, 3)), pitch=1.0)
+
+
 class JointType(NamedTuple):
     """A kind of joint.
 
     Attributes
     ----------
+    name : str
     freedoms : tuple of Freedom
         From the inner frame outward; None for what only closes loops and joins nodes.
     conditions : tuple of Condition
     axes : int
         How many directions say how it lies.
     fields : tuple of str
-        Fields of a joint in a scene that say more: attributes of its freedoms.
+        Of `OWN_FIELDS` those that say more about it: attributes of freedoms and conditions, which take the value that
+        a joint gives (`given`) unless they are 0 in the table.
     """
 
+    name: str
     freedoms: tuple[Freedom, ...] | None
     conditions: tuple[Condition, ...]
     axes: int = 1
@@ -152,7 +172,8 @@ class JointType(NamedTuple):
     @property
     def slides(self) -> bool:
         """Whether the outer origin moves in the inner frame."""
-        return sum(bool(condition.line.any()) for condition in self.conditions) < 3
+        holding = sum(condition.line.any() and not condition.pitch for condition in self.conditions)
+        return bool(holding < 3)
 
     @property
     def mutual(self) -> bool:
@@ -167,37 +188,59 @@ class JointType(NamedTuple):
         turning = sum(bool(condition.entries.any()) for condition in self.conditions)
         return {2: (Z,), 3: (X, Z)}.get(turning, ())
 
+    def given(self, joint: Any) -> JointType:
+        """This kind with the values of its own fields, which are attributes of ``joint``."""
+
+        def told(part: Any) -> Any:
+            return replace(part, **{name: getattr(joint, name) for name in self.fields if getattr(part, name)})
+
+        if not self.fields:
+            return self
+        freedoms = None if self.freedoms is None else tuple(map(told, self.freedoms))
+        return self._replace(freedoms=freedoms, conditions=tuple(map(told, self.conditions)))
+
 
 _TURN, _SLIDE = Freedom(Z, True), Freedom(Z, False)
 _SHIFT = tuple(Freedom(axis, False, 'xyz'[axis]) for axis in (X, Y, Z))
 _VECTOR = tuple(Freedom(axis, True, f"turn_{'xyz'[axis]}", vector=True) for axis in (X, Y, Z))
 
-JOINT_TYPES: dict[str, JointType] = {
-    "revolute": JointType((_TURN,), _PINNED + _PARALLEL),
-    "prismatic": JointType((_SLIDE,), _PINNED[:2] + _STRAIGHT),
-    "screw": JointType((_TURN,), (), fields=("pitch",)),
-    "cylindrical": JointType((replace(_SLIDE, name="slide"), replace(_TURN, name="turn")), _PINNED[:2] + _PARALLEL),
-    "universal": JointType(
-        (Freedom(X, True, "x"), Freedom(Y, True, "y")), (*_PINNED, _normal("axes at right angles", X, Y)), axes=2
+_TYPES = (
+    JointType("revolute", (_TURN,), _PINNED + _PARALLEL),
+    JointType("prismatic", (_SLIDE,), _PINNED[:2] + _STRAIGHT),
+    JointType("screw", (replace(_TURN, pitch=1.0),), (*_PINNED[:2], _THREAD, *_PARALLEL), fields=("pitch",)),
+    JointType("cylindrical", (replace(_SLIDE, name="slide"), replace(_TURN, name="turn")), _PINNED[:2] + _PARALLEL),
+    JointType(
+        "universal",
+        (Freedom(X, True, "x"), Freedom(Y, True, "y")),
+        (*_PINNED, _normal("axes at right angles", X, Y)),
+        axes=2,
     ),
-    "planar": JointType(
-        (Freedom(X, False, "x"), Freedom(Y, False, "y"), replace(_TURN, name="turn")), (_PINNED[Z], *_PARALLEL)
+    JointType(
+        "planar",
+        (Freedom(X, False, "x"), Freedom(Y, False, "y"), replace(_TURN, name="turn")),
+        (_PINNED[Z], *_PARALLEL),
     ),
-    "spherical": JointType(_VECTOR, _PINNED, axes=0),
-    "floating": JointType((*_SHIFT, *_VECTOR), (), axes=0),
-    "line": JointType(None, _PINNED[:2]),  # a point on a straight line
-    "fixed": JointType((), _PINNED + _STRAIGHT, axes=0),
-}
+    JointType("spherical", _VECTOR, _PINNED, axes=0),
+    JointType("floating", (*_SHIFT, *_VECTOR), (), axes=0),
+    JointType("line", None, _PINNED[:2]),  # a point on a straight line
+    JointType("fixed", (), _PINNED + _STRAIGHT, axes=0),
+)
+JOINT_TYPES = {kind.name: kind for kind in _TYPES}
 """The axis of all but the universal joint is z; its own are the inner frame's x and the outer frame's y."""
 
 CHAIN_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.freedoms is not None)
 HOLDING_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.conditions)
-"""Those of chains, and those of loops and of nodes."""
+SINGLE_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.one is not None)
+"""Those of chains, those of loops and of nodes, and those of one coordinate."""
 
+OWN_FIELDS = {"pitch": "how far it advances along its axis per radian [m/rad], other than 0"}
+"""Fields of joints in scenes that only some kinds have, and what they say."""
 
 REVOLUTE, PRISMATIC = _TURN, _SLIDE
 
 
 def single(freedom: Freedom) -> JointType:
-    """The kind of joint that leaves this motion alone free."""
-    return next(kind for kind in JOINT_TYPES.values() if kind.freedoms == (freedom,))
+    """The kind of joint that leaves such a motion alone free, about or along z."""
+    wanted = Freedom(Z, freedom.turns, pitch=freedom.pitch)
+    kinds = (kind.given(freedom) for kind in JOINT_TYPES.values())
+    return next(kind for kind in kinds if kind.freedoms == (wanted,))

@@ -32,7 +32,7 @@ class LoopEnd:
 
 @dataclass(frozen=True)
 class LoopFreedom:
-    """What a revolute or prismatic closing joint leaves free, and what acts along it.
+    """The one motion that a closing joint leaves free, and what acts along it.
 
     Attributes
     ----------
@@ -58,15 +58,15 @@ class LoopFreedom:
 
     @property
     def counts_turns(self) -> bool:
-        """Whether forces depend on how often it has turned."""
-        return self.freedom.turns and bool(self.forces.stiffness or self.drive.kind == "pd")
+        """Whether forces depend on how often it has turned, and how far it has advanced does not tell."""
+        return self.freedom.turns and not self.freedom.pitch and bool(self.forces.stiffness or self.drive.kind == "pd")
 
 
 @dataclass(frozen=True)
 class Loop:
     """A closing joint: ``outer`` moves against ``inner``, in whose axes its directions are named.
 
-    ``freedom`` is that of a revolute or prismatic one.
+    ``freedom`` is that of one that leaves one motion free.
     """
 
     name: str

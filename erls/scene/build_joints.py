@@ -34,9 +34,7 @@ def stands_on(scene: SceneRecord, k: int) -> int:
 
 def joint_coordinates(joint: JointRecord) -> dict[str, Freedom]:
     """The coordinates of a joint by the names that reports give them."""
-    kind = JOINT_TYPES[joint.type]
-    more = {field: getattr(joint, field) for field in kind.fields}
-    freedoms = [replace(freedom, **more) for freedom in kind.freedoms or ()]
+    freedoms = JOINT_TYPES[joint.type].given(joint).freedoms or ()
     return {f"{joint.name}/{freedom.name}" if freedom.name else joint.name: freedom for freedom in freedoms}
 
 
@@ -86,8 +84,6 @@ def _dh_row(joint: JointRecord, place: str) -> DHRow:
 
 def _motions(joint: JointRecord, before: Array, after: Array, place: Place) -> list[Joint]:
     """The motions of a joint, one after another."""
-    for field in JOINT_TYPES[joint.type].fields:
-        place.number(field, getattr(joint, field))
     freedoms = joint_coordinates(joint)
     if not freedoms:
         return [fixed_joint(joint.name, before, after)]

@@ -68,11 +68,13 @@ def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Pla
     base = inner.frame
     if inner.link is not None:
         base = frames[inner.link] @ pose(position=mechanism.links[inner.link].model.nodes[inner.node]) @ inner.frame
-    kind = JOINT_TYPES[record.type]
+    kind = JOINT_TYPES[record.type].given(record)
     loop = Loop(record.name, kind, inner, outer)
     if kind.one is None:
         return loop
     slide = float((inverse(base) @ start)[2, 3])
+    if kind.one.pitch:  # frames of a thread coincide where its coordinate is zero
+        loop = replace(loop, inner=replace(inner, frame=inner.frame @ pose(position=np.array([0.0, 0.0, slide]))))
     return replace(loop, freedom=_freedom(record, kind.one, mechanism, loop, slide, at))
 
 

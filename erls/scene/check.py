@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from erls.errors import SceneError
 from erls.mechanism.dh import CONVENTIONS
-from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES
+from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, SceneRecord
 from erls.scene.check_settings import check_settings
-from erls.scene.checks import bad, check_names, check_tables, directed, not_negative
+from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping, check_temperature
@@ -18,7 +18,6 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
-_FIELDS = {field for kind in JOINT_TYPES.values() for field in kind.fields}
 # on one coordinate
 _ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
 
@@ -115,9 +114,7 @@ def _check_place(scene: SceneRecord, k: int, place: str) -> None:
 def _check_coordinates(joint: Joint, place: str) -> None:
     """What acts in a joint stands at its coordinate, or at each of its coordinates."""
     plain = type(joint)(name=joint.name, dh=joint.dh)
-    for field in _FIELDS - set(JOINT_TYPES[joint.type].fields):
-        if getattr(joint, field) != getattr(plain, field):
-            raise bad(f"{place}.{field}", f"a {joint.type} joint has none", getattr(joint, field), "remove it")
+    check_joint_fields(joint, joint.type, place)
     known = [freedom.name for freedom in JOINT_TYPES[joint.type].freedoms or () if freedom.name]
     for name in joint.coordinates:
         if not known:
@@ -227,8 +224,6 @@ def _check_compound(scene: SceneRecord, place: str) -> None:
     for field, joint, found, remedy in (
         ("gauge", vector, s.gauge == "minimum-norm", "use gauge = 'joint-angle'"),
         ("gauge", screw, s.gauge == "minimum-norm", "use gauge = 'joint-angle'"),
-        ("coordinates", screw, s.coordinates == "absolute", "use coordinates = 'independent'"),
-        ("formulation", screw, s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
         ("coordinates", compound, s.coordinates == "absolute", "use coordinates = 'independent'"),
         ("bandwidth", vector, s.bandwidth is not None, "remove the bandwidth, so that all modes are integrated"),
     ):
@@ -252,6 +247,7 @@ def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
     if loop.to_link and loop.position is not None:
         message = "between two links the nodes say where the joint is"
         raise bad(f"{place}.position", message, loop.position, "remove it")
+    check_joint_fields(loop, loop.type, place)
     kind = JOINT_TYPES[loop.type]
     if loop.axis is None and kind.slides:
         raise bad(f"{place}.axis", f"a {loop.type} joint needs its axis", None, "give its direction in the world")
@@ -270,4 +266,4 @@ def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
         for field in _ACTING:
             if getattr(loop, field) != getattr(plain, field):
                 message = f"a {loop.type} joint has no single coordinate that this could act along"
-                raise bad(f"{place}.{field}", message, loop.type, "remove it, or use revolute or prismatic")
+                raise bad(f"{place}.{field}", message, loop.type, f"remove it, or use one of {', '.join(SINGLE_TYPES)}")

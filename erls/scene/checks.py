@@ -8,8 +8,9 @@ from typing import Any
 import msgspec
 
 from erls.errors import Cause, SceneError
+from erls.mechanism.joint_types import JOINT_TYPES, OWN_FIELDS
 from erls.mechanism.place import LARGEST, LATEST
-from erls.scene.records import SceneTables, Stepping
+from erls.scene.records import Record, SceneTables, Stepping
 
 MOST_STEPS = 100_000_000  # fill any memory; more are a slip
 SHORTEST = 1e-9  # s, a thousand times what separates two breakpoints
@@ -52,6 +53,16 @@ def check_names(places: Iterable[tuple[str, str]]) -> None:
         if name in seen:
             raise bad(place, "names must differ", name, "rename one")
         seen.add(name)
+
+
+def check_joint_fields(joint: Record, kind: str, place: str) -> None:
+    """A joint has those fields that only some kinds have, if its own does."""
+    for field, meaning in OWN_FIELDS.items():
+        value, wanted = getattr(joint, field), field in JOINT_TYPES[kind].fields
+        if value and not wanted:
+            raise bad(f"{place}.{field}", f"a {kind} joint has none", value, "remove it")
+        if wanted and not value:
+            raise bad(f"{place}.{field}", f"a {kind} joint needs it", value, f"give {meaning}")
 
 
 def check_stepping(s: Stepping, place: str) -> None:

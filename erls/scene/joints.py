@@ -126,6 +126,18 @@ class Acting(Record, frozen=True, kw_only=True):
     friction: Friction | None = None
 
 
+class OneCoordinate(Acting, frozen=True, kw_only=True):
+    """What acts along the coordinate of a joint that has one, with the fields of some kinds of joints.
+
+    Attributes
+    ----------
+    pitch : float
+        Of a screw, which needs it: how far it advances along its axis per radian [m/rad].
+    """
+
+    pitch: float = 0.0
+
+
 class Coordinate(Acting, frozen=True):
     """One of several coordinates of a joint, and what acts along it.
 
@@ -146,7 +158,7 @@ class Branch(Pose, frozen=True):
     stands on; on the ground, in the base frame."""
 
 
-class Joint(Acting, frozen=True):
+class Joint(OneCoordinate, frozen=True):
     """A joint between a link (or the ground) and the link that it carries.
 
     Attributes
@@ -164,8 +176,6 @@ class Joint(Acting, frozen=True):
     coordinates : dict of Coordinate
         What acts along each coordinate of a joint that has several, by the names above; reports call them
         ``joint/coordinate``. A joint of one coordinate has these fields itself.
-    pitch : float
-        Of a screw: how far it advances along z per radian [m/rad].
     on : str
         The link that it stands on, or ``ground``; the link before unless given.
     at : str
@@ -185,7 +195,6 @@ class Joint(Acting, frozen=True):
     dh: DH
     type: str = "revolute"
     coordinates: dict[str, Coordinate] = {}
-    pitch: float = 0.0
     on: str = ""
     at: str = ""
     branch: Branch | None = None
@@ -194,11 +203,11 @@ class Joint(Acting, frozen=True):
     motor: Motor = Motor()
 
 
-class Loop(Acting, frozen=True):
+class Loop(OneCoordinate, frozen=True):
     """A joint that closes a loop, between a node of a link and the ground, or a node of another link.
 
-    Drive, spring, damper, friction and rotor act along the coordinate of a revolute or prismatic one: how far the link
-    has moved about or along the axis.
+    Drive, spring, damper, friction and rotor act along the coordinate of a joint that has one: how far the link has
+    moved about or along the axis.
 
     Attributes
     ----------
@@ -215,6 +224,8 @@ class Loop(Acting, frozen=True):
         The other link and its interface or named node; the ground unless given.
     position : (3,) floats, optional
         Where the node meets the ground, in the world [m]; where it is at the initial joint coordinates unless given.
+        A screw takes from it, or from ``to_node``, where its axis runs: its thread fits the node as that lies along the
+        axis at the initial joint coordinates.
     axis : (3,) floats, optional
         Direction in the world at the initial joint coordinates, fixed to both sides from then on; that of the joint
         which carries the link unless given.

@@ -13,6 +13,7 @@ from erls.equations.formulation import State
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.joint_types import single
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
 from erls.run.chain.places import node_positions
@@ -148,7 +149,7 @@ def joint_places(mechanism: Mechanism, state: State, magnification: float) -> li
         after = mechanism.links[k]
         outer = _displaced(after, after.inboard, inverse(joint.after), state, k, magnification)
         outer_node = node_positions(mechanism, state, k, [after.inboard.node], magnification)[0]
-        kind = "fixed" if joint.fixed else "revolute" if joint.freedom.turns else "prismatic"
+        kind = "fixed" if joint.fixed else single(joint.freedom).name
         along = pose(np.roll(np.eye(3), joint.freedom.axis - 2, axis=0))  # z along the axis of the motion
         result.append(JointPlace(kind, inner @ along, outer @ along, inner_node, outer_node))
     return result

@@ -181,6 +181,7 @@ _JOINTS = {
     "revolute": _revolute,
     "prismatic": _prismatic,
     "cylindrical": _cylindrical,
+    "screw": _cylindrical,
     "universal": _universal,
     "fixed": _fixed,
 }

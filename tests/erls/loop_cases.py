@@ -28,6 +28,8 @@ CASES: dict[str, tuple[str, list[dict[str, Any]]]] = {
     "spring on a turn": ("parallel", [{"type": "revolute", "coordinate_deg": 200.0, **SPRING}]),
     "controlled turn": ("parallel", [{"type": "revolute", "drive": {**PD, "torque_limit": 5.0}}]),
     "driven turn": ("parallel", [{"type": "revolute", "coordinate": 0.25, **MOVED, **SPRING}]),
+    "screw": ("revolute", [{"type": "screw", "pitch": 0.05, **SPRING}]),
+    "driven screw": ("revolute", [{"type": "screw", "pitch": -0.08, "coordinate": 0.1, **RISING}]),
     "torque on a slide": ("revolute", [{"type": "prismatic", "drive": TORQUE, **SPRING}]),
     "driven slide": ("mixed", [{"type": "prismatic", "coordinate": 0.1, **RISING}]),
     "cylindrical": ("prescribed", [{"type": "cylindrical"}]),
@@ -70,7 +72,7 @@ def mechanism(folder: Path, name: str, source: dict[str, str] = scenes.ARM) -> M
             loop["axis"] = across.tolist() if to else AXIS
         elif loop["type"] == "planar":
             loop["axis"] = np.cross(across, AXIS).tolist()
-        elif loop["type"] in ("prismatic", "cylindrical"):
+        elif loop["type"] in ("prismatic", "screw", "cylindrical"):
             loop["axis"] = AXIS
         data["loops"].append({**loop, **({"to_link": to, "to_node": "root"} if to else {"position": here.tolist()})})
     return scenes.mechanism(scenes.write_toml(folder / "closed.toml", data))

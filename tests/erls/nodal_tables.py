@@ -1,6 +1,7 @@
 """Values of nodal systems at random states, frozen in ``tests/data/frozen/nodal.npz``.
 
-They were computed by NumPy classes beside the kernels, before the kernels took their place. Entries are called
+They were computed by NumPy classes beside the kernels, before the kernels took their place, but for those of screws,
+whose derivatives `test_nodal_system` checks. Entries are called
 ``CASE/QUANTITY``; of a matrix the values are stored as they are.
 
 ``PYTHONPATH=. python tests/erls/nodal_tables.py`` freezes the values of the present code.
@@ -51,8 +52,8 @@ def tied(kind: str, group: str) -> NodalSystem:
     bodies = [RigidBody(k, 2.0 + k, np.diag([0.2, 0.3, 0.4]), rng.standard_normal(3)) for k in (0, 1)]
     drive = swing if kind in ("revolute", "prismatic") else None
     joints = [
-        Joint("root", kind, GROUND, 0, frames[0], frames[1], drive),
-        Joint("elbow", kind, 1, 0, frames[2], frames[3], drive),
+        Joint("root", kind, GROUND, 0, frames[0], frames[1], drive, pitch=0.3),
+        Joint("elbow", kind, 1, 0, frames[2], frames[3], drive, pitch=-0.7),
     ]
     return NodalSystem(poses, [RigidBodies(bodies, nodal_cases.WEIGHT)], joints, nodal_cases.GROUPS[group])
 
@@ -120,7 +121,7 @@ def acting(limit: float) -> ChainSystem:
     return ChainSystem(poses, [RigidBodies(bodies, nodal_cases.WEIGHT)], groups, joints)
 
 
-KINDS = ("fixed", "revolute", "prismatic", "cylindrical", "universal", "spherical")
+KINDS = ("fixed", "revolute", "prismatic", "screw", "cylindrical", "universal", "spherical")
 """Joints whose values are frozen."""
 
 CASES: dict[str, Callable[[], NodalSystem]] = {

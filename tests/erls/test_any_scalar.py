@@ -57,7 +57,7 @@ def _loops(folder: Path, name: str, form: str) -> tuple[CompiledSystem, State]:
     return closed.compiled, loop_cases.states(closed, name)[1]
 
 
-@pytest.mark.parametrize(("name", "form"), [("controlled turn", "erls"), ("two loops", "ffr")])
+@pytest.mark.parametrize(("name", "form"), [("controlled turn", "erls"), ("screw", "erls"), ("two loops", "ffr")])
 def test_complex_steps_through_loops(name: str, form: str, tmp_path: Path) -> None:
     """Of a residual whose tree is called by address; to 1e-6 along random directions of all states together."""
     system, at = _loops(tmp_path, name, form)

@@ -97,7 +97,7 @@ def test_conditions_against_differences(tmp_path: Path, kind: str) -> None:
     np.testing.assert_allclose((ahead.rate - behind.rate) / (2 * STEP), found.bias, atol=1e-6)
     np.testing.assert_allclose(found.rows[:, tree.free] @ v, found.rate, atol=1e-12)
     freedoms = {"revolute": 1, "prismatic": 1, "cylindrical": 2, "spherical": 3, "fixed": 0, "line": 4}
-    freedoms |= {"planar": 3, "universal": 2}
+    freedoms |= {"planar": 3, "universal": 2, "screw": 1}
     assert len(found.violation) == len(tied.rows.names) == 2 * (6 - freedoms[kind])
 
 

@@ -117,7 +117,7 @@ def test_complex_steps_through_the_residual(case: str) -> None:
     for name, constants in model._asdict().items():
         if name == "metres" or not isinstance(constants, np.ndarray) or constants.dtype != complex:
             continue
-        for i in np.flatnonzero(np.isfinite(constants.real)):
+        for i in np.flatnonzero(np.isfinite(constants.real) & ((name != "pitches") | (constants.real != 0))):
             kept = constants.flat[i]
 
             def made(step: complex, i: int = int(i), constants: Array = constants, kept: complex = kept) -> Array:

@@ -18,18 +18,20 @@ from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths import motion_maps as motions
 from erls.maths.groups import R3_SO3, SE3, Group
 from erls.maths.so3 import Array
-from erls.mechanism.joint_types import HOLDING_TYPES
+from erls.mechanism.joint_types import HOLDING_TYPES, SINGLE_TYPES
 
 GROUPS = {"SE(3)": SE3, "R³×SO(3)": R3_SO3}
 G = np.array([0.3, -0.2, -9.81])
+PITCH = 0.3
 # twists of the outer frame, in its axes at D = 1, that each joint allows
 ALLOWED = {
-    "fixed": [],
-    "revolute": [5],
-    "prismatic": [2],
-    "cylindrical": [2, 5],
-    "universal": [3, 4],
-    "spherical": [3, 4, 5],
+    "fixed": np.zeros((0, 6)),
+    "revolute": np.eye(6)[[5]],
+    "prismatic": np.eye(6)[[2]],
+    "screw": PITCH * np.eye(6)[[2]] + np.eye(6)[[5]],
+    "cylindrical": np.eye(6)[[2, 5]],
+    "universal": np.eye(6)[[3, 4]],
+    "spherical": np.eye(6)[3:],
 }
 
 
@@ -50,17 +52,17 @@ def _random(kind: str, group: Group, seed: int, motion: bool = False) -> NodalSy
 
     drive = swing if motion else None
     joints = [
-        Joint("root", kind, GROUND, 0, frames[0], frames[1], drive),
-        Joint("elbow", kind, 1, 0, frames[2], frames[3], drive),
+        Joint("root", kind, GROUND, 0, frames[0], frames[1], drive, pitch=0.3),
+        Joint("elbow", kind, 1, 0, frames[2], frames[3], drive, pitch=-0.7),
     ]
     return NodalSystem(poses, [RigidBodies(bodies, G)], joints, group)
 
 
 @pytest.mark.parametrize("group", GROUPS)
-@pytest.mark.parametrize("kind", HOLDING_TYPES)
+@pytest.mark.parametrize("kind", [*HOLDING_TYPES, *(f"driven {kind}" for kind in SINGLE_TYPES)])
 def test_derivatives_against_differences(kind: str, group: str) -> None:
     """B, Φ̈ − B a, Φ_t, stiffness and damping, far from closed joints: central differences with step 1e-5, 1e-7."""
-    system = _random(kind, GROUPS[group], 4, motion=kind in ("revolute", "prismatic"))
+    system = _random(kind.removeprefix("driven "), GROUPS[group], 4, motion=kind.startswith("driven "))
     rng = np.random.default_rng(5)
     v, a = rng.standard_normal((2, system.size))
     multipliers, t, q, e = rng.standard_normal(system.constraints), 0.7, system.start, 1e-5
@@ -127,17 +129,15 @@ def test_both_groups_describe_one_system() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_joints_allow_their_motions_only(kind: str) -> None:
     """The null space of B at a closed joint is spanned by the free twists; a long way along one keeps Φ = 0."""
-    system = NodalSystem(
-        np.eye(4)[None], [RigidBodies([RigidBody(0, 1.0, np.eye(3))], G)], [Joint("j", kind, GROUND, 0)]
-    )
+    joint = Joint("j", kind, GROUND, 0, pitch=PITCH)
+    system = NodalSystem(np.eye(4)[None], [RigidBodies([RigidBody(0, 1.0, np.eye(3))], G)], [joint])
     q = system.start
     free = la.null_space(system.constraint_matrix(0.0, q))
     assert free.shape[1] == len(ALLOWED[kind])
-    outside = np.delete(free, ALLOWED[kind], axis=0)
-    np.testing.assert_allclose(outside, 0, atol=1e-14)
-    ways = ALLOWED[kind] if kind != "spherical" else []
-    for k in ways:
-        turned = system.compose(q, 2.5 * np.eye(6)[k])
+    outside = la.null_space(ALLOWED[kind]) if len(ALLOWED[kind]) else np.eye(6)
+    np.testing.assert_allclose(outside.T @ free, 0, atol=1e-14)
+    for way in ALLOWED[kind] if kind != "spherical" else []:
+        turned = system.compose(q, 2.5 * way)
         np.testing.assert_allclose(system.constraint(0.0, turned), 0, atol=1e-15)
     assert len(system.constraint_names) == 6 - len(ALLOWED[kind])
 

@@ -141,7 +141,7 @@ def joint_loops(given: Given) -> list[Loop]:
         if seat is not None:
             inner = LoopEnd(joint.parent, seat.node, pose(position=-seat.position) @ joint.before @ turn)
         free = LoopFreedom(straight, 0.0, joint.forces, joint.rotor_inertia, joint.drive)
-        result.append(Loop(joint.name, single(replace(straight, name="")), inner, outer, free))
+        result.append(Loop(joint.name, single(straight), inner, outer, free))
     return result
 
 

@@ -221,7 +221,7 @@ class ConstrainedFfr:
         ):
             assert loop.freedom is not None
             along = loop.freedom.freedom.row
-            effort = float(wrench[along]) if loop.prescribed else acts.force
+            effort = float(loop.freedom.freedom.screw @ wrench) if loop.prescribed else acts.force
             turning = float(found.moves[k][along] @ a) + acts.turning
             wrench[along] += acts.force - loop.freedom.rotor_inertia * turning
             arm, turn = inverse(loop.outer.frame)[:3, 3], outer[:3, :3]  # of the node, in the joint frame

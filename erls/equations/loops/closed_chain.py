@@ -227,7 +227,7 @@ class ClosedChain(Tied):
         return result
 
     def loop_motion(self, t: float, y: Array, v: Array, loop: int) -> tuple[float, float]:
-        """Coordinate of a revolute or prismatic closing joint, and its rate."""
+        """Coordinate of a closing joint that has one, and its rate."""
         effort = self.closure(t, *self.closed(t, y, v)).efforts[loop]
         return effort.coordinate, effort.rate
 
@@ -238,7 +238,7 @@ class ClosedChain(Tied):
         if free is None or not self.mechanism.loops[loop].prescribed:
             return self.closure(t, y, v).efforts[loop].force
         _, multipliers, found = self.accelerations(t, y, v)
-        return float(self.rows.wrenches(found, multipliers)[loop][free.freedom.row])
+        return float(free.freedom.screw @ self.rows.wrenches(found, multipliers)[loop])
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Reactions in the joints of the chain: what the links from there outward need beside what loops give."""

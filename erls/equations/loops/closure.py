@@ -31,8 +31,10 @@ from erls.equations.serial.time_curves import curve
 from erls.maths.coefficients import angle_of
 from erls.maths.jit import kernel, part, spliced
 from erls.maths.products import clear, copy
+from erls.maths.screws import off_thread, turn_gradient, turn_gradient_change
 from erls.maths.so3 import Array as AnyArray
 from erls.maths.spatial import add_motion_cross, dot3, dot6, transform_motion
+from erls.maths.vectors import Rotation, dot, three
 
 
 @part
@@ -100,6 +102,8 @@ def _less_prescribed(reals: Array, integers: IntArray, joint: ClosingJoint, t: f
             left[j], left[3 + j] = c * p + s * q, c * q - s * p
         p, q = left[9], left[10]
         left[9], left[10] = c * p + s * q, c * q - s * p
+        left[11] -= joint.pitch * value
+        screw[2] = joint.pitch
     else:
         left[11] -= value
     transform_motion(left, screw, screw)
@@ -156,6 +160,37 @@ def fed(scratch: Array, integers: IntArray, joint: ClosingJoint, like: Any) -> A
     return 0.0 * like + read_joint_state(scratch, integers, joint.feeding).feed[0]
 
 
+@part
+def _turn_of(pose: Array) -> Rotation:
+    return pose[0], pose[1], pose[2], pose[3], pose[4], pose[5], pose[6], pose[7], pose[8]
+
+
+@part
+def follow_thread(
+    pitch: float, value: Any, bend: Any, pose: Array, twist: Array, twist_rate: Array, gradient: Array
+) -> Any:
+    """What `measure` found, less the advance by the turn about z; that goes into ``gradient``, too."""
+    turn, spin = _turn_of(pose), three(twist, 3)
+    slope = turn_gradient(turn)
+    for i in range(3):
+        gradient[3 + i] -= pitch * slope[i]
+    bend -= pitch * (dot(turn_gradient_change(turn, spin), spin) + dot(slope, three(twist_rate, 3)))
+    return off_thread(value, pitch, turn), dot6(gradient, twist), bend
+
+
+@spliced
+def _turned(loops: Loops, reals: Array, integers: IntArray, joint: ClosingJoint, t: float, y: Array) -> Any:
+    """Turns of a closing joint, as those of the tree between its links add up."""
+    turned = -joint.turned
+    for k in range(len(loops.joints)):
+        if joint.signs[k] != 0.0:
+            if loops.joints[k] >= 0:
+                turned += joint.signs[k] * y[loops.joints[k]]
+            else:
+                turned += joint.signs[k] * curve(reals, integers, loops.motions[k], t)[0]
+    return turned
+
+
 @spliced
 def _act(
     loops: Loops, reals: Array, integers: IntArray, scratch: Array, joint: ClosingJoint, t: float, y: Array,
@@ -166,13 +201,7 @@ def _act(
     value = pose[11]
     if joint.along == 5:
         angle = angle_of(pose[3] - pose[1], pose[0] + pose[4])
-        turned = -joint.turned
-        for k in range(len(loops.joints)):
-            if joint.signs[k] != 0.0:
-                if loops.joints[k] >= 0:
-                    turned += joint.signs[k] * y[loops.joints[k]]
-                else:
-                    turned += joint.signs[k] * curve(reals, integers, loops.motions[k], t)[0]
+        turned = pose[11] / joint.pitch if joint.pitch.real != 0.0 else _turned(loops, reals, integers, joint, t, y)
         value = angle + 2 * np.pi * np.floor((turned - angle).real / (2 * np.pi) + 0.5)
     found[COORDINATE], found[RATE] = joint.zero + value, state.twist[joint.along]
     found[TURNING] = state.twist_rate[joint.along]
@@ -193,9 +222,14 @@ def _close(
     _less_prescribed(reals, integers, joint, t, state)
     for k in range(len(joint.lines)):
         at, gradient = joint.first + k, state.gradients[k]
-        room.violation[at], room.rate[at], room.bias[at] = measure(
+        value, rate, bend = measure(
             joint.lines[k], joint.entries[k], state.left, state.left_twist, state.left_rate, gradient
         )
+        if joint.pitches[k].real != 0.0:
+            value, rate, bend = follow_thread(
+                joint.pitches[k], value, bend, state.left, state.left_twist, state.left_rate, gradient
+            )
+        room.violation[at], room.rate[at], room.bias[at] = value, rate, bend
         if loops.used[at] >= 0:
             pull_back(gradient, state.moves, room.gradient[loops.used[at]])
     if joint.along >= 0:

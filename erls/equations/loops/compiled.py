@@ -306,10 +306,12 @@ def _joint(memory: Memory, given: Given, number: int, loop: Loop) -> own.Closing
         along=-1 if free is None else free.freedom.row,
         joint=joint,
         zero=0.0 if free is None else free.zero,
+        pitch=0.0 if free is None else free.freedom.pitch,
         feeding=feeding,
         turned=float(given.turns.start[number]),
         signs=given.turns.signs[number],
         ground=np.stack([pose_numbers(end.frame) for end in ends]),
         lines=np.array([row.line for row in found]),
         entries=np.array([row.entries for row in found]),
+        pitches=np.array([row.pitch for row in found]),
     )

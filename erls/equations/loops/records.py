@@ -107,15 +107,17 @@ class ClosingJoint(NamedTuple):
         Place of the `erls.equations.serial.records.JointState` whose feed-forward acts as well, -1 without.
     zero : float
         Coordinate where the frames coincide.
+    pitch : float
+        How far its coordinate, an angle, advances [m/rad].
     turned : float
         Σ signs · joint coordinates at the start.
     signs : (c,) array
-        By which these add to its own turns.
+        By which these add to its own turns; those of a screw are told by how far it has advanced.
     ground : (2, 12) array
         Poses of the outer and the inner frame where they stand on the ground.
-    lines, entries : (c, 3), (c, 3, 3) arrays
-        Conditions c · p + ⟨C, Q⟩ = 0 on place p and rotation Q of the outer frame in the inner one, less what is
-        prescribed.
+    lines, entries, pitches : (c, 3), (c, 3, 3), (c,) arrays
+        Conditions c · p + ⟨C, Q⟩ - h ψ(Q) = 0 on place p and rotation Q of the outer frame in the inner one, less what
+        is prescribed.
     """
 
     outer: int
@@ -126,11 +128,13 @@ class ClosingJoint(NamedTuple):
     joint: int
     feeding: int
     zero: float
+    pitch: float
     turned: float
     signs: Vector
     ground: Matrix
     lines: Matrix
     entries: Stack
+    pitches: Vector
 
 
 class LoopState(NamedTuple):

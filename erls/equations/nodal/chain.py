@@ -20,17 +20,15 @@ from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies
-from erls.errors import Cause, SceneError
 from erls.maths import motion_maps as motions
 from erls.maths.rotation_maps import exp
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.chain import poses as link_poses
-from erls.mechanism.drives import Drive
-from erls.mechanism.joint_types import JOINT_TYPES, Freedom, Z
+from erls.mechanism.joint_types import Freedom, Z, single
 from erls.mechanism.joints import Joint as MechanismJoint
-from erls.mechanism.loops import Loop, LoopEnd
+from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
 
@@ -217,37 +215,28 @@ def _closing(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[
 
 
 def _joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
-    kinds = ["revolute" if joint.freedom.turns else "prismatic" for joint in mechanism.joints]
-    for joint in mechanism.joints:
-        if joint.freedom.pitch:
-            raise SceneError(
-                Cause.BAD_FIELD,
-                "nodes are held by conditions that are linear in their poses, and a screw has none",
-                where=f"joint {joint.name!r}: type",
-                value="screw",
-                remedy="use formulation erls or ffr",
-            )
+    kinds = [single(j.freedom).name for j in mechanism.joints]
     for k in mechanism.rotation_vectors:  # the first one turns for all three
         kinds[k : k + 3] = "spherical", "fixed", "fixed"
-    return [
-        _joint(joint.name, kind, seat, joint.drive)
-        for joint, kind, seat in zip(mechanism.joints, kinds, seats, strict=True)
-    ]
+    whole = zip(mechanism.joints, kinds, seats, strict=True)
+    return [_joint(joint.name, kind, seat, joint) for joint, kind, seat in whole]
 
 
 def _closing_joints(mechanism: Mechanism, seats: Sequence[Seat]) -> list[Joint]:
-    kinds = [next(name for name, kind in JOINT_TYPES.items() if kind is loop.type) for loop in mechanism.loops]
-    drives = [None if loop.freedom is None else loop.freedom.drive for loop in mechanism.loops]
-    whole = zip(mechanism.loops, kinds, seats, drives, strict=True)
-    return [_joint(loop.name, kind, seat, drive) for loop, kind, seat, drive in whole]
+    return [
+        _joint(loop.name, loop.type.name, seat, loop.freedom) for loop, seat in zip(mechanism.loops, seats, strict=True)
+    ]
 
 
-def _joint(name: str, kind: str, seat: Seat, drive: Drive | None) -> Joint:
+def _joint(name: str, kind: str, seat: Seat, moving: MechanismJoint | LoopFreedom | None) -> Joint:
     ends = seat.inner, seat.outer, seat.inner_frame, seat.outer_frame
-    if drive is None or not drive.prescribed:
+    if moving is None:
         return Joint(name, kind, *ends)
+    joint, drive = Joint(name, kind, *ends, pitch=moving.freedom.pitch), moving.drive
+    if not drive.prescribed:
+        return joint
     motion: Motion = drive.reference  # type: ignore[assignment]
-    return Joint(name, kind, *ends, motion, drive.breakpoints)
+    return replace(joint, motion=motion, breakpoints=drive.breakpoints)
 
 
 def _actuators(mechanism: Mechanism, seats: Sequence[Seat], positions: Array) -> list[Actuator]:

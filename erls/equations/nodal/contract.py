@@ -41,8 +41,9 @@ class Model(NamedTuple):
         (s, 2), and (s, 9): both points in their nodes, stiffness, damping, length without force.
     winding_nodes, winding_frames, windings : arrays
         Torsion springs: (w, 2), (w, 18) their axes in both nodes, and (w, 6): axis, stiffness, damping, rest.
-    joint_nodes, joint_frames, joint_driven, joint_sign, joint_rows, conditions : arrays
-        (j, 2), (j, 24), (j,) row of the twist that is prescribed or −1, (j,), (j + 1,) first conditions, (m, 12) c, C.
+    joint_nodes, joint_frames, joint_drives, joint_rows, conditions, pitches : arrays
+        (j, 2), (j, 24), (j, 2) slide along z and turn about it per unit of the prescribed coordinate, (j + 1,) first
+        conditions, (m, 12) c, C, (m,) of threads, 0 of conditions that are linear.
     metres, place, order : arrays
         (n,) metres per unit; (N,) number of each unknown in the band, and the unknown of each number.
     """
@@ -73,10 +74,10 @@ class Model(NamedTuple):
     windings: Matrix
     joint_nodes: Pairs
     joint_frames: Matrix
-    joint_driven: Indices
-    joint_sign: Vector
+    joint_drives: Matrix
     joint_rows: Indices
     conditions: Matrix
+    pitches: Vector
     metres: Vector
     place: Indices
     order: Indices
@@ -223,7 +224,7 @@ if ENABLED:
     _i1, _i2 = _t.int64[::1], _t.int64[:, ::1]
     _beams = (_i2, _r2, _r2, _r3, _r3, _i1)
     _others = (_i1, _r3, _i1, _r2, _i1, _i2, _r2, _i1, _i1, _r2, _i2, _r2, _i2, _r2, _r2)
-    _joints = (_i2, _r2, _i1, _r1, _i1, _r2)
+    _joints = (_i2, _r2, _r2, _i1, _r2, _r1)
     MODEL = _t.NamedTuple((_t.int64, _r2, _i2, *_beams, *_others, *_joints, _r1, _i1, _i1), Model)
     _tried = (_r2, _r2, _r1, _r2)
     STATE = _t.NamedTuple(_tried, State)

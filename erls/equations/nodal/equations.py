@@ -201,7 +201,7 @@ class Nodal:
         return result
 
     def loop_motion(self, t: float, y: Array, v: Array, loop: int) -> tuple[float, float]:
-        """Coordinate of a revolute or prismatic closing joint, and its rate."""
+        """Coordinate of a closing joint that has one, and its rate."""
         q, velocity = self.configuration(y, v)
         coordinates, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
         return float(coordinates[self._moving[loop]]), float(rates[self._moving[loop]])

@@ -1,9 +1,9 @@
 """Joints as conditions on the pose of an outer frame relative to an inner one, D = (Q, p), and their forces.
 
-Every condition is linear in the entries of p and Q: c · p + ⟨C, Q⟩ = 0 (`erls.mechanism.joint_conditions`). With the
-relative twist η of the outer frame, in its axes, ṗ = Q η_v and Q̇ = Q η̃_ω. Only relative motion enters, so that a rigid
-motion of both frames changes nothing. Along a prescribed coordinate s(t) the inner frame runs ahead by exp(s ẑ) of the
-joint's z axis.
+Conditions are linear in the entries of p and Q, less what a thread advances: c · p + ⟨C, Q⟩ - h ψ(Q) = 0
+(`erls.mechanism.joint_types`, `erls.maths.screws`). With the relative twist η of the outer frame, in its axes,
+ṗ = Q η_v and Q̇ = Q η̃_ω. Only relative motion enters, so that a rigid motion of both frames changes nothing. Along a
+prescribed coordinate s(t) the inner frame runs ahead by exp(s ξ̂), ξ along or about the joint's z axis, or both.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from erls.maths.motions import (
     transposed,
 )
 from erls.maths.rotations import exponential
+from erls.maths.screws import off_thread, turn_gradient, turn_gradient_change
 from erls.maths.vectors import (
     Rotation,
     Twist,
@@ -68,14 +69,12 @@ def relative(
 def _ahead(model: Model, j: int, coordinate: float) -> tuple[Vector, Rotation]:
     """Frame of the inner node that runs ahead by a prescribed coordinate."""
     p, r = vector(model.joint_frames, j, 0), nine(model.joint_frames, j, 3)
-    if model.joint_driven[j] < 0:
+    slide, turn = model.joint_drives[j, 0] * coordinate, model.joint_drives[j, 1] * coordinate
+    if slide.real == 0.0 and turn.real == 0.0:
         return p, r
-    s = model.joint_sign[j] * coordinate
-    if model.joint_driven[j] == 2:
-        return plus(p, times(r, (0.0, 0.0, s))), r
-    psi = (0.0, 0.0, s)
-    c = stumpff(s * s)
-    return p, product(r, exponential(psi, c[0], c[1]))
+    psi = (0.0, 0.0, turn)
+    c = stumpff(turn * turn)
+    return plus(p, times(r, (0.0, 0.0, slide))), product(r, exponential(psi, c[0], c[1]))
 
 
 @inlined
@@ -96,11 +95,22 @@ def _posed(model: Model, poses: Array, j: int, coordinate: float) -> tuple[Vecto
 def _along(model: Model, row: int, turn: Rotation) -> Twist:
     """Derivative of a condition along the relative twist."""
     pull = turned(turn, vector(model.conditions, row, 0))
-    return pull, axial(back_product(turn, nine(model.conditions, row, 3)))
+    about = axial(back_product(turn, nine(model.conditions, row, 3)))
+    if model.pitches[row].real != 0.0:
+        about = minus(about, scaled(model.pitches[row], turn_gradient(turn)))
+    return pull, about
+
+
+@inlined
+def _violation(model: Model, row: int, place: Vector, turn: Rotation) -> float:
+    violation = _linear(model.conditions, row, place, turn)
+    if model.pitches[row].real != 0.0:
+        violation = off_thread(violation, model.pitches[row], turn)
+    return violation
 
 
 @part
-def _violation(conditions: Array, row: int, place: Vector, turn: Rotation) -> float:
+def _linear(conditions: Array, row: int, place: Vector, turn: Rotation) -> float:
     violation: float = dot(vector(conditions, row, 0), place)
     entries = nine(conditions, row, 3)
     for k in range(9):
@@ -115,7 +125,7 @@ def joint_forces(model: Model, work: Work, sample: Array) -> None:
         place, turn, reach, axes = _posed(model, work.poses, j, sample[3 * j])
         force = _ZERO, _ZERO
         for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
-            work.violation[row] = _violation(model.conditions, row, place, turn)
+            work.violation[row] = _violation(model, row, place, turn)
             along, about = _along(model, row, turn)
             strength = work.multipliers[row]
             force = plus(force[0], scaled(strength, along)), plus(force[1], scaled(strength, about))
@@ -138,23 +148,22 @@ def joint_gradients(model: Model, work: Work, sample: Array, j: int) -> None:
     """
     place, turn, reach, axes = _posed(model, work.poses, j, sample[3 * j])
     p, r = vector(model.joint_frames, j, 12), nine(model.joint_frames, j, 15)
-    driven, sign = model.joint_driven[j], model.joint_sign[j]
     carried, own = _twist(model, work.twist, j, reach, axes)
-    axis = unit(driven), unit(driven - 3)
-    drive = pair_scaled(sign * sample[3 * j + 1], axis)
+    axis = (0.0, 0.0, model.joint_drives[j, 0]), (0.0, 0.0, model.joint_drives[j, 1])
+    drive = pair_scaled(sample[3 * j + 1], axis)
     moved = transformed(place, turn, drive[0], drive[1])  # of the driven frame, as seen in the outer one
     inner = pair_plus(carried, moved)
     apart = pair_minus(own, inner)
     # the inner frame's twist changes as it turns ahead, and as the outer frame moves against it
     base, base_axes = _ahead(model, j, sample[3 * j])
     held = _of_node(work.twist, model.joint_nodes[j, 0], base, base_axes)
-    change = pair_minus(pair_scaled(sign * sample[3 * j + 2], axis), bracket(drive[0], drive[1], held[0], held[1]))
+    change = pair_minus(pair_scaled(sample[3 * j + 2], axis), bracket(drive[0], drive[1], held[0], held[1]))
     change = transformed(place, turn, change[0], change[1])
     bend = pair_minus(bracket(apart[0], apart[1], inner[0], inner[1]), change)
     swing = times(turn, cross(apart[1], apart[0]))
     curve = product(product(turn, _tilde(apart[1])), _tilde(apart[1]))
     for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
-        work.violation[row] = _violation(model.conditions, row, place, turn)
+        work.violation[row] = _violation(model, row, place, turn)
         along, about = _along(model, row, turn)
         n, m = transposed(reach, axes, along, about)
         end, end_moment = transposed(p, r, along, about)
@@ -162,7 +171,10 @@ def joint_gradients(model: Model, work: Work, sample: Array, j: int) -> None:
             work.gradient[row, i], work.gradient[row, 3 + i] = -n[i], -m[i]
             work.gradient[row, 6 + i], work.gradient[row, 9 + i] = end[i], end_moment[i]
         work.drift[row] = -dot(along, moved[0]) - dot(about, moved[1])
-        work.bias[row] = _violation(model.conditions, row, swing, curve) + dot(along, bend[0]) + dot(about, bend[1])
+        bias = _linear(model.conditions, row, swing, curve) + dot(along, bend[0]) + dot(about, bend[1])
+        if model.pitches[row].real != 0.0:
+            bias -= model.pitches[row] * dot(turn_gradient_change(turn, apart[1]), apart[1])
+        work.bias[row] = bias
 
 
 @part
@@ -191,10 +203,11 @@ def joint_stiffness(model: Model, work: Work, sample: Array, j: int, block: Arra
     """Derivative of Bᵀλ of joint j by increments of both nodes into a block of zeros."""
     _, turn, reach, axes = _posed(model, work.poses, j, sample[3 * j])
     p, r = vector(model.joint_frames, j, 12), nine(model.joint_frames, j, 15)
-    pull, entries = _ZERO, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    pull, entries, thread = _ZERO, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0
     for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
         strength = work.multipliers[row]
         pull = plus(pull, scaled(strength, vector(model.conditions, row, 0)))
+        thread += strength * model.pitches[row]
         c = nine(model.conditions, row, 3)
         entries = (
             entries[0] + strength * c[0],
@@ -210,6 +223,8 @@ def joint_stiffness(model: Model, work: Work, sample: Array, j: int, block: Arra
     force, spread = turned(turn, pull), back_product(turn, entries)
     trace = spread[0] + spread[4] + spread[8]
     moment = axial(spread)
+    if thread.real != 0.0:
+        moment = minus(moment, scaled(thread, turn_gradient(turn)))
     for k in range(12):
         a, b = unit(k % 6), unit(k % 6 - 3)
         if k < 6:
@@ -218,6 +233,8 @@ def joint_stiffness(model: Model, work: Work, sample: Array, j: int, block: Arra
         else:
             v, w = transformed(p, r, a, b)
         pushed = cross(force, w), minus(times(spread, w), scaled(trace, w))
+        if thread.real != 0.0:
+            pushed = pushed[0], minus(pushed[1], scaled(thread, turn_gradient_change(turn, w)))
         # the inner node's share of the wrench turns with the relative pose
         inner = pair_minus(cobracket(v, w, force, moment), pushed)
         n, m = transposed(reach, axes, inner[0], inner[1])

@@ -15,7 +15,7 @@ import numpy as np
 from erls.equations.nodal.scatter import IntArray
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.mechanism.joint_types import JOINT_TYPES, Condition
+from erls.mechanism.joint_types import JOINT_TYPES, SINGLE_TYPES, Condition, JointType, Z
 
 GROUND = -1
 Motion = Callable[[float], tuple[float, float, float]]  # coordinate, rate, acceleration at a time
@@ -34,11 +34,13 @@ class Joint:
     inner_frame, outer_frame : (4, 4) array
         Pose of the joint in the frame of each node, in the world for the ground.
     motion : callable or None
-        Prescribed coordinate of a revolute or prismatic joint.
+        Prescribed coordinate of a joint that has one.
     breakpoints : tuple
         Times at which its acceleration jumps.
     left_out : frozenset of str
         Names of conditions that other joints see to (`erls.equations.nodal.redundant`).
+    pitch : float
+        Of a screw [m/rad].
 
     Raises
     ------
@@ -55,6 +57,7 @@ class Joint:
     motion: Motion | None = None
     breakpoints: tuple[float, ...] = ()
     left_out: frozenset[str] = frozenset()
+    pitch: float = 0.0
 
     def __post_init__(self) -> None:
         where = f"joint {self.name!r}"
@@ -63,16 +66,21 @@ class Joint:
             message = "there is no such joint"
             raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: type", value=self.type, remedy=remedy)
         if self.motion is not None and JOINT_TYPES[self.type].one is None:
-            message, remedy = "its motion cannot be prescribed", "let the joint be revolute or prismatic"
+            message, remedy = "its motion cannot be prescribed", f"let the joint be one of {', '.join(SINGLE_TYPES)}"
             raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: motion", value=self.type, remedy=remedy)
         if self.inner == self.outer:
             message, remedy = "both frames belong to one node", "name two nodes, or the ground as one of them"
             raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: outer", value=self.outer, remedy=remedy)
 
     @property
+    def kind(self) -> JointType:
+        """Its type with its own fields."""
+        return JOINT_TYPES[self.type].given(self)
+
+    @property
     def conditions(self) -> list[Condition]:
         """Conditions of the type; all of them when the last freedom is prescribed; those left out aside."""
-        every = JOINT_TYPES["fixed" if self.motion else self.type].conditions
+        every = JOINT_TYPES["fixed"].conditions if self.motion else self.kind.conditions
         return [c for c in every if c.name not in self.left_out]
 
 
@@ -87,8 +95,10 @@ class JointRows:
     inner, outer : (j, 4, 4) arrays
         Frames in their nodes, or in the world for the ground.
     joint_of_row, names : arrays (m,)
-    c, entries : (m, 3), (m, 3, 3) arrays
+    c, entries, pitches : (m, 3), (m, 3, 3), (m,) arrays
         Conditions.
+    drives : (j, 2) array
+        Slide along z and turn about it of the inner frame per unit of a prescribed coordinate; 0 unless prescribed.
     """
 
     def __init__(self, joints: Sequence[Joint]) -> None:
@@ -97,11 +107,13 @@ class JointRows:
         self.nodes: IntArray = np.array([[i, o] for (i, _), (o, _) in sides], dtype=np.int64).reshape(-1, 2)
         self.inner = np.array([frame for (_, frame), _ in sides]).reshape(-1, 4, 4)
         self.outer = np.array([frame for _, (_, frame) in sides]).reshape(-1, 4, 4)
-        found = [(k, *condition) for k, joint in enumerate(joints) for condition in joint.conditions]
-        self.joint_of_row: IntArray = np.array([k for k, *_ in found], dtype=np.int64)
-        self.names = tuple(f"joint {joints[k].name!r}: {name}" for k, name, _, _ in found)
-        self.c = np.array([c for _, _, c, _ in found]).reshape(-1, 3)
-        self.entries = np.array([e for _, _, _, e in found]).reshape(-1, 3, 3)
+        self.drives = np.array([self._drive(j) for j in joints]).reshape(-1, 2)
+        found = [(k, condition) for k, joint in enumerate(joints) for condition in joint.conditions]
+        self.joint_of_row: IntArray = np.array([k for k, _ in found], dtype=np.int64)
+        self.names = tuple(f"joint {joints[k].name!r}: {row.name}" for k, row in found)
+        self.c = np.array([row.line for _, row in found]).reshape(-1, 3)
+        self.entries = np.array([row.entries for _, row in found]).reshape(-1, 3, 3)
+        self.pitches = np.array([row.pitch for _, row in found])
         turned = [j.type == "universal" and self.sign(j) < 0 for j in joints]  # its two axes differ
         for row, k in enumerate(self.joint_of_row):
             if turned[k]:
@@ -110,10 +122,10 @@ class JointRows:
     @staticmethod
     def sign(joint: Joint) -> int:
         """-1 where the ground, as the inner frame, changes places with the outer one."""
-        return -1 if joint.inner == GROUND and JOINT_TYPES[joint.type].mutual else 1
+        return -1 if joint.inner == GROUND and joint.kind.mutual else 1
 
-    @staticmethod
-    def driven_along(joint: Joint) -> int:
-        """Row of the relative twist that is prescribed, or -1."""
-        freedom = JOINT_TYPES[joint.type].one
-        return -1 if joint.motion is None or freedom is None else freedom.row
+    def _drive(self, joint: Joint) -> Array:
+        freedom = joint.kind.one
+        if joint.motion is None or freedom is None:
+            return np.zeros(2)
+        return np.asarray(self.sign(joint) * freedom.screw[[Z, 3 + Z]])

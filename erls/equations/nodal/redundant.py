@@ -31,7 +31,7 @@ def without_redundant(system: NodalSystem) -> tuple[list[Joint], tuple[str, ...]
     first = np.searchsorted(system.rows.joint_of_row, np.arange(len(joints)))
     for row in found:
         k = int(system.rows.joint_of_row[row])
-        name = system.rows.joints[k].conditions[row - int(first[k])][0]
+        name = system.rows.joints[k].conditions[row - int(first[k])].name
         joints[k] = replace(joints[k], left_out=joints[k].left_out | {name})
     return joints, tuple(system.constraint_names[row] for row in found)
 

@@ -11,8 +11,10 @@ from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.scenes.build import Assembly
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
+from erls.mechanism.joint_types import JOINT_TYPES
 
-ONE_COORDINATE = {"revolute": "rad", "prismatic": "m"}
+ONE_COORDINATE = {name: kind.one.units[0] for name, kind in JOINT_TYPES.items() if kind.one is not None}
+"""Units of the coordinates of joints that have one."""
 
 
 def joint_frames(joint: Joint, inner: Array, outer: Array) -> tuple[Array, Array]:
@@ -27,7 +29,7 @@ def joint_coordinate(joint: Joint, inner: Array, outer: Array) -> Array:
     """(...) angle within half a turn [rad] or slide [m] of a joint with one coordinate."""
     first, second = joint_frames(joint, inner, outer)
     relative = motions.inverse(first) @ second
-    if joint.type == "prismatic":
+    if ONE_COORDINATE[joint.type] == "m":
         return np.asarray(relative[..., 2, 3])
     sine, cosine = relative[..., 1, 0] - relative[..., 0, 1], relative[..., 0, 0] + relative[..., 1, 1]
     return np.asarray(np.arctan2(sine, cosine))

@@ -85,10 +85,10 @@ class BodyRun(Run):
         return np.asarray(poses[:, 0, :3, 3].reshape(*np.shape(t), 3))
 
     def joint_angle(self, joint: str, t: ArrayLike) -> Array:
-        """(...) coordinate of a revolute or prismatic connection [rad or m], 0 as built; turns are counted."""
+        """(...) coordinate of a connection that has one [rad or m], 0 as built; turns are counted."""
         choose(joint, self.joints, "connection", SceneError)
         found = self._coordinate(self.joints[joint], t)
-        if self.joints[joint].type == "revolute" and len(found):
+        if joint in self._turned and len(found):
             known = np.interp(self.within(t), self.times, self._turned[joint])
             found = found + 2 * np.pi * np.round((known - found) / (2 * np.pi))
         return found.reshape(np.shape(t))
@@ -99,7 +99,7 @@ class BodyRun(Run):
         return {
             name: np.unwrap(self._coordinate(joint, self.times))
             for name, joint in self.joints.items()
-            if joint.type == "revolute"
+            if ONE_COORDINATE[joint.type] == "rad"
         }
 
     def _coordinate(self, joint: Joint, t: ArrayLike) -> Array:

@@ -116,7 +116,7 @@ class ChainRun(ChainMotion):
         return np.array([f.force for f in found]).reshape(shape), np.array([f.moment for f in found]).reshape(shape)
 
     def loop_coordinate(self, loop: str, t: ArrayLike) -> Array:
-        """(...) coordinate of a revolute or prismatic closing joint [rad or m]."""
+        """(...) coordinate of a closing joint that has one [rad or m]."""
         return self._of_loop(loop, t, lambda chain, *at: chain.loop_motion(*at)[0])
 
     def loop_rate(self, loop: str, t: ArrayLike) -> Array:

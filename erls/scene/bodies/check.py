@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from erls.errors import SceneError
-from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES
+from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
-from erls.scene.checks import bad, check_names, check_stepping, check_tables, directed, not_negative
+from erls.scene.checks import (
+    bad,
+    check_joint_fields,
+    check_names,
+    check_stepping,
+    check_tables,
+    directed,
+    not_negative,
+)
 from erls.scene.integrators import MATRICES
 from fe_import.description.check import check_expansion, check_temperature
 from fe_import.elements.sections import check_section
@@ -124,6 +132,7 @@ def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
     choose(joint.to, [GROUND, *nodes], f"{place}.to", SceneError)
     if joint.node == joint.to:
         raise bad(f"{place}.to", "a connection needs two nodes", joint.to, "name another node, or the ground")
+    check_joint_fields(joint, joint.type, place)
     wanted = JOINT_TYPES[joint.type].axes
     for k, name in enumerate(("axis", "second_axis")):
         axis = getattr(joint, name)
@@ -134,7 +143,7 @@ def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
         directed(f"{place}.{name}", axis)
     if joint.motion is not None and JOINT_TYPES[joint.type].one is None:
         message = "its motion cannot be prescribed"
-        raise bad(f"{place}.motion", message, joint.type, "let the joint be revolute or prismatic")
+        raise bad(f"{place}.motion", message, joint.type, f"let the joint be one of {', '.join(SINGLE_TYPES)}")
 
 
 def _check_spring(spring: Spring, nodes: list[str], place: str) -> None:

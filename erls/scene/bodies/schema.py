@@ -109,11 +109,13 @@ class Connection(Record, frozen=True):
     position : (3,) floats, optional
         Where the joint sits, as built [m]; where ``node`` is unless given.
     axis : (3,) floats, optional
-        Of revolute, prismatic and cylindrical joints; the one of a universal joint that is fixed to ``to``.
+        Of revolute, prismatic, screw and cylindrical joints; the one of a universal joint that is fixed to ``to``.
     second_axis : (3,) floats, optional
         The axis of a universal joint that is fixed to ``node``.
+    pitch : float
+        Of a screw, which needs it: how far it advances along its axis per radian [m/rad].
     motion : Motion, optional
-        Prescribed coordinate of a revolute or prismatic joint, from 0 on; at rest over the load parameter.
+        Prescribed coordinate of a revolute, prismatic or screw joint, from 0 on; at rest over the load parameter.
     """
 
     name: str
@@ -123,6 +125,7 @@ class Connection(Record, frozen=True):
     position: Vector | None = None
     axis: Vector | None = None
     second_axis: Vector | None = None
+    pitch: float = 0.0
     motion: Motion | None = None
 
 

@@ -23,6 +23,7 @@ from erls.maths.groups import R3_SO3, SE3
 from erls.maths.motion_maps import inverse
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, fixed_axes
+from erls.mechanism.joint_types import JOINT_TYPES
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import build_loads
 from erls.scene.bodies.analyses import Dynamics
@@ -175,7 +176,8 @@ def _joint(record: Connection, numbers: dict[str, int], poses: Array, folder: Pa
     frame = pose(_joint_axes(record, place), where)
     motion, breakpoints = _motion(record, folder, place)
     inner = frame if other == GROUND else inverse(poses[other]) @ frame
-    return Joint(record.name, record.type, other, node, inner, inverse(poses[node]) @ frame, motion, breakpoints)
+    ends = other, node, inner, inverse(poses[node]) @ frame
+    return Joint(record.name, record.type, *ends, motion, breakpoints, pitch=record.pitch)
 
 
 def _joint_axes(record: Connection, place: str) -> Array:
@@ -193,7 +195,8 @@ def _joint_axes(record: Connection, place: str) -> Array:
 def _motion(record: Connection, folder: Path, place: str) -> tuple[Motion | None, tuple[float, ...]]:
     if record.motion is None:
         return None, ()
-    curve = record.motion.build(Place(folder, f"{place}.motion", revolute=record.type == "revolute"))
+    one = JOINT_TYPES[record.type].one
+    curve = record.motion.build(Place(folder, f"{place}.motion", revolute=one is not None and one.turns))
     start = curve.value(0.0)
     if abs(start) > 1e-12:
         raise SceneError(
