@@ -208,7 +208,11 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     inertial = [np.eye(3) if curved[k] else axes[k] for k in range(count)]
     vectors = [each.vectors for each in decoupled]
     parents = mechanism.parents
-    sizes = [6 + (3 if bends else 0) + len(each) for each in axes]
+    # on the ground a link moves along its joint alone
+    sizes = [
+        6 + (3 if bends else 0) + len(each) if bends or parent >= 0 else 1
+        for each, parent in zip(axes, parents, strict=True)
+    ]
     kept = [e + (3 if parents[k] >= 0 else 0) for k, e in enumerate(modes)]
     rooms = [
         segments.segment(

@@ -1,7 +1,8 @@
 """What ERLS says of its links at a configuration (`erls.equations.serial.segments`).
 
 The motion of a link is μ = (w, ω), w = ν + u̇ six numbers, ω about the axes of the link; with second-order displacements
-μ = (w, φ̇, ω), w = ν + u̇ + ė and φ the turn in u: then inertia knows (W, Ω) = w and ω with M₀⁻¹ (C q̇ + H ν) added.
+μ = (w, φ̇, ω), w = ν + u̇ + ė and φ the turn in u: then inertia knows (W, Ω) = w and ω with M₀⁻¹ (C q̇ + H ν) added. A
+link on the ground moves along its joint alone, of which u and φ are zero: without second-order displacements μ = (θ̇).
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from erls.equations.serial.segments import SEGMENT, Segment, fill_mass_matrix, r
 from erls.maths.jit import inlined, kernel, part, spliced
 from erls.maths.products import add_columns, add_product, add_transposed_product, clear, copy_matrix
 from erls.maths.so3 import Array
-from erls.maths.spatial import add_cross, add_motion_cross, dot3, transform_motion
+from erls.maths.spatial import add_cross, add_motion_cross, dot3, dot6, transform_motion
 from fe_import.model import IntArray
 
 
@@ -76,6 +77,43 @@ def _turn_row(row: Array, decoupled: Array, out: Array) -> None:
     """A row over elastic coordinates, over decoupled ones."""
     clear(out)
     add_columns(decoupled, row, 1.0, out)
+
+
+@inlined
+def _grounded_inertia(
+    chain: Chain, link: Link, state: LinkState, own: Segment, screw: Array, decoupled: Array, turns: bool
+) -> None:
+    """Inertia and coupling over the rate θ̇ of a joint on the ground, with w = S θ̇."""
+    axes, coupling, momentum, shared = len(link.axes), own.coupling[0], state.point, state.speeds[6:]
+    clear(coupling)
+    clear(momentum)
+    clear(shared)  # of what is not decoupled yet
+    for i in range(6):
+        weight = screw[i]
+        if weight != 0.0:
+            for j in range(6):
+                momentum[j] += weight * link.mass[i, j]
+            row = link.rigid_decoupled[i] if turns else link.mass[i, 6:]
+            for j in range(len(coupling)):
+                coupling[j] += weight * row[j]
+    inertia = dot6(momentum, screw)
+    for a in range(axes):
+        spin = dot3(link.axes[a], screw[3:])
+        if chain.first_order:
+            turned = state.turned[a]
+            inertia += 2.0 * spin * dot6(turned, screw)
+            for j in range(len(shared)):
+                shared[j] += spin * turned[6 + j]
+        if chain.second_order:
+            for b in range(axes):
+                inertia += spin * dot3(link.axes[b], screw[3:]) * state.moments[pair_of(axes, a, b)]
+    own.inertia[0, 0] = inertia
+    if chain.first_order:
+        if turns:
+            add_columns(decoupled, shared, 1.0, coupling)
+        else:
+            for j in range(len(coupling)):
+                coupling[j] += shared[j]
 
 
 @inlined
@@ -190,12 +228,21 @@ def _turned_back(pose: Array, x: Array, out: Array) -> None:
 
 
 @inlined
-def _lead(pose: Array, axes: Array, axes_before: Array, out: Array, state: LinkState, own: Segment, bends: Any) -> None:
+def _lead(
+    pose: Array, axes: Array, axes_before: Array, screw_before: Array, out: Array, state: LinkState, own: Segment,
+    bends: Any,
+) -> None:  # fmt: skip
     """L and N as far as they are of first order."""
     p, before, x = len(own.pull), own.lead.shape[1], state.point
     own.lead[:, :] = 0.0
     own.reach[:, :] = 0.0
-    for j in range(6):
+    if before == 1:
+        transform_motion(pose, screw_before, x)
+        for i in range(6):
+            own.lead[i, 0] = x[i]
+        for a in range(len(axes)):
+            own.lead[p - len(axes) + a, 0] = dot3(axes[a], x[3:])
+    for j in range(6 if before > 1 else 0):
         for i in range(6):
             x[i] = 1.0 if i == j else 0.0
         transform_motion(pose, x, x)
@@ -205,7 +252,7 @@ def _lead(pose: Array, axes: Array, axes_before: Array, out: Array, state: LinkS
         for i in range(3):
             for j in range(3):
                 own.lead[6 + i, 6 + j] = pose[3 * j + i]
-    for b in range(len(axes_before)):
+    for b in range(len(axes_before) if before > 1 else 0):
         _turned_back(pose, axes_before[b], x)
         for a in range(len(axes)):
             own.lead[p - len(axes) + a, before - len(axes_before) + b] = dot3(axes[a], x)
@@ -324,22 +371,28 @@ def set_segments(
                 _curved_inertia(chain, link, bend, state, bent, own, work, decoupled, turns)
             else:
                 _linear_inertia(chain, link, state, own, decoupled, turns)
+        elif link.parent < 0:
+            _grounded_inertia(chain, link, state, own, motion.screw, decoupled, turns)
         else:
             _linear_inertia(chain, link, state, own, decoupled, turns)
-        _subspace(motion.screw, axes, link.parent >= 0, state, own)
+        if len(own.subspace) == 1:
+            own.subspace[0] = 1.0
+        else:
+            _subspace(motion.screw, axes, link.parent >= 0, state, own)
         if link.parent >= 0:
             axes_before = read_link(reals, integers, chain.links + link.parent * LINK).axes
             if bends is not None:
                 axes_before = read_bend(reals, integers, chain.bends + link.parent * BEND).axes
             out = link.out_decoupled if turns else link.out
-            _lead(motion.pose, axes, axes_before, out, state, own, bends)
+            before = read_joint_state(scratch, integers, serial.joint_states + link.parent * JOINT_STATE)
+            _lead(motion.pose, axes, axes_before, before.screw, out, state, own, bends)
             if bends is not None:
                 bend = read_bend(reals, integers, chain.bends + k * BEND)
                 bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
-                before = read_modes(reals, integers, serial.modes + link.parent * MODES).decoupled
+                modes_before = read_modes(reals, integers, serial.modes + link.parent * MODES).decoupled
                 _turn_along(bend, state, bent, motion.screw, own)
                 if bend.bows:
-                    _bow(motion.pose, bent, state, own, before, turns)
+                    _bow(motion.pose, bent, state, own, modes_before, turns)
                 if bend.armed:
                     _arm(bend, state, bent, motion.coordinate, own)
 
