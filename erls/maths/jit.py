@@ -41,7 +41,7 @@ def folder(module: str) -> Path:
 
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
     for name in _reads(module):
-        digest.update(_file(name).read_bytes())
+        digest.update(_source(name)[0])
     given = os.environ.get("ERLS_KERNELS") or os.environ.get("ERLS_CACHE")
     base = Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
     return base / f"kernels-{_subject(module)}-{digest.hexdigest()[:16]}"
@@ -54,16 +54,28 @@ def _file(module: str) -> Path:
 
 
 @cache
+def _source(module: str) -> tuple[bytes, frozenset[str]]:
+    """Text of a module, and the modules that it imports."""
+    text = _file(module).read_bytes()
+    found: set[str] = set()
+    for base, names in _IMPORT.findall(text.decode("utf-8")):
+        ends = {base, *(f"{base}.{each}" for each in re.findall(r"\w+", names))}
+        found |= {end for end in ends if _is_module(end)}
+    return text, frozenset(found)
+
+
+@cache
+def _is_module(name: str) -> bool:
+    return _file(name).is_file()
+
+
 def _reads(module: str) -> list[str]:
     """A module of kernels and all that it imports, directly or not."""
-    found: set[str] = set()
-    waiting = {module}
+    found, waiting = set[str](), {module}
     while waiting:
         name = waiting.pop()
         found.add(name)
-        for base, names in _IMPORT.findall(_file(name).read_text(encoding="utf-8")):
-            ends = {base, *(f"{base}.{each}" for each in re.findall(r"\w+", names))}
-            waiting |= {end for end in ends if _file(end).is_file()} - found
+        waiting |= _source(name)[1] - found
     return sorted(found)
 
 

@@ -15,9 +15,6 @@ import msgspec
 
 from erls.errors import Cause, SceneError, SimulationError
 from erls.mechanism.tables import read_csv
-from erls.run.bodies.file import read_bodies, write_bodies
-from erls.run.bodies.motion import BodyMotion
-from erls.run.bodies.rest import BodyRest
 from erls.run.chain.file import read_chain, write_chain
 from erls.run.chain.run import ChainRun
 from erls.run.knots import End
@@ -69,7 +66,12 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
     write_strings(group, "warnings", run.warnings, "what the user was told")
     if isinstance(run, ChainRun):
         write_chain(group, run)
-    elif isinstance(run, (BodyMotion, BodyRest)):
+    else:
+        from erls.run.bodies.file import write_bodies  # here: they import nodal elements, which chains do not need
+        from erls.run.bodies.motion import BodyMotion
+        from erls.run.bodies.rest import BodyRest
+
+        assert isinstance(run, (BodyMotion, BodyRest))
         write_bodies(group, run)
     _fill_output(group, run)
 
@@ -131,7 +133,11 @@ def load_run(path: Path | str) -> Run:
             raise file.fail("scene", f"not JSON: {problem}") from None
         scene = checked(data, Path(file.attribute("scene_file", str) or path.name), f"{path}: /scene")
         end = End(_failure(file), file.attribute("wall_s", float), file.names("warnings"))
-        return read_bodies(file, scene, end) if isinstance(scene, BodyScene) else read_chain(file, scene, end)
+        if not isinstance(scene, BodyScene):
+            return read_chain(file, scene, end)
+        from erls.run.bodies.file import read_bodies
+
+        return read_bodies(file, scene, end)
 
 
 def _failure(file: Reader) -> SimulationError | None:

@@ -14,12 +14,18 @@ from erls.scene.chain import Scene
 from erls.scene.read import AnyScene, load_scene
 from erls.scene.records import SceneFile
 from erls.simulation.asked import Asked
-from erls.simulation.bodies import run_bodies
 from erls.simulation.chains import run_chain
 
 Progress = Callable[[float, float], None]  # (time, duration)
 
-RUNS: dict[type[SceneFile], Callable[[Any, Asked], Run]] = {Scene: run_chain, BodyScene: run_bodies}
+
+def _run_bodies(scene: BodyScene, asked: Asked) -> Run:
+    from erls.simulation.bodies import run_bodies  # here: it imports nodal elements, which chains do not need
+
+    return run_bodies(scene, asked)
+
+
+RUNS: dict[type[SceneFile], Callable[[Any, Asked], Run]] = {Scene: run_chain, BodyScene: _run_bodies}
 """What runs a kind of scene: one line each."""
 
 

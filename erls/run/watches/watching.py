@@ -8,13 +8,12 @@ from functools import cache
 from typing import TypeVar
 
 from erls.integrate.base import Solution, StopRun
-from erls.run.bodies.motion import BodyMotion
-from erls.run.chain.run import ChainRun
 from erls.run.events import cut
+from erls.run.record import Run
 from erls.run.watches.base import Begun, BodyPlan, Ended, Finding, Knots, Plan, Started, Watch
 from erls.run.watches.registry import WATCHES
 
-AnyRun = TypeVar("AnyRun", ChainRun, BodyMotion)
+AnyRun = TypeVar("AnyRun", bound=Run)
 
 
 class Warnings:
@@ -127,7 +126,7 @@ class Watching:
                 errors.append(finding.error)
             failure = failure or finding.failure
         more = {"second_order_error": sum(errors)} if errors else {}
-        run = replace(run, warnings=tuple(self._warnings.texts), **more)  # type: ignore[arg-type]
+        run = replace(run, warnings=tuple(self._warnings.texts), **more)  # type: ignore[type-var]  # all runs are dataclasses
         failure = failure or run.failure
         if failure is not None:
             failure.run = run
