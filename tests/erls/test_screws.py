@@ -34,6 +34,9 @@ FORMS: dict[str, tuple[str, ...]] = {
     "nodal": ("formulation=nodal",),
 }
 IN_LOOPS = [name for name in FORMS if name != "absolute"]
+TURNED = 40.0
+MOTION = {"shape": "polynomial", "degree": 7, "from": 0.0, "to": TURNED, "start": 0.0, "duration": END}
+DRIVE = {"type": "motion", "motion": MOTION}
 ROUNDING = 1e-9
 """Of the angle: constant accelerations are met by steps of second order exactly; what iterations may leave adds up."""
 
@@ -132,9 +135,24 @@ def test_a_nut_in_a_scene_of_bodies(tmp_path: Path, group: str) -> None:
     _falls(run.joint_angle("between", TIMES))
 
 
-TURNED = 40.0
-MOTION = {"shape": "polynomial", "degree": 7, "from": 0.0, "to": TURNED, "start": 0.0, "duration": END}
-DRIVE = {"type": "motion", "motion": MOTION}
+def test_a_driven_screw_in_a_scene_of_bodies(tmp_path: Path) -> None:
+    """Place and coordinate are those of the motion, from either side: 1e-9, where iterations stop."""
+    nuts = [{"name": name, "mass": MASS, "inertia": [INERTIA] * 3} for name in ("nut", "other")]
+    thread = {"type": "screw", "axis": [0.0, 0.0, 1.0], "pitch": PITCH, "motion": MOTION}
+    data = {
+        "simulation": {"type": "dynamics", "duration": END, "step": 0.025},
+        "bodies": nuts,
+        "connections": [
+            {"name": "first", "node": "nut", **thread},
+            {"name": "second", "node": "other", "to": "nut", **thread},
+        ],
+    }
+    run = _run(tmp_path, data)
+    s = TIMES / END
+    angle = TURNED * (35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7)
+    for number, (name, body) in enumerate((("first", "nut"), ("second", "other")), start=1):
+        np.testing.assert_allclose(run.joint_angle(name, TIMES), angle, rtol=0, atol=1e-9 * TURNED)
+        np.testing.assert_allclose(run.position(body, TIMES)[:, 2], number * PITCH * angle, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("form", FORMS)
