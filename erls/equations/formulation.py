@@ -154,12 +154,12 @@ class LoopFormulation(Formulation, Protocol):
 
 
 @runtime_checkable
-class Reporting(Protocol):
-    """Equations whose answers to what runs report are compiled in modules of their own."""
+class Modular(Protocol):
+    """Equations whose functions are compiled in modules of their own, those of what runs report included."""
 
     @property
-    def reporting(self) -> tuple[str, ...]:
-        """These modules."""
+    def kernels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """These modules, in two parts: the second takes less time, by about what an integrator takes."""
 
 
 class TreeFormulation(Formulation, SecondOrderSystem, Protocol):

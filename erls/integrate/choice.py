@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from erls.equations.formulation import Formulation, Reporting
+from erls.equations.formulation import Formulation, Modular
 from erls.equations.registry import system_of
 from erls.equations.substructures import solved
 from erls.integrate.base import Observer, Options, Solution
@@ -101,12 +101,18 @@ def _compile_named(system: Any, settings: Simulation) -> None:
         if system.compiled is not None:
             system.compiled.load_acceleration()
         return
-    reporting = system.reporting if isinstance(system, Reporting) else ()
-    with compiling_beside(loop, *reporting):
+    if isinstance(system, Modular):
+        here, beside = system.kernels
+        with compiling_beside(loop, *beside):
+            for module in here:
+                import_module(module)
+        for module in (loop, *beside):
+            import_module(module)
+        return
+    with compiling_beside(loop):
         compiled = system.compiled
     if compiled is not None:
-        for module in (loop, *reporting):
-            import_module(module)
+        import_module(loop)
 
 
 INTEGRATIONS: dict[str, Integration] = {

@@ -202,7 +202,7 @@ def _any_scalar(function: Any, called: tuple[tuple[Any, Any], ...]) -> Any:
     own: dict[str, Any] = {}
     for name in source.__code__.co_names:
         found = source.__globals__.get(name)
-        if hasattr(found, "py_func") and found in _fixed:
+        if hasattr(found, "py_func") and (found in _fixed or _calls_real_numbers(found)):
             own[name] = _any_scalar(found, called)
         elif said := getattr(found, "stands_for", ""):
             module, _, kernel_name = said.partition(":")
@@ -212,6 +212,16 @@ def _any_scalar(function: Any, called: tuple[tuple[Any, Any], ...]) -> Any:
                 own[name] = _past_address(_any_scalar(target, called))
     twin = FunctionType(source.__code__, {**source.__globals__, **own}, source.__name__, source.__defaults__)
     return _njit(twin, _nrt=False, cache=not called)  # on disk nothing tells what was called
+
+
+@cache
+def _calls_real_numbers(function: Any) -> bool:
+    """Whether a part calls kernels, or functions by address, itself or within others."""
+    names = [function.py_func.__globals__.get(name) for name in function.py_func.__code__.co_names]
+    return any(
+        hasattr(found, "stands_for") or (hasattr(found, "py_func") and (found in _fixed or _calls_real_numbers(found)))
+        for found in names
+    )
 
 
 def _past_address(function: Any) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations import compiled_system as contract
+from erls.equations.erls.balance import hand_back, push_joint
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import (
     BEND_STATE,
@@ -20,7 +21,6 @@ from erls.equations.erls.records import (
     read_link,
     read_link_state,
 )
-from erls.equations.erls.residual import hand_back, push_joint
 from erls.equations.erls.second_order import bend_frames
 from erls.equations.serial.ends import END, END_STATE, column_of, move_end, read_end, read_end_state
 from erls.equations.serial.records import (
@@ -111,7 +111,7 @@ def _clear_forces(chain: Chain, integers: IntArray, scratch: Array, k: int, bend
 def put_frames(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
 ) -> None:
-    """Of all ends; ``bends`` as in `erls.equations.erls.residual`."""
+    """Of all ends; ``bends`` as in `erls.equations.erls.balance`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     move_frames(serial, chain, reals, integers, scratch, t, y, v, y[0:0])

@@ -65,7 +65,7 @@ def _kinetic(chain: Chain, link: Link, state: LinkState, twist: Array) -> Any:
 def add_energies(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
 ) -> None:
-    """Energies; ``bends`` as in `erls.equations.erls.residual`."""
+    """Energies; ``bends`` as in `erls.equations.erls.balance`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     move_frames(serial, chain, reals, integers, scratch, t, y, v, y[0:0])

@@ -77,9 +77,11 @@ class Erls(SerialFormulation):
         return f"erls.equations.erls.{'stiffened_states' if self.stiffened else name}"
 
     @property
-    def reporting(self) -> tuple[str, ...]:
-        """Modules of what runs report: states and energies."""
-        return tuple(dict.fromkeys(map(self._module, ("energy", "states"))))
+    def kernels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """See `erls.equations.formulation.Modular`."""
+        own = f"erls.equations.erls.{'stiffened_' if self.stiffened else ''}"
+        here = f"{own}residual", "erls.equations.serial.stiffness", self._module("energy"), self._module("states")
+        return tuple(dict.fromkeys(here)), (f"{own}mass_matrix",)
 
     @cached_property
     def length_scales(self) -> Array:

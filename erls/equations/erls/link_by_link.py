@@ -7,8 +7,7 @@ from typing import Any
 from erls.equations.erls.records import read_chain
 from erls.equations.erls.segments import set_segments
 from erls.equations.serial.elimination import eliminate, set_compliance, substitute
-from erls.equations.serial.feed_forward import feed_forward
-from erls.equations.serial.records import read_serial
+from erls.equations.serial.records import call_feed_forward, read_serial
 from erls.maths.jit import part
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -26,8 +25,8 @@ def factor_links(
     """
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
-    if serial.feeds and not accelerates:
-        feed_forward(serial, reals, integers, scratch, t)
+    if serial.feeds >= 0 and not accelerates:
+        call_feed_forward(serial.feeds, integers[0], reals, integers, scratch, t)
     status = set_compliance(serial, chain.condensed, reals, integers, scratch, t, y, v, alpha, beta, factors)
     if status != 0:
         return int(status)

@@ -9,7 +9,7 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, function_in
 from erls.equations.erls import records as own
-from erls.equations.serial import pack, segments, stiffness
+from erls.equations.serial import pack, segments
 from erls.equations.serial.condensed import condensed as elimination_memory
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.ends import end_state
@@ -266,7 +266,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
             constants,
             [pack.modes_record(int(firsts[k]), masses[k][6:, 6:], links[k], decoupled[k]) for k in range(count)],
         ),
-        feeds=int(rigid >= 0),
+        **pack.addresses(mechanism),
         rigid_links=rigid,
         rigid_states=rigid_state,
         own=0,
@@ -278,7 +278,6 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     integers[0] = constants.put(serial)
     own_name = "erls.equations.erls"
     kind = "stiffened_" if bends else ""
-    balance, inertia = ("stiffened_chain", "stiffened_chain") if bends else ("residual", "segments")
     factoring = None
     if size > dense and max((each.mixing for each in decoupled), default=0.0) < MIXING:
         factor, factor_complex = (
@@ -291,9 +290,9 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         reals=constants.numbers,
         integers=np.array(integers, dtype=np.int64),
         scratch=np.concatenate([scratch.numbers, np.zeros(room + (size if bends else 0))]),
-        residual=function_in(f"{own_name}.{balance}", "residual")(),
-        mass_matrix=function_in(f"{own_name}.{inertia}", "mass_matrix")(),
-        stiffness_and_damping=stiffness.stiffness_and_damping,
+        residual=function_in(f"{own_name}.{kind}residual", "residual")(),
+        mass_matrix=function_in(f"{own_name}.{kind}mass_matrix", "mass_matrix")(),
+        stiffness_and_damping=function_in("erls.equations.serial.stiffness", "stiffness_and_damping")(),
         load_acceleration=function_in(f"{own_name}.{kind}acceleration", "acceleration"),
         factoring=factoring,
         load_frames=function_in(f"{own_name}.{kind}ends", "frames"),

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from erls.equations import compiled_system as contract
 from erls.equations.erls.frames import place_frames
 from erls.equations.erls.link_forces import deform, pair_of
 from erls.equations.erls.records import (
@@ -41,7 +40,7 @@ from erls.equations.serial.records import (
     read_serial,
 )
 from erls.equations.serial.segments import SEGMENT, Segment, fill_mass_matrix, read_segment
-from erls.maths.jit import inlined, kernel, part, spliced
+from erls.maths.jit import inlined, part, spliced
 from erls.maths.products import add_columns, add_product, add_transposed_product, clear, copy_matrix
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_motion_cross, dot3, dot6, transform_motion
@@ -399,14 +398,8 @@ def set_segments(
 
 @spliced
 def fill(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array, bends: Any) -> None:
-    """M; ``bends`` as in `erls.equations.erls.residual`."""
+    """M; ``bends`` as in `erls.equations.erls.balance`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     set_segments(serial, chain, reals, integers, scratch, t, y, False, False, bends)
     fill_mass_matrix(serial, chain.segments, reals, integers, scratch, out)
-
-
-@kernel(contract.MASS_MATRIX, counted=False)
-def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
-    """M; see `erls.equations.compiled_system`."""
-    fill(reals, integers, scratch, t, y, out, None)

@@ -19,7 +19,7 @@ from fe_import.model import IntArray
 def put_states(
     reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array, bends: Any
 ) -> None:
-    """Rows of ``out``; ``bends`` as in `erls.equations.erls.residual`."""
+    """Rows of ``out``; ``bends`` as in `erls.equations.erls.balance`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     for row in range(len(t)):

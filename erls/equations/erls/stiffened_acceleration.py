@@ -5,7 +5,7 @@ from __future__ import annotations
 from erls.equations import compiled_system as contract
 from erls.equations.erls.link_by_link import accelerate, solve_links
 from erls.equations.erls.records import read_chain
-from erls.equations.erls.stiffened_chain import residual
+from erls.equations.erls.stiffened_residual import residual
 from erls.equations.serial.records import read_serial
 from erls.maths.jit import kernel
 from erls.maths.so3 import Array

@@ -31,8 +31,7 @@ from erls.equations.ffr.records import (
 )
 from erls.equations.ffr.segments import free_segment
 from erls.equations.serial.ends import carry_end
-from erls.equations.serial.feed_forward import feed_forward
-from erls.equations.serial.records import MODES, Serial, read_modes, read_serial
+from erls.equations.serial.records import MODES, Serial, call_feed_forward, read_modes, read_serial
 from erls.equations.serial.segments import SEGMENT, read_segment
 from erls.maths.jit import kernel, part, spliced
 from erls.maths.products import clear
@@ -180,7 +179,7 @@ def frames(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array,
     """Motion of the frames that joints hold, and what drives feed forward at this time."""
     serial = read_serial(reals, integers, integers[0])
     own = read_frames(reals, integers, serial.own)
-    if serial.feeds:
-        feed_forward(serial, reals, integers, scratch, t)
+    if serial.feeds >= 0:
+        call_feed_forward(serial.feeds, integers[0], reals, integers, scratch, t)
     for number in range(own.end_count):
         _put_end(serial, own, reals, integers, scratch, number, y, v, out[number])

@@ -84,9 +84,11 @@ class Ffr(SerialFormulation):
         return pack_frames(replace(self.given, every_axis=True), self.size)
 
     @property
-    def reporting(self) -> tuple[str, ...]:
-        """Modules of what runs report: states and energies."""
-        return "erls.equations.ffr.energy", "erls.equations.ffr.states"
+    def kernels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """See `erls.equations.formulation.Modular`."""
+        own = "erls.equations.ffr"
+        here = f"{own}.residual", "erls.equations.serial.stiffness", f"{own}.energy", f"{own}.states"
+        return here, (f"{own}.mass",)
 
     @cached_property
     def length_scales(self) -> Array:

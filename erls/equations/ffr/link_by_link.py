@@ -9,8 +9,7 @@ from erls.equations.ffr.records import Frames, read_frames, read_room
 from erls.equations.ffr.residual import residual
 from erls.equations.ffr.segments import decouple_segments, fill_segments
 from erls.equations.serial.elimination import eliminate, set_compliance, substitute
-from erls.equations.serial.feed_forward import feed_forward
-from erls.equations.serial.records import Serial, read_serial
+from erls.equations.serial.records import Serial, call_feed_forward, read_serial
 from erls.maths.jit import kernel, part
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -21,8 +20,8 @@ def _factor(
     serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array,
     alpha: Any, beta: Any, factors: Any, definite: bool,
 ) -> int:  # fmt: skip
-    if serial.feeds:
-        feed_forward(serial, reals, integers, scratch, t)
+    if serial.feeds >= 0:
+        call_feed_forward(serial.feeds, integers[0], reals, integers, scratch, t)
     status = set_compliance(
         serial, frames.condensed, reals, integers, scratch, t, y, v, alpha, beta, factors
     )

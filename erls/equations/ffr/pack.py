@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, acceleration_in, function_in
-from erls.equations.ffr.mass import mass_matrix
 from erls.equations.ffr.records import (
     BentBody,
     Body,
@@ -22,7 +21,6 @@ from erls.equations.ffr.records import (
     body_state,
     node_state,
 )
-from erls.equations.ffr.residual import residual
 from erls.equations.ffr.standard_data import StandardData
 from erls.equations.serial import pack
 from erls.equations.serial.condensed import condensed
@@ -30,7 +28,6 @@ from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.modal_inertia import modal_inertia
 from erls.equations.serial.records import Serial
 from erls.equations.serial.segments import segment
-from erls.equations.serial.stiffness import stiffness_and_damping
 from erls.maths.records import Memory
 from erls.maths.se3 import pose, twist_transform
 from erls.maths.so3 import Array
@@ -287,7 +284,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
             joints=pack.put_all(constants, joints),
             joint_states=pack.joint_states(working, len(joints)),
             modes=pack.put_all(constants, modes),
-            feeds=int(rigid_links >= 0),
+            **pack.addresses(mechanism),
             rigid_links=rigid_links,
             rigid_states=rigid_states,
             own=own,
@@ -311,9 +308,9 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         reals=constants.numbers,
         integers=np.array(integers, dtype=np.int64),
         scratch=working.numbers,
-        residual=residual,
-        mass_matrix=mass_matrix,
-        stiffness_and_damping=stiffness_and_damping,
+        residual=function_in("erls.equations.ffr.residual", "residual")(),
+        mass_matrix=function_in("erls.equations.ffr.mass", "mass_matrix")(),
+        stiffness_and_damping=function_in("erls.equations.serial.stiffness", "stiffness_and_damping")(),
         load_acceleration=acceleration_in(accelerate),
         factoring=factoring,
         load_frames=function_in("erls.equations.ffr.ends", "frames"),

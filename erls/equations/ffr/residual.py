@@ -27,13 +27,13 @@ from erls.equations.ffr.records import (
     read_node,
     read_node_state,
 )
-from erls.equations.serial.feed_forward import feed_forward
 from erls.equations.serial.joints import effort
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
     MODES,
     Serial,
+    call_feed_forward,
     read_joint,
     read_joint_state,
     read_modes,
@@ -107,8 +107,8 @@ def residual(
     """
     serial = read_serial(reals, integers, integers[0])
     frames = read_frames(reals, integers, serial.own)
-    if serial.feeds:
-        feed_forward(serial, reals, integers, scratch, t)
+    if serial.feeds >= 0:
+        call_feed_forward(serial.feeds, integers[0], reals, integers, scratch, t)
     move_frames(serial, frames, reals, integers, scratch, t, y, v, a)
     for k in range(serial.links):
         body = read_body(reals, integers, frames.bodies + k * BODY)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 from erls.equations import compiled_system as contract
-from erls.equations.erls import segments
-from erls.equations.erls.residual import balance
+from erls.equations.erls.balance import balance
+from erls.equations.erls.mass_matrix import mass_matrix as masses_of_all
 from erls.equations.quasi_static.records import REDUCED, Reduced, ReducedState, read_reduced, read_reduced_state
 from erls.equations.serial import stiffness as serial_stiffness
 from erls.equations.serial.records import JOINT, read_joint, read_serial
@@ -125,7 +125,7 @@ def _set_masses(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
     state = read_reduced_state(scratch, integers, given.state)
     clear(state.place)
     add_columns(given.slow, y, 1.0, state.place)
-    segments.mass_matrix(reals, integers, scratch, t, state.place, state.matrix)
+    masses_of_all(reals, integers, scratch, t, state.place, state.matrix)
     for j in range(len(y)):
         clear(state.half[j])
         add_rows(state.matrix, given.slow[j], 1.0, state.half[j])

@@ -4,27 +4,32 @@ from __future__ import annotations
 
 from erls.equations.serial.joints import step_pose
 from erls.equations.serial.records import (
+    FEED,
     JOINT,
     JOINT_STATE,
     RIGID_LINK,
     RIGID_STATE,
-    Serial,
     read_joint,
     read_joint_state,
     read_rigid_link,
     read_rigid_state,
+    read_serial,
 )
 from erls.equations.serial.time_curves import curve
-from erls.maths.jit import part
+from erls.maths.jit import kernel
 from erls.maths.products import add_rows, clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_force_cross, add_motion_cross, dot6, transform_force_back, transform_motion
 from fe_import.model import IntArray
 
 
-@part
-def feed_forward(serial: Serial, reals: Array, integers: IntArray, scratch: Array, t: float) -> None:
-    """Into ``feed`` of every joint's state; the weight enters as an acceleration of the ground."""
+@kernel(FEED, counted=False)
+def feed_forward(at: int, reals: Array, integers: IntArray, scratch: Array, t: float) -> None:
+    """Into ``feed`` of every joint's state; the weight enters as an acceleration of the ground.
+
+    ``at`` is the place of the `Serial`.
+    """
+    serial = read_serial(reals, integers, at)
     for k in range(serial.links):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         link = read_rigid_link(reals, integers, serial.rigid_links + k * RIGID_LINK)

@@ -6,23 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from erls.equations.serial.records import (
-    JOINT,
-    JOINT_STATE,
-    Joint,
-    JointState,
-    Serial,
-    read_joint,
-    read_joint_state,
-)
+from erls.equations.serial.records import Joint, JointState, Serial, call_turn_by_vector
 from erls.equations.serial.time_curves import curve
-from erls.maths.coefficients import stumpff, tangent_coefficients
 from erls.maths.jit import part
-from erls.maths.rotations import exponential, value
-from erls.maths.rotations import first as rotations_first
 from erls.maths.so3 import Array
-from erls.maths.spatial import add_motion_cross, transform_motion
-from erls.maths.vectors import dot, nine, product
 from fe_import.model import IntArray
 
 
@@ -35,7 +22,7 @@ def step_pose(step: Array, coordinate: Any, pose: Array) -> None:
 
 
 @part
-def _set_coordinate(
+def set_coordinate(
     joint: Joint, state: JointState, reals: Array, integers: IntArray, t: float, y: Array, v: Array, a: Array
 ) -> None:
     """θ, θ̇, θ̈ from the state or, prescribed, from time; θ̈ = 0 where it is free and ``a`` is empty."""
@@ -55,69 +42,16 @@ def move_joint(
     """Coordinate, pose and motion of joint k; a rotation vector moves all three of its joints with the first one."""
     if joint.component > 0:
         return
-    _set_coordinate(joint, state, reals, integers, t, y, v, a)
+    set_coordinate(joint, state, reals, integers, t, y, v, a)
     if joint.component == 0:
-        _turn_by_vector(serial, k, reals, integers, scratch, t, y, v, a)
+        joints, states = serial.joints, serial.joint_states
+        call_turn_by_vector(serial.vectors, joints, states, k, reals, integers, scratch, t, y, v, a)
         return
     step_pose(joint.step, state.coordinate[0], state.pose)
     rate, acceleration = state.coordinate[1], state.coordinate[2]
     for i in range(6):
         state.screw[i] = joint.screw[i]
         state.twist[i], state.twist_rate[i] = joint.screw[i] * rate, joint.screw[i] * acceleration
-
-
-@part
-def _turn_by_vector(
-    serial: Serial, k: int, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array
-) -> None:
-    """The three joints of a rotation vector ψ: the first turns by exp(ψ̃), and each moves with its column of T(ψ).
-
-    The links between them do not turn against each other. What they carry is differentiated joint by joint; for that to
-    be ω = T ψ̇ and ω̇ = T ψ̈ + Ṫ ψ̇ behind the last one, the second and the third take the Lie bracket of their own
-    motion with those before as a part of their acceleration.
-    """
-    first = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
-    middle = read_joint_state(scratch, integers, serial.joint_states + (k + 1) * JOINT_STATE)
-    last = read_joint_state(scratch, integers, serial.joint_states + (k + 2) * JOINT_STATE)
-    before = read_joint(reals, integers, serial.joints + k * JOINT).step
-    second = read_joint(reals, integers, serial.joints + (k + 1) * JOINT)
-    third = read_joint(reals, integers, serial.joints + (k + 2) * JOINT)
-    _set_coordinate(second, middle, reals, integers, t, y, v, a)
-    _set_coordinate(third, last, reals, integers, t, y, v, a)
-    psi = first.coordinate[0], middle.coordinate[0], last.coordinate[0]
-    rate = first.coordinate[1], middle.coordinate[1], last.coordinate[1]
-    c = stumpff(dot(psi, psi))
-    f, g = tangent_coefficients(c)
-    turn = product(nine(before, 0, 0), exponential(psi, c[0], c[1]))
-    for i in range(9):
-        first.pose[i] = turn[i]
-    for i in range(3):
-        first.pose[9 + i] = before[0, 9 + i]
-    for i in range(12):
-        middle.pose[i], last.pose[i] = second.step[0, i], third.step[0, i]
-    _turn_column(first, value(f[0], g[0], psi, (1.0, 0.0, 0.0)))
-    _turn_column(middle, value(f[0], g[0], psi, (0.0, 1.0, 0.0)))
-    _turn_column(last, value(f[0], g[0], psi, (0.0, 0.0, 1.0)))
-    change = rotations_first(f[0], f[1], g[0], g[1], psi, rate, rate)
-    for i in range(3):
-        last.twist_rate[3 + i] += change[i]
-    add_motion_cross(middle.twist, first.twist, 1.0, middle.twist_rate)
-    add_motion_cross(last.twist, first.twist, 1.0, last.twist_rate)
-    add_motion_cross(last.twist, middle.twist, 1.0, last.twist_rate)
-    transform_motion(last.pose, last.screw, last.screw)
-    transform_motion(last.pose, last.twist, last.twist)
-    transform_motion(last.pose, last.twist_rate, last.twist_rate)
-
-
-@part
-def _turn_column(state: JointState, column: Any) -> None:
-    """A turn about an axis, and the motion along it."""
-    for i in range(3):
-        state.screw[i] = 0.0
-        state.screw[3 + i] = column[i]
-    for i in range(6):
-        state.twist[i] = state.screw[i] * state.coordinate[1]
-        state.twist_rate[i] = state.screw[i] * state.coordinate[2]
 
 
 @part

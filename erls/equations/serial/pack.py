@@ -9,8 +9,9 @@ import numpy as np
 
 from erls.equations.serial.decoupled_modes import DecoupledModes
 from erls.equations.serial.ends import End
-from erls.equations.serial.records import Joint, JointState, Modes, RigidLink, RigidState
+from erls.equations.serial.records import FEED, TURN, Joint, JointState, Modes, RigidLink, RigidState
 from erls.equations.serial.time_curves import put_curve
+from erls.maths.calls import address_of
 from erls.maths.records import Memory
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -130,6 +131,20 @@ def end_record(link: Link, modes: Array | None, curved: bool, end: LoopEnd) -> E
         bows=bows,
         offset=pose_numbers(end.frame),
     )
+
+
+def addresses(mechanism: Mechanism) -> dict[str, int]:
+    """Of the functions that `Serial` names, which are compiled now, where the mechanism needs them."""
+    found = {"feeds": -1, "vectors": -1}
+    if any(joint.drive.feed_forward for joint in mechanism.joints):
+        from erls.equations.serial.feed_forward import feed_forward  # here: few mechanisms need it
+
+        found["feeds"] = address_of(feed_forward, FEED)
+    if mechanism.rotation_vectors:
+        from erls.equations.serial.rotation_vector import turn_by_vector
+
+        found["vectors"] = address_of(turn_by_vector, TURN)
+    return found
 
 
 def rigid_links(mechanism: Mechanism, constants: Memory, scratch: Memory) -> tuple[int, int]:

@@ -6,9 +6,24 @@ Links are numbered so that every one comes after that which it stands on, its pa
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from erls.equations import compiled_system as contract
+from erls.maths.calls import caller
+from erls.maths.jit import ENABLED
 from erls.maths.records import Matrix, Vector, reader, table_size
+
+FEED: Any = None
+TURN: Any = None
+if ENABLED:
+    from numba import types as _t
+
+    _state = (contract.REALS, contract.INTEGERS, contract.REALS, _t.float64)
+    FEED = _t.void(_t.int64, *_state)
+    TURN = _t.void(_t.int64, _t.int64, _t.int64, *_state, contract.REALS, contract.REALS, contract.REALS)
+
+call_feed_forward = caller(FEED, "erls.equations.serial.feed_forward:feed_forward")
+call_turn_by_vector = caller(TURN, "erls.equations.serial.rotation_vector:turn_by_vector")
 
 
 class Serial(NamedTuple):
@@ -19,9 +34,11 @@ class Serial(NamedTuple):
     links : int
     joints, joint_states, modes : int
         Places of the first `Joint`, `JointState` and `Modes`.
-    feeds : int
-        Whether a drive feeds forward; then ``rigid_links``, ``rigid_states`` are places of the first of these.
+    feeds, vectors : int
+        Addresses of `erls.equations.serial.feed_forward`, where a drive feeds forward, and of
+        `erls.equations.serial.rotation_vector`, where a joint has one; otherwise -1, and nothing of them is compiled.
     rigid_links, rigid_states : int
+        Where a drive feeds forward, places of the first of these.
     own : int
         Place of the record of the formulation.
     gravity : (3,) array
@@ -33,6 +50,7 @@ class Serial(NamedTuple):
     joint_states: int
     modes: int
     feeds: int
+    vectors: int
     rigid_links: int
     rigid_states: int
     own: int

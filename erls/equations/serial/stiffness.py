@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from erls.equations import compiled_system as contract
-from erls.equations.serial.feed_forward import feed_forward
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
     MODES,
+    call_feed_forward,
     read_joint,
     read_joint_state,
     read_modes,
@@ -27,8 +27,8 @@ def stiffness_and_damping(
     serial = read_serial(reals, integers, integers[0])
     k[:, :] = 0.0
     c[:, :] = 0.0
-    if serial.feeds:
-        feed_forward(serial, reals, integers, scratch, t)
+    if serial.feeds >= 0:
+        call_feed_forward(serial.feeds, integers[0], reals, integers, scratch, t)
     for number in range(serial.links):
         modes = read_modes(reals, integers, serial.modes + number * MODES)
         for i in range(len(modes.stiffness)):

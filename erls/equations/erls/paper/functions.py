@@ -25,13 +25,13 @@ from erls.equations.erls.paper.records import (
     read_paper,
 )
 from erls.equations.serial.elastic import elastic_force
-from erls.equations.serial.feed_forward import feed_forward
 from erls.equations.serial.joints import effort, gains
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
     MODES,
     Serial,
+    call_feed_forward,
     read_joint,
     read_joint_state,
     read_modes,
@@ -108,8 +108,8 @@ def residual(
     paper = read_paper(reals, integers, serial.own)
     c = read_elimination(scratch, integers, paper.elimination)
     force = read_balance(scratch, integers, paper.balance).force
-    if serial.feeds:
-        feed_forward(serial, reals, integers, scratch, t)
+    if serial.feeds >= 0:
+        call_feed_forward(serial.feeds, integers[0], reals, integers, scratch, t)
     call_move(paper.move, reals, integers, scratch, t, y, v, a)
     clear(force)
     for k in range(serial.links):
@@ -193,8 +193,8 @@ def stiffness_and_damping(
     serial = read_serial(reals, integers, integers[0])
     paper = read_paper(reals, integers, serial.own)
     balance = read_balance(scratch, integers, paper.balance)
-    if serial.feeds:
-        feed_forward(serial, reals, integers, scratch, t)
+    if serial.feeds >= 0:
+        call_feed_forward(serial.feeds, integers[0], reals, integers, scratch, t)
     call_move(paper.move, reals, integers, scratch, t, y, v, v[:0])
     for which in range(2):
         every = balance.mass

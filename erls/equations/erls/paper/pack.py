@@ -12,6 +12,7 @@ from erls.equations.erls.paper.records import Balance, Body, BodyState, Paper
 from erls.equations.serial.ends import end_state
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.pack import (
+    addresses,
     effect_flags,
     end_record,
     joint_record,
@@ -215,9 +216,18 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
         **effect_flags(mechanism.effects),
     )
     own = constants.put(paper)
-    feeds = int(any(joint.drive.feed_forward for joint in mechanism.joints))
     integers[0] = constants.put(
-        Serial(links, joints, states, modes, feeds, rigid, rigid_states, own, mechanism.gravity)
+        Serial(
+            links=links,
+            joints=joints,
+            joint_states=states,
+            modes=modes,
+            **addresses(mechanism),
+            rigid_links=rigid,
+            rigid_states=rigid_states,
+            own=own,
+            gravity=mechanism.gravity,
+        )
     )
     return CompiledSystem(
         size=free + elastic,
