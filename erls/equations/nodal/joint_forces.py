@@ -69,9 +69,10 @@ def relative(
 def _ahead(model: Model, j: int, coordinate: float) -> tuple[Vector, Rotation]:
     """Frame of the inner node that runs ahead by a prescribed coordinate."""
     p, r = vector(model.joint_frames, j, 0), nine(model.joint_frames, j, 3)
-    slide, turn = model.joint_drives[j, 0] * coordinate, model.joint_drives[j, 1] * coordinate
-    if slide.real == 0.0 and turn.real == 0.0:
+    along, about = model.joint_drives[j, 0], model.joint_drives[j, 1]
+    if along.real == 0.0 and about.real == 0.0:
         return p, r
+    slide, turn = along * coordinate, about * coordinate
     psi = (0.0, 0.0, turn)
     c = stumpff(turn * turn)
     return plus(p, times(r, (0.0, 0.0, slide))), product(r, exponential(psi, c[0], c[1]))
