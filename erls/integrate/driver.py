@@ -16,7 +16,8 @@ from erls.integrate.thinning import thinned
 from erls.maths.so3 import Array
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts
-_FIRST, LARGEST_CHUNK = 32, 4096  # steps in one go; an observed run begins with one
+_SINGLE = 32  # first steps of an observed run, each looked at: a short run is seen step by step
+_FIRST, LARGEST_CHUNK = 32, 4096  # steps in one go
 
 
 class Recorder:
@@ -170,12 +171,13 @@ class Pace:
     """
 
     def __init__(self, recorder: Recorder, compiled: bool) -> None:
-        self._steps, self._largest = 1 if recorder.observed else _FIRST, LARGEST_CHUNK if compiled else 1
+        self._recorder, self._steps, self._largest = recorder, _FIRST, LARGEST_CHUNK if compiled else 1
         self._asked, self._begun = 1, 0.0
 
     def size(self) -> int:
         """Steps to make next."""
-        self._asked = min(self._steps, self._largest)
+        few = self._recorder.observed and self._recorder.steps < _SINGLE
+        self._asked = 1 if few else min(self._steps, self._largest)
         return self._asked
 
     def __enter__(self) -> None:

@@ -5,6 +5,7 @@ The code lies in the folder ``ERLS_KERNELS``, or ``ERLS_CACHE`` like reductions,
 
 from __future__ import annotations
 
+import dis
 import hashlib
 import os
 import re
@@ -200,9 +201,9 @@ def _any_scalar(function: Any, called: tuple[tuple[Any, Any], ...]) -> Any:
         return function
     source: Any = getattr(function, "py_func", function)
     own: dict[str, Any] = {}
-    for name in source.__code__.co_names:
+    for name in _named(source):
         found = source.__globals__.get(name)
-        if hasattr(found, "py_func") and (found in _fixed or _calls_real_numbers(found)):
+        if hasattr(found, "py_func") and _needs_real_numbers(found):
             own[name] = _any_scalar(found, called)
         elif said := getattr(found, "stands_for", ""):
             module, _, kernel_name = said.partition(":")
@@ -211,16 +212,18 @@ def _any_scalar(function: Any, called: tuple[tuple[Any, Any], ...]) -> Any:
             if found is caller:
                 own[name] = _past_address(_any_scalar(target, called))
     twin = FunctionType(source.__code__, {**source.__globals__, **own}, source.__name__, source.__defaults__)
-    return _njit(twin, _nrt=False, cache=not called)  # on disk nothing tells what was called
+    options = _PART if hasattr(function, "py_func") and function not in _fixed else {"_nrt": False}
+    return _njit(twin, **options, cache=not called)  # on disk nothing tells what was called
 
 
 @cache
-def _calls_real_numbers(function: Any) -> bool:
-    """Whether a part calls kernels, or functions by address, itself or within others."""
-    names = [function.py_func.__globals__.get(name) for name in function.py_func.__code__.co_names]
+def _needs_real_numbers(function: Any) -> bool:
+    """Whether it is a kernel, or a part that calls kernels, by name or by address, itself or within others."""
+    if function in _fixed:
+        return True
+    every = (function.py_func.__globals__.get(name) for name in _named(function.py_func))
     return any(
-        hasattr(found, "stands_for") or (hasattr(found, "py_func") and (found in _fixed or _calls_real_numbers(found)))
-        for found in names
+        hasattr(found, "stands_for") or (hasattr(found, "py_func") and _needs_real_numbers(found)) for found in every
     )
 
 
@@ -235,7 +238,13 @@ def _past_address(function: Any) -> Any:
 
 def _called(source: Any) -> list[str]:
     """Names of the compiled functions that a function calls."""
-    return [name for name in source.__code__.co_names if hasattr(source.__globals__.get(name), "py_func")]
+    return [name for name in _named(source) if hasattr(source.__globals__.get(name), "py_func")]
+
+
+@cache
+def _named(source: Any) -> tuple[str, ...]:
+    """Names of the module that a function uses; those of attributes are others."""
+    return tuple(dict.fromkeys(i.argval for i in dis.get_instructions(source) if i.opname == "LOAD_GLOBAL"))
 
 
 def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:

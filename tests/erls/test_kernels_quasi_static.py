@@ -10,7 +10,9 @@ import quasi_static_cases as cases
 from twins import distance, uncompiled
 
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
-LIKE_TWIN = 1e-11  # relative: sums in another order, through matrices of a condition of about 1e3
+# relative: sums in another order change mass matrices by 1e-15 of each entry, and that changes these results, through
+# the modes of the mechanism, by up to 7.4e-12 ("controllers", damping; measured by such disturbances); ten times that
+LIKE_TWIN = 7.4e-11
 
 
 @pytest.mark.parametrize("static", [True, False])
