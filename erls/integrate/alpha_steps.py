@@ -61,7 +61,7 @@ class Steps:
         matrices = system.mass_matrix or no_mass_matrix, system.stiffness_and_damping or no_stiffness_and_damping
         self._arguments = *functions, *matrices, own.factor, own.solve, system.reals, system.integers, system.scratch
         self._advance = loop.advance if system.compiled else plain(loop.advance)
-        self._pace = Pace(recorder, system.compiled)
+        self._pace = Pace(recorder, system.compiled, single=True)
         self._metres, self._reach = metres, float(metres.max(initial=1.0))
         self._progress = loop.Course(np.zeros(6), np.zeros(7, dtype=np.int64))
         self._progress.rates[loop.RATE] = SLOWEST_KNOWN

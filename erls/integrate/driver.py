@@ -167,16 +167,18 @@ class Recorder:
 class Pace:
     """How many steps to make in one go: what takes about 50 ms; one where functions are called from Python.
 
-    As a context it measures the steps that were asked for last.
+    As a context it measures the steps that were asked for last. ``single``: whether the first steps of an observed run
+    are made one by one. Each call takes up to a millisecond, and a run by steps of high order a few in all.
     """
 
-    def __init__(self, recorder: Recorder, compiled: bool) -> None:
+    def __init__(self, recorder: Recorder, compiled: bool, single: bool) -> None:
+        self._single = _SINGLE if single and recorder.observed else 0
         self._recorder, self._steps, self._largest = recorder, _FIRST, LARGEST_CHUNK if compiled else 1
         self._asked, self._begun = 1, 0.0
 
     def size(self) -> int:
         """Steps to make next."""
-        few = self._recorder.observed and self._recorder.steps < _SINGLE
+        few = self._recorder.steps < self._single
         self._asked = 1 if few else min(self._steps, self._largest)
         return self._asked
 

@@ -89,7 +89,7 @@ class _Run:
         compiled = system.compiled
         self.system = compiled or uncompiled(system)
         self.step = loop.advance if compiled else getattr(loop.advance, "py_func", loop.advance)
-        self.pace = Pace(recorder, compiled is not None)
+        self.pace = Pace(recorder, compiled is not None, single=False)
         self.factoring = own = self.system.factoring or ABSENT
         self.solving: tuple[Any, Any, Any, Any] = own.factor, own.solve, own.factor_complex, own.solve_complex
         if compiled is None:
