@@ -101,17 +101,15 @@ def _compile_named(system: Any, settings: Simulation) -> None:
         if system.compiled is not None:
             system.compiled.load_acceleration()
         return
-    if isinstance(system, Modular):
-        here, beside = system.kernels
-        with compiling_beside(loop, *beside):
-            for module in here:
-                import_module(module)
-        for module in (loop, *beside):
+    here, beside = system.kernels if isinstance(system, Modular) else ((), ())
+    with compiling_beside(loop, *beside):
+        for module in here:
             import_module(module)
-        return
-    with compiling_beside(loop):
-        compiled = system.compiled
-    if compiled is not None:
+        if not beside:
+            _ = system.compiled
+    for module in beside:
+        import_module(module)
+    if system.compiled is not None:  # with what its size asks for, factors link by link
         import_module(loop)
 
 
