@@ -103,7 +103,7 @@ def _compile_named(system: Any, settings: Simulation) -> None:
         return
     here, beside = system.kernels if isinstance(system, Modular) else ((), ())
     with compiling_beside(loop, *beside):
-        for module in here:
+        for module in ("erls.equations.independent", *here):  # the first: what steps ask of systems without ties
             import_module(module)
         if not beside:
             _ = system.compiled
