@@ -25,12 +25,20 @@ sys.path.insert(0, str(ROOT / "tests/erls"))
 
 import scenes  # noqa: E402
 
-from erls.equations.compiled_system import ACCELERATION, INTEGERS, REALS, RESIDUAL, pointer  # noqa: E402
+from erls.equations.compiled_system import (  # noqa: E402
+    ACCELERATION,
+    INTEGERS,
+    REALS,
+    RESIDUAL,
+    call_acceleration,
+    call_residual,
+)
 from erls.equations.erls.formulation import Erls  # noqa: E402
 from erls.equations.ffr.formulation import Ffr  # noqa: E402
 from erls.integrate.base import Integrator, Options  # noqa: E402
 from erls.integrate.generalized_alpha import generalized_alpha  # noqa: E402
 from erls.integrate.lobatto import lobatto  # noqa: E402
+from erls.maths.calls import handed  # noqa: E402
 
 QUICK = "--quick" in sys.argv[1:]
 FORMULATION = Ffr if "--ffr" in sys.argv[1:] else Erls
@@ -46,18 +54,18 @@ TOLERANCE = 1e-4  # m, of lobatto
 _SYSTEM = (REALS, INTEGERS, REALS)
 
 
-@numba.njit(numba.void(numba.int64, pointer(RESIDUAL), *_SYSTEM, *[REALS] * 4))
+@numba.njit(numba.void(numba.int64, numba.int64, *_SYSTEM, *[REALS] * 4))
 def residuals(count, function, reals, integers, scratch, y, v, a, out):  # type: ignore[no-untyped-def]
     """Many residuals, called from compiled code."""
     for _ in range(count):
-        function(reals, integers, scratch, 0.1, y, v, a, out)
+        call_residual(function, reals, integers, scratch, 0.1, y, v, a, out)
 
 
-@numba.njit(numba.void(numba.int64, pointer(ACCELERATION), *_SYSTEM, *[REALS] * 3))
+@numba.njit(numba.void(numba.int64, numba.int64, *_SYSTEM, *[REALS] * 3))
 def accelerations(count, function, reals, integers, scratch, y, v, out):  # type: ignore[no-untyped-def]
     """Many accelerations, called from compiled code."""
     for _ in range(count):
-        function(reals, integers, scratch, 0.1, y, v, out)
+        call_acceleration(function, reals, integers, scratch, 0.1, y, v, out)
 
 
 def least_time(call: Callable[[int], object]) -> float:
@@ -80,8 +88,9 @@ def costs(chain: Erls | Ffr) -> tuple[float, float, float]:
     y, v, a = np.random.default_rng(1).uniform(-1, 1, (3, chain.size)) * 1e-3
     out = np.empty(chain.size)
     constants = system.reals, system.integers, system.scratch
-    compiled = least_time(lambda n: residuals(n, system.residual, *constants, y, v, a, out))
-    solved = least_time(lambda n: accelerations(n, system.acceleration, *constants, y, v, out))
+    residual, acceleration = handed(system.residual, RESIDUAL), handed(system.acceleration, ACCELERATION)
+    compiled = least_time(lambda n: residuals(n, residual, *constants, y, v, a, out))
+    solved = least_time(lambda n: accelerations(n, acceleration, *constants, y, v, out))
     plain = least_time(lambda n: [chain.residual(0.1, y, v, a) for _ in range(n)])
     return compiled, solved, plain
 

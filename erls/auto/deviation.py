@@ -7,11 +7,17 @@ vectors in the rows of ``state`` (those of the whole system) and of ``lesser_sta
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from erls.equations import compiled_system as contract
-from erls.equations.compiled_system import Array, IntArray
+from erls.equations.compiled_system import (
+    Array,
+    Functions,
+    IntArray,
+    call_mass_matrix,
+    call_residual,
+    call_stiffness_and_damping,
+)
 from erls.maths import dense
 from erls.maths.jit import ENABLED, helper, kernel
 
@@ -32,13 +38,11 @@ if ENABLED:
 
     _CUBE = _t.float64[:, :, ::1]
     _FOLLOW = _t.int64(
-        contract.pointer(contract.RESIDUAL),
-        contract.pointer(contract.MASS_MATRIX),
-        contract.pointer(contract.STIFFNESS_AND_DAMPING),
+        contract.FUNCTIONS,
         contract.REALS,
         contract.INTEGERS,
         contract.REALS,
-        contract.pointer(contract.RESIDUAL),
+        _t.int64,
         contract.REALS,
         contract.INTEGERS,
         contract.REALS,
@@ -123,13 +127,11 @@ def largest(state: Array, row: int) -> float:
 
 @kernel(_FOLLOW, counted=False)
 def follow(
-    residual: Callable[..., None],
-    mass_matrix: Callable[..., None],
-    stiffness_and_damping: Callable[..., None],
+    system: Functions,
     reals: Array,
     integers: IntArray,
     scratch: Array,
-    lesser: Callable[..., None],
+    lesser: int,
     lesser_reals: Array,
     lesser_integers: IntArray,
     lesser_scratch: Array,
@@ -147,10 +149,10 @@ def follow(
 
     Parameters
     ----------
-    residual, mass_matrix, stiffness_and_damping, reals, integers, scratch
-        Of the whole system.
+    system, reals, integers, scratch
+        The whole system.
     lesser, lesser_reals, lesser_integers, lesser_scratch
-        Residual of the system that was run.
+        Residual of the system that was run, by address as those of the whole.
     kept : (m,) array
         Places of its coordinates in the whole system.
     times, knots : (k,), (k, 3, m) arrays
@@ -185,7 +187,8 @@ def follow(
                 state[Y + row, kept[i]] = knots[k, row, i]
         state[LEFT, :] = 0.0
         if m > 0:
-            lesser(
+            call_residual(
+                lesser,
                 lesser_reals,
                 lesser_integers,
                 lesser_scratch,
@@ -205,16 +208,18 @@ def follow(
             predict(state, known, h)
             try_state(state)
             if fresh:
-                mass_matrix(reals, integers, scratch, t, state[TRIED_Y], matrices[0])
-                stiffness_and_damping(
-                    reals, integers, scratch, t, state[TRIED_Y], state[TRIED_V], matrices[2], matrices[1]
+                y, v, stiffness, damping = state[TRIED_Y], state[TRIED_V], matrices[2], matrices[1]
+                call_mass_matrix(system.mass_matrix, reals, integers, scratch, t, y, matrices[0])
+                call_stiffness_and_damping(
+                    system.stiffness_and_damping, reals, integers, scratch, t, y, v, stiffness, damping
                 )
                 iteration_matrix(matrices, to_v, to_a)
                 factor_matrix(matrices[3], pivots)  # what is singular shows in the corrections
                 known[FACTORED] = 1.0
             before = math.inf
             for count in range(_ITERATIONS):
-                residual(reals, integers, scratch, t, state[TRIED_Y], state[TRIED_V], state[TRIED_A], state[OUT])
+                y, v, a = state[TRIED_Y], state[TRIED_V], state[TRIED_A]
+                call_residual(system.residual, reals, integers, scratch, t, y, v, a, state[OUT])
                 for i in range(n):
                     state[OUT, i] -= state[LEFT, i]
                 solve_matrix(matrices[3], pivots, state[OUT])

@@ -23,6 +23,7 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.quick import quick
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
+from erls.maths.jit import plain
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -142,7 +143,8 @@ class _Follower:
         n = system.size
         self.system, self.lesser, self.kept, self.loop = quick(system), quick(lesser), kept, loop
         self.functions, self.lesser_functions, compiled = _functions(system, lesser)
-        self.follow = loop.follow if compiled else getattr(loop.follow, "py_func", loop.follow)
+        self.called, self.called_lesser = self.functions.functions(), self.lesser_functions.functions().residual
+        self.follow = loop.follow if compiled else plain(loop.follow, within=False)
         alpha_m, alpha_f = (2 * RADIUS - 1) / (RADIUS + 1), RADIUS / (RADIUS + 1)
         gamma = 0.5 + alpha_f - alpha_m
         self.known = np.zeros(loop.KNOWN)
@@ -163,13 +165,11 @@ class _Follower:
         system, lesser = self.functions, self.lesser_functions
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
             reached = self.follow(
-                system.residual,
-                system.mass_matrix,
-                system.stiffness_and_damping,
+                self.called,
                 system.reals,
                 system.integers,
                 system.scratch,
-                lesser.residual,
+                self.called_lesser,
                 lesser.reals,
                 lesser.integers,
                 lesser.scratch,

@@ -30,11 +30,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from erls.maths.calls import caller, handed
 from erls.maths.jit import ENABLED
 
 Array = NDArray[np.float64]
@@ -77,13 +78,25 @@ else:
     COMPLEX = FACTOR = SOLVE = FACTOR_COMPLEX = SOLVE_COMPLEX = ENERGY = STATES = FRAMES = None
 
 
-def pointer(signature: Any) -> Any:
-    """Type of an argument that is a function of this signature."""
-    if not ENABLED:
-        return None
-    from numba import types
+call_residual, call_mass_matrix, call_acceleration = caller(RESIDUAL), caller(MASS_MATRIX), caller(ACCELERATION)
+call_stiffness_and_damping = caller(STIFFNESS_AND_DAMPING)
+call_factor, call_solve = caller(FACTOR), caller(SOLVE)
+call_factor_complex, call_solve_complex = caller(FACTOR_COMPLEX), caller(SOLVE_COMPLEX)
 
-    return types.FunctionType(signature)
+
+class Functions(NamedTuple):
+    """What compiled loops call of a system, by address (`erls.maths.calls.handed`); 0 where it has none."""
+
+    residual: int
+    mass_matrix: int
+    stiffness_and_damping: int
+    factor: int
+    solve: int
+    factor_complex: int
+    solve_complex: int
+
+
+FUNCTIONS: Any = _t.NamedUniTuple(_t.int64, 7, Functions) if ENABLED else None
 
 
 @dataclass(frozen=True)
@@ -111,6 +124,19 @@ class CompiledSystem:
     load_acceleration: Callable[[], Callable[..., int]]
     factoring: Factoring | None = field(default=None, kw_only=True)
     load_frames: Callable[[], Callable[..., None]] | None = field(default=None, kw_only=True)
+
+    def functions(self) -> Functions:
+        """What loops call: as long as this process lives."""
+        own = self.factoring
+        return Functions(
+            handed(self.residual, RESIDUAL),
+            handed(self.mass_matrix, MASS_MATRIX),
+            handed(self.stiffness_and_damping, STIFFNESS_AND_DAMPING),
+            handed(own and own.factor, FACTOR),
+            handed(own and own.solve, SOLVE),
+            handed(own and own.factor_complex, FACTOR_COMPLEX),
+            handed(own and own.solve_complex, SOLVE_COMPLEX),
+        )
 
     @cached_property
     def acceleration(self) -> Callable[..., int]:

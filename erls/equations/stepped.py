@@ -25,11 +25,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import INTEGERS, MATRIX, REALS, Array, Factoring, IntArray
+from erls.maths.calls import caller, handed
 from erls.maths.jit import ENABLED
 
 COMPOSE: Any = None
@@ -39,6 +41,23 @@ if ENABLED:
 
     COMPOSE = _t.float64(REALS, INTEGERS, REALS, REALS, REALS, REALS, REALS)
     SETTLE = _t.int64(REALS, INTEGERS, REALS, _t.float64, REALS, REALS, REALS, MATRIX)
+
+call_compose, call_settle = caller(COMPOSE), caller(SETTLE)
+
+
+class StepFunctions(NamedTuple):
+    """What compiled steps call, by address (`erls.maths.calls.handed`); 0 where a system has none."""
+
+    compose: int
+    residual: int
+    settle: int
+    mass_matrix: int
+    stiffness_and_damping: int
+    factor: int
+    solve: int
+
+
+STEP_FUNCTIONS: Any = _t.NamedUniTuple(_t.int64, 7, StepFunctions) if ENABLED else None
 
 
 def _not_refused(t: float, q: Any, v: Array) -> None:
@@ -88,3 +107,16 @@ class Stepped:
     unpack: Callable[[Any], Any]
     samples: Callable[[Array], Array] = _no_samples
     refuse: Callable[[float, Any, Array], None] = _not_refused
+
+    def functions(self) -> StepFunctions:
+        """What steps call: as long as this process lives."""
+        own = self.factoring
+        return StepFunctions(
+            handed(self.compose, COMPOSE),
+            handed(self.residual, contract.RESIDUAL),
+            handed(self.settle, SETTLE),
+            handed(self.mass_matrix, contract.MASS_MATRIX),
+            handed(self.stiffness_and_damping, contract.STIFFNESS_AND_DAMPING),
+            handed(own and own.factor, contract.FACTOR),
+            handed(own and own.solve, contract.SOLVE),
+        )

@@ -29,7 +29,7 @@ from erls.integrate.alpha_rules import (
 )
 from erls.integrate.base import Leg
 from erls.integrate.driver import Pace, Recorder
-from erls.maths.plain import plain
+from erls.maths.jit import plain
 from erls.maths.so3 import Array
 from erls.scene.integrators import MATRICES
 
@@ -52,14 +52,10 @@ class Steps:
     """
 
     def __init__(self, system: Stepped, metres: Array, rules: Rules, words: Words, recorder: Recorder) -> None:
-        from erls.equations.independent import ABSENT, no_mass_matrix, no_stiffness_and_damping
-        from erls.integrate.stepping import generalized_alpha as loop  # here: they import the compiler
+        from erls.integrate.stepping import generalized_alpha as loop  # here: it imports the compiler
 
         self._loop, self._system, self._rules, self._words, self._recorder = loop, system, rules, words, recorder
-        own = system.factoring or ABSENT
-        functions = system.compose, system.residual, system.settle
-        matrices = system.mass_matrix or no_mass_matrix, system.stiffness_and_damping or no_stiffness_and_damping
-        self._arguments = *functions, *matrices, own.factor, own.solve, system.reals, system.integers, system.scratch
+        self._arguments = system.functions(), system.reals, system.integers, system.scratch
         self._advance = loop.advance if system.compiled else plain(loop.advance)
         self._pace = Pace(recorder, system.compiled, single=True)
         self._metres, self._reach = metres, float(metres.max(initial=1.0))

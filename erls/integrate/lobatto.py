@@ -28,7 +28,6 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, Observer, Options, Solution
 from erls.integrate.driver import Pace, Recorder, integrate_legs, not_finite
+from erls.maths.jit import plain
 from erls.maths.so3 import Array
 
 NODES = (0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0)
@@ -80,7 +80,6 @@ class _Run:
     def __init__(
         self, system: SecondOrderSystem, times: tuple[float, float], options: Options, recorder: Recorder
     ) -> None:
-        from erls.equations.independent import ABSENT
         from erls.equations.uncompiled import uncompiled  # here: they import the compiler
         from erls.integrate.stepping import lobatto as loop
         from erls.integrate.stepping import stages as at
@@ -88,16 +87,13 @@ class _Run:
         self.at, self.recorder, n = at, recorder, system.size
         compiled = system.compiled
         self.system = compiled or uncompiled(system)
-        self.step = loop.advance if compiled else getattr(loop.advance, "py_func", loop.advance)
+        self.step = loop.advance if compiled else plain(loop.advance, within=False)
         self.pace = Pace(recorder, compiled is not None, single=False)
-        self.factoring = own = self.system.factoring or ABSENT
-        self.solving: tuple[Any, Any, Any, Any] = own.factor, own.solve, own.factor_complex, own.solve_complex
-        if compiled is None:
-            self.solving = None, None, None, None  # so that what the loop calls is compiled once, not in every process
+        self.functions, factoring = self.system.functions(), self.system.factoring
         self.mixed = np.zeros(n, dtype=complex)
         self.coefficients = _coefficients()
         self.stages, self.last = np.zeros((4, 3, n)), np.zeros((4, 3, n))
-        size, exchanged = self.factoring.size or n * n, 0 if self.factoring.size else n
+        size, exchanged = (n * n, n) if factoring is None else (factoring.size, 0)
         self.own = np.zeros((3, size)), np.zeros((2, size), dtype=complex), np.zeros((3, exchanged), dtype=np.int64)
         self.matrices = np.zeros((at.MATRICES, n, n))
         self.vectors = np.zeros((at.RESIDUALS + 6, n))
@@ -134,10 +130,7 @@ class _Run:
         try:
             with self.pace:
                 made = self.step(
-                    system.residual,
-                    system.mass_matrix,
-                    system.stiffness_and_damping,
-                    *self.solving,
+                    self.functions,
                     system.reals,
                     system.integers,
                     system.scratch,

@@ -25,8 +25,15 @@ def address_of(function: Any, signature: Any) -> int:
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
-def _plain(address: int, *arguments: Any) -> Any:
-    return _known[address](*arguments)
+def handed(function: Any, signature: Any) -> Any:
+    """What a loop gets that calls this function: its address, or itself where it is not compiled; 0 for None."""
+    if function is None:
+        return 0
+    return address_of(function, signature) if hasattr(function, "py_func") else function
+
+
+def _plain(address: Any, *arguments: Any) -> Any:
+    return (address if callable(address) else _known[address])(*arguments)
 
 
 def caller(signature: Any, kernel: str = "") -> Callable[..., Any]:
@@ -45,9 +52,7 @@ def caller(signature: Any, kernel: str = "") -> Callable[..., Any]:
         convention, kind, kinds = context.call_conv, signature.return_type, signature.args
         pointer = convention.get_function_type(kind, kinds).as_pointer()
         arguments = [builder.extract_value(given[1], i) for i in range(len(kinds))]
-        status, result = convention.call_function(
-            builder, builder.inttoptr(given[0], pointer), kind, kinds, arguments
-        )
+        status, result = convention.call_function(builder, builder.inttoptr(given[0], pointer), kind, kinds, arguments)
         with builder.if_then(status.is_error, likely=False):
             convention.return_status_propagate(builder, status)
         return result
@@ -56,5 +61,5 @@ def caller(signature: Any, kernel: str = "") -> Callable[..., Any]:
         return signature.return_type(every.int64, every.StarArgTuple(signature.args)), generate
 
     found: Any = intrinsic(call)
-    found.stands_for = kernel
+    found.stands_for, found.in_python = kernel, _plain
     return found  # type: ignore[no-any-return]

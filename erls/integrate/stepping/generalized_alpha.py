@@ -12,12 +12,19 @@ which stays well conditioned as the step tends to zero. Where a system has no fa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from erls.equations import compiled_system as contract
-from erls.equations.compiled_system import Array, IntArray
-from erls.equations.stepped import COMPOSE, SETTLE
+from erls.equations.compiled_system import (
+    Array,
+    IntArray,
+    call_factor,
+    call_mass_matrix,
+    call_residual,
+    call_solve,
+    call_stiffness_and_damping,
+)
+from erls.equations.stepped import STEP_FUNCTIONS, StepFunctions, call_compose, call_settle
 from erls.maths import dense
 from erls.maths.jit import ENABLED, inlined, kernel
 
@@ -156,13 +163,7 @@ if ENABLED:
 
     _cube, _reals, _flag = _t.float64[:, :, ::1], contract.REALS, _t.int64
     _ADVANCE = _t.int64(
-        contract.pointer(COMPOSE),
-        contract.pointer(contract.RESIDUAL),
-        contract.pointer(SETTLE),
-        contract.pointer(contract.MASS_MATRIX),
-        contract.pointer(contract.STIFFNESS_AND_DAMPING),
-        contract.pointer(contract.FACTOR),
-        contract.pointer(contract.SOLVE),
+        STEP_FUNCTIONS,
         _reals,
         contract.INTEGERS,
         _reals,
@@ -197,8 +198,7 @@ def predict(settings: Settings, memory: Memory) -> None:
 
 @inlined
 def dense_factors(
-    mass_matrix: Callable[..., None],
-    stiffness_and_damping: Callable[..., None],
+    system: StepFunctions,
     reals: Array,
     integers: IntArray,
     scratch: Array,
@@ -210,8 +210,9 @@ def dense_factors(
     """Factors of M + α C + β K, scaled to metres; 0, or 1 + the number of a coordinate."""
     n, per = len(memory.v), memory.per_metre
     mass, stiffness, damping = memory.matrices[0], memory.matrices[1], memory.matrices[2]
-    stiffness_and_damping(reals, integers, scratch, t, memory.tried, memory.v1, stiffness, damping)
-    mass_matrix(reals, integers, scratch, t, memory.tried, mass)
+    y, v = memory.tried, memory.v1
+    call_stiffness_and_damping(system.stiffness_and_damping, reals, integers, scratch, t, y, v, stiffness, damping)
+    call_mass_matrix(system.mass_matrix, reals, integers, scratch, t, y, mass)
     factors = memory.factors.reshape(n, n)
     for i in range(n):
         for j in range(n):
@@ -220,9 +221,7 @@ def dense_factors(
 
 
 @inlined
-def correct(
-    own_solve: Callable[..., None], reals: Array, integers: IntArray, settings: Settings, memory: Memory
-) -> float:
+def correct(system: StepFunctions, reals: Array, integers: IntArray, settings: Settings, memory: Memory) -> float:
     """Solve for a correction, apply it, and return its size [m]; infinite where a square of it is."""
     n, beta = len(memory.v), 1 / settings.to_a
     right, correction, per = memory.right, memory.correction, memory.per_metre
@@ -237,7 +236,7 @@ def correct(
         for i in range(n):
             correction[i] *= per[i]
     else:
-        own_solve(reals, integers, memory.factors, correction)
+        call_solve(system.solve, reals, integers, memory.factors, correction)
     size, total = 0.0, 0.0
     for i in range(n):
         size = max(size, abs(memory.metres[i] * correction[i]))
@@ -333,13 +332,7 @@ def accept(settings: Settings, memory: Memory) -> None:
 
 @kernel(_ADVANCE, counted=False)
 def advance(
-    compose: Callable[..., float],
-    residual: Callable[..., None],
-    settle: Callable[..., int],
-    mass_matrix: Callable[..., None],
-    stiffness_and_damping: Callable[..., None],
-    own_factor: Callable[..., int],
-    own_solve: Callable[..., None],
+    system: StepFunctions,
     reals: Array,
     integers: IntArray,
     scratch: Array,
@@ -377,12 +370,15 @@ def advance(
             before = earlier = largest = size = rounding = goal = 0.0
             rates[BEFORE] = 0.0
             for k in range(most + 1):
-                extent = compose(reals, integers, scratch, memory.metres, memory.start, memory.increment, memory.tried)
+                tried = memory.tried
+                extent = call_compose(
+                    system.compose, reals, integers, scratch, memory.metres, memory.start, memory.increment, tried
+                )
                 if k == 0:
                     rounding = use.rounding * extent
                     goal = use.tolerance + rounding
                     rates[GOAL] = goal
-                residual(reals, integers, scratch, t, memory.tried, memory.v1, memory.a1, memory.right)
+                call_residual(system.residual, reals, integers, scratch, t, tried, memory.v1, memory.a1, memory.right)
                 counts[EVALUATIONS] += 1
                 if use.balance >= 0.0:
                     force, reaction = memory.right[n + m], memory.right[n + m + 1]
@@ -402,12 +398,19 @@ def advance(
                 if fresh:
                     alpha, beta = use.to_v / use.to_a, 1 / use.to_a
                     if len(memory.pivots) > 0:
-                        status = dense_factors(
-                            mass_matrix, stiffness_and_damping, reals, integers, scratch, t, alpha, beta, memory
-                        )
+                        status = dense_factors(system, reals, integers, scratch, t, alpha, beta, memory)
                     else:
-                        status = own_factor(
-                            reals, integers, scratch, t, memory.tried, memory.v1, alpha, beta, memory.factors
+                        status = call_factor(
+                            system.factor,
+                            reals,
+                            integers,
+                            scratch,
+                            t,
+                            tried,
+                            memory.v1,
+                            alpha,
+                            beta,
+                            memory.factors,
                         )
                     counts[FACTORIZATIONS] += 1
                     counts[FACTORED] = 1 if status == 0 else 0
@@ -419,7 +422,7 @@ def advance(
                             memory.correction[i] = 1.0 if i == status - 1 else 0.0
                         found = SINGULAR
                         break
-                size = correct(own_solve, reals, integers, use, memory)
+                size = correct(system, reals, integers, use, memory)
                 counts[ITERATIONS] += 1
                 if not math.isfinite(size):
                     blame(memory)
@@ -429,7 +432,9 @@ def advance(
                     rate = math.sqrt(size / earlier) if use.over == 2 and k > 1 else size / before
                 rates[SIZE] = size
                 if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
-                    compose(reals, integers, scratch, memory.metres, memory.start, memory.increment, memory.tried)
+                    call_compose(
+                        system.compose, reals, integers, scratch, memory.metres, memory.start, memory.increment, tried
+                    )
                     note(use, progress, k + 1, rate)
                     converged = True
                     break
@@ -453,7 +458,8 @@ def advance(
         status = judge(use, progress, memory)
         if status == INACCURATE:
             return status
-        if settle(reals, integers, scratch, t, memory.tried, memory.v1, memory.a1, knots[row]) != 0:
+        v1, a1 = memory.v1, memory.a1
+        if call_settle(system.settle, reals, integers, scratch, t, memory.tried, v1, a1, knots[row]) != 0:
             return REFUSED
         accept(use, memory)
         for i in range(beside.shape[1]):

@@ -8,11 +8,19 @@ last step, each (stages + 1, 3, n) with y, v, a at the nodes of a step.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from erls.equations import compiled_system as contract
-from erls.equations.compiled_system import Array, IntArray
+from erls.equations.compiled_system import (
+    Array,
+    Functions,
+    IntArray,
+    call_factor,
+    call_factor_complex,
+    call_mass_matrix,
+    call_residual,
+    call_stiffness_and_damping,
+)
 from erls.integrate.stepping.stages import (
     BEFORE,
     CALM,
@@ -80,13 +88,7 @@ if ENABLED:
 
     _CUBE = _t.float64[:, :, ::1]
     _ADVANCE = _t.int64(
-        contract.pointer(contract.RESIDUAL),
-        contract.pointer(contract.MASS_MATRIX),
-        contract.pointer(contract.STIFFNESS_AND_DAMPING),
-        contract.pointer(contract.FACTOR),
-        contract.pointer(contract.SOLVE),
-        contract.pointer(contract.FACTOR_COMPLEX),
-        contract.pointer(contract.SOLVE_COMPLEX),
+        contract.FUNCTIONS,
         contract.REALS,
         contract.INTEGERS,
         contract.REALS,
@@ -204,13 +206,7 @@ def retry(known: Array, counts: IntArray, reason: int, share: float) -> bool:
 
 @kernel(_ADVANCE, counted=False)
 def advance(
-    residual: Callable[..., None],
-    mass_matrix: Callable[..., None],
-    stiffness_and_damping: Callable[..., None],
-    own_factor: Callable[..., int],
-    own_solve: Callable[..., None],
-    own_factor_complex: Callable[..., int],
-    own_solve_complex: Callable[..., None],
+    system: Functions,
     reals: Array,
     integers: IntArray,
     scratch: Array,
@@ -236,7 +232,7 @@ def advance(
         Number of knots made; -1 - that number when no step is small enough to go on.
     """
     made, m, nodes = 0, stages.shape[0] - 1, coefficients[ROWS, NODES]
-    way = reals, integers, own, own_complex, pivots, mixed
+    way = system.solve, system.solve_complex, reals, integers, own, own_complex, pivots, mixed
     factored = known[BEFORE] if counts[FACTORED] else 0.0  # the step of the present factors
     while made + m <= len(times) and known[T] < known[END]:
         choose_step(known)
@@ -247,26 +243,38 @@ def advance(
             if fresh:
                 at = min(max(t + h / 2, known[FIRST]), known[LAST])
                 halfway(h, stages)
-                mass_matrix(reals, integers, scratch, at, stages[1, 0], matrices[MASS])
-                stiffness_and_damping(
-                    reals, integers, scratch, at, stages[1, 0], stages[0, 1], matrices[STIFFNESS], matrices[DAMPING]
+                y, v, stiffness, damping = stages[1, 0], stages[0, 1], matrices[STIFFNESS], matrices[DAMPING]
+                call_mass_matrix(system.mass_matrix, reals, integers, scratch, at, y, matrices[MASS])
+                call_stiffness_and_damping(
+                    system.stiffness_and_damping, reals, integers, scratch, at, y, v, stiffness, damping
                 )
                 transpose(matrices[MASS])
-                transpose(matrices[STIFFNESS])
-                transpose(matrices[DAMPING])
-                diagonal = is_diagonal(matrices[STIFFNESS]) and is_diagonal(matrices[DAMPING])
+                transpose(stiffness)
+                transpose(damping)
+                diagonal = is_diagonal(stiffness) and is_diagonal(damping)
                 counts[DIAGONAL] = 1 if diagonal else 0
                 if pivots.shape[1] == 0:
-                    y, v = stages[1, 0], stages[0, 1]
-                    status = own_factor(reals, integers, scratch, at, y, v, h, h * h, own[0])
+                    status = call_factor(system.factor, reals, integers, scratch, at, y, v, h, h * h, own[0])
                     for k in range(pairs(m)):
                         p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
                         if status == 0 and q == 0.0:
-                            status = own_factor(reals, integers, scratch, at, y, v, p, p * p, own[k + 1])
+                            status = call_factor(
+                                system.factor, reals, integers, scratch, at, y, v, p, p * p, own[k + 1]
+                            )
                         elif status == 0:
                             shift = p + 1j * q
-                            status = own_factor_complex(
-                                reals, integers, scratch, at, y, v, shift, shift * shift, own_complex[k]
+                            square = shift * shift
+                            status = call_factor_complex(
+                                system.factor_complex,
+                                reals,
+                                integers,
+                                scratch,
+                                at,
+                                y,
+                                v,
+                                shift,
+                                square,
+                                own_complex[k],
                             )
                 else:
                     status = factor(h, coefficients, matrices, own, own_complex, pivots)
@@ -276,17 +284,18 @@ def advance(
                 if status != 0:
                     counts[SUSPECT] = status - 1
                     break
-            foretell(known, counts, coefficients, stages, last, matrices, vectors, own_solve, own_solve_complex, way)
+            foretell(known, counts, coefficients, stages, last, matrices, vectors, way)
             rounding = known[ROUNDING] * farthest(stages, vectors[METRES])
             goal, before, earlier, verdict = known[GOAL] + rounding, 0.0, 0.0, 0
             for k in range(1, counts[MAX_ITERATIONS] + 1):
                 for i in range(1, m + 1):
                     at = min(max(t + h * nodes[i], known[FIRST]), known[LAST])
                     y, v, a = stages[i, 0], stages[i, 1], stages[i, 2]
-                    residual(reals, integers, scratch, at, y, v, a, vectors[RESIDUALS + i - 1])
+                    out = vectors[RESIDUALS + i - 1]
+                    call_residual(system.residual, reals, integers, scratch, at, y, v, a, out)
                     counts[RHS_CALLS] += 1
                 counts[ITERATIONS] += 1
-                size = correct(h, coefficients, stages, matrices, vectors, own_solve, own_solve_complex, way)
+                size = correct(h, coefficients, stages, matrices, vectors, way)
                 if not math.isfinite(size):
                     verdict = -2
                     break
@@ -308,9 +317,7 @@ def advance(
             counts[SUSPECT] = largest_entry(vectors[RESIDUALS + m], vectors[METRES])
             going = retry(known, counts, SLOW, 0.5)
         else:
-            error = (
-                judge(h, coefficients, stages, matrices, vectors, own_solve, own_solve_complex, way) / known[TOLERANCE]
-            )
+            error = judge(h, coefficients, stages, matrices, vectors, way) / known[TOLERANCE]
             scale = min(GROWTH, max(SHRINK, SAFETY * max(error, 1e-12) ** (-1.0 / (m + 2))))
             if error > 1.0:
                 counts[SUSPECT] = largest_entry(vectors[PART_IM], vectors[METRES])

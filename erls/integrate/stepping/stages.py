@@ -1,19 +1,18 @@
 """The stages of a step of Lobatto IIIA: their start, iteration, factors and error (`erls.integrate.stepping.lobatto`).
 
 Arrays: numbers in ``known``, counts in ``counts``; ``stages`` and ``last`` (stages + 1, 3, n) hold y, v, a at the nodes
-of the present and of the last step; ``coefficients``, ``matrices`` and ``vectors`` are named below. ``own_solve`` and
-``own_solve_complex`` are the system's way of solving (`erls.equations.compiled_system.Factoring`), ``way`` what they
-need: its constants, factors in real and in complex numbers, row exchanges of dense ones, room for n complex numbers.
-The factors are dense, row by row, where there is room for row exchanges.
+of the present and of the last step; ``coefficients``, ``matrices`` and ``vectors`` are named below. ``way`` is how to
+solve: the system's functions for that (`erls.equations.compiled_system.Factoring`), constants, factors in real and in
+complex numbers, row exchanges of dense ones, room for n complex numbers. The factors are dense, row by row, where there
+is room for row exchanges.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
-from erls.equations.compiled_system import Array, IntArray
+from erls.equations.compiled_system import Array, IntArray, call_solve, call_solve_complex
 from erls.maths import dense
 from erls.maths.jit import helper, part
 
@@ -52,8 +51,6 @@ def foretell(
     last: Array,
     matrices: Array,
     vectors: Array,
-    own_solve: Callable[..., None] | None,
-    own_solve_complex: Any,
     way: Any,
 ) -> None:
     """Stages from the polynomial through the last ones, made to fulfil the linear part of the equations.
@@ -93,7 +90,7 @@ def foretell(
                     out[q] += matrix[q, q] * difference[q]
             else:
                 dense.add_product(matrices[kind], difference, out)
-    correct(h, coefficients, stages, matrices, vectors, own_solve, own_solve_complex, way)
+    correct(h, coefficients, stages, matrices, vectors, way)
 
 
 @part
@@ -126,27 +123,23 @@ def solve(
     real: bool,
     re: Array,
     im: Array,
-    own_solve: Callable[..., None] | None,
-    own_solve_complex: Any,
     way: Any,
 ) -> None:
     """Replace re + i im by the solution with the matrix of eigenvalue k, or with the filter where k is -1."""
-    reals, integers, own, own_complex, pivots, mixed = way
+    own_solve, own_solve_complex, reals, integers, own, own_complex, pivots, mixed = way
     n, plain = len(re), pivots.shape[1] > 0
     if real and plain:
         dense.solve(own[k + 1].reshape(n, n), pivots[k + 1], re)
         return
-    # a system that is not compiled has no way of its own: what calls it is then left out of the compiled code
-    if own_solve is not None:  # noqa: SIM102
-        if real:
-            own_solve(reals, integers, own[k + 1], re)
-            return
+    if real:
+        call_solve(own_solve, reals, integers, own[k + 1], re)
+        return
     for i in range(n):
         mixed[i] = re[i] + 1j * im[i]
     if plain:
         dense.solve(own_complex[k].reshape(n, n), pivots[k + 1], mixed)
-    elif own_solve is not None:
-        own_solve_complex(reals, integers, own_complex[k], mixed)
+    else:
+        call_solve_complex(own_solve_complex, reals, integers, own_complex[k], mixed)
     for i in range(n):
         re[i], im[i] = mixed[i].real, mixed[i].imag
 
@@ -158,8 +151,6 @@ def correct(
     stages: Array,
     matrices: Array,
     vectors: Array,
-    own_solve: Callable[..., None] | None,
-    own_solve_complex: Any,
     way: Any,
 ) -> float:
     """One iteration from the residuals of the stages; the largest change of a position, and of h v [metres]."""
@@ -179,7 +170,7 @@ def correct(
             for i in range(n):
                 re[i] += p * out[i]
                 im[i] += q * out[i]
-        solve(k, coefficients[ROWS, LAMBDA_IM, k] == 0.0, re, im, own_solve, own_solve_complex, way)
+        solve(k, coefficients[ROWS, LAMBDA_IM, k] == 0.0, re, im, way)
         for j in range(m):
             p, q, change = back_re[j, k], back_im[j, k], changes[j]
             for i in range(n):
@@ -266,8 +257,6 @@ def judge(
     stages: Array,
     matrices: Array,
     vectors: Array,
-    own_solve: Callable[..., None] | None,
-    own_solve_complex: Any,
     way: Any,
 ) -> float:
     """Estimated error of a step [metres]: (M + h C + h² K)⁻¹ M h² times the highest difference of the accelerations."""
@@ -281,7 +270,7 @@ def judge(
         difference[q] = h * h * total
         error[q] = 0.0
     dense.add_product(matrices[MASS], difference, error)
-    solve(-1, True, error, difference, own_solve, own_solve_complex, way)
+    solve(-1, True, error, difference, way)
     largest = 0.0
     for q in range(n):
         largest = max(largest, metres[q] * abs(error[q]))
