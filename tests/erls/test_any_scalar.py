@@ -36,6 +36,8 @@ CASES: list[tuple[Any, str]] = [
 STEP = 1e-30
 AGREE = 1e-6
 
+pytestmark = pytest.mark.xdist_group("complex numbers in trees")  # equations for them are compiled once in a process
+
 
 def _complex(
     system: CompiledSystem, residual: Any, t: float, arguments: list[np.ndarray], reals: np.ndarray

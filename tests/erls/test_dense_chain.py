@@ -108,6 +108,7 @@ class _Derivatives:
         return bool(np.abs(found - expected).max() <= limit)
 
 
+@pytest.mark.xdist_group("complex numbers in the dense form")  # which are compiled once in a process
 @pytest.mark.parametrize(("kind", "case", "gauge"), DERIVED)
 def test_complex_steps_are_derivatives(kind: str, case: str, gauge: str, tmp_path: Path) -> None:
     """Of the residual, by y, ẏ, ÿ and by every constant of the records."""
