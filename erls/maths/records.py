@@ -18,6 +18,7 @@ The numbers may be real or complex: a record of complex numbers is read by the s
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache, partial
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
@@ -45,10 +46,13 @@ def _axes(kind: Any) -> int | None:
     return len(said.split()) if isinstance(said, str) else int(said)
 
 
+# evaluated once: that takes a millisecond
+_hints: Callable[[Any], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))
+
+
 def _fields(record: type[Any]) -> list[tuple[str, int | None, bool]]:
     """Name, axes, and whether it lies in the integers, of each field."""
-    hints = get_type_hints(record, include_extras=True)
-    return [(name, _axes(kind), kind in (Indices, Pairs)) for name, kind in hints.items()]
+    return [(name, _axes(kind), kind in (Indices, Pairs)) for name, kind in _hints(record).items()]
 
 
 def room(record: type[R], **sizes: int) -> R:
@@ -57,8 +61,8 @@ def room(record: type[R], **sizes: int) -> R:
     Whole numbers are given beside the sizes, by the names of their fields.
     """
     make: Callable[..., R] = record
-    fields: dict[str, Any] = get_type_hints(record, include_extras=True)
-    return make(*(sizes[name] if kind is int else _zeros(kind, sizes) for name, kind in fields.items()))
+    fields = _hints(record).items()
+    return make(*(sizes[name] if kind is int else _zeros(kind, sizes) for name, kind in fields))
 
 
 def _zeros(kind: Any, sizes: dict[str, int]) -> Array:
