@@ -1,8 +1,8 @@
-"""Calls of compiled functions whose addresses lie among the integers of a system.
+"""Calls of compiled functions by address: of a system by the loops of integrators, of one system by another.
 
-A system that is built upon another one, known only by its functions, keeps their addresses beside its constants: then
-it is compiled once for all of them, and what it calls is not compiled within it again. In plain Python an address is
-the place of a function in a list.
+Addresses are arguments of loops, or lie among the integers of a system. A system that is built upon another one, known
+only by its functions, keeps their addresses beside its constants: then it is compiled once for all of them, and what it
+calls is not compiled within it again. In plain Python an address is the place of a function in a list, or the function.
 """
 
 from __future__ import annotations

@@ -303,7 +303,7 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
 def _type_arrays_first() -> None:
     """Have Numba type ``a[i]`` as that of an array before the twenty other things that it knows to be indexed.
 
-    It tries what is registered for its target before what is registered for any; a third of compilation went there.
+    It tries what is registered for its target before what is registered for any; a quarter of compilation went there.
     """
     from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
     from numba.core.typing.templates import infer_global
