@@ -145,7 +145,7 @@ def helper(function: F) -> F:
 
 
 def part(function: F) -> F:
-    """A helper of kernels that are not ``counted``: without a way in from Python, a third of its compilation."""
+    """A helper of kernels that are not ``counted``: no way in from Python, and optimized within its callers alone."""
     return _njit(function, **_PART) if ENABLED else function
 
 
@@ -200,12 +200,12 @@ def any_scalar(function: F, called: Mapping[Any, Any] | None = None) -> F:
     called : mapping, optional
         What it calls by address, by what calls it (`erls.maths.calls.caller`): an address leads to real numbers only.
     """
-    return cast(F, _any_scalar(function, tuple((called or {}).items())) if ENABLED else function)
+    return cast(F, _any_scalar(function, tuple((called or {}).items()), within=False) if ENABLED else function)
 
 
-def _any_scalar(function: Any, called: tuple[tuple[Any, Any], ...]) -> Any:
+def _any_scalar(function: Any, called: tuple[tuple[Any, Any], ...], within: bool) -> Any:
     reached = _callers(function, called)  # one twin for all systems whose difference it does not reach
-    return _twin(function, tuple((caller, target) for caller, target in called if caller in reached))
+    return _twin(function, tuple((caller, target) for caller, target in called if caller in reached), within)
 
 
 @cache
@@ -224,22 +224,23 @@ def _callers(function: Any, called: tuple[tuple[Any, Any], ...]) -> frozenset[An
 
 
 @cache
-def _twin(function: Any, called: tuple[tuple[Any, Any], ...]) -> Any:
+def _twin(function: Any, called: tuple[tuple[Any, Any], ...], within: bool) -> Any:
     source: Any = getattr(function, "py_func", function)
     own: dict[str, Any] = {}
     for name in _named(source):
         found = source.__globals__.get(name)
         if hasattr(found, "py_func") and _needs_real_numbers(found):
-            own[name] = _any_scalar(found, called)
+            own[name] = _any_scalar(found, called, within=True)
         elif said := getattr(found, "stands_for", ""):
             module, _, kernel_name = said.partition(":")
-            own[name] = _past_address(_any_scalar(getattr(import_module(module), kernel_name), called))
+            own[name] = _past_address(_any_scalar(getattr(import_module(module), kernel_name), called, within=True))
         for caller, target in called:
             if found is caller:
-                own[name] = _past_address(_any_scalar(target, called))
+                own[name] = _past_address(_any_scalar(target, called, within=True))
     twin = FunctionType(source.__code__, {**source.__globals__, **own}, source.__name__, source.__defaults__)
-    options = _PART if hasattr(function, "py_func") and function not in _fixed else {"_nrt": False}
-    return _njit(twin, **options, cache=not called)  # on disk nothing tells what was called
+    if within:  # a name of its own on disk: Python cannot call it
+        twin.__qualname__ += "_within"
+    return _njit(twin, **(_PART if within else {"_nrt": False}), cache=not called)  # no name tells what was called
 
 
 @cache
@@ -259,7 +260,7 @@ def _past_address(function: Any) -> Any:
     def call(address, *arguments):  # type: ignore[no-untyped-def]
         return function(*arguments)
 
-    return _njit(call, _nrt=False, cache=False)
+    return _njit(call, **_PART, cache=False)
 
 
 @cache
@@ -287,6 +288,8 @@ def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
 def _njit(function: Any, *signature: Any, **options: Any) -> Any:
     import numba
 
+    from erls.maths.compilers import CompilerOfKernels, CompilerOfParts
+
     _type_arrays_first()
     before = numba.config.CACHE_DIR
     if signature and not _on_disk(function):
@@ -294,7 +297,8 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
     numba.config.CACHE_DIR = str(folder(function.__module__))
     try:
         settings = {"cache": True, "error_model": "numpy", "nogil": True, **options}
-        return numba.njit(*signature, **settings)(function)
+        compiler = CompilerOfParts if "no_cpython_wrapper" in options else CompilerOfKernels
+        return numba.njit(*signature, **settings, pipeline_class=compiler)(function)
     finally:
         numba.config.CACHE_DIR = before
 

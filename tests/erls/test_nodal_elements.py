@@ -82,7 +82,6 @@ def _somewhere(case: str) -> tuple[NodalSystem, Nodes, list[Array]]:
     return system, system.compose(system.start, increment), [0 * increment, v, a, multipliers]
 
 
-@pytest.mark.xdist_group("complex numbers in nodal elements")
 @pytest.mark.parametrize("case", CASES)
 def test_complex_steps_through_the_residual(case: str) -> None:
     """By state, velocity, acceleration, multipliers and each real constant: against central differences, and against
