@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache, cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -51,10 +52,13 @@ class Functions(NamedTuple):
 
 @cache
 def functions() -> Functions:
-    """Compiled by two processes where they never were."""
-    with compiling_beside("erls.equations.nodal.matrix"):
+    """Compiled by two processes where they never were: blocks take as long as all others, those of steps included."""
+    with compiling_beside("erls.equations.nodal.blocks"):
         from erls.equations.nodal.outputs import energies, in_joints, knot
         from erls.equations.nodal.sums import forces, move, remember
+
+        for steps in ("matrix", "step"):
+            import_module(f"erls.equations.nodal.{steps}")
     from erls.equations.nodal.blocks import blocks, conditions, weighted
 
     return Functions(forces, remember, move, energies, knot, in_joints, conditions, blocks, weighted)
