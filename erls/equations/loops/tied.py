@@ -10,6 +10,7 @@ import numpy as np
 from erls.equations.formulation import TreeFormulation
 from erls.equations.loops.rows import Closure, LoopRows
 from erls.equations.system import metre_scales
+from erls.maths.jit import compiling_beside
 from erls.maths.so3 import Array
 from erls.mechanism.loop_turns import turning_signs
 from fe_import.model import IntArray
@@ -17,6 +18,7 @@ from fe_import.model import IntArray
 if TYPE_CHECKING:
     from erls.equations.loops.compiled import CompiledLoops
 
+KERNELS = tuple(f"erls.equations.loops.{name}" for name in ("closure", "system", "nearest", "actuated", "steps"))
 OPEN = 1e-4  # of the size of the mechanism: a loop that has come apart
 
 
@@ -40,7 +42,8 @@ class Tied:
     def __init__(self, bare: TreeFormulation) -> None:
         self.bare, self.mechanism = bare, bare.mechanism
         self.rows = LoopRows(bare.mechanism.loops)
-        self.metres = metre_scales(bare)
+        with compiling_beside(*KERNELS):
+            self.metres = metre_scales(bare)  # by functions of the chain, which take as long to compile
         self.reach = self.mechanism.reach
         self.row_metres = np.where(self.rows.turns, self.reach, 1.0)
         self._known: tuple[float, Array, Array, Closure] | None = None
