@@ -214,7 +214,7 @@ def _callers(function: Any, called: tuple[tuple[Any, Any], ...]) -> frozenset[An
     source: Any = getattr(function, "py_func", function)
     found: set[Any] = set()
     for used in map(source.__globals__.get, _named(source)):
-        if hasattr(used, "in_python"):
+        if hasattr(used, "stands_for"):
             found.add(used)
             for target in (target for caller, target in called if caller is used):
                 found |= _callers(target, called)

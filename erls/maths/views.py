@@ -87,4 +87,6 @@ if ENABLED:
 
         return _signature(array, 4), generate
 
+    for view in (_vector, _matrix, _stack, _pile):
+        view.in_python = plain_at
     vector_at, matrix_at, stack_at, pile_at = _vector, _matrix, _stack, _pile

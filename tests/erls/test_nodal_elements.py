@@ -14,9 +14,8 @@ from nodal_tables import CASES, TIME
 from erls.equations.consistency import consistent_velocity
 from erls.equations.nodal import outputs, sums
 from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.contract import Model, State
-from erls.equations.nodal.model import room
-from erls.equations.nodal.nodes import Nodes, rows_of
+from erls.equations.nodal.layout import Flat
+from erls.equations.nodal.nodes import Nodes, numbers_of
 from erls.maths import motion_maps as motions
 from erls.maths.jit import any_scalar, plain
 from erls.maths.saddle import dense
@@ -46,33 +45,31 @@ class Complex:
 
     def __init__(self, system: NodalSystem, q: Nodes, of: Callable[[Any], Any]) -> None:
         self._move, self._forces, self._energies = of(sums.move), of(sums.forces), of(outputs.energies)
-        self.model = Model(*(_complex(x) for x in system.model))
-        self._sample = system.samples(np.array([TIME]))[0]
-        self._work = room(self.model, complex)
-        known = rows_of(q.poses), q.bent, q.turned, q.wound
-        self._start = State(*(_complex(x) for x in known))
+        known = system.flat
+        flat = Flat(known.reals.astype(complex), known.integers, known.scratch.astype(complex), 0)
+        sample = system.samples(np.array([TIME]))[0]
+        flat.scratch[: len(sample)] = sample
+        self.model, self._work = flat.model(), flat.work()
+        self._memory, self._start = (flat.reals, flat.integers, flat.scratch), numbers_of(q).astype(complex)
 
-    def _at(self, model: Model, increment: Array, v: Array, a: Array, multipliers: Array) -> Any:
+    def _at(self, increment: Array, v: Array, a: Array, multipliers: Array) -> Any:
         work = self._work
         work.increment[:], work.v[:], work.a[:], work.multipliers[:] = increment, v, a, multipliers
-        self._move(model, work, self._start)
+        self._move(*self._memory, self._start)
         return work
 
-    def forces(self, model: Model, *motion: Array) -> Array:
+    def forces(self, *motion: Array) -> Array:
         """(n + m,) residual with the forces of the joints, and violations."""
-        work = self._at(model, *motion)
-        self._forces(model, work, self._start, self._sample)
+        work = self._at(*motion)
+        self._forces(*self._memory, self._start)
         return np.concatenate([work.force + work.reaction, work.violation])
 
-    def energies(self, model: Model, *motion: Array) -> Array:
+    def energies(self, *motion: Array) -> Array:
         """(5,)"""
+        self._at(*motion)
         out = np.zeros(5, dtype=complex)
-        self._energies(model, self._at(model, *motion), out)
+        self._energies(*self._memory, out)
         return out
-
-
-def _complex(x: Any) -> Any:
-    return x.astype(complex) if isinstance(x, np.ndarray) and x.dtype == float else x
 
 
 def _somewhere(case: str) -> tuple[NodalSystem, Nodes, list[Array]]:
@@ -89,7 +86,6 @@ def test_complex_steps_through_the_residual(case: str) -> None:
     """
     system, q, motion = _somewhere(case)
     complex_one, n = Complex(system, q, any_scalar), system.size
-    model = complex_one.model
 
     def check(with_change: Callable[[complex], Array], scale: float) -> Array:
         slope: Array = with_change(1j * H).imag / H
@@ -105,7 +101,7 @@ def test_complex_steps_through_the_residual(case: str) -> None:
 
             def moved(step: complex, k: int = k, i: int = i, changed: list[Array] = changed) -> Array:
                 changed[k][i] = motion[k][i] + step
-                return complex_one.forces(model, *changed)
+                return complex_one.forces(*changed)
 
             columns.append(check(moved, 1.0))
         jacobians.append(np.array(columns).reshape(len(values), n + system.constraints).T)
@@ -114,7 +110,7 @@ def test_complex_steps_through_the_residual(case: str) -> None:
     np.testing.assert_allclose(jacobians[2][:n], mass, rtol=0, atol=1e-12 * np.abs(mass).max())
     np.testing.assert_allclose(jacobians[3][:n], gradient.T, rtol=0, atol=1e-12 * np.abs(gradient).max(initial=1.0))
 
-    for name, constants in model._asdict().items():
+    for name, constants in complex_one.model._asdict().items():
         if name == "metres" or not isinstance(constants, np.ndarray) or constants.dtype != complex:
             continue
         for i in np.flatnonzero(np.isfinite(constants.real) & ((name != "pitches") | (constants.real != 0))):
@@ -122,7 +118,7 @@ def test_complex_steps_through_the_residual(case: str) -> None:
 
             def made(step: complex, i: int = int(i), constants: Array = constants, kept: complex = kept) -> Array:
                 constants.flat[i] = kept + step
-                found = complex_one.forces(model, *motion)
+                found = complex_one.forces(*motion)
                 constants.flat[i] = kept
                 return found
 
@@ -154,7 +150,7 @@ def test_energy_changes_by_the_power_of_all_forces(case: str) -> None:
         q = _closed(system)
         v = consistent_velocity(system, TIME, q, v)
     complex_one = Complex(system, q, plain)
-    change = complex_one.energies(complex_one.model, 1j * H * v, v + 1j * H * a, a, multipliers).imag.sum() / H
+    change = complex_one.energies(1j * H * v, v + 1j * H * a, a, multipliers).imag.sum() / H
     acting = system.in_joints(TIME, q, v, a)
     law = system.model.actuators
     springs = law[:, 1] * (acting[:, 0] - law[:, 2])
@@ -178,7 +174,7 @@ def test_plain_complex_numbers_give_the_real_parts(case: str) -> None:
     """The same source without the compiler."""
     system, q, motion = _somewhere(case)
     complex_one = Complex(system, q, plain)
-    found = complex_one.forces(complex_one.model, *motion)
+    found = complex_one.forces(*motion)
     work = system.residual(TIME, q, motion[1], motion[2]), dense(system.constraint_matrix(TIME, q))
     expected = np.concatenate([work[0] + work[1].T @ motion[3], system.constraint(TIME, q)])
     np.testing.assert_allclose(found.real, expected, rtol=0, atol=1e-12 * np.abs(expected).max())

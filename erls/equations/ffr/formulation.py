@@ -87,8 +87,8 @@ class Ffr(SerialFormulation):
     def kernels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """See `erls.equations.formulation.Modular`."""
         own = "erls.equations.ffr"
-        here = f"{own}.residual", "erls.equations.serial.stiffness", f"{own}.energy", f"{own}.states"
-        return here, (f"{own}.mass",)
+        here = f"{own}.residual", "erls.equations.serial.stiffness", f"{own}.states"
+        return here, (f"{own}.mass", f"{own}.energy")  # both take the matrices of segments
 
     @cached_property
     def length_scales(self) -> Array:

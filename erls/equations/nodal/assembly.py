@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache, cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.equations.nodal.contract import Model, State, Work
+from erls.equations.nodal.contract import Model, Work
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import Joint, JointRows
-from erls.equations.nodal.model import Kinds, band_order, build_model, room
-from erls.equations.nodal.nodes import Nodes, poses_of, rows_of
+from erls.equations.nodal.layout import Flat, Functions, lay_out
+from erls.equations.nodal.model import Kinds, band_order, build_model
+from erls.equations.nodal.nodes import Nodes, numbers_of, poses_of, rows_of
 from erls.equations.nodal.scatter import Scatter, dofs
 from erls.equations.system import metre_scales
 from erls.maths.groups import SE3, Group
@@ -36,23 +37,12 @@ _STEPPED = (
 )  # methods of a system that compiled steps stand for
 
 
-class Functions(NamedTuple):
-    """What computes all values, loaded with the first system: not every run is one of nodes."""
-
-    forces: Callable[..., None]
-    remember: Callable[..., None]
-    move: Callable[..., None]
-    energies: Callable[..., None]
-    knot: Callable[..., None]
-    in_joints: Callable[..., None]
-    conditions: Callable[..., None]
-    blocks: Callable[..., None]
-    weighted: Callable[..., None]
-
-
 @cache
 def functions() -> Functions:
-    """Compiled by two processes where they never were: blocks take as long as all others, those of steps included."""
+    """Loaded with the first system: not every run is one of nodes.
+
+    Compiled by two processes where they never were: blocks take as long as all others, those of steps included.
+    """
     with compiling_beside("erls.equations.nodal.blocks"):
         from erls.equations.nodal.outputs import energies, in_joints, knot
         from erls.equations.nodal.sums import forces, move, remember
@@ -102,14 +92,18 @@ class NodalSystem:
         built = Nodes(poses, self.kinds.beams.built, coordinates, np.zeros((windings, 3)))
         self.start = built  # `length_scales` asks for it
         order, self.width = band_order(self.count, pairs, self.rows)
-        self.model: Model = build_model(self.kinds, self.rows, self.local, metre_scales(self), order)
+        model = build_model(self.kinds, self.rows, self.local, metre_scales(self), order)
         self._functions = functions()
-        self._work: Work = room(self.model)
-        self._sampled: tuple[float, Array] = (np.nan, np.zeros(0))
+        self.flat: Flat = lay_out(model, built, self.samples(np.zeros(1)).shape[1], self.width, self._functions)
+        self._memory = self.flat.reals, self.flat.integers, self.flat.scratch
+        self.model: Model = self.flat.model()
+        self._work: Work = self.flat.work()
+        self._sampled = np.nan
         self._tied: tuple[float, Nodes | None, tuple[Array, ...]] = (np.nan, None, ())
         self.start = self.at(poses, built)
         # the same to the last bit: no strain as built, unless it expands
-        self.model.beam_built[:] = self.kinds.beams.without_force(self.start.bent)
+        beams = self.kinds.beams
+        self.model.beam_built[:] = beams.built[:] = beams.without_force(self.start.bent)
 
     @property
     def size(self) -> int:
@@ -152,14 +146,14 @@ class NodalSystem:
     def at(self, poses: Array, near: Nodes | None = None) -> Nodes:
         """Configuration at poses (k, 4, 4), with elements wound up as they are nearby (as built unless given)."""
         self._work.poses[:] = rows_of(poses)
-        self._functions.remember(self.model, self._work, self._knot(near or self.start))
+        self._functions.remember(*self._memory, numbers_of(near or self.start))
         return Nodes(poses, self._work.bent.copy(), self._work.turned.copy(), self._work.wound.copy())
 
     def compose(self, q: Nodes, increment: Array) -> Nodes:
         """Poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
         work = self._work
         work.increment[:] = increment
-        self._functions.move(self.model, work, self._knot(q))
+        self._functions.move(*self._memory, numbers_of(q))
         return Nodes(poses_of(work.poses), work.bent.copy(), work.turned.copy(), work.wound.copy())
 
     def tangent(self, increment: Array) -> Matrix:
@@ -174,7 +168,7 @@ class NodalSystem:
         """(n, n)"""
         rest = np.zeros(self.size)
         work = self._evaluated(t, q, rest, rest, None)
-        self._functions.blocks(self.model, work, self._sample(t), 0)
+        self._functions.blocks(*self._memory, 0)
         return self._mass.matrix([self._weighted(work, 0, (1.0, 0.0, 0.0))[: len(self.kinds.pairs)]])
 
     def stiffness_and_damping(
@@ -182,7 +176,7 @@ class NodalSystem:
     ) -> tuple[Matrix, Matrix]:
         """(n, n) twice; ``material`` as in `erls.equations.nodal.blocks.blocks`."""
         work = self._evaluated(t, q, v, a, multipliers)
-        self._functions.blocks(self.model, work, self._sample(t), int(material))
+        self._functions.blocks(*self._memory, int(material))
         stiffness = self._stiffness.matrix([self._weighted(work, 2, (0.0, 0.0, 1.0))])
         if not self.local:
             turning = np.zeros((self.count, 6, 6))
@@ -207,7 +201,8 @@ class NodalSystem:
     def constraint_bias(self, t: float, q: Nodes, v: Array) -> Array:
         """(m,) Φ̈ − B a."""
         work = self._state(q, v, np.zeros(self.size))
-        self._functions.conditions(self.model, work, self._sample(t))
+        self._sample(t)
+        self._functions.conditions(*self._memory)
         return work.bias.copy()
 
     def stored(self, t: float, q: Nodes, v: Array, a: Array) -> tuple[Array, Array, Array]:
@@ -215,13 +210,15 @@ class NodalSystem:
         second derivatives.
         """
         out = np.zeros((3, 12 * self.count + len(self.model.actuators)))
-        self._functions.knot(self.model, self._state(q, v, a), out)
+        self._state(q, v, a)
+        self._functions.knot(*self._memory, out)
         return out[0], out[1], out[2]
 
     def energies(self, q: Nodes, v: Array) -> Array:
         """(5,) kinetic, elastic of beams, gravity, springs, springs in joints [J]."""
         out = np.zeros(5)
-        self._functions.energies(self.model, self._state(q, v, np.zeros(self.size)), out)
+        self._state(q, v, np.zeros(self.size))
+        self._functions.energies(*self._memory, out)
         return out
 
     def energy(self, t: float, q: Nodes, v: Array) -> tuple[float, float]:
@@ -232,13 +229,16 @@ class NodalSystem:
     def in_joints(self, t: float, q: Nodes, v: Array, a: Array) -> Array:
         """(a, 10) coordinate, rate, acceleration, effort of each actuator, and its wrench on the outer node there."""
         out = np.zeros((len(self.model.actuators), 10))
-        self._functions.in_joints(self.model, self._state(q, v, a), self._sample(t), out)
+        self._state(q, v, a)
+        self._sample(t)
+        self._functions.in_joints(*self._memory, out)
         return out
 
     def samples(self, times: Array) -> Array:
         """(times, ...) what depends on time alone; see `erls.equations.nodal.contract`."""
         joints, loads = self.rows.joints, self.kinds.loads.loads
-        result = np.zeros((len(times), 3 * len(joints) + len(loads) + 3 * len(self.model.actuators)))
+        actuators = sum(len(group.joints) for group in self.kinds.actuators)
+        result = np.zeros((len(times), 3 * len(joints) + len(loads) + 3 * actuators))
         for k, tie in enumerate(joints):
             if tie.motion is not None:
                 result[:, 3 * k : 3 * k + 3] = [tie.motion(t) for t in times.tolist()]
@@ -260,14 +260,11 @@ class NodalSystem:
 
         return stepped(self)
 
-    def _sample(self, t: float) -> Array:
-        if self._sampled[0] != t:
-            self._sampled = t, self.samples(np.array([t], dtype=float))[0]
-        return self._sampled[1]
-
-    def _knot(self, q: Nodes) -> State:
-        """A configuration as arrays."""
-        return State(rows_of(q.poses), q.bent, q.turned, q.wound)
+    def _sample(self, t: float) -> None:
+        """Into working memory."""
+        if self._sampled != t:
+            sample = self.samples(np.array([t], dtype=float))[0]
+            self._sampled, self.flat.scratch[: len(sample)] = t, sample
 
     def _state(self, q: Nodes, v: Array, a: Array) -> Work:
         """The configuration and the motion in memory."""
@@ -280,14 +277,15 @@ class NodalSystem:
         """With all forces."""
         work = self._state(q, v, a)
         work.multipliers[:] = 0.0 if multipliers is None else multipliers
-        self._functions.forces(self.model, work, self._knot(q), self._sample(t))
+        self._sample(t)
+        self._functions.forces(*self._memory, numbers_of(q))
         return work
 
     def _weighted(self, work: Work, kind: int, weights: tuple[float, float, float]) -> Array:
         """(E, 12, 12) mass, damping or stiffness in the coordinates of the system."""
         if self.local:
             return work.blocks[:, kind]
-        self._functions.weighted(self.model, work, *weights)
+        self._functions.weighted(*self._memory, *weights)
         return work.whole
 
     def _conditions(self, t: float, q: Nodes) -> tuple[Array, ...]:
@@ -296,7 +294,8 @@ class NodalSystem:
         if known_t == t and known_q is q:
             return known
         work = self._state(q, np.zeros(self.size), np.zeros(self.size))
-        self._functions.conditions(self.model, work, self._sample(t))
+        self._sample(t)
+        self._functions.conditions(*self._memory)
         found = work.violation.copy(), work.gradient.copy(), work.drift.copy()
         self._tied = t, q, found
         return found

@@ -5,11 +5,20 @@ Velocities as in `erls.equations.nodal.motion`: on R³×SO(3) the chain rule ove
 
 from __future__ import annotations
 
-from erls.equations.compiled_system import Array
+from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.actuator_forces import actuator_derivatives
 from erls.equations.nodal.beam_forces import beam_derivatives
 from erls.equations.nodal.body_forces import body_derivatives, load_derivatives
-from erls.equations.nodal.contract import BLOCKS, CONDITIONS, SUMMED, Model, Work
+from erls.equations.nodal.contract import (
+    BLOCKS,
+    CONDITIONS,
+    SUMMED,
+    Model,
+    Work,
+    read_layout,
+    read_model,
+    read_work,
+)
 from erls.equations.nodal.joint_forces import joint_gradients, joint_stiffness
 from erls.equations.nodal.motion import set_twists
 from erls.equations.nodal.spring_forces import spring_derivatives, winding_derivatives
@@ -18,11 +27,11 @@ from erls.maths.jit import inlined, kernel
 from erls.maths.motions import series
 from erls.maths.rotations import value
 from erls.maths.vectors import cross, dot, minus, nine, plus, scaled, three, times, turned, unit
+from erls.maths.views import vector_at
 
 
-@kernel(CONDITIONS, counted=False)
-def conditions(model: Model, work: Work, sample: Array) -> None:
-    """Violation, gradient, Φ_t and, without accelerations, Φ̈ − B a of all conditions at ``work``'s poses and motion."""
+@inlined
+def _conditions(model: Model, work: Work, sample: Array) -> None:
     set_twists(model, work)
     for j in range(len(model.joint_nodes)):
         joint_gradients(model, work, sample, j)
@@ -35,15 +44,25 @@ def conditions(model: Model, work: Work, sample: Array) -> None:
                     work.bias[row] += work.gradient[row, 6 * side + i] * work.rate[6 * node + i]
 
 
+@kernel(CONDITIONS, counted=False)
+def conditions(reals: Array, integers: IntArray, scratch: Array) -> None:
+    """Violation, gradient, Φ_t and, without accelerations, Φ̈ − B a of all conditions at `Work`'s poses and motion."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    _conditions(model, work, vector_at(scratch, 0, known.samples))
+
+
 @kernel(BLOCKS, counted=False)
-def blocks(model: Model, work: Work, sample: Array, material: int) -> None:
-    """Derivatives of forces by accelerations, velocities and increments of the nodes into ``work.blocks``, gradients of
-    conditions; ``work`` holds the state with `erls.equations.nodal.sums.forces` evaluated.
+def blocks(reals: Array, integers: IntArray, scratch: Array, material: int) -> None:
+    """Derivatives of forces by accelerations, velocities and increments of the nodes into `Work.blocks`, gradients of
+    conditions; `Work` holds the state with `erls.equations.nodal.sums.forces` evaluated.
 
     With ``material``, internal forces count as if they did not turn with deformation. Inertia that changes with
     deformation is left out.
     """
-    table = work.blocks
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    table, sample = work.blocks, vector_at(scratch, 0, known.samples)
     for e in range(table.shape[0]):
         for kind in range(3):
             for i in range(12):
@@ -70,7 +89,7 @@ def blocks(model: Model, work: Work, sample: Array, material: int) -> None:
     for k in range(len(model.winding_nodes)):
         winding_derivatives(model, work, k, table[at + k], material)
     at += len(model.winding_nodes)
-    conditions(model, work, sample)
+    _conditions(model, work, sample)
     for j in range(len(model.joint_nodes)):
         joint_stiffness(model, work, sample, j, table[at + j])
 
@@ -118,8 +137,10 @@ def _node_factors(model: Model, work: Work, to_a: float, to_v: float, to_q: floa
 
 
 @kernel(SUMMED, counted=False)
-def weighted(model: Model, work: Work, to_a: float, to_v: float, to_q: float) -> None:
-    """β' M + γ' C + κ K T of each element into ``work.whole``, T being the tangent of ``work.increment``."""
+def weighted(reals: Array, integers: IntArray, scratch: Array, to_a: float, to_v: float, to_q: float) -> None:
+    """β' M + γ' C + κ K T of each element into `Work.whole`, T being the tangent of `Work.increment`."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     _node_factors(model, work, to_a, to_v, to_q)
     for e in range(len(model.pairs)):
         block, out = work.blocks[e], work.whole[e]

@@ -5,13 +5,16 @@ frames in its first and its second node (for the ground, in the world). A node â
 what depends on time alone: of every joint the prescribed coordinate with two derivatives (0 unless prescribed), the
 factor of every load, and of every actuator the wanted coordinate, the wanted rate and the torque besides.
 
-The numbers of constants and of working memory may be complex; time, samples and integers are real.
+Functions are given flat memory, whose last integer says where `Layout` lies, and read from it the records that they
+use (`erls.maths.records`): a call with some hundred arrays would take as long as the forces on a body. Working memory
+begins with a sample. The numbers of constants and of working memory may be complex.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from erls.equations.compiled_system import INTEGERS, MATRIX, REALS
 from erls.maths.calls import caller
 from erls.maths.jit import ENABLED
 from erls.maths.records import Indices, Matrix, Pairs, Pile, Stack, Vector, reader
@@ -168,13 +171,13 @@ class Factors(NamedTuple):
     pivots: Vector
 
 
-class Stepping(NamedTuple):
-    """What steps know of a system, at the place that the last of the integers says.
+class Layout(NamedTuple):
+    """Where a system's records lie, at the place that the last of the integers says.
 
     Attributes
     ----------
     model, work, before, state, factors : int
-        Places of `Model`, of `Work` and `Before` in working memory, of `State` in a configuration, of `Factors`.
+        Tables of `Model`, of `Work` and `Before` in working memory, of `State` in a configuration, of `Factors`.
     forces, remember, knot, blocks, weighted : int
         Addresses of the functions of `erls.equations.nodal.sums`, `outputs` and `blocks`.
     samples : int
@@ -206,9 +209,6 @@ class Before(NamedTuple):
     behind: Vector
 
 
-MODEL: Any = None
-STATE: Any = None
-WORK: Any = None
 FORCES: Any = None
 REMEMBER: Any = None
 CONDITIONS: Any = None
@@ -220,26 +220,14 @@ ACTING: Any = None
 if ENABLED:
     from numba import types as _t
 
-    _r1, _r2, _r3, _r4 = _t.float64[::1], _t.float64[:, ::1], _t.float64[:, :, ::1], _t.float64[:, :, :, ::1]
-    _i1, _i2 = _t.int64[::1], _t.int64[:, ::1]
-    _beams = (_i2, _r2, _r2, _r3, _r3, _i1)
-    _others = (_i1, _r3, _i1, _r2, _i1, _i2, _r2, _i1, _i1, _r2, _i2, _r2, _i2, _r2, _r2)
-    _joints = (_i2, _r2, _r2, _i1, _r2, _r1)
-    MODEL = _t.NamedTuple((_t.int64, _r2, _i2, *_beams, *_others, *_joints, _r1, _i1, _i1), Model)
-    _tried = (_r2, _r2, _r1, _r2)
-    STATE = _t.NamedTuple(_tried, State)
-    _sums = (_r4, _r3, *(_r2,) * 3, _r1, _r1, _r4, _r3, _r1)
-    WORK = _t.NamedTuple((*_tried, *(_r1,) * 9, *_sums), Work)
-    FORCES = _t.void(MODEL, WORK, STATE, _r1)
-    REMEMBER = _t.void(MODEL, WORK, STATE)
-    CONDITIONS = _t.void(MODEL, WORK, _r1)
-    BLOCKS = _t.void(MODEL, WORK, _r1, _t.int64)
-    SUMMED = _t.void(MODEL, WORK, _t.float64, _t.float64, _t.float64)
-    ENERGIES = _t.void(MODEL, WORK, _r1)
-    KNOT = _t.void(MODEL, WORK, _r2)
-    ACTING = _t.void(MODEL, WORK, _r1, _r2)
+    _memory = REALS, INTEGERS, REALS
+    FORCES = REMEMBER = ENERGIES = _t.void(*_memory, REALS)
+    CONDITIONS = _t.void(*_memory)
+    BLOCKS = _t.void(*_memory, _t.int64)
+    SUMMED = _t.void(*_memory, _t.float64, _t.float64, _t.float64)
+    KNOT = ACTING = _t.void(*_memory, MATRIX)
 
 read_model, read_work, read_state = reader(Model), reader(Work), reader(State)
-read_stepping, read_before, read_factors = reader(Stepping), reader(Before), reader(Factors)
+read_layout, read_before, read_factors = reader(Layout), reader(Before), reader(Factors)
 call_forces, call_remember, call_knot = caller(FORCES), caller(REMEMBER), caller(KNOT)
 call_blocks, call_weighted = caller(BLOCKS), caller(SUMMED)

@@ -12,14 +12,13 @@ from erls.equations.nodal.contract import (
     call_blocks,
     call_weighted,
     read_factors,
+    read_layout,
     read_model,
-    read_stepping,
     read_work,
 )
 from erls.maths import band
 from erls.maths.jit import inlined, kernel, part
 from erls.maths.vectors import Rotation, nine, times
-from erls.maths.views import vector_at
 
 _ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -121,17 +120,17 @@ def factor(
     factors: Array,
 ) -> int:
     """Factor [[M + α C + β K T, Bᵀ], [B T, 0]] at the state whose residual was found last; see `stepped`."""
-    own = read_stepping(reals, integers, integers[len(integers) - 1])
+    own = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, own.model), read_work(scratch, integers, own.work)
-    room, sample = read_factors(factors, integers, own.factors), vector_at(scratch, 0, own.samples)
+    room = read_factors(factors, integers, own.factors)
     table, n = room.band, len(work.force)
     for i in range(table.shape[0]):
         for j in range(table.shape[1]):
             table[i, j] = 0.0
     for i in range(n):
         work.inertia[i] = 0.0
-    call_blocks(own.blocks, model, work, sample, 0)
-    call_weighted(own.weighted, model, work, 1.0, alpha, beta)
+    call_blocks(own.blocks, reals, integers, scratch, 0)
+    call_weighted(own.weighted, reals, integers, scratch, 1.0, alpha, beta)
     for e in range(len(model.pairs)):
         _add_element(table, model.place, model.pairs, e, work.whole[e])
         for side in range(2):
@@ -160,7 +159,7 @@ def factor(
 @kernel(contract.SOLVE, counted=False)
 def solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
     """Replace [b; Φ] by [x; β λ]."""
-    own = read_stepping(reals, integers, integers[len(integers) - 1])
+    own = read_layout(reals, integers, integers[len(integers) - 1])
     order = read_model(reals, integers, own.model).order
     room = read_factors(factors, integers, own.factors)
     for i in range(len(order)):

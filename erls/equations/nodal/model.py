@@ -100,7 +100,7 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
     )
 
 
-def room(model: Model, kind: type = float) -> Work:
+def room(model: Model) -> Work:
     """Memory for evaluations."""
     n, m, k, e = len(model.metres), len(model.conditions), len(model.metres) // 6, len(model.pairs)
     per_velocity = ("v", "a", "increment", "twist", "rate", "force", "reaction", "inertia")
@@ -118,7 +118,7 @@ def room(model: Model, kind: type = float) -> Work:
         "factors": (k, 3, 6, 6),
         "turning": (k, 3, 3),
     }
-    return Work(**{name: np.zeros(shape, dtype=kind) for name, shape in shapes.items()})
+    return Work(**{name: np.zeros(shape) for name, shape in shapes.items()})
 
 
 def factor_room(model: Model, width: int) -> Factors:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from erls.equations.compiled_system import Array
+from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.actuator_forces import acting, actuator_energy, store_coordinates
 from erls.equations.nodal.beam_forces import beam_energy
 from erls.equations.nodal.body_forces import body_energy
-from erls.equations.nodal.contract import ACTING, ENERGIES, KNOT, Model, Work
+from erls.equations.nodal.contract import ACTING, ENERGIES, KNOT, read_layout, read_model, read_work
 from erls.equations.nodal.motion import set_twists
 from erls.equations.nodal.spring_forces import spring_energy, winding_energy
 from erls.maths.jit import kernel
 from erls.maths.vectors import cross, dot, nine, plus, put, scaled, three, times, vector
+from erls.maths.views import vector_at
 
 
 @kernel(ENERGIES, counted=False)
-def energies(model: Model, work: Work, out: Array) -> None:
+def energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
     """Kinetic, elastic of beams, gravity, springs, springs in joints; loads count as work done from outside."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     set_twists(model, work)
     for i in range(5):
         out[i] = 0.0
@@ -36,8 +39,10 @@ def energies(model: Model, work: Work, out: Array) -> None:
 
 
 @kernel(KNOT, counted=False)
-def knot(model: Model, work: Work, out: Array) -> None:
+def knot(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
     """Positions and rotation matrices, then joint coordinates, with first and second derivative (3, s)."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     set_twists(model, work)
     for node in range(len(work.poses)):
         v, w = three(work.twist, 6 * node), three(work.twist, 6 * node + 3)
@@ -57,8 +62,11 @@ def knot(model: Model, work: Work, out: Array) -> None:
 
 
 @kernel(ACTING, counted=False)
-def in_joints(model: Model, work: Work, sample: Array, out: Array) -> None:
+def in_joints(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
     """(a, 10) coordinate, rate, acceleration, effort and wrench of each actuator."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    sample = vector_at(scratch, 0, known.samples)
     set_twists(model, work)
     for k in range(len(model.actuator_nodes)):
         acting(model, work, sample, k, out[k])

@@ -16,15 +16,14 @@ from erls.equations.nodal.contract import (
     call_knot,
     call_remember,
     read_before,
+    read_layout,
     read_model,
     read_state,
-    read_stepping,
     read_work,
 )
 from erls.equations.nodal.motion import compose as composed
 from erls.equations.stepped import COMPOSE, SETTLE
 from erls.maths.jit import kernel
-from erls.maths.views import vector_at
 
 
 @kernel(COMPOSE, counted=False)
@@ -32,7 +31,7 @@ def compose(
     reals: Array, integers: IntArray, scratch: Array, metres: Array, start: Array, d: Array, out: Array
 ) -> float:
     """Poses ∘ exp(d); the size of the mechanism."""
-    known = read_stepping(reals, integers, integers[len(integers) - 1])
+    known = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     before = read_before(scratch, integers, known.before)
     for i in range(len(start)):
@@ -51,7 +50,7 @@ def residual(
     reals: Array, integers: IntArray, scratch: Array, t: float, q: Array, v: Array, a: Array, out: Array
 ) -> None:
     """[M a + Bᵀ λ - f; Φ], then the norms of M a - f and of Bᵀ λ [N]."""
-    known = read_stepping(reals, integers, integers[len(integers) - 1])
+    known = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     before, poses = read_before(scratch, integers, known.before), read_state(q, integers, known.state).poses
     n, m = len(work.v), len(work.multipliers)
@@ -62,8 +61,7 @@ def residual(
         work.v[i], work.a[i] = v[i], a[i]
     for k in range(m):
         work.multipliers[k] = a[n + k]
-    held, sample = read_state(before.numbers, integers, known.state), vector_at(scratch, 0, known.samples)
-    call_forces(known.forces, model, work, held, sample)
+    call_forces(known.forces, reals, integers, scratch, before.numbers)
     before.behind[0] = 0.0
     force = reaction = 0.0
     for i in range(n):
@@ -81,8 +79,8 @@ def settle(
     reals: Array, integers: IntArray, scratch: Array, t: float, q: Array, v: Array, a: Array, knot: Array
 ) -> int:
     """A knot; ``q`` gets what its poses do not tell."""
-    known = read_stepping(reals, integers, integers[len(integers) - 1])
-    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    work = read_work(scratch, integers, known.work)
     before, there = read_before(scratch, integers, known.before), read_state(q, integers, known.state)
     for node in range(len(work.poses)):
         for i in range(12):
@@ -90,7 +88,7 @@ def settle(
     for i in range(len(work.v)):
         work.v[i], work.a[i] = v[i], a[i]
     if before.behind[0] != 0.0:
-        call_remember(known.remember, model, work, read_state(before.numbers, integers, known.state))
+        call_remember(known.remember, reals, integers, scratch, before.numbers)
     for e in range(len(work.bent)):
         for i in range(6):
             there.bent[e, i] = work.bent[e, i]
@@ -99,5 +97,5 @@ def settle(
     for k in range(len(work.wound)):
         for i in range(3):
             there.wound[k, i] = work.wound[k, i]
-    call_knot(known.knot, model, work, knot)
+    call_knot(known.knot, reals, integers, scratch, knot)
     return 0

@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
-from erls.equations.compiled_system import Array
+from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.actuator_forces import actuator_forces, set_coordinates
 from erls.equations.nodal.beam_forces import beam_forces, bend
 from erls.equations.nodal.body_forces import body_forces, load_forces
-from erls.equations.nodal.contract import FORCES, REMEMBER, Model, State, Work
+from erls.equations.nodal.contract import (
+    FORCES,
+    REMEMBER,
+    Model,
+    State,
+    Work,
+    read_layout,
+    read_model,
+    read_state,
+    read_work,
+)
 from erls.equations.nodal.joint_forces import joint_forces
 from erls.equations.nodal.motion import compose, set_twists
 from erls.equations.nodal.spring_forces import spring_forces, wind, winding_forces
-from erls.maths.jit import kernel
+from erls.maths.jit import inlined, kernel
 from erls.maths.vectors import nine, put, three, times
+from erls.maths.views import vector_at
 
 
 @kernel(FORCES, counted=False)
-def forces(model: Model, work: Work, before: State, sample: Array) -> None:
-    """Residual and Bᵀλ (n,), violations (m,) of the state that ``work`` tries."""
+def forces(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """Residual and Bᵀλ (n,), violations (m,) of the state that `Work` tries; ``last`` is the configuration before."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before, sample = read_state(last, integers, known.state), vector_at(scratch, 0, known.samples)
     set_twists(model, work)
     for i in range(len(work.force)):
         work.force[i] = work.reaction[i] = 0.0
@@ -36,9 +50,8 @@ def forces(model: Model, work: Work, before: State, sample: Array) -> None:
             put(work.reaction, 6 * node, times(turn, three(work.reaction, 6 * node)))
 
 
-@kernel(REMEMBER, counted=False)
-def remember(model: Model, work: Work, before: State) -> None:
-    """What ``work``'s poses do not tell: twists of beams, joint coordinates and torsion springs, next to ``before``."""
+@inlined
+def _remember(model: Model, work: Work, before: State) -> None:
     for e in range(len(model.beam_nodes)):
         bend(model, work.poses, before.bent, work.bent, e)
     set_coordinates(model, work, before.turned)
@@ -46,7 +59,18 @@ def remember(model: Model, work: Work, before: State) -> None:
 
 
 @kernel(REMEMBER, counted=False)
-def move(model: Model, work: Work, before: State) -> None:
-    """Poses ∘ exp(increment) from ``before`` into ``work``, with what they do not tell."""
+def remember(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """What the poses of `Work` do not tell, next to ``last``: twists of beams, coordinates, torsion springs."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    _remember(model, work, read_state(last, integers, known.state))
+
+
+@kernel(REMEMBER, counted=False)
+def move(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """Poses ∘ exp(increment) from ``last`` into `Work`, with what they do not tell."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before = read_state(last, integers, known.state)
     compose(model, before.poses, work.increment, work.poses)
-    remember(model, work, before)
+    _remember(model, work, before)

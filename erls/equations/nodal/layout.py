@@ -1,0 +1,92 @@
+"""A nodal system's records in flat memory, as its functions take them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from erls.equations.nodal import contract
+from erls.equations.nodal.contract import Before, Layout, Model, State, Work
+from erls.equations.nodal.model import factor_room, room
+from erls.equations.nodal.nodes import Nodes, numbers_of, rows_of
+from erls.maths.calls import address_of
+from erls.maths.records import Memory, python_reader
+from erls.maths.so3 import Array
+from fe_import.model import IntArray
+
+_read_layout, _read_model, _read_work = python_reader(Layout), python_reader(Model), python_reader(Work)
+
+
+class Functions(NamedTuple):
+    """What computes all values: `erls.equations.nodal.sums`, `outputs` and `blocks`."""
+
+    forces: Callable[..., None]
+    remember: Callable[..., None]
+    move: Callable[..., None]
+    energies: Callable[..., None]
+    knot: Callable[..., None]
+    in_joints: Callable[..., None]
+    conditions: Callable[..., None]
+    blocks: Callable[..., None]
+    weighted: Callable[..., None]
+
+
+@dataclass(frozen=True)
+class Flat:
+    """Memory that functions are given, and how many numbers a factored iteration matrix takes."""
+
+    reals: Array
+    integers: IntArray
+    scratch: Array
+    factors: int
+
+    def model(self) -> Model:
+        """Views of the constants."""
+        return _read_model(self.reals, self.integers, self._layout().model)
+
+    def work(self) -> Work:
+        """Views of working memory."""
+        return _read_work(self.scratch, self.integers, self._layout().work)
+
+    def _layout(self) -> Layout:
+        return _read_layout(self.reals, self.integers, int(self.integers[-1]))
+
+
+def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Functions) -> Flat:
+    """Put a system into flat memory.
+
+    Parameters
+    ----------
+    model : Model
+    start : Nodes
+        A configuration.
+    samples : int
+        Numbers that depend on time alone.
+    width : int
+        Of the band, from `erls.equations.nodal.model.band_order`.
+    functions : Functions
+        What is called by address.
+    """
+    integers: list[int] = []
+    constants, scratch, factors = Memory(integers), Memory(integers, np.zeros(samples)), Memory(integers)
+    state = State(rows_of(start.poses), start.bent, start.turned, start.wound)
+    layout = Layout(
+        model=constants.put(model),
+        work=scratch.put(room(model)),
+        before=scratch.put(Before(numbers_of(start), np.zeros(1))),
+        state=Memory(integers).put(state),
+        factors=factors.put(factor_room(model, width)),
+        forces=address_of(functions.forces, contract.FORCES),
+        remember=address_of(functions.remember, contract.REMEMBER),
+        knot=address_of(functions.knot, contract.KNOT),
+        blocks=address_of(functions.blocks, contract.BLOCKS),
+        weighted=address_of(functions.weighted, contract.SUMMED),
+        samples=samples,
+        reach=float(model.metres.max(initial=1.0)),
+    )
+    integers.append(constants.put(layout))
+    numbers = np.array(integers, dtype=np.int64)
+    return Flat(constants.numbers, numbers, scratch.numbers, len(factors.numbers))
