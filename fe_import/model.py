@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # a run on links that were reduced before has no use for it
+    import scipy.sparse as sp
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

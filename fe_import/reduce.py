@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
-import importlib.metadata
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -14,20 +11,20 @@ import msgspec
 import numpy as np
 
 from fe_import.description.link import LinkFile, load_link
-from fe_import.errors import FEImportError
 from fe_import.files.toml import choose
+from fe_import.files.versions import package_version
 from fe_import.health.plausibility import plausible_link, plausible_materials
 from fe_import.health.report import check_basis, check_model, check_reduction, mode_residuals
 from fe_import.health.static_flexibility import check_static
 from fe_import.health.thermal_expansion import check_expansion
-from fe_import.modal.file import SCHEMA_VERSION, read_modal_file, write_modal_file
+from fe_import.modal.damping import damping_ratios
 from fe_import.modal.inertia import inertia_invariants, mass_properties
 from fe_import.modal.model import HealthCheck, ModalModel
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.model import build_model, unit_factors
 from fe_import.recovery.recover import recovery_maps, thermal_expansion
 from fe_import.reduction import REDUCTIONS, Basis
-from fe_import.reduction.modes import damping_ratios, mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
+from fe_import.reduction.modes import mode_kinds, mode_shapes, orthonormal_modes, reduced_matrices
 from fe_import.reduction.thermal import with_thermal_shape
 from fe_import.second_order.compute import second_order
 from fe_import.solver import chosen_solver
@@ -172,48 +169,8 @@ def provenance(link: LinkFile, model: FEModel, selection: dict[str, Any] | None 
         "options": json.dumps(options, sort_keys=True),
         **({"selection": json.dumps(selection, sort_keys=True)} if selection else {}),
         **{f"source: {key}": text for key, text in model.notes.items()},
-        "versions": ", ".join(f"{p} {_version(p)}" for p in packages),
+        "versions": ", ".join(f"{p} {package_version(p)}" for p in packages),
     }
-
-
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "unknown"
-
-
-def cache_key(link: LinkFile) -> str:
-    """Key of a reduction: content of the description and its files, package version and file schema."""
-    text = f"{SCHEMA_VERSION} {_version('erls')} {link.content_hash()} {_sources_hash()}"
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-def _sources_hash() -> str:
-    """Hash of this package's own code, so that a changed reduction never meets an old cache."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-def reduce_cached(link: LinkFile, folder: Path) -> tuple[ModalModel, bool]:
-    """Reduce, or read the earlier reduction of the same content from a cache folder.
-
-    Returns
-    -------
-    model : ModalModel
-    cached : bool
-        Whether it came from the cache. An unreadable cache entry is made anew.
-    """
-    path = folder / f"{cache_key(link)}.modal.h5"
-    with contextlib.suppress(OSError, FEImportError):  # none there, or not readable: made anew
-        return read_modal_file(path), True
-    model = reduce_link(link)
-    with contextlib.suppress(OSError, FEImportError):  # a cache that cannot be written costs time, not the result
-        folder.mkdir(parents=True, exist_ok=True)
-        write_modal_file(path, model)
-    return model, False
 
 
 def reduction_summary(model: ModalModel) -> dict[str, Any]:

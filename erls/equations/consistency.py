@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from erls.equations.constrained_system import Configuration, ConstrainedSystem
 from erls.equations.system import metre_scales
@@ -137,4 +136,8 @@ def _masses(system: ConstrainedSystem, t: float, q: Configuration) -> Saddle:
 
 
 def _diagonal(values: Array, like: Matrix) -> Matrix:
-    return sp.csc_array(sp.diags_array(values)) if sp.issparse(like) else np.diag(values)
+    if isinstance(like, np.ndarray):
+        return np.diag(values)
+    import scipy.sparse as sp
+
+    return sp.csc_array(sp.diags_array(values))

@@ -14,7 +14,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -172,23 +172,47 @@ def generated(function: F) -> F:
     return _njit(function, **_PART, forceinline=True, cache=False) if ENABLED else function
 
 
-@cache
-def plain(function: F, within: bool = True) -> F:
+def plain(function: F, within: bool = True, called: Mapping[Any, Any] | None = None) -> F:
     """The same source as plain Python, with all that it calls by name unless ``within`` is False.
 
-    What it calls by address may be functions of Python (`erls.maths.calls.handed`). Arrays may stand for its numbers
-    where it does not choose by them, nor keeps what it makes in tables.
+    Arrays may stand for its numbers where it does not choose by them, nor keeps what it makes in tables.
+
+    Parameters
+    ----------
+    function : callable
+    within : bool, optional
+    called : mapping, optional
+        What it calls by address, by what calls it, as for `any_scalar`. Unless it is told, an address may be a function
+        of Python (`erls.maths.calls.handed`).
     """
+    return cast(F, _in_python(function, within, tuple((called or {}).items())))
+
+
+@cache
+def _in_python(function: Any, within: bool, called: tuple[tuple[Any, Any], ...]) -> Any:
     source: Any = getattr(function, "py_func", function)
     own: dict[str, Any] = {}
     for name in _named(source):
         found = source.__globals__.get(name)
-        if hasattr(found, "in_python"):
+        target = next((target for caller, target in called if caller is found), _stood_for(found) if called else None)
+        if target is not None:
+            own[name] = partial(_without_address, _in_python(target, within, called))
+        elif hasattr(found, "in_python"):
             own[name] = found.in_python
         elif within and hasattr(found, "py_func"):
-            own[name] = plain(found)
+            own[name] = _in_python(found, within, called)
     names = {**source.__globals__, **own}
-    return cast(F, FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__))
+    return FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__)
+
+
+def _without_address(function: Any, address: Any, *arguments: Any) -> Any:
+    return function(*arguments)
+
+
+def _stood_for(caller: Any) -> Any:
+    """The kernel that is always called by this (`erls.maths.calls.caller`), or None."""
+    module, _, name = str(getattr(caller, "stands_for", "")).partition(":")
+    return getattr(import_module(module), name) if module else None
 
 
 def any_scalar(function: F, called: Mapping[Any, Any] | None = None) -> F:
@@ -231,9 +255,8 @@ def _twin(function: Any, called: tuple[tuple[Any, Any], ...], within: bool) -> A
         found = source.__globals__.get(name)
         if hasattr(found, "py_func") and _needs_real_numbers(found):
             own[name] = _any_scalar(found, called, within=True)
-        elif said := getattr(found, "stands_for", ""):
-            module, _, kernel_name = said.partition(":")
-            own[name] = _past_address(_any_scalar(getattr(import_module(module), kernel_name), called, within=True))
+        elif (known := _stood_for(found)) is not None:
+            own[name] = _past_address(_any_scalar(known, called, within=True))
         for caller, target in called:
             if found is caller:
                 own[name] = _past_address(_any_scalar(target, called, within=True))

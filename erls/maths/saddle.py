@@ -7,16 +7,16 @@ Increments and constraints are measured in metres, forces in newtons per mass of
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse.linalg import splu
 
 from erls.maths.so3 import Array
 
-Matrix: TypeAlias = Array | sp.csc_array
+if TYPE_CHECKING:  # SciPy takes longer to load than most runs: it comes with what needs it
+    import scipy.sparse as sp
+
+Matrix: TypeAlias = "Array | sp.csc_array"
 
 
 class Scales:
@@ -62,12 +62,16 @@ class Saddle:
         self._right = np.concatenate([d, s / self.force])
         self.singular: int | None = None  # unknown at which the factorization broke down
         whole = _assemble(block, columns, rows, self._left, self._right)
-        if sp.issparse(whole):
+        if not isinstance(whole, np.ndarray):
+            from scipy.sparse.linalg import splu
+
             try:
                 self._sparse = splu(whole)
             except RuntimeError:
                 self.singular = _emptiest(whole)
         else:
+            from scipy.linalg.lapack import dgetrf
+
             self._sparse = None
             self._factors, self._pivots, info = dgetrf(whole)
             if info > 0:
@@ -82,6 +86,8 @@ class Saddle:
         """(n + m,) scaled unknowns [metres] of a scaled right-hand side."""
         if self._sparse is not None:
             return np.asarray(self._sparse.solve(right), dtype=float)
+        from scipy.linalg.lapack import dgetrs
+
         return np.asarray(dgetrs(self._factors, self._pivots, right)[0], dtype=float)
 
     def unscaled(self, unknowns: Array) -> tuple[Array, Array]:
@@ -99,13 +105,15 @@ def scaled_matrix(block: Matrix, rows: Matrix, scales: Scales, period: float) ->
 
 def dense(matrix: Any) -> Array:
     """A sparse or dense matrix as an array."""
-    result: Array = matrix.toarray() if sp.issparse(matrix) else np.asarray(matrix)
+    result: Array = matrix.toarray() if hasattr(matrix, "toarray") else np.asarray(matrix)
     return result
 
 
 def _assemble(block: Matrix, columns: Matrix, rows: Matrix, left: Array, right: Array) -> Matrix:
     n, m = block.shape[0], rows.shape[0]
-    if sp.issparse(block) or sp.issparse(rows):
+    if not (isinstance(block, np.ndarray) and isinstance(rows, np.ndarray)):
+        import scipy.sparse as sp
+
         whole = sp.block_array([[sp.csc_array(block), sp.csc_array(columns)], [sp.csc_array(rows), None]], format="csc")
         return sp.csc_array(sp.diags_array(left) @ whole @ sp.diags_array(right))
     result = np.zeros((n + m, n + m))
@@ -115,4 +123,4 @@ def _assemble(block: Matrix, columns: Matrix, rows: Matrix, left: Array, right: 
 
 def _emptiest(matrix: Matrix) -> int:
     """Column of smallest norm: the first suspect of a singular sparse matrix."""
-    return int(np.argmin(sp.linalg.norm(matrix, axis=0)))
+    return int(np.argmin(abs(matrix).power(2).sum(axis=0)))

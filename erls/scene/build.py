@@ -27,17 +27,16 @@ from erls.scene.build_loops import build_loops
 from erls.scene.build_substructures import piece_links, piece_models, piece_warnings
 from erls.scene.chain import Scene
 from erls.scene.links import Link as LinkRecord
+from fe_import.cache import reduce_cached
 from fe_import.description.link import LinkFile, load_link
 from fe_import.description.records import LinkDescription
 from fe_import.errors import FEImportError, ReportedError
 from fe_import.files.toml import choose
+from fe_import.modal.damping import damping_ratios
 from fe_import.modal.file import read_modal_file
 from fe_import.modal.model import ModalModel
 from fe_import.model import InterfaceNode
-from fe_import.models.model import inertia_matrix
-from fe_import.reduce import reduce_cached
-from fe_import.reduction.modes import damping_ratios
-from fe_import.solver.watch import telling
+from fe_import.models.inertia import inertia_matrix
 
 Message = Callable[[str], None]
 T = TypeVar("T")
@@ -148,8 +147,7 @@ def _pieces(scene: Scene, models: Sequence[ModalModel], tell: Message) -> list[t
             result.append(())
             continue
         description = _description(scene, link)
-        with telling(tell):
-            found = piece_models(link, description, model, cache_folder(), f"{scene.path}: links[{k}]")
+        found = piece_models(link, description, model, cache_folder(), f"{scene.path}: links[{k}]", tell)
         result.append(tuple(_warmed(piece, link, f"{scene.path}: links[{k}]") for piece in found))
         tell(f"{link.name}: {link.substructures} substructures")
     return result
@@ -192,8 +190,7 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
             )
     else:
         description = _within(f"{place}.model", lambda: _description(scene, link))
-        with telling(tell):
-            model, cached = reduce_cached(description, cache_folder())
+        model, cached = reduce_cached(description, cache_folder(), tell)
         tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({description.path.name})")
     model = _warmed(model, link, place)
     wanted = 0 if not link.flexible else link.elastic_modes

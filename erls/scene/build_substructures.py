@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,16 +10,20 @@ import numpy as np
 
 from erls.mechanism.links import Link, truncated
 from erls.scene.links import Link as LinkRecord
+from fe_import.cache import reduce_cached
 from fe_import.description.link import LinkFile
 from fe_import.errors import Cause, FEImportError
+from fe_import.modal.damping import damping_ratios
 from fe_import.modal.model import ModalModel
-from fe_import.models.substructures import split_link
-from fe_import.reduce import reduce_cached
-from fe_import.reduction.modes import damping_ratios
 
 
 def piece_models(
-    record: LinkRecord, link: LinkFile, whole: ModalModel, folder: Path, where: str
+    record: LinkRecord,
+    link: LinkFile,
+    whole: ModalModel,
+    folder: Path,
+    where: str,
+    tell: Callable[[str], None] | None = None,
 ) -> tuple[ModalModel, ...]:
     """Modal models of the pieces of a link, from its inboard end outward.
 
@@ -35,18 +39,22 @@ def piece_models(
         Where reductions are kept.
     where : str
         Place of the link, for messages.
+    tell : callable, optional
+        Gets messages of long computations.
 
     Raises
     ------
     FEImportError
         The link cannot be split: see `fe_import.models.substructures.split_link`.
     """
+    from fe_import.models.substructures import split_link  # graphs of SciPy
+
     names = [i.name for i in whole.interface_nodes]
     inboard = record.inboard or names[0]
     others = [name for name in names if name != inboard]
     outboard = record.outboard or (others[0] if others else "")
     pieces = split_link(link, record.substructures, inboard, outboard, f"{where}.substructures")
-    models = [reduce_cached(piece, folder)[0] for piece in pieces]
+    models = [reduce_cached(piece, folder, tell)[0] for piece in pieces]
     if record.elastic_modes is None:
         return tuple(models)
     return tuple(truncated(m, min(record.elastic_modes, m.elastic_modes)) for m in models)

@@ -24,7 +24,7 @@ from erls.view.body_shapes import body_surface, ellipsoid, facing, spring_surfac
 from erls.view.figure import Figure, Part, PartMesh, Pose
 from erls.view.shapes import JointPlace, ground_surface, joints_surface, part_surface, polylines
 from fe_import.model import IntArray
-from fe_import.models.model import inertia_matrix
+from fe_import.models.inertia import inertia_matrix
 
 _SMOOTH = 160  # points along all beams; at least two for each element
 

@@ -15,6 +15,8 @@ from fe_import.elements.sections import Section
 Vector = tuple[float, float, float]
 Inertia = tuple[float | Vector, float | Vector, float | Vector]  # [Ixx, Iyy, Izz] or a 3x3 matrix
 
+MOST_PIECES = 1000  # that a link may be split into
+
 
 class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     pass

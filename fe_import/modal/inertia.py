@@ -12,12 +12,15 @@ m, X_a and Z_ab are the invariants (ERLS-CMS paper, appendix C, for any mass mat
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_import.model import Array, IntArray
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
 
 _BLOCK = 8  # modes turned and weighted at a time: fields of a large model are long
 

@@ -11,7 +11,8 @@ from fe_import.elements.frame import FrameElement
 from fe_import.elements.sections import SectionConstants
 from fe_import.model import Array
 from fe_import.models.frame import FrameMesh, frame_mesh, node_number
-from fe_import.models.model import inertia_matrix, unit_factors
+from fe_import.models.inertia import inertia_matrix
+from fe_import.models.model import unit_factors
 
 
 @dataclass(frozen=True)

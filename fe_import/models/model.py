@@ -8,11 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.description.link import LinkFile
-from fe_import.description.records import Inertia, LinkDescription, PointMass
-from fe_import.errors import Cause, FEImportError, ReportedError
+from fe_import.description.records import LinkDescription, PointMass
+from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.frame import frame_model, node_number
+from fe_import.models.inertia import inertia_matrix
 
 _LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
 _POUND = 0.45359237
@@ -96,33 +97,6 @@ def add_masses(model: FEModel, masses: list[PointMass], where: str) -> FEModel:
     j = np.concatenate([np.tile(r, len(r)) for r in rows])
     added = sp.coo_array((np.concatenate([b.ravel() for b in blocks]), (i, j)), shape=model.mass.shape).tocsc()
     return replace(model, mass=(model.mass + added).tocsc(), added_mass=added)
-
-
-def inertia_matrix(given: Inertia, where: str, error: type[ReportedError] = FEImportError) -> Array:
-    """(3, 3) inertia from ``[Ixx, Iyy, Izz]`` or three rows.
-
-    Raises
-    ------
-    ReportedError
-        Of class ``error``: not finite, not symmetric, or not positive semidefinite.
-    """
-    inertia = np.zeros((3, 3))
-    for k, row in enumerate(given):
-        if isinstance(row, tuple):
-            inertia[k] = row
-        else:
-            inertia[k, k] = row
-    scale = np.abs(inertia).max(initial=0.0)
-    ok = np.isfinite(inertia).all() and np.abs(inertia - inertia.T).max() <= 1e-9 * scale
-    if not ok or np.linalg.eigvalsh(inertia).min() < -1e-9 * scale:
-        raise error(
-            Cause.BAD_FIELD,
-            "an inertia must be finite, symmetric and not negative",
-            where=where,
-            value=inertia.tolist(),
-            remedy="give [Ixx, Iyy, Izz] or a symmetric 3x3 matrix about the node",
-        )
-    return inertia
 
 
 def unit_factors(link: LinkDescription, where: str) -> tuple[float, float, float]:

@@ -17,13 +17,12 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from fe_import.description.link import LinkFile
-from fe_import.description.records import Interface, LinkDescription, Member, Recovery
+from fe_import.description.records import MOST_PIECES, Interface, LinkDescription, Member, Recovery
 from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, IntArray
 from fe_import.models.frame import FrameMesh, frame_mesh
 
-MOST_PIECES = 1000  # of any link
 _ALWAYS = 16  # pieces that a coarse mesh may have too: elements are cut where need be
 _SAME = 1e-9  # of the length of the path
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as la
 
-from fe_import.description.records import Damping
 from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, FEModel
@@ -213,31 +212,3 @@ def mode_kinds(model: FEModel, shapes: Array, basis: Basis, coordinates: Array, 
     interface = np.einsum("km,kl,lm->m", z[:n], stiffness[:n, :n], z[:n])
     interior = np.einsum("km,kl,lm->m", z[n:], stiffness[n:, n:], z[n:])
     return (*kinds, *("interface" if a > b else "interior" for a, b in zip(interface, interior, strict=True)))
-
-
-def damping_ratios(damping: Damping, omega: Array, where: str) -> Array:
-    """(m,) modal damping ratios; 0 for rigid-body modes. Rayleigh: ζ = α / 2ω + β ω / 2.
-
-    Raises
-    ------
-    FEImportError
-        More ratios than elastic modes.
-    """
-    result = np.zeros(len(omega))
-    elastic = omega[6:]
-    if damping.ratio is not None:
-        result[6:] = damping.ratio
-    elif damping.ratios is not None:
-        if len(damping.ratios) > len(elastic):
-            raise FEImportError(
-                Cause.BAD_FIELD,
-                "more damping ratios than elastic modes",
-                where=f"{where}: damping.ratios",
-                value=len(damping.ratios),
-                limit=len(elastic),
-                remedy="give one per elastic mode, from the lowest on",
-            )
-        result[6 : 6 + len(damping.ratios)] = damping.ratios
-    elif damping.rayleigh is not None:
-        result[6:] = damping.rayleigh.alpha / (2 * elastic) + damping.rayleigh.beta * elastic / 2
-    return result

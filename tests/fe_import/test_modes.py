@@ -16,9 +16,9 @@ from link_files import Array, dense, frame_link, free_frequencies, merged, solid
 import fe_import.solver.sparse
 from fe_import.description.records import Damping, Rayleigh
 from fe_import.errors import Cause, FEImportError
+from fe_import.modal.damping import damping_ratios
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link, reduce_model
-from fe_import.reduction.modes import damping_ratios
 from fe_import.solver.lanczos import NotConverged
 from fe_import.solver.sparse import dense_modes, factorize, lowest_modes, polishing
 

@@ -10,7 +10,6 @@ from abc import abstractmethod
 from typing import Any
 
 import numpy as np
-import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
@@ -96,9 +95,10 @@ class SerialFormulation(TreeFormulation):
         """
         force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
         try:
-            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
-        except la.LinAlgError:
+            lower = np.linalg.cholesky(mass)
+        except np.linalg.LinAlgError:
             raise singular_mass(self, t, mass, self.elastic_name) from None
+        return np.asarray(np.linalg.solve(lower.T, np.linalg.solve(lower, -force)))
 
     def elastic_name(self, place: int) -> str:
         """What messages call an elastic coordinate, by its place among them."""

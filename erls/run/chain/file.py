@@ -18,14 +18,13 @@ from erls.run.chain.run import ChainRun
 from erls.run.knots import End, read_solution, write_solution
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene, SceneRecord
-from fe_import.description.records import LinkDescription
+from fe_import.description.records import MOST_PIECES, LinkDescription
 from fe_import.errors import ReportedError
 from fe_import.files.hdf5.files import write_array, write_attribute, write_strings
 from fe_import.files.hdf5.values import Reader
 from fe_import.files.toml import choose, convert
 from fe_import.modal.file import read_modal_group, write_modal_group
 from fe_import.modal.model import ModalModel
-from fe_import.models.substructures import MOST_PIECES
 
 
 def write_chain(group: h5py.Group, run: ChainRun) -> None:

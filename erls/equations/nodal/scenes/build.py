@@ -32,7 +32,7 @@ from erls.scene.bodies.schema import Beam as BeamRecord
 from erls.scene.bodies.schema import BodyScene, BodySceneRecord, Connection, Load
 from erls.scene.build_loops import two_axes
 from fe_import.elements.sections import section_constants
-from fe_import.models.model import inertia_matrix
+from fe_import.models.inertia import inertia_matrix
 
 
 @dataclass(frozen=True)
