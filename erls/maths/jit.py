@@ -172,7 +172,7 @@ def generated(function: F) -> F:
     return _njit(function, **_PART, forceinline=True, cache=False) if ENABLED else function
 
 
-def plain(function: F, within: bool = True, called: Mapping[Any, Any] | None = None) -> F:
+def plain(function: Callable[..., Any], within: bool = True, called: Mapping[Any, Any] | None = None) -> Any:
     """The same source as plain Python, with all that it calls by name unless ``within`` is False.
 
     Arrays may stand for its numbers where it does not choose by them, nor keeps what it makes in tables.
@@ -185,7 +185,7 @@ def plain(function: F, within: bool = True, called: Mapping[Any, Any] | None = N
         What it calls by address, by what calls it, as for `any_scalar`. Unless it is told, an address may be a function
         of Python (`erls.maths.calls.handed`).
     """
-    return cast(F, _in_python(function, within, tuple((called or {}).items())))
+    return _in_python(function, within, tuple((called or {}).items()))
 
 
 @cache
