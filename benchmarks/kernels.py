@@ -5,7 +5,7 @@
 Chains of equal links on revolute joints in all directions; between two links of a spatial chain nothing can be told of
 the axis of rotation, so this is the general case. Then the shipped L and the two-link robot. Prints the least CPU time
 of several repetitions, of a residual, an acceleration, a step of generalized-α and one of lobatto, with its share of
-factors, the growth exponent from row to row, and how many times longer the NumPy equations take for a residual.
+factors, the growth exponent from row to row, and how many times longer a residual takes that Python calls.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def least_time(call: Callable[[int], object]) -> float:
 
 
 def costs(chain: Erls | Ffr) -> tuple[float, float, float]:
-    """Seconds of a compiled residual and acceleration, and of a NumPy residual."""
+    """Seconds of a residual and an acceleration called from compiled code, and of a residual called from Python."""
     system = chain.compiled
     assert system is not None
     y, v, a = np.random.default_rng(1).uniform(-1, 1, (3, chain.size)) * 1e-3
@@ -129,7 +129,7 @@ def step_cost(chain: Erls | Ffr, integrate: Integrator, options: Options) -> flo
 def table(title: str, what: str, cases: dict[int, Erls | Ffr]) -> None:
     """Print costs with growth exponents."""
     heads = "".join(f"{name:>13} {'exponent':>9}" for name in ("residual", "acceleration", "step", "lobatto"))
-    print(f"\n{title}\n{what:>6} {heads} {'NumPy':>8}")
+    print(f"\n{title}\n{what:>6} {heads} {'Python':>8}")
     before: tuple[int, tuple[float, ...]] | None = None
     for number, chain in cases.items():
         residual, acceleration, plain = costs(chain)
@@ -155,7 +155,7 @@ def main() -> None:
         residual, acceleration, plain = costs(FORMULATION(scenes.mechanism(ROOT / "data" / name)))
         print(
             f"{name}: residual {residual * 1e6:.2f} µs, acceleration {acceleration * 1e6:.2f} µs, "
-            f"NumPy {plain / residual:.0f}x"
+            f"called from Python {plain / residual:.0f}x"
         )
 
 
