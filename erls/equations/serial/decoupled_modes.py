@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as la
 
 from erls.maths.so3 import Array
 
@@ -36,10 +37,7 @@ def decoupled_modes(mass: Array, stiffness: Array, damping: Array) -> DecoupledM
     """Of an elastic block (e, e) of the mass matrix, with diagonals (e,) of stiffness and damping."""
     if not len(mass):
         return DecoupledModes(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
-    lower = np.linalg.cholesky(mass)
-    half = np.linalg.solve(lower, np.diag(stiffness))
-    squares, turned = np.linalg.eigh(np.linalg.solve(lower, half.T))
-    vectors = np.linalg.solve(lower.T, turned)
+    squares, vectors = la.eigh(np.diag(stiffness), mass)
     turned = vectors.T @ (damping[:, None] * vectors)
     coupled = np.abs(turned - np.diag(np.diag(turned)))
     if not coupled.any():

@@ -10,6 +10,7 @@ from abc import abstractmethod
 from typing import Any
 
 import numpy as np
+import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
@@ -95,10 +96,9 @@ class SerialFormulation(TreeFormulation):
         """
         force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
         try:
-            lower = np.linalg.cholesky(mass)
-        except np.linalg.LinAlgError:
+            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
+        except la.LinAlgError:
             raise singular_mass(self, t, mass, self.elastic_name) from None
-        return np.asarray(np.linalg.solve(lower.T, np.linalg.solve(lower, -force)))
 
     def elastic_name(self, place: int) -> str:
         """What messages call an elastic coordinate, by its place among them."""
