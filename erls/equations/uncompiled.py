@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, IntArray
 from erls.equations.consistency import consistent_velocity
@@ -49,8 +50,6 @@ def uncompiled(system: SecondOrderSystem) -> CompiledSystem:
 
 def steps_of(system: SecondOrderSystem) -> Stepped:
     """The same as steps of generalized-α take it, with factors by LAPACK."""
-    from scipy.linalg.lapack import dgetrf, dgetrs  # here: compiled systems have no use for it
-
     plain, per = uncompiled(system), 1 / metre_scales(system)
     known: list[tuple[Array, Array]] = []
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from erls.maths.so3 import Array
 
-if TYPE_CHECKING:  # SciPy takes longer to load than most runs: it comes with what needs it
+if TYPE_CHECKING:  # sparse matrices come with the systems that have them
     import scipy.sparse as sp
 
 Matrix: TypeAlias = "Array | sp.csc_array"
@@ -70,8 +71,6 @@ class Saddle:
             except RuntimeError:
                 self.singular = _emptiest(whole)
         else:
-            from scipy.linalg.lapack import dgetrf
-
             self._sparse = None
             self._factors, self._pivots, info = dgetrf(whole)
             if info > 0:
@@ -86,8 +85,6 @@ class Saddle:
         """(n + m,) scaled unknowns [metres] of a scaled right-hand side."""
         if self._sparse is not None:
             return np.asarray(self._sparse.solve(right), dtype=float)
-        from scipy.linalg.lapack import dgetrs
-
         return np.asarray(dgetrs(self._factors, self._pivots, right)[0], dtype=float)
 
     def unscaled(self, unknowns: Array) -> tuple[Array, Array]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg as la
 
 from erls.maths.se3 import pose, twist_transform
 from erls.maths.so3 import Array, skew
@@ -133,21 +134,14 @@ def payload_invariants(model: ModalModel, node: int, offset: Array, mass: float,
     """
     translation, rotation = node_shape6(model, node)
     shape = np.vstack([translation - skew(offset) @ rotation, rotation])
-    weight = _side_by_side(mass * np.eye(3), inertia)
-    turned = [_side_by_side(skew(e), skew(e)) @ shape for e in np.eye(3)]
+    weight = la.block_diag(mass * np.eye(3), inertia)
+    turned = [la.block_diag(skew(e), skew(e)) @ shape for e in np.eye(3)]
     return InertiaInvariants(
         m=shape.T @ weight @ shape,
         X=np.stack([shape.T @ weight @ a for a in turned]),
         Z=np.stack([np.stack([a.T @ weight @ b for b in turned]) for a in turned]),
         rigid=model.invariants.rigid,
     )
-
-
-def _side_by_side(first: Array, second: Array) -> Array:
-    """(6, 6) with two blocks (3, 3) on its diagonal."""
-    result = np.zeros((6, 6))
-    result[:3, :3], result[3:, 3:] = first, second
-    return result
 
 
 def rigid_model(
@@ -181,10 +175,10 @@ def rigid_model(
     inverse = np.linalg.inv(factor).T  # (6, 6) rigid-body twists of the modes
     translation = np.stack([inverse[:3] - skew(x) @ inverse[3:] for x in nodes])
     rotation = np.repeat(inverse[None, 3:], len(nodes), axis=0)
-    turned = [_side_by_side(skew(e), skew(e)) for e in np.eye(3)]
+    turned = [la.block_diag(skew(e), skew(e)) for e in np.eye(3)]
     # the same body as one node at its centre of mass
     shape = np.vstack([inverse[:3] - c @ inverse[3:], inverse[3:]])
-    weight = _side_by_side(mass * np.eye(3), inertia)
+    weight = la.block_diag(mass * np.eye(3), inertia)
     names = list(interfaces)
     return ModalModel(
         name=name,

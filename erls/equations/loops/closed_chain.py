@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy.linalg as la
 
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
 from erls.equations.loops.failures import comes_apart, locks, warnings_of
@@ -62,9 +63,7 @@ class ClosedChain(Tied):
     def kept(self) -> IntArray:
         """(r,) rows that do not follow from others, at the start."""
         matrix = self.scaled_rows(self.closure(0.0, self.start.y, np.zeros(self.size)), np.arange(len(self.rows.names)))
-        from scipy.linalg import qr  # here: chains have no use for it
-
-        _, factor, order = qr(matrix.T, mode="economic", pivoting=True)
+        _, factor, order = la.qr(matrix.T, mode="economic", pivoting=True)
         sizes = np.abs(np.diag(factor))
         return np.sort(order[: np.count_nonzero(sizes > DEPENDENT)])
 
@@ -144,7 +143,7 @@ class ClosedChain(Tied):
 
     def stiffest(self, found: Closure) -> tuple[float, int]:
         """Smallest singular value of the conditions in use, and the loop that it belongs to."""
-        left, values, _ = np.linalg.svd(self.scaled_rows(found, self.kept), full_matrices=False)
+        left, values, _ = la.svd(self.scaled_rows(found, self.kept), full_matrices=False)
         if not len(values):
             return 1.0, 0
         return float(values[-1]), int(self.rows.owner[self.kept[np.abs(left[:, -1]).argmax()]])

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as la
 
 from erls.equations.formulation import State, TreeFormulation
 from erls.maths.so3 import Array
@@ -87,8 +88,6 @@ def static_modes(equations: TreeFormulation, bandwidth: float, duration: float, 
     SimulationError
         SINGULAR_MASS.
     """
-    import scipy.linalg as la  # here: runs without static modes have no use for it
-
     n, f = equations.size, len(equations.free_joints)
     y, v = equations.initial_state()
     masses = _masses(equations, y, duration)
