@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -62,3 +64,19 @@ def test_help_needs_no_heavy_package() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert done.stderr.strip() == "[]"
+
+
+def test_runs_on_reduced_links_load_no_solver(tmp_path: Path) -> None:
+    """Elements, reductions and sparse matrices are for links that were never reduced before."""
+    code = (
+        "import sys\nfrom erls.cli.main import main\nassert main(['simulate', sys.argv[1]]) == 0\n"
+        "print('loaded', *sorted({'fe_import.reduce', 'fe_import.solver', 'scipy.sparse'} & set(sys.modules)))"
+    )
+    scene = str(Path(__file__).parents[2] / "data/l_shape/steel_flat.toml")
+    environment = {**os.environ, "ERLS_CACHE": str(tmp_path), "ERLS_KERNELS": os.environ["ERLS_KERNELS"]}
+    command = [sys.executable, "-c", code, scene]
+    last = []
+    for _ in range(2):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True, env=environment)
+        last.append(done.stdout.splitlines()[-1])
+    assert last == ["loaded fe_import.reduce fe_import.solver scipy.sparse", "loaded"]
