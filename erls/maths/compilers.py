@@ -30,7 +30,22 @@ _name_apart()
 os.register_at_fork(after_in_child=_name_apart)
 
 
-class _Whole(JITCodeLibrary):  # type: ignore[misc]  # Numba has no annotations
+class _Library(JITCodeLibrary):  # type: ignore[misc]  # Numba has no annotations
+    """Code of a function, made smaller before it meets that of others; what takes time waits until then."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+        builder = llvm.create_pass_builder(self._codegen._tm, llvm.create_pipeline_tuning_options(speed_level=1))
+        passes = llvm.create_new_function_pass_manager()
+        passes.add_sroa_pass()
+        passes.add_simplify_cfg_pass()
+        passes.add_instruction_combine_pass()
+        for function in module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+
+
+class _Whole(_Library):
     """Code of a function with all that it calls, optimized without copies of what loops repeat."""
 
     def _optimize_final_module(self) -> None:
@@ -41,12 +56,10 @@ class _Whole(JITCodeLibrary):  # type: ignore[misc]  # Numba has no annotations
         builder = llvm.create_pass_builder(codegen._tm, tuning)
         passes = builder.getModulePassManager()
         passes.add_refprune_pass()
-        first = codegen._module_pass_manager(opt=0, loop_vectorize=False, slp_vectorize=False, cost="cheap")
-        for manager, builds in (first, (passes, builder)):
-            manager.run(self._final_module, builds)
+        passes.run(self._final_module, builder)
 
 
-class _Linked(JITCodeLibrary):  # type: ignore[misc]
+class _Linked(_Library):
     """Code of a function that only others call, with all that it calls, as it is linked into them.
 
     What of it becomes machine code is the place of its environment, which Numba sets whether it is asked for or not.

@@ -154,24 +154,6 @@ def reordered(function: F) -> F:
     return _njit(function, **_PART, fastmath={"reassoc", "contract"}) if ENABLED else function
 
 
-def inlined(function: F) -> F:
-    """A `part` that becomes one with its caller: for what takes many arrays."""
-    return _njit(function, **_PART, forceinline=True) if ENABLED else function
-
-
-def spliced(function: F) -> F:
-    """A function whose source is taken into its caller's, so that nothing of it is compiled on its own.
-
-    For what takes records and has one call site: compilation takes a quarter less than `inlined`.
-    """
-    return _njit(function, **_PART, inline="always") if ENABLED else function
-
-
-def generated(function: F) -> F:
-    """A `part` whose source is made at import and not kept on disk: it becomes one with its caller."""
-    return _njit(function, **_PART, forceinline=True, cache=False) if ENABLED else function
-
-
 def plain(function: Callable[..., Any], within: bool = True, called: Mapping[Any, Any] | None = None) -> Any:
     """The same source as plain Python, with all that it calls by name unless ``within`` is False.
 
@@ -313,7 +295,7 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
 
     from erls.maths.compilers import CompilerOfKernels, CompilerOfParts
 
-    _type_arrays_first()
+    _prepare_numba()
     before = numba.config.CACHE_DIR
     if signature and not _on_disk(function):
         _tell_of(function.__module__)
@@ -327,7 +309,7 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
 
 
 @cache
-def _type_arrays_first() -> None:
+def _prepare_numba() -> None:
     """Have Numba type ``a[i]`` as that of an array before the twenty other things that it knows to be indexed.
 
     It tries what is registered for its target before what is registered for any; a quarter of compilation went there.
@@ -335,5 +317,8 @@ def _type_arrays_first() -> None:
     from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
     from numba.core.typing.templates import infer_global
 
+    from erls.maths import array_code
+
     for operation, rule in ((operator.getitem, GetItemBuffer), (operator.setitem, SetItemBuffer)):
         infer_global(operation)(type(rule.__name__, (rule,), {"metadata": {"target": "cpu"}}))
+    array_code.register()

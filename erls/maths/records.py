@@ -5,7 +5,8 @@ one to four axes), `Indices` or `Pairs` (whole numbers, of one and two axes); or
 shape itself, ``Annotated[Array, "6 6+n"]``, of which `room` makes zeros. Compiled functions are handed flat arrays,
 since those alone fit every system behind one function pointer; where they begin they make records of them, which are
 views: nothing is copied. A table in ``integers`` says where in the flat numbers each array lies and what its shape is;
-it is made here from the record's declaration, as is the function that reads it.
+it is made here from the record's declaration, as is the function that reads it. Plain Python looks all fields up when
+a record is read, compiled code when they are used (`erls.maths.record_code`).
 
 1. Declare the record, with shapes and units of its fields.
 2. ``read = reader(Record)`` beside it.
@@ -23,9 +24,9 @@ from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
-from erls.maths.jit import generated
+from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
-from erls.maths.views import matrix_at, pile_at, plain_at, stack_at, vector_at
+from erls.maths.views import plain_at
 from fe_import.model import IntArray
 
 Vector = Annotated[Array, 1]
@@ -88,16 +89,18 @@ def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
     callable
         ``read(numbers, integers, at)`` with the place of the table.
     """
-    return generated(_reader(record, {"view1": vector_at, "view2": matrix_at, "view3": stack_at, "view4": pile_at}))
+    plain = python_reader(record)
+    if not ENABLED:
+        return plain
+    from erls.maths import record_code
+
+    read: Any = record_code.reader(record, tuple(_fields(record)))
+    read.in_python = plain
+    return read  # type: ignore[no-any-return]
 
 
 def python_reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
     """The same for Python: what compiled functions left in working memory is seen through it."""
-    return _reader(record, dict.fromkeys(("view1", "view2", "view3", "view4"), plain_at))
-
-
-def _reader(record: type[R], views: dict[str, Any]) -> Callable[[Any, IntArray, int], R]:
-    """The reader that makes its arrays by these functions."""
     parts, place = [], 0
     for _, axes, whole in _fields(record):
         if axes is None:
@@ -110,10 +113,10 @@ def _reader(record: type[R], views: dict[str, Any]) -> Callable[[Any, IntArray, 
         if axes == 0:
             parts.append(f"{flat}[{start}]")
         else:
-            parts.append(f"view{axes}({flat}, {', '.join([start, *dims])})")
+            parts.append(f"plain_at({flat}, {', '.join([start, *dims])})")
         place += 1 + axes
     source = f"def read(numbers, integers, at):\n    return {record.__name__}({', '.join(parts)})\n"
-    names: dict[str, Any] = {record.__name__: record, "__name__": __name__, **views}
+    names: dict[str, Any] = {record.__name__: record, "__name__": __name__, "plain_at": plain_at}
     exec(compile(source, f"<reader of {record.__qualname__}>", "exec"), names)
     read: Callable[[Any, IntArray, int], R] = names["read"]
     return read

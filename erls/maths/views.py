@@ -29,64 +29,24 @@ pile_at: Any = plain_at
 """``pile_at(array, start, l, k, m, n)``: (l, k, m, n)."""
 
 if ENABLED:
-    from numba.core import cgutils, types
     from numba.core.extending import intrinsic
-    from numba.np.arrayobj import make_array, populate_array
 
-    def _view(context: Any, builder: Any, base: Any, array: Any, start: Any, shape: list[Any]) -> Any:
-        """Array struct over ``array`` from number ``start`` on."""
-        result_type = types.Array(base.dtype, len(shape), "C")
-        source = make_array(base)(context, builder, array)
-        result = make_array(result_type)(context, builder)
-        intp = context.get_value_type(types.intp)
-        itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(base.dtype)))
-        strides: list[Any] = []
-        stride = itemsize
-        for n in reversed(shape):
-            strides.insert(0, stride)
-            stride = builder.mul(stride, n)
-        populate_array(
-            result,
-            data=builder.gep(source.data, [start]),
-            shape=cgutils.pack_array(builder, shape, intp),
-            strides=cgutils.pack_array(builder, strides, intp),
-            itemsize=itemsize,
-            meminfo=None,
-            parent=None,
-        )
-        return result._getvalue()
+    from erls.maths.array_code import DATA, contiguous, member, types
 
-    def _signature(array: Any, count: int) -> Any:
-        return types.Array(array.dtype, count, "C")(array, *[types.intp] * (count + 1))
+    def _view(axes: int) -> Any:
+        def view(typing_context: Any, array: Any, start: Any, *shape: Any) -> Any:
+            kind = types.Array(array.dtype, axes, "C")
 
-    @intrinsic
-    def _vector(typing_context: Any, array: Any, start: Any, n: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return _view(context, builder, signature.args[0], args[0], args[1], [args[2]])
+            def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+                base, first, dims = given[0], given[1], given[2]
+                lengths = [member(builder, dims, k) for k in range(axes)]
+                address = builder.gep(member(builder, base, DATA), [first])
+                return contiguous(context, builder, kind, address, lengths)
 
-        return _signature(array, 1), generate
+            return kind(array, types.intp, types.StarArgTuple((types.intp,) * axes)), generate
 
-    @intrinsic
-    def _matrix(typing_context: Any, array: Any, start: Any, m: Any, n: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return _view(context, builder, signature.args[0], args[0], args[1], [args[2], args[3]])
+        found = intrinsic(view)
+        found.in_python = plain_at
+        return found
 
-        return _signature(array, 2), generate
-
-    @intrinsic
-    def _stack(typing_context: Any, array: Any, start: Any, k: Any, m: Any, n: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return _view(context, builder, signature.args[0], args[0], args[1], [args[2], args[3], args[4]])
-
-        return _signature(array, 3), generate
-
-    @intrinsic
-    def _pile(typing_context: Any, array: Any, start: Any, l: Any, k: Any, m: Any, n: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return _view(context, builder, signature.args[0], args[0], args[1], list(args[2:6]))
-
-        return _signature(array, 4), generate
-
-    for view in (_vector, _matrix, _stack, _pile):
-        view.in_python = plain_at
-    vector_at, matrix_at, stack_at, pile_at = _vector, _matrix, _stack, _pile
+    vector_at, matrix_at, stack_at, pile_at = map(_view, (1, 2, 3, 4))

@@ -39,14 +39,14 @@ from erls.equations.serial.records import (
     read_modes,
     read_serial,
 )
-from erls.maths.jit import inlined, part, spliced
+from erls.maths.jit import part
 from erls.maths.products import add_rows, clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_force_cross, add_motion_cross, dot6, transform_force_back
 from fe_import.model import IntArray
 
 
-@spliced
+@part
 def _forces_of_links(
     serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, accelerated: bool, bends: Any
 ) -> None:
@@ -79,7 +79,7 @@ def _forces_of_links(
                 push[i] = state.modal[i]
 
 
-@inlined
+@part
 def _turn_arm_back(bend: Bend, state: LinkState, bent: BendState, coordinate: Any) -> None:
     """What ``push`` does to the turn of a link, by the arm from its inboard interface to its joint."""
     back = bent.share[:3]
@@ -90,7 +90,7 @@ def _turn_arm_back(bend: Bend, state: LinkState, bent: BendState, coordinate: An
     add_cross(bent.d, back, 0.5, state.force[3:])
 
 
-@inlined
+@part
 def _push_along(bend: Bend, state: LinkState, bent: BendState, screw: Array) -> Any:
     """Force of ``push`` along a joint, which turns second-order displacements along."""
     path, turned = bent.share, bent.share_rate[:3]
@@ -162,7 +162,7 @@ def hand_back(
                 before.modal[6 + i - turns] += forces[i]
 
 
-@spliced
+@part
 def balance(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array, bends: Any,
     at: int,

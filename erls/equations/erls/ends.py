@@ -31,7 +31,7 @@ from erls.equations.serial.records import (
     read_modes,
     read_serial,
 )
-from erls.maths.jit import kernel, part, spliced
+from erls.maths.jit import kernel, part
 from erls.maths.products import clear, copy
 from erls.maths.so3 import Array
 from erls.maths.spatial import compose_poses, transform_force_back
@@ -107,7 +107,7 @@ def _clear_forces(chain: Chain, integers: IntArray, scratch: Array, k: int, bend
         clear(read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).push)
 
 
-@spliced
+@part
 def put_frames(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
 ) -> None:

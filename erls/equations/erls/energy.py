@@ -32,14 +32,14 @@ from erls.equations.serial.records import (
     read_modes,
     read_serial,
 )
-from erls.maths.jit import inlined, kernel, spliced
+from erls.maths.jit import kernel, part
 from erls.maths.products import add_columns, clear, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import dot3
 from fe_import.model import IntArray
 
 
-@inlined
+@part
 def _kinetic(chain: Chain, link: Link, state: LinkState, twist: Array) -> Any:
     """T of a link, with the twist that inertia knows."""
     s, momenta, axes = state.q_acceleration, state.modal, len(link.axes)
@@ -61,7 +61,7 @@ def _kinetic(chain: Chain, link: Link, state: LinkState, twist: Array) -> Any:
     return total
 
 
-@spliced
+@part
 def add_energies(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array, bends: Any
 ) -> None:

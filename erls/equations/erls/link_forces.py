@@ -22,7 +22,7 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations.erls.records import Chain, Link, LinkState
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part
 from erls.maths.products import add_columns, add_symmetric, clear, dot, pass_columns
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, dot3, dot6
@@ -34,7 +34,7 @@ def pair_of(axes: int, a: int, b: int) -> int:
     return a if a == b or axes == 1 else a + b + 2
 
 
-@inlined
+@part
 def deform(chain: Chain, link: Link, state: LinkState) -> None:
     """X q about the axes of a link, Z q and qᵀ Z q of their pairs, as far as the inertia of a link needs them."""
     axes, skip = len(link.axes), 6 if link.parent < 0 else 0  # u = 0 on the ground
@@ -55,7 +55,7 @@ def _square(z: Array, q: Array, skip: int, squared: Array) -> Any:
     return dot(squared[skip:], q[skip:])
 
 
-@inlined
+@part
 def link_forces(chain: Chain, link: Link, state: LinkState, twist: Array, rate: Array, accelerated: bool) -> None:
     """``wrench`` (without the transport of momentum), ``momentum`` and ``modal`` of a link, weight on it included.
 
@@ -139,7 +139,7 @@ def link_forces(chain: Chain, link: Link, state: LinkState, twist: Array, rate: 
                         modal[i] -= omega * other * squared[i]
 
 
-@inlined
+@part
 def weigh_displaced(link: Link, state: LinkState) -> None:
     """Take the moment of weight on the displaced mass from ``wrench``."""
     moment = state.point[:3]

@@ -41,7 +41,7 @@ from erls.equations.erls.records import (
     read_link_state,
 )
 from erls.equations.serial.records import JOINT_STATE, Serial, read_joint_state
-from erls.maths.jit import inlined, part, reordered
+from erls.maths.jit import part, reordered
 from erls.maths.products import add_rows, clear, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, dot3, transform_motion
@@ -105,7 +105,7 @@ def _set_coordinates(turns: int, q: Array, x: Array) -> None:
         x[i] = q[6 + i - turns]
 
 
-@inlined
+@part
 def _lift(bend: Bend, before: BendState, bent: BendState, moving: bool) -> None:
     """e + ½ xᵀ P x of the parent's interface, and derivatives."""
     for i in range(6):
@@ -131,7 +131,7 @@ def set_arm(slide: Array, arm: Array, coordinate: Any, phi: Array, d: Array, b: 
     add_cross(phi, d, 1.0, b)
 
 
-@inlined
+@part
 def _turn_arm(bend: Bend, state: LinkState, bent: BendState, coordinate: Array, moving: bool) -> None:
     """Add ½ φ × (φ × d), and derivatives."""
     phi, rate, acceleration = state.u[3:], state.u_rate[3:], state.u_acceleration[3:]
@@ -153,7 +153,7 @@ def _turn_arm(bend: Bend, state: LinkState, bent: BendState, coordinate: Array, 
         add_cross(phi, once, 0.5, bent.e_acceleration)
 
 
-@inlined
+@part
 def curve_inertia(bend: Bend, state: LinkState, bent: BendState) -> None:
     """The second-order tensors of a link times its coordinates x, now with e: ``rows``, S and ½ qᵀ W q."""
     _set_coordinates(bend.turns, state.q, bent.x)
@@ -165,7 +165,7 @@ def curve_inertia(bend: Bend, state: LinkState, bent: BendState) -> None:
         bent.spin[i] = dot(bent.rows[6 + i], bent.x) / 2
 
 
-@inlined
+@part
 def correct_twist(bend: Bend, state: LinkState, bent: BendState) -> None:
     """``full`` = ν + M₀⁻¹ (C q̇ + H ν), and its derivative."""
     omega, alpha, added, added_rate = state.twist[3:], state.twist_rate[3:], bent.added, bent.added_rate
@@ -197,7 +197,7 @@ def correct_twist(bend: Bend, state: LinkState, bent: BendState) -> None:
     add_rows(bend.compliance, added_rate, 1.0, bent.full_rate)
 
 
-@inlined
+@part
 def feel_curvature(bend: Bend, link: Link, state: LinkState, bent: BendState) -> None:
     """What second-order momenta add to the modal forces, the momentum and the wrench of a link."""
     share, share_rate, weights = bent.share, bent.share_rate, bent.weights

@@ -40,7 +40,7 @@ from erls.equations.serial.records import (
     read_serial,
 )
 from erls.equations.serial.segments import SEGMENT, Segment, fill_mass_matrix, read_segment
-from erls.maths.jit import inlined, part, spliced
+from erls.maths.jit import part
 from erls.maths.products import add_columns, add_product, add_transposed_product, clear, copy_matrix
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_motion_cross, dot3, dot6, transform_motion
@@ -65,7 +65,7 @@ def _own_inertia(chain: Chain, mass: Array, axes: Array, turned: Array, moments:
                 inertia[first + a, first + b] = moments[pair_of(len(axes), a, b)]
 
 
-@inlined
+@part
 def _linear_inertia(chain: Chain, link: Link, state: LinkState, own: Segment, decoupled: Array, turns: bool) -> None:
     _own_inertia(chain, link.mass, link.axes, state.turned, state.moments, own.inertia)
     _couple(chain, link, state, decoupled, turns, len(own.pull) - len(link.axes), own.coupling)
@@ -78,7 +78,7 @@ def _turn_row(row: Array, decoupled: Array, out: Array) -> None:
     add_columns(decoupled, row, 1.0, out)
 
 
-@inlined
+@part
 def _grounded_inertia(
     chain: Chain, link: Link, state: LinkState, own: Segment, screw: Array, decoupled: Array, turns: bool
 ) -> None:
@@ -115,7 +115,7 @@ def _grounded_inertia(
                 coupling[j] += shared[j]
 
 
-@inlined
+@part
 def _couple(
     chain: Chain, link: Link, state: LinkState, decoupled: Array, turns: bool, first: int, coupling: Array
 ) -> None:
@@ -136,7 +136,7 @@ def _couple(
                     coupling[first + a, j] = state.turned[a, 6 + j]
 
 
-@inlined
+@part
 def _curved_inertia(
     chain: Chain, link: Link, bend: Bend, state: LinkState, bent: BendState, own: Segment, work: Change,
     decoupled: Array, turns: bool,
@@ -199,7 +199,7 @@ def _turn_rows(rows: Array, decoupled: Array, spare: Array) -> None:
         _turn_row(spare[:e], decoupled, rows[i])
 
 
-@inlined
+@part
 def _pull(bend: Bend, bent: BendState) -> None:
     """``turning`` and ``pulls``: M₀⁻¹ H on ω and M₀⁻¹ C."""
     s, m = bent.moment, len(bent.x)
@@ -226,7 +226,7 @@ def _turned_back(pose: Array, x: Array, out: Array) -> None:
         out[i] = pose[i] * x[0] + pose[3 + i] * x[1] + pose[6 + i] * x[2]
 
 
-@inlined
+@part
 def _lead(
     pose: Array, axes: Array, axes_before: Array, screw_before: Array, out: Array, state: LinkState, own: Segment,
     bends: Any,
@@ -264,7 +264,7 @@ def _lead(
                 own.reach[6 + i, j] = x[3 + i]
 
 
-@inlined
+@part
 def _bow(pose: Array, bent: BendState, state: LinkState, own: Segment, decoupled: Array, turns: bool) -> None:
     """Second-order motion of the parent's interface, in L and N."""
     e, m, x = own.reach.shape[1], bent.bow.shape[1], state.point
@@ -291,7 +291,7 @@ def _bow(pose: Array, bent: BendState, state: LinkState, own: Segment, decoupled
             own.reach[i, j] += x[i]
 
 
-@inlined
+@part
 def _arm(bend: Bend, state: LinkState, bent: BendState, coordinate: Array, own: Segment) -> None:
     """½ (φ̇ × b + φ × (φ̇ × d)) of the arm to the joint, in L, N and S."""
     d, b, phi = bent.d, bent.b, state.u[3:]
@@ -311,7 +311,7 @@ def _arm_column(d: Array, b: Array, phi: Array, column: Array) -> None:
     column[2] += (p * b[1] - q * b[0] + phi[0] * c1 - phi[1] * c0) / 2
 
 
-@inlined
+@part
 def _subspace(screw: Array, axes: Array, attached: bool, state: LinkState, own: Segment) -> None:
     """S: (S - ad(S) u, S_ω) as far as it is of first order."""
     p, s = len(own.pull), own.subspace
@@ -327,7 +327,7 @@ def _subspace(screw: Array, axes: Array, attached: bool, state: LinkState, own: 
         s[p - len(axes) + a] = dot3(axes[a], screw[3:])
 
 
-@inlined
+@part
 def _turn_along(bend: Bend, state: LinkState, bent: BendState, screw: Array, own: Segment) -> None:
     """What S has of second order: the joint turns the displacement along, and a slide the arm."""
     add_motion_cross(bent.carried, screw, 1.0, own.subspace)
@@ -396,7 +396,7 @@ def set_segments(
                     _arm(bend, state, bent, motion.coordinate, own)
 
 
-@spliced
+@part
 def fill(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array, bends: Any) -> None:
     """M; ``bends`` as in `erls.equations.erls.balance`."""
     serial = read_serial(reals, integers, integers[0])

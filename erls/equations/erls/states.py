@@ -9,13 +9,13 @@ from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import LINK, LINK_STATE, read_chain, read_link, read_link_state
 from erls.equations.erls.second_order import bend_frames
 from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
-from erls.maths.jit import kernel, spliced
+from erls.maths.jit import kernel, part
 from erls.maths.so3 import Array
 from erls.maths.spatial import compose_poses
 from fe_import.model import IntArray
 
 
-@spliced
+@part
 def put_states(
     reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array, bends: Any
 ) -> None:

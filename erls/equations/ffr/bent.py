@@ -18,13 +18,13 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations.ffr.records import BentBody, BentState, BodyState
-from erls.maths.jit import part, spliced
+from erls.maths.jit import part
 from erls.maths.products import add_columns, add_rows, clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross
 
 
-@spliced
+@part
 def bend(bent: BentBody, state: BentState, q: Array) -> None:
     """C₂, W η, S and ½ ηᵀ W η, and K."""
     e = len(q)
@@ -44,7 +44,7 @@ def bend(bent: BentBody, state: BentState, q: Array) -> None:
         add_columns(bent.warp, q, 1.0, warp)
 
 
-@spliced
+@part
 def bend_rates(bent: BentBody, state: BentState, rates: Array) -> None:
     """Derivatives of what `bend` gives; of W η only that of ½ ηᵀ W η."""
     e = len(rates)
@@ -72,7 +72,7 @@ def _add_block_back(moment: Array, square: Array, x: Array, out: Array) -> None:
     add_columns(square, x[3:], 1.0, out[3:])
 
 
-@spliced
+@part
 def correct_frame(bent: BentBody, bending: BentState, state: BodyState, rates: Array, moved: Array) -> None:
     """Corrected twist and its rate in the place of the frame's own; ``moved`` is η̈, empty for zero."""
     more, more_rate = state.spare[:6], state.spare[6:]
@@ -90,7 +90,7 @@ def correct_frame(bent: BentBody, bending: BentState, state: BodyState, rates: A
     add_rows(bent.per_mass, more_rate, 1.0, state.twist_rate)
 
 
-@spliced
+@part
 def bent_forces(bent: BentBody, bending: BentState, state: BodyState, rates: Array, forces: Array) -> None:
     """Wrench and momentum of the corrected twist become those of the frame's own, which is put back; forces on η."""
     share, share_rate, pull = bending.share, bending.share_rate, bending.spare
@@ -116,7 +116,7 @@ def bent_forces(bent: BentBody, bending: BentState, state: BodyState, rates: Arr
         add_columns(bending.spun[3 * i : 3 * i + 3], state.twist[3:], -share[3 + i], forces)
 
 
-@spliced
+@part
 def modal_forces(bent: BentBody, bending: BentState, rates: Array, moved: Array, forces: Array) -> None:
     """Add d/dt ∂T₃/∂η̇ - ∂T₃/∂η; ``moved`` is η̈, empty for zero."""
     e, lag = len(rates), bending.lag
@@ -143,7 +143,7 @@ def modal_forces(bent: BentBody, bending: BentState, rates: Array, moved: Array,
         forces[i] += lag[i]
 
 
-@spliced
+@part
 def correct_arrival(bent: BentBody, bending: BentState, state: BodyState, floats: Any) -> None:
     """Z and W of the corrected twist."""
     factor, x, y = bending.factor, state.spare[:6], state.spare[6:]

@@ -33,7 +33,7 @@ from erls.equations.ffr.segments import free_segment
 from erls.equations.serial.ends import carry_end
 from erls.equations.serial.records import MODES, Serial, call_feed_forward, read_modes, read_serial
 from erls.equations.serial.segments import SEGMENT, read_segment
-from erls.maths.jit import kernel, part, spliced
+from erls.maths.jit import kernel, part
 from erls.maths.products import clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import compose_poses, rotate_back, transform_motion
@@ -133,7 +133,7 @@ def stiffness_and_damping(
             k[first + i, first + i], c[first + i, first + i] = modes.stiffness[i], modes.damping[i]
 
 
-@spliced
+@part
 def _put_end(
     serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, number: int, y: Array, v: Array,
     found: Array,

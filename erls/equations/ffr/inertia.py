@@ -25,13 +25,13 @@ from erls.equations.ffr.bent import bent_forces, correct_frame, modal_forces
 from erls.equations.ffr.records import BentBody, BentState, Body, BodyState, Frames
 from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.records import Modes
-from erls.maths.jit import part, spliced
+from erls.maths.jit import part
 from erls.maths.products import add_columns, add_rows, add_symmetric, clear, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_force_cross, dot3, dot6
 
 
-@spliced
+@part
 def turn_inertia(body: Body, state: BodyState, q: Array) -> None:
     """C₁ η for each axis."""
     for a in range(body.axes.shape[0]):
@@ -47,7 +47,7 @@ def square_inertia(square: Array, a: int, b: int, q: Array, squared: Array) -> N
     add_symmetric(square[a if a == b else a + b + 2], q, 0, squared)
 
 
-@spliced
+@part
 def _first_order(body: Body, state: BodyState, q: Array, rates: Array, moved: Array, forces: Array) -> None:
     """What M₁ η and C₁ η add to the frame's wrench and momentum and, by ω̇, to the elastic forces."""
     half, half_rate = state.spare[:6], state.spare[6:]
@@ -76,7 +76,7 @@ def _first_order(body: Body, state: BodyState, q: Array, rates: Array, moved: Ar
             forces[i] += alpha * turned[i]
 
 
-@spliced
+@part
 def _second_order(
     frames: Frames, body: Body, state: BodyState, q: Array, rates: Array, forces: Array
 ) -> None:
@@ -103,7 +103,7 @@ def _second_order(
                         wrench[3 + i] += about_b * other[i]
 
 
-@spliced
+@part
 def _spin_forces(frames: Frames, body: Body, state: BodyState, rates: Array, forces: Array) -> None:
     """Coriolis forces on η by its own rates, and centrifugal ones."""
     for a in range(body.axes.shape[0]):
@@ -114,7 +114,7 @@ def _spin_forces(frames: Frames, body: Body, state: BodyState, rates: Array, for
             add_columns(body.half[a], state.twist, -omega, forces)
 
 
-@spliced
+@part
 def _weigh(body: Body, bending: BentState, state: BodyState, q: Array) -> None:
     """Take the weight from the wrench."""
     moment, gravity, wrench = state.moment, state.gravity, state.wrench
@@ -128,7 +128,7 @@ def _weigh(body: Body, bending: BentState, state: BodyState, q: Array) -> None:
     add_cross(moment, gravity, -1.0, wrench[3:])
 
 
-@spliced
+@part
 def link_forces(
     frames: Frames, body: Body, bent: BentBody, modes: Modes, state: BodyState, bending: BentState, q: Array,
     rates: Array, moved: Array, forces: Array,
@@ -170,7 +170,7 @@ def link_forces(
         _weigh(body, bending, state, q)
 
 
-@spliced
+@part
 def inertia_blocks(frames: Frames, body: Body, state: BodyState, q: Array) -> None:
     """M(η) and C(η)."""
     inertia, coupling, half = state.inertia, state.coupling, state.spare[:6]

@@ -37,7 +37,7 @@ from erls.equations.serial.records import (
     read_joint_state,
     read_modes,
 )
-from erls.maths.jit import part, spliced
+from erls.maths.jit import part
 from erls.maths.products import clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_motion_cross, rotate_back, transform_motion
@@ -67,7 +67,7 @@ def place_frames(
             place_node(node, state, y[modes.first : modes.first + len(modes.stiffness)])
 
 
-@spliced
+@part
 def move_frames(
     serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array,
     a: Array,
@@ -119,7 +119,7 @@ def _turn_joint(moved: JointState, twist: Array, rate: Array, arrived: Array) ->
         arrived[i] = twist[i]
 
 
-@spliced
+@part
 def _leave(node: Node, moved: NodeState, before: BodyState, state: BodyState) -> None:
     """Motion of the node that a joint stands on, from the floating frame ``before``."""
     twist, rate, gravity = state.twist, state.twist_rate, state.gravity
@@ -138,7 +138,7 @@ def _leave(node: Node, moved: NodeState, before: BodyState, state: BodyState) ->
         rate[i] += moved.twist_rate[i]
 
 
-@spliced
+@part
 def _arrive(inner: NodeState, state: BodyState) -> None:
     """From the inboard node to the floating frame in which it moves."""
     twist, rate = state.twist, state.twist_rate

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.ffr.records import Node, NodeState
-from erls.maths.jit import part, spliced
+from erls.maths.jit import part
 from erls.maths.products import add_columns, add_rows, clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, dot3, invert_pose
@@ -62,7 +62,7 @@ def _turn(phi: Array, pose: Array, tangent: Array, turning: Array) -> None:
         tangent[j, i] += a * f
 
 
-@spliced
+@part
 def place_node(node: Node, state: NodeState, q: Array) -> None:
     """Pose of a node, and what `move_node` needs of it."""
     e, place, phi = len(q), state.pose[9:12], state.phi
@@ -115,7 +115,7 @@ def _turning_rate(phi: Array, change: Array, turning: Array, out: Array) -> None
     out[5] += twice * (f0 * o1 - f1 * o0) + once * o2 + b * (d0 * o1 - d1 * o0)
 
 
-@spliced
+@part
 def move_node(node: Node, state: NodeState, rates: Array, accelerations: Array) -> None:
     """Twist of a node and its rate, at η̈ = 0 where ``accelerations`` is empty."""
     e, twist, rate = len(rates), state.twist, state.twist_rate
@@ -137,7 +137,7 @@ def move_node(node: Node, state: NodeState, rates: Array, accelerations: Array) 
     _turning_rate(state.phi, state.phi_rate, state.turning, rate)
 
 
-@spliced
+@part
 def node_moves(state: NodeState) -> None:
     """Twist of a node per η̇."""
     x = state.twist

@@ -44,7 +44,7 @@ from erls.equations.serial.records import (
     read_modes,
 )
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
-from erls.maths.jit import part, spliced
+from erls.maths.jit import part
 from erls.maths.products import add_columns, add_product, add_transposed_product, clear, copy, copy_matrix
 from erls.maths.so3 import Array
 from erls.maths.spatial import transform_motion
@@ -75,7 +75,7 @@ def fill_segments(
         _weights(body, bent, bending, state, own, inner.moves)
 
 
-@spliced
+@part
 def _arrival(floats: Any, inner: NodeState, state: BodyState) -> None:
     """Z and W of the floating frame."""
     x = state.spare[:6]
@@ -95,7 +95,7 @@ def _arrival(floats: Any, inner: NodeState, state: BodyState) -> None:
                 state.carried[i, j] = x[i]
 
 
-@spliced
+@part
 def _reach(
     serial: Serial, frames: Frames, k: int, parent: int, state: BodyState, own: Segment, reals: Array,
     integers: IntArray, scratch: Array,
@@ -134,7 +134,7 @@ def _reach(
             own.reach[i, j] = x[i]
 
 
-@spliced
+@part
 def _weights(
     body: Body, bent: BentBody, bending: BentState, state: BodyState, own: Segment, floats: Any
 ) -> None:
@@ -174,7 +174,7 @@ def _weights(
             add_columns(bending.warp, bent.per_modal[i], 1.0, partner)
 
 
-@spliced
+@part
 def free_segment(body: Body, bent: BentBody, bending: BentState, state: BodyState, own: Segment) -> None:
     """I, B, E and F over the twist of the floating frame itself."""
     for i in range(6):

@@ -29,7 +29,7 @@ from erls.equations.serial.joints import effort
 from erls.equations.serial.records import read_joint, read_joint_state
 from erls.equations.serial.time_curves import curve
 from erls.maths.coefficients import angle_of
-from erls.maths.jit import kernel, part, spliced
+from erls.maths.jit import kernel, part
 from erls.maths.products import clear, copy
 from erls.maths.screws import off_thread, turn_gradient, turn_gradient_change
 from erls.maths.so3 import Array as AnyArray
@@ -48,7 +48,7 @@ def relative_pose(inner: AnyArray, outer: AnyArray, out: AnyArray) -> None:
             out[9 + i] += inner[3 * j + i] * (outer[9 + j] - inner[9 + j])
 
 
-@spliced
+@part
 def _between(joint: ClosingJoint, frames: Array, state: LoopState) -> None:
     """Pose, twist, its derivative and rows of the outer frame in the inner one."""
     moves, carried = state.moves, state.spare
@@ -82,7 +82,7 @@ def _between(joint: ClosingJoint, frames: Array, state: LoopState) -> None:
                 moves[i, j] -= carried[i]
 
 
-@spliced
+@part
 def _less_prescribed(reals: Array, integers: IntArray, joint: ClosingJoint, t: float, state: LoopState) -> None:
     """What is between the frames beside the prescribed coordinate, or all of it."""
     left, screw = state.left, state.spare
@@ -178,7 +178,7 @@ def follow_thread(
     return off_thread(value, pitch, turn), dot6(gradient, twist), bend
 
 
-@spliced
+@part
 def _turned(loops: Loops, reals: Array, integers: IntArray, joint: ClosingJoint, t: float, y: Array) -> Any:
     """Turns of a closing joint, as those of the tree between its links add up."""
     turned = -joint.turned
@@ -191,7 +191,7 @@ def _turned(loops: Loops, reals: Array, integers: IntArray, joint: ClosingJoint,
     return turned
 
 
-@spliced
+@part
 def _act(
     loops: Loops, reals: Array, integers: IntArray, scratch: Array, joint: ClosingJoint, t: float, y: Array,
     state: LoopState,
@@ -212,7 +212,7 @@ def _act(
         found[PUSH] = effort(forces, reals, integers, t, found[COORDINATE], found[RATE], feed)
 
 
-@spliced
+@part
 def _close(
     loops: Loops, room: LoopRoom, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, y: Array
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from erls.equations.compiled_system import Array
 from erls.equations.loops.records import LoopRoom, Loops
 from erls.maths.dense import backward, cholesky, dot, forward
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part
 from erls.maths.products import copy_matrix
 
 SINGULAR = 1e-13  # of a condition's flexibility, once those before it hold: nothing is left of sixteen digits
@@ -29,7 +29,7 @@ def spread_rows(mass: Array, factor: Array, gradient: Array, spread: Array, flex
     return 0 if cholesky(flexible, SINGULAR) == 0 else -1
 
 
-@inlined
+@part
 def multipliers_of(loops: Loops, room: LoopRoom, reduced: Array, out: Array) -> None:
     """λ of the conditions in use, from z = U⁻ᵀ f."""
     for condition in range(loops.conditions):

@@ -16,7 +16,7 @@ from erls.equations.nodal.contract import Model, Work
 from erls.equations.nodal.joint_forces import frame_in_world, relative
 from erls.equations.nodal.rows import outer_product, push, rate_along
 from erls.maths.coefficients import angle_of
-from erls.maths.jit import inlined
+from erls.maths.jit import part
 from erls.maths.motions import bracket, pair_minus, transformed, transposed
 from erls.maths.vectors import (
     Rotation,
@@ -36,7 +36,7 @@ from erls.maths.vectors import (
 _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-@inlined
+@part
 def _posed(model: Model, poses: Array, k: int) -> tuple[Vector, Rotation, Vector, Rotation]:
     """Pose of the outer frame in the inner one, and in the inner node."""
     inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
@@ -48,7 +48,7 @@ def _posed(model: Model, poses: Array, k: int) -> tuple[Vector, Rotation, Vector
     return place, turn, plus(p, times(r, place)), product(r, turn)
 
 
-@inlined
+@part
 def _coordinate(model: Model, k: int, place: Vector, turn: Rotation, near: float) -> float:
     """Joint coordinate on the turn next to ``near``."""
     if model.actuator_along[k] == 2:
@@ -58,7 +58,7 @@ def _coordinate(model: Model, k: int, place: Vector, turn: Rotation, near: float
     return angle + 2 * math.pi * turns
 
 
-@inlined
+@part
 def _rows(model: Model, k: int, reach: Vector, axes: Rotation) -> tuple[Twist, Twist]:
     """Rate of the coordinate along the twists of the inner and the outer node."""
     along = model.actuator_along[k]
@@ -71,7 +71,7 @@ def _rows(model: Model, k: int, reach: Vector, axes: Rotation) -> tuple[Twist, T
     return (scaled(-1.0, inner[0]), scaled(-1.0, inner[1])), outer
 
 
-@inlined
+@part
 def _swing(model: Model, k: int, reach: Vector, axes: Rotation, twist: Array) -> float:
     """Acceleration of the coordinate at constant twists."""
     inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
@@ -89,7 +89,7 @@ def _swing(model: Model, k: int, reach: Vector, axes: Rotation, twist: Array) ->
     return w[2]
 
 
-@inlined
+@part
 def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> float:
     """What drive, spring, damper and friction give."""
     at = 3 * len(model.joint_nodes) + len(model.load_nodes) + 3 * k
@@ -106,7 +106,7 @@ def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> f
     return torque
 
 
-@inlined
+@part
 def _turning(model: Model, work: Work, k: int, reach: Vector, axes: Rotation) -> tuple[Twist, Twist, float, float]:
     """Rows of the coordinate's rate over the twists of both nodes, the rate and its own rate."""
     inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
@@ -116,7 +116,7 @@ def _turning(model: Model, work: Work, k: int, reach: Vector, axes: Rotation) ->
     return first, second, rate, gain + _swing(model, k, reach, axes, work.twist)
 
 
-@inlined
+@part
 def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> None:
     """Add inertia of rotors less efforts to ``work.force``; coordinates near ``before`` go into ``work.turned``."""
     for k in range(len(model.actuator_nodes)):
@@ -131,7 +131,7 @@ def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> N
         push(work.force, outer, balance, second)
 
 
-@inlined
+@part
 def actuator_derivatives(model: Model, work: Work, k: int, block: Array) -> None:
     """Mass of the rotor; damping of dampers, friction and gains; stiffness of springs and gains into a block."""
     if not model.actuator_active[k]:
@@ -145,7 +145,7 @@ def actuator_derivatives(model: Model, work: Work, k: int, block: Array) -> None
     outer_product(block, work.rows[0], first, second, stiffness, damping, law[k, 0])
 
 
-@inlined
+@part
 def actuator_energy(model: Model, work: Work, k: int) -> tuple[float, float]:
     """Of the rotor, and of the spring."""
     _, _, reach, axes = _posed(model, work.poses, k)
@@ -154,7 +154,7 @@ def actuator_energy(model: Model, work: Work, k: int) -> tuple[float, float]:
     return 0.5 * law[k, 0] * rate * rate, 0.5 * law[k, 1] * (work.turned[k] - law[k, 2]) ** 2
 
 
-@inlined
+@part
 def acting(model: Model, work: Work, sample: Array, k: int, out: Array) -> None:
     """Of actuator k (10,): coordinate, rate, acceleration, effort, and the wrench on the outer node in its axes."""
     _, _, reach, axes = _posed(model, work.poses, k)
@@ -168,7 +168,7 @@ def acting(model: Model, work: Work, sample: Array, k: int, out: Array) -> None:
     put(out, 7, scaled(strength, second[1]))
 
 
-@inlined
+@part
 def set_coordinates(model: Model, work: Work, before: Array) -> None:
     """Coordinates of all actuators near ``before``."""
     for k in range(len(model.actuator_nodes)):
@@ -176,7 +176,7 @@ def set_coordinates(model: Model, work: Work, before: Array) -> None:
         work.turned[k] = _coordinate(model, k, place, turn, before[k])
 
 
-@inlined
+@part
 def store_coordinates(model: Model, work: Work, out: Array) -> None:
     """Coordinates, rates and accelerations of all actuators at the end of a knot (3, s)."""
     first_entry = out.shape[1] - len(model.actuator_nodes)

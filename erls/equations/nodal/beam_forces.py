@@ -17,7 +17,7 @@ import math
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.contract import Model, Work
 from erls.maths.coefficients import Three, inverse_coefficient, stumpff, tangent_coefficients
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part
 from erls.maths.motions import (
     bracket,
     change,
@@ -58,7 +58,7 @@ _HALF = (0.5, 0.0, 0.0)
 _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-@inlined
+@part
 def _section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rotation]:
     """Frame of the section at an end in the world."""
     node = model.beam_nodes[e, side]
@@ -67,7 +67,7 @@ def _section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rot
     return place, product(turn, nine(model.beam_frames, e, 12 * side + 3))
 
 
-@inlined
+@part
 def bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple[Vector, Vector]:
     """d of element e, which goes on past a turn of π, near that in ``before``; also written into ``out``."""
     place, turn = _section(model, poses, e, 0)
@@ -79,14 +79,14 @@ def bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple
     return u, psi
 
 
-@inlined
+@part
 def _inward(model: Model, e: int, side: int, force: Twist) -> Twist:
     """Wrench on a section as one on its node."""
     frames = model.beam_frames
     return transposed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), force[0], force[1])
 
 
-@inlined
+@part
 def _outward(model: Model, e: int, side: int, table: Array) -> Twist:
     """Twist of a section from those of the nodes."""
     at, frames = 6 * model.beam_nodes[e, side], model.beam_frames
@@ -94,13 +94,13 @@ def _outward(model: Model, e: int, side: int, table: Array) -> Twist:
     return transformed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), v, w)
 
 
-@inlined
+@part
 def _section_force(model: Model, e: int, u: Vector, psi: Vector) -> Twist:
     built = model.beam_built
     return of_matrix(model.beam_stiffness, e, minus(u, vector(built, e, 0)), minus(psi, vector(built, e, 3)))
 
 
-@inlined
+@part
 def beam_forces(model: Model, work: Work, before: Array) -> None:
     """Add inertia and internal forces less weight to ``work.force``, from poses, twists and rates there."""
     out = work.force
@@ -121,7 +121,7 @@ def beam_forces(model: Model, work: Work, before: Array) -> None:
             add(out, at + 3, force[1])
 
 
-@inlined
+@part
 def _inertia(model: Model, work: Work, e: int, u: Vector, psi: Vector, b: Three) -> tuple[Twist, Twist]:
     """Inertia less weight as a wrench on the first section, and one along d."""
     c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
@@ -178,7 +178,7 @@ def _add_power(out: Array, table: Array, j: int, scale: float, force: Twist) -> 
         out[i, j] += scale * (linear + table[3, i] * m[0] + table[4, i] * m[1] + table[5, i] * m[2])
 
 
-@inlined
+@part
 def _unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
     """Twists of both sections when coordinate j of the nodes moves alone."""
     side = j // 6
@@ -189,7 +189,7 @@ def _unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
     return _NONE, moved
 
 
-@inlined
+@part
 def beam_derivatives(model: Model, work: Work, e: int, block: Array, material: int) -> None:
     """Mass, damping and stiffness of element e at ``work``'s poses, bends and twists into a block of zeros."""
     stiffness, rows = block[2], work.rows
@@ -219,7 +219,7 @@ def beam_derivatives(model: Model, work: Work, e: int, block: Array, material: i
         _inertia_derivatives(model, work, e, block, u, psi)
 
 
-@inlined
+@part
 def _inertia_derivatives(model: Model, work: Work, e: int, block: Array, u: Vector, psi: Vector) -> None:
     rows, shape = work.rows, work.shape
     c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
@@ -257,7 +257,7 @@ def _inertia_derivatives(model: Model, work: Work, e: int, block: Array, u: Vect
             _add_power(block[1], shape, j, -weight, spin)
 
 
-@inlined
+@part
 def beam_energy(model: Model, work: Work, e: int) -> tuple[float, float, float]:
     """Kinetic, elastic and that of gravity of element e."""
     u, psi = vector(work.bent, e, 0), vector(work.bent, e, 3)

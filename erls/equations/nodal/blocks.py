@@ -23,14 +23,14 @@ from erls.equations.nodal.joint_forces import joint_gradients, joint_stiffness
 from erls.equations.nodal.motion import set_twists
 from erls.equations.nodal.spring_forces import spring_derivatives, winding_derivatives
 from erls.maths.coefficients import stumpff, tangent_coefficients
-from erls.maths.jit import inlined, kernel
+from erls.maths.jit import kernel, part
 from erls.maths.motions import series
 from erls.maths.rotations import value
 from erls.maths.vectors import cross, dot, minus, nine, plus, scaled, three, times, turned, unit
 from erls.maths.views import vector_at
 
 
-@inlined
+@part
 def _conditions(model: Model, work: Work, sample: Array) -> None:
     set_twists(model, work)
     for j in range(len(model.joint_nodes)):
@@ -94,7 +94,7 @@ def blocks(reals: Array, integers: IntArray, scratch: Array, material: int) -> N
         joint_stiffness(model, work, sample, j, table[at + j])
 
 
-@inlined
+@part
 def _node_factors(model: Model, work: Work, to_a: float, to_v: float, to_q: float) -> None:
     """What stands to the right of M, C and K for each node, and what Eᵀ f adds as the node turns."""
     for node in range(len(work.poses)):

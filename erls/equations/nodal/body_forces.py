@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.contract import Model, Work
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part
 from erls.maths.motions import cobracket, pair_minus, pair_plus
 from erls.maths.vectors import (
     Twist,
@@ -31,12 +31,12 @@ from erls.maths.vectors import (
 _ZERO = (0.0, 0.0, 0.0)
 
 
-@inlined
+@part
 def _weight(model: Model, poses: Array, node: int) -> Vector:
     return turned(nine(poses, node, 3), vector(model.gravity, 1, 0))
 
 
-@inlined
+@part
 def body_forces(model: Model, work: Work) -> None:
     """Add inertia less weight to ``work.force``."""
     for k in range(len(model.body_nodes)):
@@ -51,7 +51,7 @@ def body_forces(model: Model, work: Work) -> None:
         add(work.force, at + 3, force[1])
 
 
-@inlined
+@part
 def body_derivatives(model: Model, work: Work, k: int, block: Array) -> None:
     """Mass, damping (gyroscopic) and stiffness (weight turns with the body) of body k into a block of zeros."""
     node = model.body_nodes[k]
@@ -74,7 +74,7 @@ def _fill(out: Array, j: int, scale: float, column: Twist) -> None:
         out[3 + i, j] = scale * column[1][i]
 
 
-@inlined
+@part
 def _load(model: Model, poses: Array, k: int, factor: float) -> Twist:
     """In node axes."""
     force, moment = scaled(factor, vector(model.loads, k, 0)), scaled(factor, vector(model.loads, k, 3))
@@ -84,7 +84,7 @@ def _load(model: Model, poses: Array, k: int, factor: float) -> Twist:
     return force, moment
 
 
-@inlined
+@part
 def load_forces(model: Model, work: Work, sample: Array) -> None:
     """Subtract loads from ``work.force``; their factors follow the joints in ``sample``."""
     first = 3 * len(model.joint_nodes)
@@ -95,7 +95,7 @@ def load_forces(model: Model, work: Work, sample: Array) -> None:
         add(work.force, at + 3, moment)
 
 
-@inlined
+@part
 def load_derivatives(model: Model, work: Work, sample: Array, k: int, block: Array) -> None:
     """Stiffness of load k into a block of zeros: dead ones turn in the node's axes."""
     if model.load_dead[k]:
@@ -104,7 +104,7 @@ def load_derivatives(model: Model, work: Work, sample: Array, k: int, block: Arr
             _fill(block[2], 3 + j, 1.0, (cross(unit(j), force), cross(unit(j), moment)))
 
 
-@inlined
+@part
 def body_energy(model: Model, work: Work, k: int) -> tuple[float, float]:
     """Kinetic, and that of gravity."""
     node = model.body_nodes[k]

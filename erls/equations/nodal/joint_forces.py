@@ -11,7 +11,7 @@ from __future__ import annotations
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.contract import Model, Work
 from erls.maths.coefficients import stumpff
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part
 from erls.maths.motions import (
     bracket,
     cobracket,
@@ -65,7 +65,7 @@ def relative(
     return turned(r, minus(place, p)), back_product(r, turn)
 
 
-@inlined
+@part
 def _ahead(model: Model, j: int, coordinate: float) -> tuple[Vector, Rotation]:
     """Frame of the inner node that runs ahead by a prescribed coordinate."""
     p, r = vector(model.joint_frames, j, 0), nine(model.joint_frames, j, 3)
@@ -78,7 +78,7 @@ def _ahead(model: Model, j: int, coordinate: float) -> tuple[Vector, Rotation]:
     return plus(p, times(r, (0.0, 0.0, slide))), product(r, exponential(psi, c[0], c[1]))
 
 
-@inlined
+@part
 def _posed(model: Model, poses: Array, j: int, coordinate: float) -> tuple[Vector, Rotation, Vector, Rotation]:
     """Pose D of the outer frame in the inner one, and that of the outer frame in the inner node."""
     inner, outer = model.joint_nodes[j, 0], model.joint_nodes[j, 1]
@@ -92,7 +92,7 @@ def _posed(model: Model, poses: Array, j: int, coordinate: float) -> tuple[Vecto
     return place, turn, plus(p, times(r, place)), product(r, turn)
 
 
-@inlined
+@part
 def _along(model: Model, row: int, turn: Rotation) -> Twist:
     """Derivative of a condition along the relative twist."""
     pull = turned(turn, vector(model.conditions, row, 0))
@@ -102,7 +102,7 @@ def _along(model: Model, row: int, turn: Rotation) -> Twist:
     return pull, about
 
 
-@inlined
+@part
 def _violation(model: Model, row: int, place: Vector, turn: Rotation) -> float:
     violation = _linear(model.conditions, row, place, turn)
     if model.pitches[row].real != 0.0:
@@ -119,7 +119,7 @@ def _linear(conditions: Array, row: int, place: Vector, turn: Rotation) -> float
     return violation
 
 
-@inlined
+@part
 def joint_forces(model: Model, work: Work, sample: Array) -> None:
     """Violations of all conditions, and the forces Bᵀλ in node axes, added to ``work.reaction``."""
     for j in range(len(model.joint_nodes)):
@@ -142,7 +142,7 @@ def joint_forces(model: Model, work: Work, sample: Array) -> None:
             add(work.reaction, 6 * outer + 3, m)
 
 
-@inlined
+@part
 def joint_gradients(model: Model, work: Work, sample: Array, j: int) -> None:
     """Violation and gradient of each condition of joint j, and its derivatives along the motion at ``work``'s twists:
     Φ_t in ``work.drift``, Φ̈ − B a in ``work.bias`` (accelerations of the twists on R³×SO(3) included).
@@ -191,7 +191,7 @@ def _of_node(values: Array, node: int, p: Vector, r: Rotation) -> Twist:
     return transformed(p, r, three(values, 6 * node), three(values, 6 * node + 3))
 
 
-@inlined
+@part
 def _twist(model: Model, values: Array, j: int, reach: Vector, axes: Rotation) -> tuple[Twist, Twist]:
     """Twists of the outer frame as carried by the inner node, and by its own."""
     frames = model.joint_frames
@@ -199,7 +199,7 @@ def _twist(model: Model, values: Array, j: int, reach: Vector, axes: Rotation) -
     return _of_node(values, model.joint_nodes[j, 0], reach, axes), own
 
 
-@inlined
+@part
 def joint_stiffness(model: Model, work: Work, sample: Array, j: int, block: Array) -> None:
     """Derivative of Bᵀλ of joint j by increments of both nodes into a block of zeros."""
     _, turn, reach, axes = _posed(model, work.poses, j, sample[3 * j])

@@ -17,7 +17,7 @@ from erls.equations.nodal.contract import (
     read_work,
 )
 from erls.maths import band
-from erls.maths.jit import inlined, kernel, part
+from erls.maths.jit import kernel, part
 from erls.maths.vectors import Rotation, nine, times
 
 _ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -86,7 +86,7 @@ def _scale(band: Array, order: IntArray, inertia: Array, metres: Array, left: Ar
             band[i, j - i + width] *= scale * right[order[j]]
 
 
-@inlined
+@part
 def _add_joints(model: Model, work: Work, beta: float, table: Array, left: Array) -> None:
     """Rows and columns of all conditions, and their scales."""
     n = len(work.force)

@@ -9,12 +9,12 @@ from __future__ import annotations
 from erls.equations.compiled_system import Array
 from erls.equations.nodal.contract import Model, Work
 from erls.maths.coefficients import stumpff
-from erls.maths.jit import inlined
+from erls.maths.jit import part
 from erls.maths.rotations import turned_further, value
 from erls.maths.vectors import cross, dot, minus, nine, plus, put, three, times, turned, vector
 
 
-@inlined
+@part
 def compose(model: Model, start: Array, increment: Array, out: Array) -> None:
     """Poses ∘ exp(increment), their rotations orthogonal to rounding however many steps were made."""
     for node in range(len(start)):
@@ -31,7 +31,7 @@ def compose(model: Model, start: Array, increment: Array, out: Array) -> None:
             out[node, 3 + i] = r[i]
 
 
-@inlined
+@part
 def set_twists(model: Model, work: Work) -> None:
     """Twists of all nodes in their own axes, and their rates."""
     for node in range(len(work.poses)):

@@ -16,7 +16,7 @@ from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.contract import Model, Work
 from erls.equations.nodal.rows import outer_product, push, rate_along
 from erls.maths.coefficients import inverse_coefficient
-from erls.maths.jit import inlined, part
+from erls.maths.jit import part
 from erls.maths.rotations import first, logarithm_near, value
 from erls.maths.vectors import (
     Rotation,
@@ -171,7 +171,7 @@ def winding_forces(
         push(force, nodes[k, 1], moment, outer)
 
 
-@inlined
+@part
 def winding_derivatives(model: Model, work: Work, k: int, block: Array, material: int) -> None:
     """Damping and stiffness of torsion spring k into a block of zeros."""
     nodes, frames, laws = model.winding_nodes, model.winding_frames, model.windings

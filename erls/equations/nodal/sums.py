@@ -20,7 +20,7 @@ from erls.equations.nodal.contract import (
 from erls.equations.nodal.joint_forces import joint_forces
 from erls.equations.nodal.motion import compose, set_twists
 from erls.equations.nodal.spring_forces import spring_forces, wind, winding_forces
-from erls.maths.jit import inlined, kernel
+from erls.maths.jit import kernel, part
 from erls.maths.vectors import nine, put, three, times
 from erls.maths.views import vector_at
 
@@ -50,7 +50,7 @@ def forces(reals: Array, integers: IntArray, scratch: Array, last: Array) -> Non
             put(work.reaction, 6 * node, times(turn, three(work.reaction, 6 * node)))
 
 
-@inlined
+@part
 def _remember(model: Model, work: Work, before: State) -> None:
     for e in range(len(model.beam_nodes)):
         bend(model, work.poses, before.bent, work.bent, e)

@@ -14,7 +14,7 @@ from erls.equations.quasi_static.records import REDUCED, Reduced, ReducedState, 
 from erls.equations.serial import stiffness as serial_stiffness
 from erls.equations.serial.records import JOINT, read_joint, read_serial
 from erls.maths.dense import backward, cholesky, forward
-from erls.maths.jit import inlined, kernel, part
+from erls.maths.jit import kernel, part
 from erls.maths.products import add_columns, add_rows, clear, copy_matrix, dot
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -32,7 +32,7 @@ def _forces(
     balance(reals, integers, scratch, t, y, v, a, out, None, at)
 
 
-@inlined
+@part
 def _set_motion(given: Reduced, state: ReducedState, y: Array, v: Array, a: Array) -> None:
     """Motion of all modes by the slow coordinates; zero acceleration where ``a`` is empty."""
     for values, out in ((y, state.place), (v, state.rate), (a, state.acceleration)):

@@ -29,7 +29,7 @@ from erls.equations.serial.records import (
     read_modes,
 )
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
-from erls.maths.jit import inlined, part, spliced
+from erls.maths.jit import part
 from erls.maths.products import (
     add_columns,
     add_inner_products,
@@ -114,7 +114,7 @@ def _set_whole(own: Segment, work: Condensed, definite: bool) -> int:
     return int(factor_symmetric(work.whole, work.diagonal, definite))
 
 
-@spliced
+@part
 def condense(own: Segment, work: Condensed) -> float:
     """Take the elastic coordinates of a link out of its ``articulated`` inertia; the sign of `invert`.
 
@@ -243,13 +243,13 @@ def eliminate(
     return 0
 
 
-@inlined
+@part
 def place_of(work: Condensed, i: int) -> int:
     """Where number i of the motion of a link stands among those on its parent."""
     return (work.first if i < work.ports else work.rest) + i
 
 
-@spliced
+@part
 def _borne(own: Segment, work: Condensed) -> Any:
     """Inertia along a joint of what its link bears, were nothing elastic; before `condense`."""
     clear(work.given)
@@ -289,7 +289,7 @@ def substitute(serial: Serial, condensed: int, reals: Array, integers: IntArray,
         _answer(work, modes.decoupled, b[modes.first : modes.first + len(work.forces)])
 
 
-@spliced
+@part
 def _collect(work: Condensed, decoupled: Array, b: Array) -> None:
     """``load`` by the forces on elastic coordinates and by ``handed``; ``forces`` on decoupled ones, W⁻¹ times them.
 
@@ -311,14 +311,14 @@ def _collect(work: Condensed, decoupled: Array, b: Array) -> None:
     _solve_modes(work.whole, work.compliance, work.forces)
 
 
-@inlined
+@part
 def _pull(work: Condensed) -> None:
     """H̃ m + h, with which the links on it pull at a link, into ``given``."""
     copy(work.handed, work.given)
     add_rows(work.bound, work.moved, 1.0, work.given)
 
 
-@spliced
+@part
 def _answer(work: Condensed, decoupled: Array, b: Array) -> None:
     """Elastic coordinates of a link whose ``motion`` is known, decoupled into ``forces``, and its own into ``b``."""
     add_columns(work.follow, work.motion, 1.0, work.moved)

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from erls.equations.serial.records import JOINT, MODES, Serial, read_joint, read_modes
-from erls.maths.jit import part, spliced
+from erls.maths.jit import part
 from erls.maths.products import add_product, add_transposed_product, copy_matrix, dot
 from erls.maths.records import reader, room, table_size
 from erls.maths.so3 import Array
@@ -77,7 +77,7 @@ read_segment = reader(Segment)
 SEGMENT = table_size(Segment)
 
 
-@spliced
+@part
 def fill_mass_matrix(
     serial: Serial, segments: int, reals: Array, integers: IntArray, scratch: Array, out: Array
 ) -> None:

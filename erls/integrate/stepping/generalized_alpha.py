@@ -26,7 +26,7 @@ from erls.equations.compiled_system import (
 )
 from erls.equations.stepped import STEP_FUNCTIONS, StepFunctions, call_compose, call_settle
 from erls.maths import dense
-from erls.maths.jit import ENABLED, inlined, kernel
+from erls.maths.jit import ENABLED, kernel, part
 
 DONE, FAILED, INACCURATE, TIMID, REFUSED = range(5)
 """Ends of a stretch: all steps made; Newton's method failed; too large a local error; a larger step would do; the
@@ -177,7 +177,7 @@ if ENABLED:
     )
 
 
-@inlined
+@part
 def predict(settings: Settings, memory: Memory) -> None:
     """Increment, velocity and acceleration of a step from what its acceleration is expected to be."""
     h, beta, gamma = settings.h, settings.beta, settings.gamma
@@ -196,7 +196,7 @@ def predict(settings: Settings, memory: Memory) -> None:
         memory.v1[i] = v[i] + v_old * alg + v_new * alg1
 
 
-@inlined
+@part
 def dense_factors(
     system: StepFunctions,
     reals: Array,
@@ -220,7 +220,7 @@ def dense_factors(
     return int(dense.factor(factors, memory.pivots))
 
 
-@inlined
+@part
 def correct(system: StepFunctions, reals: Array, integers: IntArray, settings: Settings, memory: Memory) -> float:
     """Solve for a correction, apply it, and return its size [m]; infinite where a square of it is."""
     n, beta = len(memory.v), 1 / settings.to_a
@@ -259,7 +259,7 @@ def correct(system: StepFunctions, reals: Array, integers: IntArray, settings: S
     return size
 
 
-@inlined
+@part
 def blame(memory: Memory) -> None:
     """Into the correction, what is not finite: the residual, or where it is, the correction itself."""
     finite, n = True, len(memory.v)
@@ -270,7 +270,7 @@ def blame(memory: Memory) -> None:
         memory.correction[i] = x * abs(x) if finite else memory.right[i]
 
 
-@inlined
+@part
 def is_balanced(settings: Settings, memory: Memory, largest: float) -> bool:
     """Whether forces balance against the size of their terms, and the conditions hold."""
     n, m, both, gap = len(memory.v), len(memory.a) - len(memory.v), 0.0, 0.0
@@ -284,7 +284,7 @@ def is_balanced(settings: Settings, memory: Memory, largest: float) -> bool:
     return gap <= settings.balance * settings.reach
 
 
-@inlined
+@part
 def note(settings: Settings, progress: Course, iterations: int, rate: float) -> None:
     """How fast iteration was."""
     rates, counts = progress.rates, progress.counts
@@ -296,7 +296,7 @@ def note(settings: Settings, progress: Course, iterations: int, rate: float) -> 
     rates[SPENT] = max(0.0, rates[SPENT] + beyond)
 
 
-@inlined
+@part
 def judge(settings: Settings, progress: Course, memory: Memory) -> int:
     """Whether the local error of a step is too large, or so small that a larger step would do."""
     if settings.error_limit == 0.0:
@@ -311,7 +311,7 @@ def judge(settings: Settings, progress: Course, memory: Memory) -> int:
     return TIMID if settings.growth > 0.0 and error * settings.growth**3 < settings.error_limit else DONE
 
 
-@inlined
+@part
 def accept(settings: Settings, memory: Memory) -> None:
     """Move on to the end of the step, and foretell the next change of the acceleration.
 
