@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 from fe_import.description.link import LinkFile
@@ -20,6 +21,7 @@ def cache_key(link: LinkFile) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+@cache
 def _sources_hash() -> str:
     """Hash of this package's own code, so that a changed reduction never meets an old cache."""
     digest = hashlib.sha256()

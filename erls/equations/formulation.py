@@ -158,8 +158,8 @@ class Modular(Protocol):
     """Equations whose functions are compiled in modules of their own, those of what runs report included."""
 
     @property
-    def kernels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """These modules, in two parts: the second takes less time, by about what an integrator takes."""
+    def kernels(self) -> tuple[str, ...]:
+        """These modules, from the one that takes longest."""
 
 
 class TreeFormulation(Formulation, SecondOrderSystem, Protocol):

@@ -29,6 +29,7 @@ from erls.integrate.alpha_rules import (
 )
 from erls.integrate.base import Leg
 from erls.integrate.driver import Pace, Recorder
+from erls.integrate.stepping import alpha_memory as alpha
 from erls.maths.jit import plain
 from erls.maths.so3 import Array
 from erls.scene.integrators import MATRICES
@@ -54,14 +55,14 @@ class Steps:
     def __init__(self, system: Stepped, metres: Array, rules: Rules, words: Words, recorder: Recorder) -> None:
         from erls.integrate.stepping import generalized_alpha as loop  # here: it imports the compiler
 
-        self._loop, self._system, self._rules, self._words, self._recorder = loop, system, rules, words, recorder
+        self._system, self._rules, self._words, self._recorder = system, rules, words, recorder
         self._arguments = system.functions(), system.reals, system.integers, system.scratch
         self._advance = loop.advance if system.compiled else plain(loop.advance)
         self._pace = Pace(recorder, system.compiled, single=True)
         self._metres, self._reach = metres, float(metres.max(initial=1.0))
-        self._progress = loop.Course(np.zeros(6), np.zeros(7, dtype=np.int64))
-        self._progress.rates[loop.RATE] = SLOWEST_KNOWN
-        self._progress.counts[loop.USUAL] = MAX_ITERATIONS
+        self._progress = alpha.Course(np.zeros(6), np.zeros(7, dtype=np.int64))
+        self._progress.rates[alpha.RATE] = SLOWEST_KNOWN
+        self._progress.counts[alpha.USUAL] = MAX_ITERATIONS
         self._memory: Any = None
         self.h, self.error = 0.0, 0.0
         """Step [s], and local error of the last one [m]."""
@@ -79,7 +80,7 @@ class Steps:
         dense = n if own is None else 0
         rows = [np.zeros(n) for _ in range(6)]
         v, alg, increment, v1, change, guess = rows
-        return self._loop.Memory(
+        return alpha.Memory(
             start=start.copy(),
             tried=start.copy(),
             v=v,
@@ -103,7 +104,7 @@ class Steps:
         """Change the step, with a₀ moved along; one that differs only by rounding keeps the iteration matrix."""
         memory = self._memory
         if abs(h - self.h) > 1e-6 * h:
-            self._progress.counts[self._loop.FACTORED] = 0
+            self._progress.counts[alpha.FACTORED] = 0
         if self.h:
             a = memory.a[: len(memory.v)]
             memory.alg[:] = a + (memory.alg - a) * (h / self.h)
@@ -112,9 +113,9 @@ class Steps:
 
     def stretch(self, times: Array, last: float, limit: Limit) -> tuple[int, int]:
         """Steps to ``times``, with forces up to ``last``, in chunks; how many were recorded, and what ended them."""
-        loop, settings = self._loop, self._settings(last, limit)
-        done, status = 0, loop.DONE
-        while done < len(times) and status == loop.DONE:
+        settings = self._settings(last, limit)
+        done, status = 0, alpha.DONE
+        while done < len(times) and status == alpha.DONE:
             part = times[done : done + self._pace.size()]
             knots = np.empty((len(part), 3, self._system.kept))
             beside = np.empty((len(part), self._recorder.beside))
@@ -128,10 +129,10 @@ class Steps:
                 made = self._count()
             self._recorder.extend(part[:made], knots[:made], beside=beside[:made])
             done += made
-        if status == loop.REFUSED:
+        if status == alpha.REFUSED:
             self._system.refuse(float(times[done]), self._system.unpack(self._memory.tried), self._memory.v1)
-            status = loop.FAILED  # it does not insist
-        self.error = float(self._progress.rates[loop.ERROR])
+            status = alpha.FAILED  # it does not insist
+        self.error = float(self._progress.rates[alpha.ERROR])
         return done, status
 
     def end(self) -> tuple[Any, Array]:
@@ -140,16 +141,16 @@ class Steps:
 
     def failure(self, t: float) -> SimulationError:
         """Why the step to ``t`` failed."""
-        loop, rates = self._loop, self._progress.rates
-        slow = too_slow(rates[loop.BEFORE], rates[loop.SIZE], rates[loop.GOAL])
-        reason = SINGULAR if self._progress.counts[loop.REASON] == loop.SINGULAR else slow
+        rates = self._progress.rates
+        slow = too_slow(rates[alpha.BEFORE], rates[alpha.SIZE], rates[alpha.GOAL])
+        reason = SINGULAR if self._progress.counts[alpha.REASON] == alpha.SINGULAR else slow
         size, suspect = self._system.size, self._memory.correction
         return newton_failure(self._words, size, self._rules, t, self.h, suspect, reason)
 
     def _settings(self, last: float, limit: Limit) -> Any:
         use, rules = Formulas.of(self._rules, self.h), self._rules
         shared = ("h", "beta", "gamma", "share", "pull", "keep", "to_v", "to_a", "tolerance")
-        return self._loop.Settings(
+        return alpha.Settings(
             **{name: getattr(use, name) for name in shared},
             last=last,
             rounding=ROUNDING,
@@ -172,12 +173,12 @@ class Steps:
 
     def _count(self) -> int:
         """Steps made by the last call, whose work is added to that of the run."""
-        loop, counts, work = self._loop, self._progress.counts, self._recorder.work
-        work.rhs_calls += int(counts[loop.EVALUATIONS])
-        work.newton_iterations += int(counts[loop.ITERATIONS])
-        work.factorizations += int(counts[loop.FACTORIZATIONS])
-        counts[[loop.EVALUATIONS, loop.ITERATIONS, loop.FACTORIZATIONS]] = 0
-        return int(counts[loop.STEPS])
+        counts, work = self._progress.counts, self._recorder.work
+        work.rhs_calls += int(counts[alpha.EVALUATIONS])
+        work.newton_iterations += int(counts[alpha.ITERATIONS])
+        work.factorizations += int(counts[alpha.FACTORIZATIONS])
+        counts[[alpha.EVALUATIONS, alpha.ITERATIONS, alpha.FACTORIZATIONS]] = 0
+        return int(counts[alpha.STEPS])
 
 
 def equal_steps(steps: Steps, leg: Leg, step: float, halve: bool, recorder: Recorder) -> None:
@@ -185,8 +186,6 @@ def equal_steps(steps: Steps, leg: Leg, step: float, halve: bool, recorder: Reco
 
     Where Newton's method fails they are halved for a while, or the run fails unless ``halve``.
     """
-    from erls.integrate.stepping.generalized_alpha import FAILED
-
     unit = 1 << MAX_HALVINGS
     count = max(1, math.ceil((leg.end - leg.start) / step * (1 - 1e-9)))
     total, at, halvings, served = count * unit, 0, 0, 0
@@ -199,7 +198,7 @@ def equal_steps(steps: Steps, leg: Leg, step: float, halve: bool, recorder: Reco
         times = np.where(ends == total, leg.end, leg.start + span * (ends / total))
         made, status = steps.stretch(times, leg.last, Limit())
         at, served = at + made * width, served + made
-        if status == FAILED:
+        if status == alpha.FAILED:
             recorder.work.rejected_steps += 1
             halvings, served = halvings + 1, 0
             if halvings > MAX_HALVINGS or not halve:
@@ -216,8 +215,6 @@ def adaptive_steps(steps: Steps, leg: Leg, largest: float, tolerance: float, rec
 
     The error of a step is of third order (M. Géradin, A. Cardona, Flexible Multibody Dynamics, 2001, ch. 14).
     """
-    from erls.integrate.stepping.generalized_alpha import FAILED, INACCURATE
-
     t, h, held = leg.start, min(max(steps.h, _FIRST * largest), largest), False
     while t < leg.end:
         count = max(1, math.ceil((leg.end - t) / h * (1 - 1e-9)))
@@ -231,15 +228,15 @@ def adaptive_steps(steps: Steps, leg: Leg, largest: float, tolerance: float, rec
         if made:
             t = float(times[made - 1])
         ratio = _SAFETY * (tolerance / max(steps.error, 1e-300)) ** (1 / 3)
-        if status == FAILED:
+        if status == alpha.FAILED:
             ratio = 1 / _LARGEST_CHANGE
-        elif status == INACCURATE:
+        elif status == alpha.INACCURATE:
             ratio = min(ratio, 0.8)
-        held = status in (FAILED, INACCURATE)
+        held = status in (alpha.FAILED, alpha.INACCURATE)
         recorder.work.rejected_steps += held
         h = min(largest, steps.h * min(max(ratio, 1 / _LARGEST_CHANGE), _LARGEST_CHANGE))
         if h < _SMALLEST * largest:
-            raise steps.failure(float(times[made])) if status == FAILED else _too_small(t, steps, tolerance)
+            raise steps.failure(float(times[made])) if status == alpha.FAILED else _too_small(t, steps, tolerance)
 
 
 def _too_small(t: float, steps: Steps, tolerance: float) -> SimulationError:

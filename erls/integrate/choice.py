@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias
@@ -16,12 +17,14 @@ from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.charts import in_charts
 from erls.integrate.registry import integrator_named
 from erls.integrate.thinning import output_step
-from erls.maths.jit import compiling_beside
+from erls.maths.beside import compiling_beside
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import split
 from erls.scene.integrators import FIXED_STEP, INTEGRATORS
 from erls.scene.settings import Simulation
+
+NODAL_STEPS = "erls.integrate.stepping.generalized_alpha"
 
 Integrate: TypeAlias = Callable[..., Solution]
 """An `erls.integrate.base.Integrator` for one kind of system."""
@@ -41,10 +44,7 @@ def _nodal(mechanism: Mechanism, settings: Simulation) -> Integrate:
 
 
 def _compile_nodal(system: Any, settings: Simulation) -> None:
-    loop = "erls.integrate.stepping.generalized_alpha"
-    with compiling_beside(loop):
-        import_module("erls.equations.nodal.compiled")
-    import_module(loop)
+    import_module("erls.equations.nodal.compiled")
 
 
 def _pieces(mechanism: Mechanism, settings: Simulation) -> Integrate:
@@ -74,15 +74,10 @@ def _tied(mechanism: Mechanism, settings: Simulation) -> Integrate:
 
 
 def _compile_tied(system: Any, settings: Simulation) -> None:
-    if settings.integrator != FIXED_STEP:
+    if settings.integrator == FIXED_STEP and system.compiled is not None:
+        import_module("erls.equations.loops.steps")
+    elif settings.integrator != FIXED_STEP:
         _compile_named(system, settings)
-        return
-    loop = "erls.integrate.stepping.generalized_alpha"
-    with compiling_beside(loop):
-        if system.compiled is not None:
-            import_module("erls.equations.loops.steps")
-    if system.compiled is not None:
-        import_module(loop)
 
 
 def _absolute(mechanism: Mechanism, settings: Simulation) -> Integrate:
@@ -96,21 +91,17 @@ def _named(mechanism: Mechanism, settings: Simulation) -> Integrate:
 
 
 def _compile_named(system: Any, settings: Simulation) -> None:
-    loop = INTEGRATORS[settings.integrator].kernels
-    if loop is None:
+    if INTEGRATORS[settings.integrator].kernels is None:
         if system.compiled is not None:
             system.compiled.load_acceleration()
         return
-    here, beside = system.kernels if isinstance(system, Modular) else ((), ())
-    with compiling_beside(loop, *beside):
-        for module in ("erls.equations.independent", *here):  # the first: what steps ask of systems without ties
+    own = ("erls.equations.independent", *(system.kernels if isinstance(system, Modular) else ()))
+    with compiling_beside(*own[2:]):
+        for module in own[:2]:  # the first: what steps ask of systems without ties
             import_module(module)
-        if not beside:
-            _ = system.compiled
-    for module in beside:
+    for module in own:
         import_module(module)
-    if system.compiled is not None:  # with what its size asks for, factors link by link
-        import_module(loop)
+    _ = system.compiled  # with what its size asks for, factors link by link
 
 
 INTEGRATIONS: dict[str, Integration] = {
@@ -134,8 +125,26 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Integrate:
     return in_charts(found, [k - int(prescribed[k]) for k in mechanism.rotation_vectors])
 
 
+def compiled_steps(mechanism: Mechanism, settings: Simulation) -> str | None:
+    """The module of the compiled steps that integrate; None where they are not compiled."""
+    if system_of(mechanism, settings) == "nodal":
+        return NODAL_STEPS
+    return INTEGRATORS[settings.integrator].kernels
+
+
+@contextmanager
+def compiling_steps(module: str | None) -> Iterator[None]:
+    """Compile the steps of an integrator beside the equations, which the block compiles."""
+    if module is None:
+        yield
+        return
+    with compiling_beside(module):
+        yield
+    import_module(module)
+
+
 def compile_kernels(formulation: Formulation, settings: Simulation) -> None:
-    """Compile what a run will call, by importing it: before the clock of the run starts."""
+    """Compile the equations that a run will call, by importing them: before the clock of the run starts."""
     INTEGRATIONS[system_of(formulation.mechanism, settings)].compile(formulation, settings)
 
 

@@ -10,7 +10,6 @@ import hashlib
 import operator
 import os
 import re
-import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -101,31 +100,8 @@ def compiled_before(module: str) -> bool:
     return not ENABLED or folder(module).is_dir()
 
 
-@contextmanager
-def compiling_beside(*modules: str) -> Iterator[None]:
-    """While kernels are compiled here, have those of other modules compiled too, by a process of their own."""
-    waiting = [module for module in modules if not compiled_before(module)]
-    if not waiting or (os.cpu_count() or 1) < 2:
-        yield
-        return
-    for module in waiting:
-        _tell_of(module)
-    process = subprocess.Popen(
-        [sys.executable, "-c", f"import {', '.join(waiting)}"],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        yield
-    except BaseException:
-        process.terminate()
-        raise
-    finally:
-        process.wait()  # whatever became of it: what it has not compiled is compiled here
-
-
-def _tell_of(module: str) -> None:
+def tell_of(module: str) -> None:
+    """Say that kernels of a module are about to be compiled, once for each subject."""
     subject = next((words for part, words in _SUBJECTS.items() if f".{part}." in f"{module}."), _EQUATIONS)
     if subject in _told or not _listeners:
         return
@@ -298,7 +274,7 @@ def _njit(function: Any, *signature: Any, **options: Any) -> Any:
     _prepare_numba()
     before = numba.config.CACHE_DIR
     if signature and not _on_disk(function):
-        _tell_of(function.__module__)
+        tell_of(function.__module__)
     numba.config.CACHE_DIR = str(folder(function.__module__))
     try:
         settings = {"cache": True, "error_model": "numpy", "nogil": True, **options}

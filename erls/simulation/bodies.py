@@ -10,8 +10,10 @@ from erls.equations.nodal.redundant import refuse_open
 from erls.equations.nodal.scenes.build import Assembly, assemble
 from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
 from erls.equations.nodal.statics import Statics, solve_statics
+from erls.integrate.choice import NODAL_STEPS, compiling_steps
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths.jit import announcing
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest, Modes, work
 from erls.run.watches.base import BodyPlan, Started
@@ -31,8 +33,9 @@ def run_bodies(scene: BodyScene, asked: Asked) -> BodyMotion | BodyRest:
     SimulationError
         A failure or an interrupt; what was computed is in its attribute ``run``.
     """
-    assembly = assemble(scene)
     analysis = scene.record.simulation
+    with announcing(asked.tell), compiling_steps(NODAL_STEPS if isinstance(analysis, Dynamics) else None):
+        assembly = assemble(scene)
     if isinstance(analysis, Dynamics):
         return _motion(scene, assembly, analysis, asked)
     run = _rest(scene, assembly, analysis)

@@ -8,7 +8,7 @@ from functools import partial
 from erls.equations.registry import FORMULATIONS, formulate
 from erls.errors import SceneError
 from erls.integrate.base import Solution
-from erls.integrate.choice import compile_kernels, integrator, options_of
+from erls.integrate.choice import compile_kernels, compiled_steps, compiling_steps, integrator, options_of
 from erls.maths.jit import announcing
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
@@ -53,8 +53,8 @@ def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -
     settings, plan, told = scene.record.simulation, Plan(scene, mechanism), warnings.beside()
     watching = Watching(plan, told, asked.watches())
     watching.before()
-    formulation = formulate(mechanism, settings)
-    with announcing(asked.tell):
+    with announcing(asked.tell), compiling_steps(compiled_steps(mechanism, settings)):
+        formulation = formulate(mechanism, settings)
         compile_kernels(formulation, settings)
     y, v = formulation.initial_state()
     begun = time.perf_counter()

@@ -9,7 +9,7 @@ import msgspec
 
 from erls.equations.nodal.scenes.build import assemble
 from erls.equations.registry import formulate
-from erls.integrate.choice import compile_kernels
+from erls.integrate.choice import compile_kernels, compiled_steps, compiling_steps
 from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.scene.bodies.schema import BodyScene
@@ -59,8 +59,9 @@ class Variants:
         if isinstance(scene, BodyScene):
             assemble(scene)
             return
-        formulation = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
-        compile_kernels(formulation, scene.record.simulation)
+        mechanism, settings = build_mechanism(scene).mechanism, scene.record.simulation
+        with compiling_steps(compiled_steps(mechanism, settings)):
+            compile_kernels(formulate(mechanism, settings), settings)
 
     def unpacked(self, sent: Packed) -> Run:
         """A run that was computed by another process."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib.metadata
+from functools import cache
 
 
+@cache
 def package_version(package: str) -> str:
     """Of an installed package, or "unknown"."""
     try:

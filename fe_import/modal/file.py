@@ -5,7 +5,12 @@ The same group can stand inside another file (a run file embeds the modal models
 
 from __future__ import annotations
 
+import hashlib
+import os
+import stat
 from collections.abc import Iterable
+from contextlib import suppress
+from copy import deepcopy
 from pathlib import Path
 
 import h5py
@@ -32,6 +37,9 @@ SCHEMA = "erls modal model"
 SCHEMA_VERSION = 4
 UNITS = "SI"
 
+_KEPT, _LARGEST = 32, 4_000_000  # models, and bytes of a file
+_lately: dict[bytes, ModalModel] = {}
+
 
 def write_modal_file(path: Path | str, model: ModalModel) -> None:
     """Validate a modal model and write it, completely or not at all; equal models give equal bytes.
@@ -48,13 +56,34 @@ def write_modal_file(path: Path | str, model: ModalModel) -> None:
 def read_modal_file(path: Path | str) -> ModalModel:
     """Read and validate a modal file.
 
+    What this process has read lately, a mechanism of equal links or the variants of a study, is copied from memory
+    while the file keeps every byte.
+
     Raises
     ------
     FEImportError
         FILE_NOT_FOUND; NOT_READABLE: not an HDF5 file; MODAL_FILE: anything wrong inside.
     """
+    digest = _digest(path)
+    if digest in _lately:
+        return deepcopy(_lately[digest])
     with open_for_reading(path, FEImportError, Cause.MODAL_FILE) as file:
-        return read_modal_group(file.group, str(path))
+        model = read_modal_group(file.group, str(path))
+    if digest and digest == _digest(path):  # not replaced meanwhile
+        _lately[digest] = deepcopy(model)
+        while len(_lately) > _KEPT:
+            del _lately[next(iter(_lately))]
+    return model
+
+
+def _digest(path: Path | str) -> bytes:
+    """SHA-256 of a file; empty for what is too large to be kept in memory, or no file."""
+    with suppress(OSError, ValueError):
+        status = os.stat(path)
+        if stat.S_ISREG(status.st_mode) and status.st_size <= _LARGEST:
+            with open(path, "rb") as file:
+                return hashlib.file_digest(file, "sha256").digest()
+    return b""
 
 
 def write_modal_group(group: h5py.Group, model: ModalModel) -> None:

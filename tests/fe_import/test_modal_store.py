@@ -77,6 +77,29 @@ def test_round_trip(tmp_path: Path, model: ModalModel) -> None:
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
+def test_reading_again(path: Path) -> None:
+    """What was read before neither shares memory with what is read again, nor hides that the file has changed."""
+    first, second = read_modal_file(path), read_modal_file(path)
+    assert same(first, second)
+    second.frequencies_hz[7] = 1.0
+    second.provenance["by"] = "hand"
+    assert same(read_modal_file(path), first)
+    content, status = path.read_bytes(), path.stat()
+    write_modal_file(path, rigid_link())
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert same(read_modal_file(path), rigid_link())
+    place = content.index(MODEL.frequencies_hz.tobytes())
+    path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    with pytest.raises(FEImportError) as caught:
+        read_modal_file(path)
+    assert caught.value.cause is Cause.MODAL_FILE
+    path.unlink()
+    with pytest.raises(FEImportError) as caught:
+        read_modal_file(path)
+    assert caught.value.cause is Cause.FILE_NOT_FOUND
+
+
 def test_every_dataset_says_unit_and_meaning(path: Path) -> None:
     described = []
 

@@ -77,11 +77,11 @@ class Erls(SerialFormulation):
         return f"erls.equations.erls.{'stiffened_states' if self.stiffened else name}"
 
     @property
-    def kernels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    def kernels(self) -> tuple[str, ...]:
         """See `erls.equations.formulation.Modular`."""
         own = f"erls.equations.erls.{'stiffened_' if self.stiffened else ''}"
-        here = f"{own}residual", "erls.equations.serial.stiffness", self._module("energy"), self._module("states")
-        return tuple(dict.fromkeys(here)), (f"{own}mass_matrix",)
+        seen = self._module("energy"), self._module("states")
+        return tuple(dict.fromkeys((f"{own}residual", f"{own}mass_matrix", *seen, "erls.equations.serial.stiffness")))
 
     @cached_property
     def length_scales(self) -> Array:

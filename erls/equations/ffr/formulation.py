@@ -84,11 +84,10 @@ class Ffr(SerialFormulation):
         return pack_frames(replace(self.given, every_axis=True), self.size)
 
     @property
-    def kernels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    def kernels(self) -> tuple[str, ...]:
         """See `erls.equations.formulation.Modular`."""
         own = "erls.equations.ffr"
-        here = f"{own}.residual", "erls.equations.serial.stiffness", f"{own}.states"
-        return here, (f"{own}.mass", f"{own}.energy")  # both take the matrices of segments
+        return f"{own}.residual", f"{own}.mass", f"{own}.energy", f"{own}.states", "erls.equations.serial.stiffness"
 
     @cached_property
     def length_scales(self) -> Array:

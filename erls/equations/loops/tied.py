@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.equations.formulation import TreeFormulation
+from erls.equations.formulation import Modular, TreeFormulation
 from erls.equations.loops.rows import Closure, LoopRows
 from erls.equations.system import metre_scales
-from erls.maths.jit import compiling_beside
+from erls.maths.beside import compiling_beside
 from erls.maths.so3 import Array
 from erls.mechanism.loop_turns import turning_signs
 from fe_import.model import IntArray
@@ -42,8 +42,10 @@ class Tied:
     def __init__(self, bare: TreeFormulation) -> None:
         self.bare, self.mechanism = bare, bare.mechanism
         self.rows = LoopRows(bare.mechanism.loops)
-        with compiling_beside(*KERNELS):
-            self.metres = metre_scales(bare)  # by functions of the chain, which take as long to compile
+        seen = bare.kernels[2:] if isinstance(bare, Modular) else ()
+        with compiling_beside(*KERNELS, *seen):  # meanwhile, what the equations of the chain take
+            self.metres = metre_scales(bare)
+            _ = bare.compiled and bare.compiled.frames
         self.reach = self.mechanism.reach
         self.row_metres = np.where(self.rows.turns, self.reach, 1.0)
         self._known: tuple[float, Array, Array, Closure] | None = None

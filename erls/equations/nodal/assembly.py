@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache, cached_property
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,8 +16,8 @@ from erls.equations.nodal.model import Kinds, band_order, build_model
 from erls.equations.nodal.nodes import Nodes, numbers_of, poses_of, rows_of
 from erls.equations.nodal.scatter import Scatter, dofs
 from erls.equations.system import metre_scales
+from erls.maths.beside import compiling_beside
 from erls.maths.groups import SE3, Group
-from erls.maths.jit import compiling_beside
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array
 
@@ -39,17 +38,12 @@ _STEPPED = (
 
 @cache
 def functions() -> Functions:
-    """Loaded with the first system: not every run is one of nodes.
-
-    Compiled by two processes where they never were: blocks take as long as all others, those of steps included.
-    """
-    with compiling_beside("erls.equations.nodal.blocks"):
-        from erls.equations.nodal.outputs import energies, in_joints, knot
+    """Loaded with the first system: not every run is one of nodes."""
+    own = "erls.equations.nodal"
+    with compiling_beside(*(f"{own}.{name}" for name in ("outputs", "blocks", "matrix", "step"))):
         from erls.equations.nodal.sums import forces, move, remember
-
-        for steps in ("matrix", "step"):
-            import_module(f"erls.equations.nodal.{steps}")
     from erls.equations.nodal.blocks import blocks, conditions, weighted
+    from erls.equations.nodal.outputs import energies, in_joints, knot
 
     return Functions(forces, remember, move, energies, knot, in_joints, conditions, blocks, weighted)
 

@@ -23,8 +23,8 @@ from erls.equations.serial.pack import (
 )
 from erls.equations.serial.records import Joint, Modes, Serial
 from erls.errors import Cause, SceneError
+from erls.maths.beside import compiling_beside
 from erls.maths.calls import address_of
-from erls.maths.jit import compiling_beside
 from erls.maths.records import Memory, room
 from erls.maths.se3 import inverse, twist_cross
 from erls.maths.so3 import Array
