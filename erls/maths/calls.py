@@ -8,9 +8,10 @@ calls is not compiled within it again. In plain Python an address is the place o
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from erls.maths.jit import ENABLED
+from erls.maths.jit import ENABLED, stood_for
 
 _known: list[Callable[..., Any]] = []
 
@@ -32,6 +33,13 @@ def handed(function: Any, signature: Any) -> Any:
     return address_of(function, signature) if hasattr(function, "py_func") else function
 
 
+def address_for(call: Any, needed: bool = True) -> int:
+    """Of the kernel that a `caller` always calls, which is compiled now; -1 unless it is needed."""
+    if not needed:
+        return -1
+    return address_of(stood_for(call), call.signature)
+
+
 def _plain(address: Any, *arguments: Any) -> Any:
     return (address if callable(address) else _known[address])(*arguments)
 
@@ -42,7 +50,7 @@ def caller(signature: Any, kernel: str = "") -> Callable[..., Any]:
     Where the address is always that of one kernel, `erls.maths.jit.any_scalar` is told which, ``module:name``.
     """
     if not ENABLED:
-        return _plain
+        return _with(partial(_plain), signature, kernel)
     from numba.core import types
     from numba.core.extending import intrinsic
 
@@ -61,5 +69,11 @@ def caller(signature: Any, kernel: str = "") -> Callable[..., Any]:
         return signature.return_type(every.int64, every.StarArgTuple(signature.args)), generate
 
     found: Any = intrinsic(call)
-    found.stands_for, found.in_python = kernel, _plain
-    return found  # type: ignore[no-any-return]
+    found.in_python = _plain
+    return _with(found, signature, kernel)
+
+
+def _with(call: Any, signature: Any, kernel: str) -> Callable[..., Any]:
+    """The caller, which knows what it calls."""
+    call.signature, call.stands_for = signature, kernel
+    return call  # type: ignore[no-any-return]

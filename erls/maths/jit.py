@@ -152,7 +152,7 @@ def _in_python(function: Any, within: bool, called: tuple[tuple[Any, Any], ...])
     own: dict[str, Any] = {}
     for name in _named(source):
         found = source.__globals__.get(name)
-        target = next((target for caller, target in called if caller is found), _stood_for(found) if called else None)
+        target = next((target for caller, target in called if caller is found), stood_for(found))
         if target is not None:
             own[name] = partial(_without_address, _in_python(target, within, called))
         elif hasattr(found, "in_python"):
@@ -167,7 +167,7 @@ def _without_address(function: Any, address: Any, *arguments: Any) -> Any:
     return function(*arguments)
 
 
-def _stood_for(caller: Any) -> Any:
+def stood_for(caller: Any) -> Any:
     """The kernel that is always called by this (`erls.maths.calls.caller`), or None."""
     module, _, name = str(getattr(caller, "stands_for", "")).partition(":")
     return getattr(import_module(module), name) if module else None
@@ -213,7 +213,7 @@ def _twin(function: Any, called: tuple[tuple[Any, Any], ...], within: bool) -> A
         found = source.__globals__.get(name)
         if hasattr(found, "py_func") and _needs_real_numbers(found):
             own[name] = _any_scalar(found, called, within=True)
-        elif (known := _stood_for(found)) is not None:
+        elif (known := stood_for(found)) is not None:
             own[name] = _past_address(_any_scalar(known, called, within=True))
         for caller, target in called:
             if found is caller:

@@ -15,18 +15,42 @@ Modal inertia, derived in `erls.equations.serial.modal_inertia`, adds T₃ = η�
 
 from __future__ import annotations
 
-from typing import Any
-
-from erls.equations.ffr.records import BentBody, BentState, BodyState
-from erls.maths.jit import part
+from erls.equations.ffr.records import (
+    BEND_LINK,
+    BENT_BODY,
+    BENT_FORCES,
+    BENT_STATE,
+    BODY_STATE,
+    CORRECT_ARRIVAL,
+    CORRECT_TWIST,
+    BentBody,
+    BentState,
+    BodyState,
+    Frames,
+    read_bent_body,
+    read_bent_state,
+    read_body_state,
+    read_frames,
+)
+from erls.equations.serial.records import read_serial
+from erls.maths.jit import kernel, part
 from erls.maths.products import add_columns, add_rows, clear
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross
+from fe_import.model import IntArray
 
 
 @part
-def bend(bent: BentBody, state: BentState, q: Array) -> None:
-    """C₂, W η, S and ½ ηᵀ W η, and K."""
+def _frames(reals: Array, integers: IntArray) -> Frames:
+    return read_frames(reals, integers, read_serial(reals, integers, integers[0]).own)
+
+
+@kernel(BEND_LINK, counted=False)
+def bend_link(k: int, reals: Array, integers: IntArray, scratch: Array, q: Array) -> None:
+    """C₂, W η, S and ½ ηᵀ W η, and K of link k."""
+    frames = _frames(reals, integers)
+    bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+    state = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
     e = len(q)
     rows, spun = state.bending.reshape(6 * e), state.spun.reshape(9 * e)
     clear(rows)
@@ -45,8 +69,8 @@ def bend(bent: BentBody, state: BentState, q: Array) -> None:
 
 
 @part
-def bend_rates(bent: BentBody, state: BentState, rates: Array) -> None:
-    """Derivatives of what `bend` gives; of W η only that of ½ ηᵀ W η."""
+def _bend_rates(bent: BentBody, state: BentState, rates: Array) -> None:
+    """Derivatives of what `bend_link` gives; of W η only that of ½ ηᵀ W η."""
     e = len(rates)
     rows = state.bending_rate.reshape(6 * e)
     clear(rows)
@@ -72,9 +96,16 @@ def _add_block_back(moment: Array, square: Array, x: Array, out: Array) -> None:
     add_columns(square, x[3:], 1.0, out[3:])
 
 
-@part
-def correct_frame(bent: BentBody, bending: BentState, state: BodyState, rates: Array, moved: Array) -> None:
-    """Corrected twist and its rate in the place of the frame's own; ``moved`` is η̈, empty for zero."""
+@kernel(CORRECT_TWIST, counted=False)
+def correct_twist(
+    k: int, reals: Array, integers: IntArray, scratch: Array, rates: Array, moved: Array
+) -> None:
+    """Corrected twist of link k and its rate in the place of the frame's own; ``moved`` is η̈, empty for zero."""
+    frames = _frames(reals, integers)
+    bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+    bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+    state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
+    _bend_rates(bent, bending, rates)
     more, more_rate = state.spare[:6], state.spare[6:]
     for i in range(6):
         bending.twist[i], bending.twist_rate[i] = state.twist[i], state.twist_rate[i]
@@ -91,7 +122,7 @@ def correct_frame(bent: BentBody, bending: BentState, state: BodyState, rates: A
 
 
 @part
-def bent_forces(bent: BentBody, bending: BentState, state: BodyState, rates: Array, forces: Array) -> None:
+def _put_back(bent: BentBody, bending: BentState, state: BodyState, rates: Array, forces: Array) -> None:
     """Wrench and momentum of the corrected twist become those of the frame's own, which is put back; forces on η."""
     share, share_rate, pull = bending.share, bending.share_rate, bending.spare
     for i in range(6):
@@ -117,7 +148,7 @@ def bent_forces(bent: BentBody, bending: BentState, state: BodyState, rates: Arr
 
 
 @part
-def modal_forces(bent: BentBody, bending: BentState, rates: Array, moved: Array, forces: Array) -> None:
+def _modal_forces(bent: BentBody, bending: BentState, rates: Array, moved: Array, forces: Array) -> None:
     """Add d/dt ∂T₃/∂η̇ - ∂T₃/∂η; ``moved`` is η̈, empty for zero."""
     e, lag = len(rates), bending.lag
     warp_rate, twisted = bending.warp_rate.reshape(e * e), bending.twisted.reshape(e * e)
@@ -143,9 +174,26 @@ def modal_forces(bent: BentBody, bending: BentState, rates: Array, moved: Array,
         forces[i] += lag[i]
 
 
-@part
-def correct_arrival(bent: BentBody, bending: BentState, state: BodyState, floats: Any) -> None:
-    """Z and W of the corrected twist."""
+@kernel(BENT_FORCES, counted=False)
+def bent_forces(
+    k: int, reals: Array, integers: IntArray, scratch: Array, rates: Array, moved: Array, forces: Array
+) -> None:
+    """Wrench, momentum and forces on η of link k from those of its corrected twist; modal inertia."""
+    frames = _frames(reals, integers)
+    bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+    bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+    _put_back(bent, bending, read_body_state(scratch, integers, frames.body_states + k * BODY_STATE), rates, forces)
+    if len(bent.per_modal) > 0:
+        _modal_forces(bent, bending, rates, moved, forces)
+
+
+@kernel(CORRECT_ARRIVAL, counted=False)
+def correct_arrival(k: int, reals: Array, integers: IntArray, scratch: Array, floats: int) -> None:
+    """Z and W of the corrected twist of link k."""
+    frames = _frames(reals, integers)
+    bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+    bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+    state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
     factor, x, y = bending.factor, state.spare[:6], state.spare[6:]
     for j in range(6):
         for i in range(6):

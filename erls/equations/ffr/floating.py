@@ -8,20 +8,16 @@ axes, and the rates of the elastic coordinates. Joints are conditions upon them 
 from __future__ import annotations
 
 from erls.equations import compiled_system as contract
-from erls.equations.ffr.bent import bend, bend_rates
 from erls.equations.ffr.inertia import inertia_blocks, link_forces
 from erls.equations.ffr.nodes import move_node, place_node, to_node_axes
 from erls.equations.ffr.records import (
-    BENT_BODY,
-    BENT_STATE,
     BODY,
     BODY_STATE,
     END,
     NODE,
     NODE_STATE,
     Frames,
-    read_bent_body,
-    read_bent_state,
+    call_bend_link,
     read_body,
     read_body_state,
     read_end,
@@ -46,18 +42,6 @@ def elastic_at(serial: Serial, frames: Frames, reals: Array, integers: IntArray,
     return int(read_modes(reals, integers, serial.modes + k * MODES).first - frames.free)
 
 
-@part
-def _bend_link(
-    serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, k: int, q: Array, rates: Array
-) -> None:
-    """Second-order displacements of a link."""
-    if read_body(reals, integers, frames.bodies + k * BODY).bent:
-        bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
-        bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
-        bend(bent, bending, q)
-        bend_rates(bent, bending, rates)
-
-
 @kernel(contract.RESIDUAL, counted=False)
 def residual(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
@@ -68,8 +52,6 @@ def residual(
     for k in range(links):
         body = read_body(reals, integers, frames.bodies + k * BODY)
         state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
-        bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
-        bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
         e, at = len(modes.stiffness), elastic_at(serial, frames, reals, integers, k)
         q, first = y[12 * links + at : 12 * links + at + e], 6 * links + at
@@ -77,11 +59,10 @@ def residual(
             state.twist[i] = v[6 * k + i]
             state.twist_rate[i] = a[6 * k + i] if len(a) > 0 else 0.0
         rotate_back(y[12 * k : 12 * k + 12], serial.gravity, state.gravity)
-        _bend_link(serial, frames, reals, integers, scratch, k, q, v[first : first + e])
-        moved = a[first : first + e] if len(a) > 0 else a
-        link_forces(
-            frames, body, bent, modes, state, bending, q, v[first : first + e], moved, out[first : first + e]
-        )
+        if body.bent:
+            call_bend_link(frames.bend_link, k, reals, integers, scratch, q)
+        moved, forces = a[first : first + e] if len(a) > 0 else a, out[first : first + e]
+        link_forces(frames, reals, integers, scratch, k, modes, q, v[first : first + e], moved, forces)
         for i in range(6):
             out[6 * k + i] = state.wrench[i]
 
@@ -95,15 +76,14 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
     for k in range(links):
         body = read_body(reals, integers, frames.bodies + k * BODY)
         state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
-        bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
-        bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
         own = read_segment(scratch, integers, frames.segments + k * SEGMENT)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
         e, at = len(modes.stiffness), elastic_at(serial, frames, reals, integers, k)
         q, first = y[12 * links + at : 12 * links + at + e], 6 * links + at
-        _bend_link(serial, frames, reals, integers, scratch, k, q, q)
+        if body.bent:
+            call_bend_link(frames.bend_link, k, reals, integers, scratch, q)
         inertia_blocks(frames, body, state, q)
-        free_segment(body, bent, bending, state, own)
+        free_segment(frames, reals, integers, scratch, k)
         for i in range(6):
             for j in range(6):
                 out[6 * k + i, 6 * k + j] = own.inertia[i, j]

@@ -21,14 +21,26 @@ With one axis of rotation the moment about that axis is complete, and no joint f
 
 from __future__ import annotations
 
-from erls.equations.ffr.bent import bent_forces, correct_frame, modal_forces
-from erls.equations.ffr.records import BentBody, BentState, Body, BodyState, Frames
+from erls.equations.ffr.records import (
+    BENT_STATE,
+    BODY,
+    BODY_STATE,
+    Body,
+    BodyState,
+    Frames,
+    call_bent_forces,
+    call_correct_twist,
+    read_bent_state,
+    read_body,
+    read_body_state,
+)
 from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.records import Modes
 from erls.maths.jit import part
 from erls.maths.products import add_columns, add_rows, add_symmetric, clear, dot
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, add_force_cross, dot3, dot6
+from fe_import.model import IntArray
 
 
 @part
@@ -115,30 +127,33 @@ def _spin_forces(frames: Frames, body: Body, state: BodyState, rates: Array, for
 
 
 @part
-def _weigh(body: Body, bending: BentState, state: BodyState, q: Array) -> None:
-    """Take the weight from the wrench."""
+def _weigh(frames: Frames, body: Body, state: BodyState, q: Array, integers: IntArray, scratch: Array, k: int) -> None:
+    """Take the weight of link k from the wrench."""
     moment, gravity, wrench = state.moment, state.gravity, state.wrench
     for i in range(3):
         moment[i] = body.moment[i]
         wrench[i] -= body.mass * gravity[i]
     add_rows(body.coupling[:3], q, 1.0, moment)
     if body.bent:
+        bent = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
         for i in range(3):
-            moment[i] += bending.moment[i]
+            moment[i] += bent.moment[i]
     add_cross(moment, gravity, -1.0, wrench[3:])
 
 
 @part
 def link_forces(
-    frames: Frames, body: Body, bent: BentBody, modes: Modes, state: BodyState, bending: BentState, q: Array,
-    rates: Array, moved: Array, forces: Array,
+    frames: Frames, reals: Array, integers: IntArray, scratch: Array, k: int, modes: Modes, q: Array, rates: Array,
+    moved: Array, forces: Array,
 ) -> None:  # fmt: skip
-    """Wrench of a link on its frame, and ``forces`` (e,) on its η; all as inertia less what acts.
+    """Wrench of link k on its frame, and ``forces`` (e,) on its η; all as inertia less what acts.
 
     ``moved`` is η̈, empty for zero.
     """
+    body = read_body(reals, integers, frames.bodies + k * BODY)
+    state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
     if body.bent:
-        correct_frame(bent, bending, state, rates, moved)
+        call_correct_twist(frames.correct_twist, k, reals, integers, scratch, rates, moved)
     clear(state.momentum)
     clear(state.wrench)
     add_rows(body.rigid, state.twist, 1.0, state.momentum)
@@ -162,12 +177,10 @@ def link_forces(
         if frames.coriolis or frames.centrifugal:
             _spin_forces(frames, body, state, rates, forces)
     if body.bent:
-        bent_forces(bent, bending, state, rates, forces)
-        if body.warped:
-            modal_forces(bent, bending, rates, moved, forces)
+        call_bent_forces(frames.bent_forces, k, reals, integers, scratch, rates, moved, forces)
     add_force_cross(state.twist, state.momentum, state.wrench)
     if frames.weight:
-        _weigh(body, bending, state, q)
+        _weigh(frames, body, state, q, integers, scratch, k)
 
 
 @part

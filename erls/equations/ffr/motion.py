@@ -6,11 +6,8 @@ from that, displaced by its inboard node, the floating frame of the next link: t
 
 from __future__ import annotations
 
-from erls.equations.ffr.bent import bend, bend_rates
 from erls.equations.ffr.nodes import move_node, place_node
 from erls.equations.ffr.records import (
-    BENT_BODY,
-    BENT_STATE,
     BODY,
     BODY_STATE,
     NODE,
@@ -19,8 +16,7 @@ from erls.equations.ffr.records import (
     Frames,
     Node,
     NodeState,
-    read_bent_body,
-    read_bent_state,
+    call_bend_link,
     read_body,
     read_body_state,
     read_node,
@@ -56,9 +52,8 @@ def place_frames(
         move_joint(serial, k, joint, moved, reals, integers, scratch, t, y, v, a)
         if read_body(reals, integers, frames.bodies + k * BODY).bent:
             modes = read_modes(reals, integers, serial.modes + k * MODES)
-            bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
-            bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
-            bend(bent, bending, y[modes.first : modes.first + len(modes.stiffness)])
+            q = y[modes.first : modes.first + len(modes.stiffness)]
+            call_bend_link(frames.bend_link, k, reals, integers, scratch, q)
     for number in range(frames.node_count):
         node = read_node(reals, integers, frames.nodes + number * NODE)
         if node.moves:
@@ -89,11 +84,6 @@ def move_frames(
         base_state = read_node_state(scratch, integers, frames.node_states + 2 * k * NODE_STATE)
         inner = read_node(reals, integers, frames.nodes + (2 * k + 1) * NODE)
         inner_state = read_node_state(scratch, integers, frames.node_states + (2 * k + 1) * NODE_STATE)
-        if body.bent:
-            modes = read_modes(reals, integers, serial.modes + k * MODES)
-            bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
-            bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
-            bend_rates(bent, bending, v[modes.first : modes.first + len(modes.stiffness)])
         if body.parent < 0:
             clear(state.twist)
             clear(state.twist_rate)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, acceleration_in, function_in
+from erls.equations.ffr import records
 from erls.equations.ffr.records import (
     BentBody,
     Body,
@@ -28,6 +29,7 @@ from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.modal_inertia import modal_inertia
 from erls.equations.serial.records import Serial
 from erls.equations.serial.segments import segment
+from erls.maths.calls import address_for
 from erls.maths.records import Memory
 from erls.maths.se3 import pose, twist_transform
 from erls.maths.so3 import Array
@@ -226,6 +228,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
     ]
     linked = size > dense and max(found.mixing for found in decoupled) < MIXING
     nodes, bodies = [_nodes(given, k) for k in links], [_body(given, k) for k in links]
+    bent = any(body.bent for body in bodies)
     places = np.where(prescribed, -1, np.cumsum(~prescribed) - 1)
     joints = [
         pack.joint_record(
@@ -269,6 +272,10 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         bent_states=pack.put_all(
             working, [bent_state(sizes[k].modes if b.bent else 0, bool(b.warped)) for k, b in enumerate(bodies)]
         ),
+        bend_link=address_for(records.call_bend_link, bent),
+        correct_twist=address_for(records.call_correct_twist, bent),
+        bent_forces=address_for(records.call_bent_forces, bent),
+        correct_arrival=address_for(records.call_correct_arrival, bent),
         segments=pack.put_all(working, segments),
         decoupled=pack.put_all(working, segments if linked else []),
         condensed=condensed_at,

@@ -10,12 +10,33 @@ N m, of lengths in m.
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from erls.equations import compiled_system as contract
+from erls.maths.calls import caller
+from erls.maths.jit import ENABLED
 from erls.maths.records import Matrix, Stack, Vector, reader, room, table_size
 from erls.maths.so3 import Array
+
+BEND_LINK: Any = None
+CORRECT_TWIST: Any = None
+BENT_FORCES: Any = None
+CORRECT_ARRIVAL: Any = None
+if ENABLED:
+    from numba import types as _t
+
+    _link = (_t.int64, contract.REALS, contract.INTEGERS, contract.REALS)
+    BEND_LINK = _t.void(*_link, contract.REALS)
+    CORRECT_TWIST = _t.void(*_link, contract.REALS, contract.REALS)
+    BENT_FORCES = _t.void(*_link, contract.REALS, contract.REALS, contract.REALS)
+    CORRECT_ARRIVAL = _t.void(*_link, _t.int64)
+
+call_bend_link = caller(BEND_LINK, "erls.equations.ffr.bent:bend_link")
+call_correct_twist = caller(CORRECT_TWIST, "erls.equations.ffr.bent:correct_twist")
+call_bent_forces = caller(BENT_FORCES, "erls.equations.ffr.bent:bent_forces")
+call_correct_arrival = caller(CORRECT_ARRIVAL, "erls.equations.ffr.bent:correct_arrival")
 
 
 class Frames(NamedTuple):
@@ -31,6 +52,9 @@ class Frames(NamedTuple):
         Frames that loops hold, the place of the first `End`, and of the `EndRoom`.
     bent_bodies, bent_states : int
         Places of the first ones; empty records of links without second-order displacements.
+    bend_link, correct_twist, bent_forces, correct_arrival : int
+        Addresses of `erls.equations.ffr.bent`, where a link has second-order displacements; otherwise -1, and nothing
+        of them is compiled.
     segments, decoupled, condensed : int
         Places of the first `Segment` in the links' coordinates and in decoupled ones, and of the first `Condensed`.
     room : int
@@ -49,6 +73,10 @@ class Frames(NamedTuple):
     end_room: int
     bent_bodies: int
     bent_states: int
+    bend_link: int
+    correct_twist: int
+    bent_forces: int
+    correct_arrival: int
     segments: int
     decoupled: int
     condensed: int

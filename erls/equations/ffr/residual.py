@@ -12,15 +12,11 @@ from erls.equations.ffr.inertia import link_forces
 from erls.equations.ffr.motion import move_frames
 from erls.equations.ffr.nodes import from_node_axes
 from erls.equations.ffr.records import (
-    BENT_BODY,
-    BENT_STATE,
     BODY,
     BODY_STATE,
     NODE,
     NODE_STATE,
     Frames,
-    read_bent_body,
-    read_bent_state,
     read_body,
     read_body_state,
     read_frames,
@@ -111,14 +107,10 @@ def residual(
         call_feed_forward(serial.feeds, integers[0], reals, integers, scratch, t)
     move_frames(serial, frames, reals, integers, scratch, t, y, v, a)
     for k in range(serial.links):
-        body = read_body(reals, integers, frames.bodies + k * BODY)
-        state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
-        bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
-        bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
         first, last = modes.first, modes.first + len(modes.stiffness)
         q, rates, accelerations = y[first:last], v[first:last], a[first:last] if len(a) > 0 else a
-        link_forces(frames, body, bent, modes, state, bending, q, rates, accelerations, out[first:last])
+        link_forces(frames, reals, integers, scratch, k, modes, q, rates, accelerations, out[first:last])
     for k in range(serial.links - 1, -1, -1):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         moved = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)

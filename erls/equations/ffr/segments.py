@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from erls.equations.ffr.bent import correct_arrival
 from erls.equations.ffr.inertia import inertia_blocks
 from erls.equations.ffr.motion import place_frames
 from erls.equations.ffr.nodes import node_moves
@@ -23,12 +22,10 @@ from erls.equations.ffr.records import (
     BODY_STATE,
     NODE,
     NODE_STATE,
-    BentBody,
-    BentState,
-    Body,
     BodyState,
     Frames,
     NodeState,
+    call_correct_arrival,
     read_bent_body,
     read_bent_state,
     read_body,
@@ -66,13 +63,11 @@ def fill_segments(
         modes = read_modes(reals, integers, serial.modes + k * MODES)
         inner = read_node(reals, integers, frames.nodes + (2 * k + 1) * NODE)
         inner_state = read_node_state(scratch, integers, frames.node_states + (2 * k + 1) * NODE_STATE)
-        bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
-        bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
         own = read_segment(scratch, integers, frames.segments + k * SEGMENT)
         inertia_blocks(frames, body, state, y[modes.first : modes.first + len(modes.stiffness)])
         _arrival(inner.moves, inner_state, state)
         _reach(serial, frames, k, body.parent, state, own, reals, integers, scratch)
-        _weights(body, bent, bending, state, own, inner.moves)
+        _weights(frames, reals, integers, scratch, k, inner.moves)
 
 
 @part
@@ -136,9 +131,14 @@ def _reach(
 
 @part
 def _weights(
-    body: Body, bent: BentBody, bending: BentState, state: BodyState, own: Segment, floats: Any
+    frames: Frames, reals: Array, integers: IntArray, scratch: Array, k: int, floats: Any
 ) -> None:
-    """I, B, E and F."""
+    """I, B, E and F of link k."""
+    body = read_body(reals, integers, frames.bodies + k * BODY)
+    state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
+    bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
+    bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
+    own = read_segment(scratch, integers, frames.segments + k * SEGMENT)
     e = state.coupling.shape[1]
     if not (floats or body.bent):
         for i in range(6):
@@ -148,7 +148,7 @@ def _weights(
                 own.coupling[i, j] = state.coupling[i, j]
         return
     if body.bent:
-        correct_arrival(bent, bending, state, floats)
+        call_correct_arrival(frames.correct_arrival, k, reals, integers, scratch, floats)
     arrival = bending.arrival if body.bent else state.arrival
     carried = bending.carried if body.bent else state.carried
     for i in range(6):
@@ -175,12 +175,13 @@ def _weights(
 
 
 @part
-def free_segment(body: Body, bent: BentBody, bending: BentState, state: BodyState, own: Segment) -> None:
-    """I, B, E and F over the twist of the floating frame itself."""
+def free_segment(frames: Frames, reals: Array, integers: IntArray, scratch: Array, k: int) -> None:
+    """I, B, E and F of link k over the twist of the floating frame itself."""
+    state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
     for i in range(6):
         for j in range(6):
             state.arrival[i, j] = 1.0 if i == j else 0.0
-    _weights(body, bent, bending, state, own, 0)
+    _weights(frames, reals, integers, scratch, k, 0)
 
 
 @part

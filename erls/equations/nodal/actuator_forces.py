@@ -11,12 +11,26 @@ import math
 
 import numpy as np
 
-from erls.equations.compiled_system import Array
-from erls.equations.nodal.contract import Model, Work
+from erls.equations.compiled_system import Array, IntArray
+from erls.equations.nodal.contract import (
+    ACTING,
+    BLOCKS,
+    ENERGIES,
+    FORCES,
+    KNOT,
+    REMEMBER,
+    Model,
+    Work,
+    read_layout,
+    read_model,
+    read_state,
+    read_work,
+)
 from erls.equations.nodal.joint_forces import frame_in_world, relative
+from erls.equations.nodal.motion import set_twists
 from erls.equations.nodal.rows import outer_product, push, rate_along
 from erls.maths.coefficients import angle_of
-from erls.maths.jit import part
+from erls.maths.jit import kernel, part
 from erls.maths.motions import bracket, pair_minus, transformed, transposed
 from erls.maths.vectors import (
     Rotation,
@@ -32,6 +46,7 @@ from erls.maths.vectors import (
     unit,
     vector,
 )
+from erls.maths.views import vector_at
 
 _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
@@ -116,9 +131,12 @@ def _turning(model: Model, work: Work, k: int, reach: Vector, axes: Rotation) ->
     return first, second, rate, gain + _swing(model, k, reach, axes, work.twist)
 
 
-@part
-def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> None:
-    """Add inertia of rotors less efforts to ``work.force``; coordinates near ``before`` go into ``work.turned``."""
+@kernel(FORCES, counted=False)
+def actuator_forces(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """Add inertia of rotors less efforts to the force in `Work`, which gets the coordinates near those of ``last``."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before, sample = read_state(last, integers, known.state).turned, vector_at(scratch, 0, known.samples)
     for k in range(len(model.actuator_nodes)):
         place, turn, reach, axes = _posed(model, work.poses, k)
         work.turned[k] = _coordinate(model, k, place, turn, before[k])
@@ -132,7 +150,7 @@ def actuator_forces(model: Model, work: Work, before: Array, sample: Array) -> N
 
 
 @part
-def actuator_derivatives(model: Model, work: Work, k: int, block: Array) -> None:
+def _derivatives(model: Model, work: Work, k: int, block: Array) -> None:
     """Mass of the rotor; damping of dampers, friction and gains; stiffness of springs and gains into a block."""
     if not model.actuator_active[k]:
         return
@@ -145,8 +163,18 @@ def actuator_derivatives(model: Model, work: Work, k: int, block: Array) -> None
     outer_product(block, work.rows[0], first, second, stiffness, damping, law[k, 0])
 
 
+@kernel(BLOCKS, counted=False)
+def actuator_derivatives(reals: Array, integers: IntArray, scratch: Array, material: int) -> None:
+    """Those of all actuators, next to what beams, bodies and loads have in `Work.blocks`."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    first = len(model.beam_nodes) + len(model.body_nodes) + len(model.load_nodes)
+    for k in range(len(model.actuator_nodes)):
+        _derivatives(model, work, k, work.blocks[first + k])
+
+
 @part
-def actuator_energy(model: Model, work: Work, k: int) -> tuple[float, float]:
+def _energy(model: Model, work: Work, k: int) -> tuple[float, float]:
     """Of the rotor, and of the spring."""
     _, _, reach, axes = _posed(model, work.poses, k)
     _, _, rate, _ = _turning(model, work, k, reach, axes)
@@ -154,8 +182,19 @@ def actuator_energy(model: Model, work: Work, k: int) -> tuple[float, float]:
     return 0.5 * law[k, 0] * rate * rate, 0.5 * law[k, 1] * (work.turned[k] - law[k, 2]) ** 2
 
 
+@kernel(ENERGIES, counted=False)
+def actuator_energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
+    """Add kinetic energy of rotors, and that of springs in joints."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    for k in range(len(model.actuator_nodes)):
+        kinetic, spring = _energy(model, work, k)
+        out[0] += kinetic
+        out[4] += spring
+
+
 @part
-def acting(model: Model, work: Work, sample: Array, k: int, out: Array) -> None:
+def _acting(model: Model, work: Work, sample: Array, k: int, out: Array) -> None:
     """Of actuator k (10,): coordinate, rate, acceleration, effort, and the wrench on the outer node in its axes."""
     _, _, reach, axes = _posed(model, work.poses, k)
     _, second, rate, gain = _turning(model, work, k, reach, axes)
@@ -168,17 +207,33 @@ def acting(model: Model, work: Work, sample: Array, k: int, out: Array) -> None:
     put(out, 7, scaled(strength, second[1]))
 
 
-@part
-def set_coordinates(model: Model, work: Work, before: Array) -> None:
-    """Coordinates of all actuators near ``before``."""
+@kernel(ACTING, counted=False)
+def in_joints(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
+    """(a, 10) coordinate, rate, acceleration, effort and wrench of each actuator."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    sample = vector_at(scratch, 0, known.samples)
+    set_twists(model, work)
+    for k in range(len(model.actuator_nodes)):
+        _acting(model, work, sample, k, out[k])
+
+
+@kernel(REMEMBER, counted=False)
+def turn_actuators(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """Coordinates at the poses of `Work`, near those of ``last``."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before = read_state(last, integers, known.state).turned
     for k in range(len(model.actuator_nodes)):
         place, turn, _, _ = _posed(model, work.poses, k)
         work.turned[k] = _coordinate(model, k, place, turn, before[k])
 
 
-@part
-def store_coordinates(model: Model, work: Work, out: Array) -> None:
+@kernel(KNOT, counted=False)
+def store_actuators(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
     """Coordinates, rates and accelerations of all actuators at the end of a knot (3, s)."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     first_entry = out.shape[1] - len(model.actuator_nodes)
     for k in range(len(model.actuator_nodes)):
         _, _, reach, axes = _posed(model, work.poses, k)

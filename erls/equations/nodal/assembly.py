@@ -11,7 +11,7 @@ import numpy as np
 from erls.equations.nodal.contract import Model, Work
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import Joint, JointRows
-from erls.equations.nodal.layout import Flat, Functions, lay_out
+from erls.equations.nodal.layout import Flat, Functions, lay_out, used_kinds
 from erls.equations.nodal.model import Kinds, band_order, build_model
 from erls.equations.nodal.nodes import Nodes, numbers_of, poses_of, rows_of
 from erls.equations.nodal.scatter import Scatter, dofs
@@ -37,15 +37,15 @@ _STEPPED = (
 
 
 @cache
-def functions() -> Functions:
-    """Loaded with the first system: not every run is one of nodes."""
+def functions(*kinds: str) -> Functions:
+    """Loaded with the first system, together with modules of these kinds of elements: not every run is one of nodes."""
     own = "erls.equations.nodal"
-    with compiling_beside(*(f"{own}.{name}" for name in ("outputs", "blocks", "matrix", "step"))):
+    with compiling_beside(*(f"{own}.{name}" for name in (*kinds, "outputs", "blocks", "matrix", "step"))):
         from erls.equations.nodal.sums import forces, move, remember
     from erls.equations.nodal.blocks import blocks, conditions, weighted
-    from erls.equations.nodal.outputs import energies, in_joints, knot
+    from erls.equations.nodal.outputs import energies, knot
 
-    return Functions(forces, remember, move, energies, knot, in_joints, conditions, blocks, weighted)
+    return Functions(forces, remember, move, energies, knot, conditions, blocks, weighted)
 
 
 class NodalSystem:
@@ -87,7 +87,7 @@ class NodalSystem:
         self.start = built  # `length_scales` asks for it
         order, self.width = band_order(self.count, pairs, self.rows)
         model = build_model(self.kinds, self.rows, self.local, metre_scales(self), order)
-        self._functions = functions()
+        self._functions = functions(*used_kinds(model))
         self.flat: Flat = lay_out(model, built, self.samples(np.zeros(1)).shape[1], self.width, self._functions)
         self._memory = self.flat.reals, self.flat.integers, self.flat.scratch
         self.model: Model = self.flat.model()
@@ -223,9 +223,12 @@ class NodalSystem:
     def in_joints(self, t: float, q: Nodes, v: Array, a: Array) -> Array:
         """(a, 10) coordinate, rate, acceleration, effort of each actuator, and its wrench on the outer node there."""
         out = np.zeros((len(self.model.actuators), 10))
-        self._state(q, v, a)
-        self._sample(t)
-        self._functions.in_joints(*self._memory, out)
+        if len(out):
+            from erls.equations.nodal.actuator_forces import in_joints  # here: it is compiled
+
+            self._state(q, v, a)
+            self._sample(t)
+            in_joints(*self._memory, out)
         return out
 
     def samples(self, times: Array) -> Array:

@@ -14,10 +14,21 @@ from __future__ import annotations
 
 import math
 
-from erls.equations.compiled_system import Array
-from erls.equations.nodal.contract import Model, Work
+from erls.equations.compiled_system import Array, IntArray
+from erls.equations.nodal.contract import (
+    BLOCKS,
+    ENERGIES,
+    FORCES,
+    REMEMBER,
+    Model,
+    Work,
+    read_layout,
+    read_model,
+    read_state,
+    read_work,
+)
 from erls.maths.coefficients import Three, inverse_coefficient, stumpff, tangent_coefficients
-from erls.maths.jit import part
+from erls.maths.jit import kernel, part
 from erls.maths.motions import (
     bracket,
     change,
@@ -68,7 +79,7 @@ def _section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rot
 
 
 @part
-def bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple[Vector, Vector]:
+def _bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple[Vector, Vector]:
     """d of element e, which goes on past a turn of π, near that in ``before``; also written into ``out``."""
     place, turn = _section(model, poses, e, 0)
     end, end_turn = _section(model, poses, e, 1)
@@ -98,27 +109,6 @@ def _outward(model: Model, e: int, side: int, table: Array) -> Twist:
 def _section_force(model: Model, e: int, u: Vector, psi: Vector) -> Twist:
     built = model.beam_built
     return of_matrix(model.beam_stiffness, e, minus(u, vector(built, e, 0)), minus(psi, vector(built, e, 3)))
-
-
-@part
-def beam_forces(model: Model, work: Work, before: Array) -> None:
-    """Add inertia and internal forces less weight to ``work.force``, from poses, twists and rates there."""
-    out = work.force
-    for e in range(len(model.beam_nodes)):
-        u, psi = bend(model, work.poses, before, work.bent, e)
-        b = inverse_coefficient(dot(psi, psi))
-        push = _section_force(model, e, u, psi)
-        direct = _NONE
-        if model.beam_moving[e]:
-            direct, along = _inertia(model, work, e, u, psi, b)
-            push = pair_plus(push, along)
-        outer = series_transposed(_HALF, b, u, psi, push[0], push[1])
-        inner = pair_plus(direct, pair_minus(cobracket(u, psi, push[0], push[1]), outer))
-        for side in range(2):
-            force = _inward(model, e, side, inner if side == 0 else outer)
-            at = 6 * model.beam_nodes[e, side]
-            add(out, at, force[0])
-            add(out, at + 3, force[1])
 
 
 @part
@@ -158,6 +148,39 @@ def _inertia(model: Model, work: Work, e: int, u: Vector, psi: Vector, b: Three)
     return direct, along
 
 
+@kernel(FORCES, counted=False)
+def beam_forces(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """Add inertia and internal forces less weight to the force in `Work`, from poses, twists and rates there."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before, out = read_state(last, integers, known.state).bent, work.force
+    for e in range(len(model.beam_nodes)):
+        u, psi = _bend(model, work.poses, before, work.bent, e)
+        b = inverse_coefficient(dot(psi, psi))
+        push = _section_force(model, e, u, psi)
+        direct = _NONE
+        if model.beam_moving[e]:
+            direct, along = _inertia(model, work, e, u, psi, b)
+            push = pair_plus(push, along)
+        outer = series_transposed(_HALF, b, u, psi, push[0], push[1])
+        inner = pair_plus(direct, pair_minus(cobracket(u, psi, push[0], push[1]), outer))
+        for side in range(2):
+            force = _inward(model, e, side, inner if side == 0 else outer)
+            at = 6 * model.beam_nodes[e, side]
+            add(out, at, force[0])
+            add(out, at + 3, force[1])
+
+
+@kernel(REMEMBER, counted=False)
+def bend_beams(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """d of all elements at the poses of `Work`, near those of ``last``."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    before = read_state(last, integers, known.state).bent
+    for e in range(len(model.beam_nodes)):
+        _bend(model, work.poses, before, work.bent, e)
+
+
 @part
 def _column(table: Array, j: int) -> Twist:
     return (table[0, j], table[1, j], table[2, j]), (table[3, j], table[4, j], table[5, j])
@@ -187,36 +210,6 @@ def _unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
     if side == 0:
         return moved, _NONE
     return _NONE, moved
-
-
-@part
-def beam_derivatives(model: Model, work: Work, e: int, block: Array, material: int) -> None:
-    """Mass, damping and stiffness of element e at ``work``'s poses, bends and twists into a block of zeros."""
-    stiffness, rows = block[2], work.rows
-    u, psi = vector(work.bent, e, 0), vector(work.bent, e, 3)
-    b = inverse_coefficient(dot(psi, psi))
-    push = _section_force(model, e, u, psi)
-    for j in range(12):
-        c0, c1 = _unit_twist(model, e, j)
-        apart = pair_minus(c1, c0)
-        eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
-        _set_column(rows, j, eta)
-    for j in range(12):
-        eta = _column(rows, j)
-        force = of_matrix(model.beam_stiffness, e, eta[0], eta[1])
-        _add_power(stiffness, rows, j, 1.0, force)
-        if material:
-            continue
-        # derivative of Pᵀ σ at fixed σ as d moves along η
-        outer = change_transposed(_HALF, b, u, psi, eta[0], eta[1], push[0], push[1])
-        inner = pair_minus(cobracket(eta[0], eta[1], push[0], push[1]), outer)
-        for side in range(2):
-            n, m = _inward(model, e, side, inner if side == 0 else outer)
-            for i in range(3):
-                stiffness[6 * side + i, j] += n[i]
-                stiffness[6 * side + 3 + i, j] += m[i]
-    if model.beam_moving[e]:
-        _inertia_derivatives(model, work, e, block, u, psi)
 
 
 @part
@@ -258,7 +251,46 @@ def _inertia_derivatives(model: Model, work: Work, e: int, block: Array, u: Vect
 
 
 @part
-def beam_energy(model: Model, work: Work, e: int) -> tuple[float, float, float]:
+def _derivatives(model: Model, work: Work, e: int, block: Array, material: int) -> None:
+    """Mass, damping and stiffness of element e at ``work``'s poses, bends and twists into a block of zeros."""
+    stiffness, rows = block[2], work.rows
+    u, psi = vector(work.bent, e, 0), vector(work.bent, e, 3)
+    b = inverse_coefficient(dot(psi, psi))
+    push = _section_force(model, e, u, psi)
+    for j in range(12):
+        c0, c1 = _unit_twist(model, e, j)
+        apart = pair_minus(c1, c0)
+        eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
+        _set_column(rows, j, eta)
+    for j in range(12):
+        eta = _column(rows, j)
+        force = of_matrix(model.beam_stiffness, e, eta[0], eta[1])
+        _add_power(stiffness, rows, j, 1.0, force)
+        if material:
+            continue
+        # derivative of Pᵀ σ at fixed σ as d moves along η
+        outer = change_transposed(_HALF, b, u, psi, eta[0], eta[1], push[0], push[1])
+        inner = pair_minus(cobracket(eta[0], eta[1], push[0], push[1]), outer)
+        for side in range(2):
+            n, m = _inward(model, e, side, inner if side == 0 else outer)
+            for i in range(3):
+                stiffness[6 * side + i, j] += n[i]
+                stiffness[6 * side + 3 + i, j] += m[i]
+    if model.beam_moving[e]:
+        _inertia_derivatives(model, work, e, block, u, psi)
+
+
+@kernel(BLOCKS, counted=False)
+def beam_derivatives(reals: Array, integers: IntArray, scratch: Array, material: int) -> None:
+    """Mass, damping and stiffness of all elements, the first ones, into `Work.blocks`."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    for e in range(len(model.beam_nodes)):
+        _derivatives(model, work, e, work.blocks[e], material)
+
+
+@part
+def _energy(model: Model, work: Work, e: int) -> tuple[float, float, float]:
     """Kinetic, elastic and that of gravity of element e."""
     u, psi = vector(work.bent, e, 0), vector(work.bent, e, 3)
     built = model.beam_built
@@ -283,3 +315,15 @@ def beam_energy(model: Model, work: Work, e: int) -> tuple[float, float, float]:
         kinetic += 0.5 * _WEIGHTS[k] * (dot(nu[0], momentum[0]) + dot(nu[1], momentum[1]))
         height += _WEIGHTS[k] * dot(vector(model.gravity, 0, 0), plus(place, times(turn, p)))
     return kinetic, elastic, -model.beam_inertia[e, 0, 0] * height
+
+
+@kernel(ENERGIES, counted=False)
+def beam_energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
+    """Add kinetic and elastic energy and that of gravity."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    for e in range(len(model.beam_nodes)):
+        kinetic, elastic, gravity = _energy(model, work, e)
+        out[0] += kinetic
+        out[1] += elastic
+        out[2] += gravity

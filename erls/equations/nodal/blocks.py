@@ -6,8 +6,6 @@ Velocities as in `erls.equations.nodal.motion`: on R³×SO(3) the chain rule ove
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.nodal.actuator_forces import actuator_derivatives
-from erls.equations.nodal.beam_forces import beam_derivatives
 from erls.equations.nodal.body_forces import body_derivatives, load_derivatives
 from erls.equations.nodal.contract import (
     BLOCKS,
@@ -15,13 +13,15 @@ from erls.equations.nodal.contract import (
     SUMMED,
     Model,
     Work,
+    call_actuator_derivatives,
+    call_beam_derivatives,
+    call_spring_derivatives,
     read_layout,
     read_model,
     read_work,
 )
 from erls.equations.nodal.joint_forces import joint_gradients, joint_stiffness
 from erls.equations.nodal.motion import set_twists
-from erls.equations.nodal.spring_forces import spring_derivatives, winding_derivatives
 from erls.maths.coefficients import stumpff, tangent_coefficients
 from erls.maths.jit import kernel, part
 from erls.maths.motions import series
@@ -68,27 +68,19 @@ def blocks(reals: Array, integers: IntArray, scratch: Array, material: int) -> N
             for i in range(12):
                 for j in range(12):
                     table[e, kind, i, j] = 0.0
-    at = 0
-    for k in range(len(model.beam_nodes)):
-        beam_derivatives(model, work, k, table[at + k], material)
-    at += len(model.beam_nodes)
+    if known.beam_derivatives >= 0:
+        call_beam_derivatives(known.beam_derivatives, reals, integers, scratch, material)
+    at = len(model.beam_nodes)
     for k in range(len(model.body_nodes)):
         body_derivatives(model, work, k, table[at + k])
     at += len(model.body_nodes)
     for k in range(len(model.load_nodes)):
         load_derivatives(model, work, sample, k, table[at + k])
-    at += len(model.load_nodes)
-    for k in range(len(model.actuator_nodes)):
-        actuator_derivatives(model, work, k, table[at + k])
-    at += len(model.actuator_nodes)
-    for k in range(len(model.spring_nodes)):
-        spring_derivatives(
-            model.spring_nodes, model.springs, work.poses, work.twist, work.rows[0], k, table[at + k], material
-        )
-    at += len(model.spring_nodes)
-    for k in range(len(model.winding_nodes)):
-        winding_derivatives(model, work, k, table[at + k], material)
-    at += len(model.winding_nodes)
+    if known.actuator_derivatives >= 0:
+        call_actuator_derivatives(known.actuator_derivatives, reals, integers, scratch, material)
+    if known.spring_derivatives >= 0:
+        call_spring_derivatives(known.spring_derivatives, reals, integers, scratch, material)
+    at = len(model.pairs) - len(model.joint_nodes)
     _conditions(model, work, sample)
     for j in range(len(model.joint_nodes)):
         joint_stiffness(model, work, sample, j, table[at + j])

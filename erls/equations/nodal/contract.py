@@ -180,6 +180,13 @@ class Layout(NamedTuple):
         Tables of `Model`, of `Work` and `Before` in working memory, of `State` in a configuration, of `Factors`.
     forces, remember, knot, blocks, weighted : int
         Addresses of the functions of `erls.equations.nodal.sums`, `outputs` and `blocks`.
+    beam_forces, bend_beams, beam_derivatives, beam_energies : int
+        Those of `beam_forces`; of this and of the next two kinds -1, and nothing of them is compiled, where there are
+        none.
+    actuator_forces, turn_actuators, actuator_derivatives, actuator_energies, store_actuators : int
+        Those of `actuator_forces`.
+    spring_forces, wind_springs, spring_derivatives, spring_energies : int
+        Those of `spring_forces`, for springs along a line and about an axis.
     samples : int
         Numbers that depend on time alone, with which working memory begins.
     reach : float
@@ -196,6 +203,19 @@ class Layout(NamedTuple):
     knot: int
     blocks: int
     weighted: int
+    beam_forces: int
+    bend_beams: int
+    beam_derivatives: int
+    beam_energies: int
+    actuator_forces: int
+    turn_actuators: int
+    actuator_derivatives: int
+    actuator_energies: int
+    store_actuators: int
+    spring_forces: int
+    wind_springs: int
+    spring_derivatives: int
+    spring_energies: int
     samples: int
     reach: float
 
@@ -231,3 +251,16 @@ read_model, read_work, read_state = reader(Model), reader(Work), reader(State)
 read_layout, read_before, read_factors = reader(Layout), reader(Before), reader(Factors)
 call_forces, call_remember, call_knot = caller(FORCES), caller(REMEMBER), caller(KNOT)
 call_blocks, call_weighted = caller(BLOCKS), caller(SUMMED)
+call_beam_forces = caller(FORCES, "erls.equations.nodal.beam_forces:beam_forces")
+call_bend_beams = caller(REMEMBER, "erls.equations.nodal.beam_forces:bend_beams")
+call_beam_derivatives = caller(BLOCKS, "erls.equations.nodal.beam_forces:beam_derivatives")
+call_beam_energies = caller(ENERGIES, "erls.equations.nodal.beam_forces:beam_energies")
+call_actuator_forces = caller(FORCES, "erls.equations.nodal.actuator_forces:actuator_forces")
+call_turn_actuators = caller(REMEMBER, "erls.equations.nodal.actuator_forces:turn_actuators")
+call_actuator_derivatives = caller(BLOCKS, "erls.equations.nodal.actuator_forces:actuator_derivatives")
+call_actuator_energies = caller(ENERGIES, "erls.equations.nodal.actuator_forces:actuator_energies")
+call_store_actuators = caller(KNOT, "erls.equations.nodal.actuator_forces:store_actuators")
+call_spring_forces = caller(FORCES, "erls.equations.nodal.spring_forces:spring_forces")
+call_wind_springs = caller(REMEMBER, "erls.equations.nodal.spring_forces:wind_springs")
+call_spring_derivatives = caller(BLOCKS, "erls.equations.nodal.spring_forces:spring_derivatives")
+call_spring_energies = caller(ENERGIES, "erls.equations.nodal.spring_forces:spring_energies")

@@ -12,7 +12,7 @@ from erls.equations.nodal import contract
 from erls.equations.nodal.contract import Before, Layout, Model, State, Work
 from erls.equations.nodal.model import factor_room, room
 from erls.equations.nodal.nodes import Nodes, numbers_of, rows_of
-from erls.maths.calls import address_of
+from erls.maths.calls import address_for, address_of
 from erls.maths.records import Memory, python_reader
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -28,7 +28,6 @@ class Functions(NamedTuple):
     move: Callable[..., None]
     energies: Callable[..., None]
     knot: Callable[..., None]
-    in_joints: Callable[..., None]
     conditions: Callable[..., None]
     blocks: Callable[..., None]
     weighted: Callable[..., None]
@@ -55,6 +54,16 @@ class Flat:
         return _read_layout(self.reals, self.integers, int(self.integers[-1]))
 
 
+def used_kinds(model: Model) -> list[str]:
+    """Modules of elements that a system has and that are compiled for those alone."""
+    has = {
+        "beam_forces": len(model.beam_nodes),
+        "actuator_forces": len(model.actuator_nodes),
+        "spring_forces": len(model.spring_nodes) + len(model.winding_nodes),
+    }
+    return [name for name, count in has.items() if count]
+
+
 def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Functions) -> Flat:
     """Put a system into flat memory.
 
@@ -70,7 +79,7 @@ def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Fun
     functions : Functions
         What is called by address.
     """
-    integers: list[int] = []
+    integers, used = list[int](), used_kinds(model)
     constants, scratch, factors = Memory(integers), Memory(integers, np.zeros(samples)), Memory(integers)
     state = State(rows_of(start.poses), start.bent, start.turned, start.wound)
     layout = Layout(
@@ -84,6 +93,19 @@ def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Fun
         knot=address_of(functions.knot, contract.KNOT),
         blocks=address_of(functions.blocks, contract.BLOCKS),
         weighted=address_of(functions.weighted, contract.SUMMED),
+        beam_forces=address_for(contract.call_beam_forces, "beam_forces" in used),
+        bend_beams=address_for(contract.call_bend_beams, "beam_forces" in used),
+        beam_derivatives=address_for(contract.call_beam_derivatives, "beam_forces" in used),
+        beam_energies=address_for(contract.call_beam_energies, "beam_forces" in used),
+        actuator_forces=address_for(contract.call_actuator_forces, "actuator_forces" in used),
+        turn_actuators=address_for(contract.call_turn_actuators, "actuator_forces" in used),
+        actuator_derivatives=address_for(contract.call_actuator_derivatives, "actuator_forces" in used),
+        actuator_energies=address_for(contract.call_actuator_energies, "actuator_forces" in used),
+        store_actuators=address_for(contract.call_store_actuators, "actuator_forces" in used),
+        spring_forces=address_for(contract.call_spring_forces, "spring_forces" in used),
+        wind_springs=address_for(contract.call_wind_springs, "spring_forces" in used),
+        spring_derivatives=address_for(contract.call_spring_derivatives, "spring_forces" in used),
+        spring_energies=address_for(contract.call_spring_energies, "spring_forces" in used),
         samples=samples,
         reach=float(model.metres.max(initial=1.0)),
     )

@@ -1,17 +1,23 @@
-"""What reports and runs keep of a state: energies, frames, what acts in joints."""
+"""What reports and runs keep of a state: energies, frames; what acts in joints is in `actuator_forces`."""
 
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.nodal.actuator_forces import acting, actuator_energy, store_coordinates
-from erls.equations.nodal.beam_forces import beam_energy
 from erls.equations.nodal.body_forces import body_energy
-from erls.equations.nodal.contract import ACTING, ENERGIES, KNOT, read_layout, read_model, read_work
+from erls.equations.nodal.contract import (
+    ENERGIES,
+    KNOT,
+    call_actuator_energies,
+    call_beam_energies,
+    call_spring_energies,
+    call_store_actuators,
+    read_layout,
+    read_model,
+    read_work,
+)
 from erls.equations.nodal.motion import set_twists
-from erls.equations.nodal.spring_forces import spring_energy, winding_energy
 from erls.maths.jit import kernel
 from erls.maths.vectors import cross, dot, nine, plus, put, scaled, three, times, vector
-from erls.maths.views import vector_at
 
 
 @kernel(ENERGIES, counted=False)
@@ -22,20 +28,16 @@ def energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> No
     set_twists(model, work)
     for i in range(5):
         out[i] = 0.0
-    for e in range(len(model.beam_nodes)):
-        kinetic, elastic, gravity = beam_energy(model, work, e)
-        out[0] += kinetic
-        out[1] += elastic
-        out[2] += gravity
+    if known.beam_energies >= 0:
+        call_beam_energies(known.beam_energies, reals, integers, scratch, out)
     for k in range(len(model.body_nodes)):
         kinetic, gravity = body_energy(model, work, k)
         out[0] += kinetic
         out[2] += gravity
-    out[3] = spring_energy(model.spring_nodes, model.springs, work.poses) + winding_energy(model.windings, work.wound)
-    for k in range(len(model.actuator_nodes)):
-        kinetic, spring = actuator_energy(model, work, k)
-        out[0] += kinetic
-        out[4] += spring
+    if known.spring_energies >= 0:
+        call_spring_energies(known.spring_energies, reals, integers, scratch, out)
+    if known.actuator_energies >= 0:
+        call_actuator_energies(known.actuator_energies, reals, integers, scratch, out)
 
 
 @kernel(KNOT, counted=False)
@@ -58,15 +60,5 @@ def knot(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
             put(out[1], entry + 3 + 3 * i, cross(row, w))
             second = plus(cross(row, gain), plus(scaled(dot(row, w), w), scaled(-speed, row)))
             put(out[2], entry + 3 + 3 * i, second)
-    store_coordinates(model, work, out)
-
-
-@kernel(ACTING, counted=False)
-def in_joints(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
-    """(a, 10) coordinate, rate, acceleration, effort and wrench of each actuator."""
-    known = read_layout(reals, integers, integers[len(integers) - 1])
-    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
-    sample = vector_at(scratch, 0, known.samples)
-    set_twists(model, work)
-    for k in range(len(model.actuator_nodes)):
-        acting(model, work, sample, k, out[k])
+    if known.store_actuators >= 0:
+        call_store_actuators(known.store_actuators, reals, integers, scratch, out)

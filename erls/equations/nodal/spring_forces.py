@@ -13,10 +13,21 @@ from __future__ import annotations
 import numpy as np
 
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.nodal.contract import Model, Work
+from erls.equations.nodal.contract import (
+    BLOCKS,
+    ENERGIES,
+    FORCES,
+    REMEMBER,
+    Model,
+    Work,
+    read_layout,
+    read_model,
+    read_state,
+    read_work,
+)
 from erls.equations.nodal.rows import outer_product, push, rate_along
 from erls.maths.coefficients import inverse_coefficient
-from erls.maths.jit import part
+from erls.maths.jit import kernel, part
 from erls.maths.rotations import first, logarithm_near, value
 from erls.maths.vectors import (
     Rotation,
@@ -77,7 +88,7 @@ def _tension(
 
 
 @part
-def spring_forces(nodes: IntArray, springs: Array, poses: Array, twist: Array, force: Array) -> None:
+def _pull(nodes: IntArray, springs: Array, poses: Array, twist: Array, force: Array) -> None:
     """Add tensions to ``force``."""
     for k in range(len(nodes)):
         tension, _, _, inner, outer = _tension(nodes, springs, poses, twist, k)
@@ -86,7 +97,7 @@ def spring_forces(nodes: IntArray, springs: Array, poses: Array, twist: Array, f
 
 
 @part
-def spring_derivatives(
+def _line_derivatives(
     nodes: IntArray, springs: Array, poses: Array, twist: Array, line: Array, k: int, block: Array, material: int
 ) -> None:
     """Damping and stiffness of spring k into a block of zeros; ``line`` (12,) is memory."""
@@ -118,7 +129,7 @@ def spring_derivatives(
 
 
 @part
-def spring_energy(nodes: IntArray, springs: Array, poses: Array) -> float:
+def _line_energy(nodes: IntArray, springs: Array, poses: Array) -> float:
     """Of all springs."""
     total = 0.0
     for k in range(len(nodes)):
@@ -136,7 +147,7 @@ def _axes(poses: Array, node: int, frames: Array, k: int, at: int) -> Rotation:
 
 
 @part
-def wind(nodes: IntArray, frames: Array, poses: Array, before: Array, out: Array) -> None:
+def _wind(nodes: IntArray, frames: Array, poses: Array, before: Array, out: Array) -> None:
     """ψ of all torsion springs near those in ``before`` into ``out``."""
     for k in range(len(nodes)):
         turn = back_product(_axes(poses, nodes[k, 0], frames, k, 0), _axes(poses, nodes[k, 1], frames, k, 9))
@@ -161,7 +172,7 @@ def _winding(
 
 
 @part
-def winding_forces(
+def _twist_back(
     nodes: IntArray, frames: Array, laws: Array, poses: Array, wound: Array, twist: Array, force: Array
 ) -> None:
     """Add moments of torsion springs to ``force``."""
@@ -172,7 +183,7 @@ def winding_forces(
 
 
 @part
-def winding_derivatives(model: Model, work: Work, k: int, block: Array, material: int) -> None:
+def _turn_derivatives(model: Model, work: Work, k: int, block: Array, material: int) -> None:
     """Damping and stiffness of torsion spring k into a block of zeros."""
     nodes, frames, laws = model.winding_nodes, model.winding_frames, model.windings
     moment, turn, w, inner, outer = _winding(nodes, frames, laws, work.poses, work.wound, work.twist, k)
@@ -200,10 +211,52 @@ def winding_derivatives(model: Model, work: Work, k: int, block: Array, material
 
 
 @part
-def winding_energy(laws: Array, wound: Array) -> float:
+def _turn_energy(laws: Array, wound: Array) -> float:
     """Of all torsion springs."""
     total = 0.0
     for k in range(len(laws)):
         turned_by = dot(vector(laws, k, 0), vector(wound, k, 0)) - laws[k, 5]
         total += 0.5 * laws[k, 3] * turned_by * turned_by
     return total
+
+
+@kernel(FORCES, counted=False)
+def spring_forces(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """Add tensions and moments to the force in `Work`, which gets turns of torsion springs near those of ``last``."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    nodes, frames, wound = model.winding_nodes, model.winding_frames, read_state(last, integers, known.state).wound
+    _pull(model.spring_nodes, model.springs, work.poses, work.twist, work.force)
+    _wind(nodes, frames, work.poses, wound, work.wound)
+    _twist_back(nodes, frames, model.windings, work.poses, work.wound, work.twist, work.force)
+
+
+@kernel(REMEMBER, counted=False)
+def wind_springs(reals: Array, integers: IntArray, scratch: Array, last: Array) -> None:
+    """Turns of torsion springs at the poses of `Work`, near those of ``last``."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    wound = read_state(last, integers, known.state).wound
+    _wind(model.winding_nodes, model.winding_frames, work.poses, wound, work.wound)
+
+
+@kernel(BLOCKS, counted=False)
+def spring_derivatives(reals: Array, integers: IntArray, scratch: Array, material: int) -> None:
+    """Damping and stiffness of all springs, the last elements, into `Work.blocks`."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    nodes, laws, windings = model.spring_nodes, model.springs, len(model.winding_nodes)
+    first = len(model.pairs) - len(model.joint_nodes) - windings
+    for k in range(len(nodes)):
+        block = work.blocks[first - len(nodes) + k]
+        _line_derivatives(nodes, laws, work.poses, work.twist, work.rows[0], k, block, material)
+    for k in range(windings):
+        _turn_derivatives(model, work, k, work.blocks[first + k], material)
+
+
+@kernel(ENERGIES, counted=False)
+def spring_energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
+    """Energy of all springs."""
+    known = read_layout(reals, integers, integers[len(integers) - 1])
+    model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
+    out[3] = _line_energy(model.spring_nodes, model.springs, work.poses) + _turn_energy(model.windings, work.wound)

@@ -9,9 +9,17 @@ import numpy as np
 
 from erls.equations.serial.decoupled_modes import DecoupledModes
 from erls.equations.serial.ends import End
-from erls.equations.serial.records import FEED, TURN, Joint, JointState, Modes, RigidLink, RigidState
+from erls.equations.serial.records import (
+    Joint,
+    JointState,
+    Modes,
+    RigidLink,
+    RigidState,
+    call_feed_forward,
+    call_turn_by_vector,
+)
 from erls.equations.serial.time_curves import put_curve
-from erls.maths.calls import address_of
+from erls.maths.calls import address_for
 from erls.maths.records import Memory
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -135,16 +143,11 @@ def end_record(link: Link, modes: Array | None, curved: bool, end: LoopEnd) -> E
 
 def addresses(mechanism: Mechanism) -> dict[str, int]:
     """Of the functions that `Serial` names, which are compiled now, where the mechanism needs them."""
-    found = {"feeds": -1, "vectors": -1}
-    if any(joint.drive.feed_forward for joint in mechanism.joints):
-        from erls.equations.serial.feed_forward import feed_forward  # here: few mechanisms need it
-
-        found["feeds"] = address_of(feed_forward, FEED)
-    if mechanism.rotation_vectors:
-        from erls.equations.serial.rotation_vector import turn_by_vector
-
-        found["vectors"] = address_of(turn_by_vector, TURN)
-    return found
+    feeds = any(joint.drive.feed_forward for joint in mechanism.joints)
+    return {
+        "feeds": address_for(call_feed_forward, feeds),
+        "vectors": address_for(call_turn_by_vector, bool(mechanism.rotation_vectors)),
+    }
 
 
 def rigid_links(mechanism: Mechanism, constants: Memory, scratch: Memory) -> tuple[int, int]:

@@ -21,9 +21,18 @@ k = K(q) q̇, derived in `erls.equations.serial.modal_inertia`.
 
 from __future__ import annotations
 
-from erls.equations.erls.paper.bent_records import BentBody, BentState
-from erls.equations.erls.paper.records import BodyState
-from erls.maths.jit import part
+from erls.equations.erls.paper.bent_records import (
+    BENT_BODY,
+    BENT_STATE,
+    OF_LINK,
+    BentBody,
+    BentState,
+    read_bent_body,
+    read_bent_state,
+)
+from erls.equations.erls.paper.records import BODY_STATE, BodyState, Paper, read_body_state, read_paper
+from erls.equations.serial.records import read_serial
+from erls.maths.jit import kernel, part
 from erls.maths.products import (
     add_columns,
     add_product,
@@ -35,10 +44,11 @@ from erls.maths.products import (
 )
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, dot3
+from fe_import.model import IntArray
 
 
 @part
-def fill_bend(bent: BentBody, state: BentState, q: Array) -> None:
+def _fill_bend(bent: BentBody, state: BentState, q: Array) -> None:
     """C, W q, S, ½ qᵀ W q and K."""
     for i in range(6):
         clear(state.coupling[i])
@@ -70,7 +80,7 @@ def _add_block_back(moment: Array, square: Array, x: Array, out: Array) -> None:
 
 
 @part
-def correct_twist(bent: BentBody, state: BentState, body: BodyState) -> None:
+def _correct_twist(bent: BentBody, state: BentState, body: BodyState) -> None:
     """ν + M₀⁻¹ h and its derivative in the place of ν and ν̇."""
     rates, nu, nu_rate = body.velocity[6:], body.velocity[:6], body.acceleration[:6]
     for i in range(6):
@@ -93,7 +103,7 @@ def correct_twist(bent: BentBody, state: BentState, body: BodyState) -> None:
 
 
 @part
-def add_bent_forces(bent: BentBody, state: BentState, body: BodyState) -> None:
+def _add_bent_forces(bent: BentBody, state: BentState, body: BodyState) -> None:
     """Make forces on the corrected twist, and its momentum, those on the link's own twist; add those on q."""
     wrench, modal, omega = body.force[:6], body.force[6:], body.velocity[3:6]
     share, share_rate = state.share, state.share_rate
@@ -117,7 +127,7 @@ def add_bent_forces(bent: BentBody, state: BentState, body: BodyState) -> None:
 
 
 @part
-def subtract_bent_weight(state: BentState, body: BodyState) -> None:
+def _subtract_bent_weight(state: BentState, body: BodyState) -> None:
     """Weight of ½ qᵀ Ψ q, and its potential."""
     clear(state.more)
     for i in range(3):
@@ -128,7 +138,7 @@ def subtract_bent_weight(state: BentState, body: BodyState) -> None:
 
 
 @part
-def bend_mass(bent: BentBody, state: BentState, body: BodyState) -> None:
+def _bend_mass(bent: BentBody, state: BentState, body: BodyState) -> None:
     """Mass matrix of (ν, q̇) from that of the corrected twist: Bᵀ M B, B = [1 + M₀⁻¹ H, M₀⁻¹ C; 0, 1]."""
     change, mass, changed, size = state.change, body.mass, state.changed, body.mass.shape[0]
     clear_matrix(change)
@@ -153,7 +163,7 @@ def bend_mass(bent: BentBody, state: BentState, body: BodyState) -> None:
 
 
 @part
-def add_modal_inertia(bent: BentBody, state: BentState, body: BodyState) -> None:
+def _add_modal_inertia(bent: BentBody, state: BentState, body: BodyState) -> None:
     """Add d/dt ∂T₃/∂q̇ - ∂T₃/∂q."""
     rates, modal = body.velocity[6:], body.force[6:]
     for c in range(bent.warp.shape[0]):
@@ -172,7 +182,7 @@ def add_modal_inertia(bent: BentBody, state: BentState, body: BodyState) -> None
 
 
 @part
-def add_modal_mass(bent: BentBody, state: BentState, mass: Array) -> None:
+def _add_modal_mass(bent: BentBody, state: BentState, mass: Array) -> None:
     """Add the mass matrix of T₃ = ½ q̇ᵀ M₃ q̇ to that of (ν, q̇)."""
     clear_matrix(state.warp_spare)
     add_product(bent.per_modal, state.warp, state.warp_spare)
@@ -182,3 +192,43 @@ def add_modal_mass(bent: BentBody, state: BentState, mass: Array) -> None:
             mass[6 + j, 12 + c] += state.warp[c, j]
             for i in range(state.warp.shape[1]):
                 mass[6 + i, 6 + j] += state.warp[c, i] * state.warp_spare[c, j]
+
+
+@part
+def _paper(reals: Array, integers: IntArray) -> Paper:
+    return read_paper(reals, integers, read_serial(reals, integers, integers[0]).own)
+
+
+@kernel(OF_LINK, counted=False)
+def correct_twist(k: int, reals: Array, integers: IntArray, scratch: Array) -> None:
+    """Corrected twist of link k and its derivative in the place of its own."""
+    paper = _paper(reals, integers)
+    bent = read_bent_body(reals, integers, paper.bent_bodies + k * BENT_BODY)
+    state = read_bent_state(scratch, integers, paper.bent_states + k * BENT_STATE)
+    body = read_body_state(scratch, integers, paper.body_states + k * BODY_STATE)
+    _fill_bend(bent, state, body.q)
+    _correct_twist(bent, state, body)
+
+
+@kernel(OF_LINK, counted=False)
+def bent_forces(k: int, reals: Array, integers: IntArray, scratch: Array) -> None:
+    """Forces on (ν, q̇) of link k from those on its corrected twist; modal inertia; weight of the displacement."""
+    paper = _paper(reals, integers)
+    bent = read_bent_body(reals, integers, paper.bent_bodies + k * BENT_BODY)
+    state = read_bent_state(scratch, integers, paper.bent_states + k * BENT_STATE)
+    body = read_body_state(scratch, integers, paper.body_states + k * BODY_STATE)
+    _add_bent_forces(bent, state, body)
+    _add_modal_inertia(bent, state, body)
+    _subtract_bent_weight(state, body)
+
+
+@kernel(OF_LINK, counted=False)
+def bent_mass(k: int, reals: Array, integers: IntArray, scratch: Array) -> None:
+    """Mass matrix of (ν, q̇) of link k from that of its corrected twist."""
+    paper = _paper(reals, integers)
+    bent = read_bent_body(reals, integers, paper.bent_bodies + k * BENT_BODY)
+    state = read_bent_state(scratch, integers, paper.bent_states + k * BENT_STATE)
+    body = read_body_state(scratch, integers, paper.body_states + k * BODY_STATE)
+    _fill_bend(bent, state, body.q)
+    _bend_mass(bent, state, body)
+    _add_modal_mass(bent, state, body.mass)

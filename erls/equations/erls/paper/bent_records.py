@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
+from erls.equations import compiled_system as contract
+from erls.maths.calls import caller
+from erls.maths.jit import ENABLED
 from erls.maths.records import Matrix, Stack, reader, room, table_size
 from erls.maths.so3 import Array
+
+OF_LINK: Any = None
+if ENABLED:
+    from numba import types as _t
+
+    OF_LINK = _t.void(_t.int64, contract.REALS, contract.INTEGERS, contract.REALS)
+
+call_correct_twist = caller(OF_LINK, "erls.equations.erls.paper.bent:correct_twist")
+call_bent_forces = caller(OF_LINK, "erls.equations.erls.paper.bent:bent_forces")
+call_bent_mass = caller(OF_LINK, "erls.equations.erls.paper.bent:bent_mass")
 
 
 class BentBody(NamedTuple):

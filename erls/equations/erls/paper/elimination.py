@@ -29,11 +29,19 @@ from erls.equations.erls.paper.compatibility_records import (
     read_joint_rows,
     read_row_state,
 )
-from erls.equations.erls.paper.records import BODY, BODY_STATE, Paper, read_body, read_body_state
-from erls.equations.erls.paper.second_order_rows import fill_extra
-from erls.equations.serial.records import Serial
+from erls.equations.erls.paper.records import (
+    BODY,
+    BODY_STATE,
+    ELIMINATE,
+    Paper,
+    call_extra_rows,
+    read_body,
+    read_body_state,
+    read_paper,
+)
+from erls.equations.serial.records import Serial, read_serial
 from erls.maths.dense import backward, cholesky, forward
-from erls.maths.jit import part
+from erls.maths.jit import kernel, part
 from erls.maths.products import (
     add_columns,
     add_product,
@@ -259,9 +267,11 @@ def _gather(
             state.q[6 + i], state.velocity[12 + i] = c.place[first + i], c.rate[first + i]
 
 
-@part
-def eliminate(serial: Serial, paper: Paper, reals: Array, integers: IntArray, scratch: Array) -> int:
+@kernel(ELIMINATE, counted=False)
+def eliminate(reals: Array, integers: IntArray, scratch: Array) -> int:
     """q, q̇ and D, G, n from θ, q_d and their rates; the status of `fill_right_inverse`."""
+    serial = read_serial(reals, integers, integers[0])
+    paper = read_paper(reals, integers, serial.own)
     c, links = read_elimination(scratch, integers, paper.elimination), serial.links
     fill_compatibility(serial, paper, reals, integers, scratch, c)
     status = fill_right_inverse(c)
@@ -275,7 +285,7 @@ def eliminate(serial: Serial, paper: Paper, reals: Array, integers: IntArray, sc
     _relate(serial, paper, reals, integers, c)
     _gather(serial, paper, reals, integers, scratch, c)
     if paper.curved:
-        fill_extra(serial, paper, reals, integers, scratch, c)
+        call_extra_rows(paper.extra_rows, reals, integers, scratch)
         add_rows(c.plus, c.extra, -1.0, c.q_r)
         for r in range(len(c.q_r)):
             for i in range(len(c.extra)):

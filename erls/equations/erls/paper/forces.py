@@ -147,7 +147,7 @@ def subtract_weight(body: Body, state: BodyState) -> None:
     add_rows(body.first_shape, state.q, 1.0, moment)
     add_cross(moment, g, -1.0, state.force[3:6])
     add_columns(body.first_shape, g, -1.0, state.force[6:])
-    state.potential[0] = -dot3(g, moment)
+    state.potential[0] -= dot3(g, moment)
     for i in range(3):  # the frame's place in its own axes
         height = state.world[i] * state.world[9] + state.world[3 + i] * state.world[10]
         state.potential[0] -= body.mass * g[i] * (height + state.world[6 + i] * state.world[11])

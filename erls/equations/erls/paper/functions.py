@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from erls.equations import compiled_system as contract
-from erls.equations.erls.paper.bent import (
-    add_bent_forces,
-    add_modal_inertia,
-    add_modal_mass,
-    bend_mass,
-    correct_twist,
-    fill_bend,
-    subtract_bent_weight,
+from erls.equations.erls.paper.bent_records import (
+    BENT_BODY,
+    call_bent_forces,
+    call_bent_mass,
+    call_correct_twist,
+    read_bent_body,
 )
-from erls.equations.erls.paper.bent_records import BENT_BODY, BENT_STATE, read_bent_body, read_bent_state
 from erls.equations.erls.paper.compatibility_records import ROW_STATE, read_elimination, read_row_state
 from erls.equations.erls.paper.forces import add_inertia_forces, fill_mass, fill_moments, subtract_weight
 from erls.equations.erls.paper.records import (
@@ -52,22 +49,17 @@ def _load_link(paper: Paper, reals: Array, integers: IntArray, scratch: Array, k
     """Inertia less weight of a link on (ν, q̇) into its ``force``."""
     body = read_body(reals, integers, paper.bodies + k * BODY)
     state = read_body_state(scratch, integers, paper.body_states + k * BODY_STATE)
-    bent = read_bent_body(reals, integers, paper.bent_bodies + k * BENT_BODY)
-    bending = read_bent_state(scratch, integers, paper.bent_states + k * BENT_STATE)
-    is_bent = bent.coupling.shape[0] > 0
+    is_bent = read_bent_body(reals, integers, paper.bent_bodies + k * BENT_BODY).coupling.shape[0] > 0
     clear(state.force)
+    state.potential[0] = 0.0
     fill_moments(paper, body, state)
     if is_bent:
-        fill_bend(bent, bending, state.q)
-        correct_twist(bent, bending, state)
+        call_correct_twist(paper.correct_twist, k, reals, integers, scratch)
     add_inertia_forces(paper, body, state)
     if is_bent:
-        add_bent_forces(bent, bending, state)
-        add_modal_inertia(bent, bending, state)
+        call_bent_forces(paper.bent_forces, k, reals, integers, scratch)
     add_force_cross(state.velocity[:6], state.p, state.force[:6])
     subtract_weight(body, state)
-    if is_bent:
-        subtract_bent_weight(bending, state)
 
 
 @part
@@ -75,14 +67,10 @@ def _weigh_link(paper: Paper, reals: Array, integers: IntArray, scratch: Array, 
     """Mass matrix of a link's (ν, q̇) into its ``mass``."""
     body = read_body(reals, integers, paper.bodies + k * BODY)
     state = read_body_state(scratch, integers, paper.body_states + k * BODY_STATE)
-    bent = read_bent_body(reals, integers, paper.bent_bodies + k * BENT_BODY)
     fill_moments(paper, body, state)
     fill_mass(paper, body, state)
-    if bent.coupling.shape[0] > 0:
-        bending = read_bent_state(scratch, integers, paper.bent_states + k * BENT_STATE)
-        fill_bend(bent, bending, state.q)
-        bend_mass(bent, bending, state)
-        add_modal_mass(bent, bending, state.mass)
+    if read_bent_body(reals, integers, paper.bent_bodies + k * BENT_BODY).coupling.shape[0] > 0:
+        call_bent_mass(paper.bent_mass, k, reals, integers, scratch)
 
 
 @part

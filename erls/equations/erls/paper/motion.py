@@ -17,8 +17,16 @@ from erls.equations.erls.paper.compatibility_records import (
     read_joint_rows,
     read_row_state,
 )
-from erls.equations.erls.paper.elimination import eliminate
-from erls.equations.erls.paper.records import BODY, BODY_STATE, BodyState, Paper, read_body, read_body_state, read_paper
+from erls.equations.erls.paper.records import (
+    BODY,
+    BODY_STATE,
+    BodyState,
+    Paper,
+    call_eliminate,
+    read_body,
+    read_body_state,
+    read_paper,
+)
 from erls.equations.serial.joints import move_joint
 from erls.equations.serial.records import JOINT, JOINT_STATE, Serial, read_joint, read_joint_state, read_serial
 from erls.maths.jit import kernel, part
@@ -129,7 +137,7 @@ def move(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v
         c.place[links + i], c.rate[links + i], c.acceleration[links + i] = y[at], v[at], 0.0
         if len(a) > 0:
             c.acceleration[links + i] = a[at]
-    status = eliminate(serial, paper, reals, integers, scratch)
+    status: int = call_eliminate(paper.eliminate, reals, integers, scratch)
     for k in range(links):
         _move_link(serial, paper, reals, integers, scratch, c, k)
     for k in range(links):

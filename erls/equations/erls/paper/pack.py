@@ -6,9 +6,15 @@ import numpy as np
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import CompiledSystem, acceleration_in, function_in
-from erls.equations.erls.paper.bent_records import BentBody, bent_state
+from erls.equations.erls.paper.bent_records import (
+    BentBody,
+    bent_state,
+    call_bent_forces,
+    call_bent_mass,
+    call_correct_twist,
+)
 from erls.equations.erls.paper.compatibility_records import Elimination, JointRows, RowState
-from erls.equations.erls.paper.records import Balance, Body, BodyState, Paper
+from erls.equations.erls.paper.records import Balance, Body, BodyState, Paper, call_eliminate, call_extra_rows
 from erls.equations.serial.ends import end_state
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.pack import (
@@ -24,7 +30,7 @@ from erls.equations.serial.pack import (
 from erls.equations.serial.records import Joint, Modes, Serial
 from erls.errors import Cause, SceneError
 from erls.maths.beside import compiling_beside
-from erls.maths.calls import address_of
+from erls.maths.calls import address_for, address_of
 from erls.maths.records import Memory, room
 from erls.maths.se3 import inverse, twist_cross
 from erls.maths.so3 import Array
@@ -171,7 +177,7 @@ def _bent_body(mechanism: Mechanism, link: Link, curved: bool) -> BentBody:
 
 def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
     """The functions of a chain in either gauge, with dense factors."""
-    with compiling_beside("erls.equations.erls.paper.motion"):
+    with compiling_beside("erls.equations.erls.paper.elimination", "erls.equations.erls.paper.motion"):
         from erls.equations.erls.paper import functions  # here: it is compiled
     from erls.equations.erls.paper.motion import move
 
@@ -186,6 +192,7 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
     rigid, rigid_states = rigid_links(mechanism, constants, working)
     rows, bodies = joint_rows(mechanism, gauge, curved), _bodies(mechanism)
     bent = [_bent_body(mechanism, link, curved) for link in mechanism.links]
+    is_bent = any(len(body.coupling) > 0 for body in bent)
     size, count = links + elastic, sum(row.kept for row in rows)
     counts = np.repeat([float(not link.intermediate) for link in mechanism.links], 6)
     weighted = 0 if counts.all() or count == 6 * links else 6 * links  # a square C_r leaves nothing to choose
@@ -202,6 +209,9 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
         bent_states=put_all(
             working, [bent_state(b.coupling.shape[1], len(b.coupling) > 0, len(b.warp) > 0) for b in bent]
         ),
+        correct_twist=address_for(call_correct_twist, is_bent),
+        bent_forces=address_for(call_bent_forces, is_bent),
+        bent_mass=address_for(call_bent_mass, is_bent),
         elimination=working.put(
             room(Elimination, L=links, r=6 * links, v=count, d=elastic, z=size, h=weighted)._replace(counts=counts)
         ),
@@ -209,6 +219,8 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
         move=address_of(move, contract.ACCELERATION),
         residual=address_of(functions.residual, contract.RESIDUAL),
         mass_matrix=address_of(functions.mass_matrix, contract.MASS_MATRIX),
+        eliminate=address_for(call_eliminate),
+        extra_rows=address_for(call_extra_rows, curved),
         end_count=len(ends),
         ends=put_all(constants, [end_record(mechanism.links[k], None, curved, end) for k, end in ends]),
         end_states=put_all(working, [end_state(6 + mechanism.links[k].elastic_modes) for k, _ in ends]),

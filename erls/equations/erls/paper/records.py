@@ -6,10 +6,24 @@ Sizes as in `erls.equations.erls.paper.compatibility_records`; f independent coo
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
+from erls.equations import compiled_system as contract
+from erls.maths.calls import caller
+from erls.maths.jit import ENABLED
 from erls.maths.records import Matrix, Stack, Vector, reader, table_size
 from erls.maths.so3 import Array
+
+ELIMINATE: Any = None
+EXTRA_ROWS: Any = None
+if ENABLED:
+    from numba import types as _t
+
+    _memory = contract.REALS, contract.INTEGERS, contract.REALS
+    ELIMINATE, EXTRA_ROWS = _t.int64(*_memory), _t.void(*_memory)
+
+call_eliminate = caller(ELIMINATE, "erls.equations.erls.paper.elimination:eliminate")
+call_extra_rows = caller(EXTRA_ROWS, "erls.equations.erls.paper.second_order_rows:extra_rows")
 
 
 class Paper(NamedTuple):
@@ -21,10 +35,15 @@ class Paper(NamedTuple):
         v, d, and the number of joints that are not prescribed.
     joint_rows, row_states, bodies, body_states, bent_bodies, bent_states : int
         Places of the first ones.
+    correct_twist, bent_forces, bent_mass : int
+        Addresses of `erls.equations.erls.paper.bent`, where a link has second-order displacements; otherwise -1, and
+        nothing of them is compiled.
     elimination, balance : int
         Places of `Elimination` and `Balance`.
-    move, residual, mass_matrix : int
+    move, eliminate, residual, mass_matrix : int
         Addresses of the functions: what calls them is compiled without them.
+    extra_rows : int
+        Address of `erls.equations.erls.paper.second_order_rows`, where compatibility is of second order; otherwise -1.
     end_count, ends, end_states : int
         Frames that loops hold (`erls.equations.serial.ends`), and places of the first ones.
     curved : int
@@ -40,11 +59,16 @@ class Paper(NamedTuple):
     body_states: int
     bent_bodies: int
     bent_states: int
+    correct_twist: int
+    bent_forces: int
+    bent_mass: int
     elimination: int
     balance: int
     move: int
+    eliminate: int
     residual: int
     mass_matrix: int
+    extra_rows: int
     end_count: int
     ends: int
     end_states: int

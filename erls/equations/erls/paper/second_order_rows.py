@@ -27,15 +27,15 @@ from typing import Any
 from erls.equations.erls.paper.compatibility_records import (
     JOINT_ROWS,
     ROW_STATE,
-    Elimination,
     JointRows,
     RowState,
+    read_elimination,
     read_joint_rows,
     read_row_state,
 )
-from erls.equations.erls.paper.records import BODY_STATE, Paper, read_body_state
-from erls.equations.serial.records import Serial
-from erls.maths.jit import part
+from erls.equations.erls.paper.records import BODY_STATE, EXTRA_ROWS, read_body_state, read_paper
+from erls.equations.serial.records import read_serial
+from erls.maths.jit import kernel, part
 from erls.maths.products import add_rows, add_scaled_product, clear, clear_matrix, dot
 from erls.maths.so3 import Array
 from erls.maths.vectors import Vector, add, cross, minus, plus, scaled, three
@@ -165,10 +165,20 @@ def _add_joint(
 
 
 @part
-def fill_extra(
-    serial: Serial, paper: Paper, reals: Array, integers: IntArray, scratch: Array, c: Elimination
-) -> None:
+def _add_back(moves: Array, slope: Array, row: Array) -> None:
+    """Add a derivative by q of a link, as one over (θ, q_d)."""
+    for i in range(len(slope)):
+        weight, along = slope[i], moves[6 + i]
+        for j in range(len(row)):
+            row[j] += weight * along[j]
+
+
+@kernel(EXTRA_ROWS, counted=False)
+def extra_rows(reals: Array, integers: IntArray, scratch: Array) -> None:
     """e of all rows, its derivatives over (θ, q_d), and ë at θ̈ = 0, q̈_d = 0."""
+    serial = read_serial(reals, integers, integers[0])
+    paper = read_paper(reals, integers, serial.own)
+    c = read_elimination(scratch, integers, paper.elimination)
     for k in range(serial.links):
         rows = read_joint_rows(reals, integers, paper.joint_rows + k * JOINT_ROWS)
         state = read_row_state(scratch, integers, paper.row_states + k * ROW_STATE)
@@ -203,12 +213,3 @@ def fill_extra(
                 before = read_body_state(scratch, integers, paper.body_states + rows.parent * BODY_STATE)
                 _add_back(before.moves, state.extra_previous[i], row)
             at += 1
-
-
-@part
-def _add_back(moves: Array, slope: Array, row: Array) -> None:
-    """Add a derivative by q of a link, as one over (θ, q_d)."""
-    for i in range(len(slope)):
-        weight, along = slope[i], moves[6 + i]
-        for j in range(len(row)):
-            row[j] += weight * along[j]
