@@ -5,8 +5,9 @@ Rules for adding a kind of element:
 1. A file with its record and one class that holds all elements of the kind as arrays: ``nodes`` (e, 1) or (e, 2), −1
    for the ground, and ``breakpoints``. Fields for the arrays in `erls.equations.nodal.contract.Model`; lines that fill
    them in `erls.equations.nodal.model`.
-2. A file of functions on those records: forces, derivatives, energy, called by `erls.equations.nodal.sums` and
-   `erls.equations.nodal.blocks`. They serve real and complex numbers alike.
+2. A file of functions on those records, kernels that add forces, derivatives and energy of all elements of the kind:
+   `erls.equations.nodal.sums`, `blocks` and `outputs` call them by address (`erls.equations.nodal.contract.Layout`), so
+   that nothing of them is compiled for a system without such elements. They serve real and complex numbers alike.
 3. Forces, velocities and increments are twists and wrenches in the axes of each node.
 4. Forces depend on relative poses of nodes only, gravity aside: rigid motions leave them at rounding level.
 5. Derivatives are exact for internal forces and loads, and for gyroscopic forces of rigid bodies; a row in the tables
