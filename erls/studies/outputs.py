@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.formulation import State
+from erls.equations.serial.state_series import StateSeries, accelerations, reaction_series, state_series
 from erls.integrate.base import hermite
 from erls.maths.so3 import Array
 from erls.run.chain.places import node_positions
@@ -78,18 +79,13 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
     formulation, s = run.formulation, run.solution
     t = np.clip(np.asarray(times, dtype=float), s.t[0], s.t[-1])
     y, v = hermite(s.t, s.y, s.v, s.a, t)
-    states, accelerated, reactions, energies = [], [], [], []
-    for at, q, rate in zip(t.tolist(), y, v, strict=True):
-        a = formulation.acceleration(at, q, rate)
-        nudges = (-_NUDGE, 0.0, _NUDGE)  # of the time, too: prescribed joints follow it
-        parabola = [formulation.state(at + h, q + h * rate + h**2 / 2 * a, rate + h * a) for h in nudges]
-        places = np.array([_points(run, state) for state in parabola])
-        states.append(parabola[1])
-        accelerated.append((places[0] - 2 * places[1] + places[2]) / _NUDGE**2)
-        reactions.append(formulation.reactions(at, q, rate))
-        energies.append(formulation.energy(at, q, rate).total)
-    places = np.array([_points(run, state) for state in states])
-    acceleration = np.array(accelerated)
+    a = accelerations(formulation, t, y, v)
+    nudges = (-_NUDGE, 0.0, _NUDGE)  # of the time, too: prescribed joints follow it
+    parabola = [state_series(formulation, t + h, y + h * v + h**2 / 2 * a, v + h * a) for h in nudges]
+    before, places, after = (_points(run, series) for series in parabola)
+    acceleration, states = (before - 2 * places + after) / _NUDGE**2, parabola[1]
+    reactions = reaction_series(formulation, t, y, v, a)
+    energies = [formulation.energy(*at).total for at in zip(t.tolist(), y, v, strict=True)]
     joints = run.joint_names
     numbers = {name: run.link_number(name) for name in run.link_names}
     models = {name: formulation.mechanism.links[k].model for name, k in numbers.items()}
@@ -97,17 +93,17 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
         times=t,
         points={name: places[:, k] for k, name in enumerate(run.point_names)},
         accelerations={name: acceleration[:, k] for k, name in enumerate(run.point_names)},
-        angles={name: np.array([x.angles[k] for x in states]) for k, name in enumerate(joints)},
-        coordinates={name: np.array([x.coordinates[k] for x in states]) for k, name in enumerate(joints)},
-        forces={name: np.array([r[k].force for r in reactions]) for k, name in enumerate(joints)},
-        moments={name: np.array([r[k].moment for r in reactions]) for k, name in enumerate(joints)},
-        efforts={name: np.array([r[k].effort for r in reactions]) for k, name in enumerate(joints)},
+        angles={name: states.angles[:, k] for k, name in enumerate(joints)},
+        coordinates={name: states.coordinates[:, k] for k, name in enumerate(joints)},
+        forces={name: reactions.force[:, k] for k, name in enumerate(joints)},
+        moments={name: reactions.moment[:, k] for k, name in enumerate(joints)},
+        efforts={name: reactions.effort[:, k] for k, name in enumerate(joints)},
         energy=np.array(energies),
         conservative=run.conservative,
-        deflection=max((_deflection(run, state) for state in states[:: max(1, len(states) // 100)]), default=0.0),
+        deflection=max((_deflection(run, state) for state in states.states()[:: max(1, len(t) // 100)]), default=0.0),
         size=max(float(np.linalg.norm(np.ptp(m.nodes, axis=0))) for m in models.values()),
         mode_energy={
-            name: _mode_energy(np.array([x.modal[k][6:] for x in states]), m.frequencies_hz[6:])
+            name: _mode_energy(states.modal[k][:, 6:], m.frequencies_hz[6:])
             for (name, m), k in zip(models.items(), numbers.values(), strict=True)
         },
         mode_kinds={name: m.kinds[6:] for name, m in models.items()},
@@ -116,10 +112,10 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
     )
 
 
-def _points(run: ChainRun, state: State) -> Array:
-    """(p, 3) places of all named points."""
+def _points(run: ChainRun, states: StateSeries) -> Array:
+    """(k, p, 3) places of all named points."""
     count = len(run.point_names)
-    return np.array([run.point_position(state, k) for k in range(count)]).reshape(count, 3)
+    return np.array([run.point_position(states, k) for k in range(count)]).reshape(count, -1, 3).swapaxes(0, 1)
 
 
 def _deflection(run: ChainRun, state: State) -> float:

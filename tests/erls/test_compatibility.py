@@ -82,7 +82,7 @@ def test_links_stay_together(chain: Mechanism) -> None:
         joint = frames[k] @ inverse(chain.joints[k].after)
         moved = []
         for link, node, number in ((inner, chain.joints[k].seat, below), (outer, outer.inboard, k)):
-            frame, q = frames[number], dense.link(number).q
+            frame, q = frames[number], dense.links[number].q
             shift, turn = (frame[:3, :3] @ (s @ q) for s in link.model.node_shape(node.node))
             arm = joint[:3, 3] - (frame[:3, :3] @ node.position + frame[:3, 3])
             moved.append(np.concatenate([shift + np.cross(turn, arm), turn]))

@@ -131,12 +131,15 @@ class Erls(SerialFormulation):
         energy(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), out)
         return Energy(*out.tolist())
 
-    def borne(self, k: int) -> tuple[Array, Array]:
-        """What a residual left; see `SerialFormulation.borne`."""
-        system = self.complete
-        places = _see_serial(system.reals, system.integers, int(system.integers[0])).joint_states
-        joint = _see_joint(system.scratch, system.integers, places + k * JOINT_STATE)
-        return self._links(system)[k].wrench, joint.forces
+    @cached_property
+    def borne(self) -> list[tuple[Array, Array, Array]]:
+        """What a residual leaves; see `SerialFormulation.borne`."""
+        system, result = self.complete, []
+        first = _see_serial(system.reals, system.integers, int(system.integers[0])).joint_states
+        for k, link in enumerate(self._links(system)):
+            forces = _see_joint(system.scratch, system.integers, first + k * JOINT_STATE).forces
+            result.append((link.wrench, forces[:1], forces[1:]))
+        return result
 
     @property
     def kind(self) -> dict[str, Any]:

@@ -155,12 +155,15 @@ class Ffr(SerialFormulation):
         places = [frames.body_states + k * BODY_STATE for k in range(self.joints)]
         return [_read_body_state(system.scratch, system.integers, place) for place in places]
 
-    def borne(self, k: int) -> tuple[Array, Array]:
-        """What a residual left; see `SerialFormulation.borne`."""
-        system = self.complete
-        serial = _read_serial(system.reals, system.integers, int(system.integers[0]))
-        place = serial.joint_states + k * JOINT_STATE
-        return self._bodies(system)[k].wrench, _read_joint_state(system.scratch, system.integers, place).forces
+    @cached_property
+    def borne(self) -> list[tuple[Array, Array, Array]]:
+        """What a residual leaves; see `SerialFormulation.borne`."""
+        system, result = self.complete, []
+        first = _read_serial(system.reals, system.integers, int(system.integers[0])).joint_states
+        for k, body in enumerate(self._bodies(system)):
+            forces = _read_joint_state(system.scratch, system.integers, first + k * JOINT_STATE).forces
+            result.append((body.wrench, forces[:1], forces[1:]))
+        return result
 
     @property
     def kind(self) -> dict[str, Any]:

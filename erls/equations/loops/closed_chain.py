@@ -19,12 +19,19 @@ import scipy.linalg as la
 
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
 from erls.equations.loops.failures import comes_apart, locks, warnings_of
-from erls.equations.loops.rows import Closure, about, applied
+from erls.equations.loops.rows import Closure, applied
 from erls.equations.loops.start import Start, find_start, start_velocity
 from erls.equations.loops.static import closed_equilibrium
 from erls.equations.loops.tied import OPEN, Tied
+from erls.equations.serial.state_series import (
+    ReactionSeries,
+    StateSeries,
+    inboard_place,
+    reaction_series,
+    state_series,
+)
 from erls.errors import SimulationError
-from erls.maths.so3 import Array
+from erls.maths.so3 import Array, cross_all
 from fe_import.model import IntArray
 
 if TYPE_CHECKING:
@@ -198,6 +205,16 @@ class ClosedChain(Tied):
         """Poses, modal coordinates and joint angles."""
         return self.bare.state(t, *self.closed(t, y, v))
 
+    def _closed_at(self, t: Array, y: Array, v: Array) -> tuple[Array, Array]:
+        """`closed` at times (k,)."""
+        found = np.array([self.closed(*at) for at in zip(t.tolist(), y, v, strict=True)])
+        found = found.reshape(len(t), 2, y.shape[1])
+        return found[:, 0], found[:, 1]
+
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries:
+        """The same at times (k,)."""
+        return state_series(self.bare, t, *self._closed_at(t, y, v))
+
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies, with those of springs and rotors in closing joints."""
         y, v = self.closed(t, y, v)
@@ -242,27 +259,35 @@ class ClosedChain(Tied):
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Reactions in the joints of the chain: what the links from there outward need beside what loops give."""
-        y, v = self.closed(t, y, v)
-        a, multipliers, found = self.accelerations(t, y, v)
-        state, links = self.bare.state(t, y, v), self.mechanism.links
-        nodes: list[Array] = []
-        for link, world, modal in zip(links, state.poses, state.modal, strict=True):
-            local = link.inboard.position + link.model.node_shape(link.inboard.node)[0] @ modal
-            nodes.append(world[:3, :3] @ local + world[:3, 3])
-        result = self.bare.reactions_at(t, y, v, a)
-        wrenches = self._wrenches(a, multipliers, found)
-        for loop, outer, wrench in zip(self.mechanism.loops, found.outer, wrenches, strict=True):
-            given = applied(outer, wrench)
+        return self.reaction_series(np.array([t]), y[None], v[None]).reactions(0)
+
+    def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
+        """The same at times (k,); accelerations, which go with the loops' forces, are found here."""
+        y, v = self._closed_at(t, y, v)
+        loops, links = self.mechanism.loops, self.mechanism.links
+        found, loads = np.empty((len(t), self.size)), np.empty((len(t), len(links)))
+        given: list[list[LoopForce]] = []
+        for i, at in enumerate(t.tolist()):
+            found[i], multipliers, closure = self.accelerations(at, y[i], v[i])
+            wrenches = self._wrenches(found[i], multipliers, closure)
+            given.append([applied(outer, wrench) for outer, wrench in zip(closure.outer, wrenches, strict=True)])
+            loads[i] = -(np.concatenate(closure.moves).T @ np.concatenate(wrenches))[: len(links)]
+        result, states = reaction_series(self.bare, t, y, v, found), state_series(self.bare, t, y, v)
+        for number, loop in enumerate(loops):
+            force, moment, place = (
+                np.array([getattr(every[number], what) for every in given]).reshape(-1, 3)
+                for what in ("force", "moment", "place")
+            )
             for end, sign in ((loop.outer, 1.0), (loop.inner, -1.0)):
                 for k in range(0 if end.link is None else end.link + 1):
-                    force, moment = about(given, nodes[k])
-                    old = result[k]
-                    result[k] = replace(old, force=old.force - sign * force, moment=old.moment - sign * moment)
-        loads = -np.concatenate(found.moves).T @ np.concatenate(wrenches)
-        return [
-            replace(r, effort=r.effort + float(loads[k])) if self.mechanism.joints[k].drive.prescribed else r
-            for k, r in enumerate(result)
-        ]
+                    local, pose = inboard_place(links[k], states.modal[k]), states.poses[k]
+                    node = np.einsum("tij,tj->ti", pose[:, :3, :3], local) + pose[:, :3, 3]
+                    result.force[:, k] -= sign * force
+                    result.moment[:, k] -= sign * (moment + cross_all(place - node, force))
+        for k, joint in enumerate(self.mechanism.joints):
+            if joint.drive.prescribed:
+                result.effort[:, k] += loads[:, k]
+        return result
 
     def describe(self) -> dict[str, Any]:
         """Names and sizes for reports."""

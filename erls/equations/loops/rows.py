@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.equations.formulation import LoopForce
-from erls.maths.so3 import Array, cross
+from erls.maths.so3 import Array
 from erls.mechanism.joint_types import JOINT_TYPES, Condition
 from erls.mechanism.loops import Loop
 
@@ -108,8 +108,3 @@ class LoopRows:
 def applied(outer: Array, wrench: Array) -> LoopForce:
     """A wrench (6,) in the axes of an outer frame, at its pose (4, 4), as a force in the world."""
     return LoopForce(outer[:3, :3] @ wrench[:3], outer[:3, :3] @ wrench[3:], outer[:3, 3])
-
-
-def about(force: LoopForce, place: Array) -> tuple[Array, Array]:
-    """Force and moment about another place (3,)."""
-    return force.force, force.moment + cross(force.place - place, force.force)

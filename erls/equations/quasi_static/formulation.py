@@ -34,7 +34,7 @@ import numpy as np
 
 from erls.equations.formulation import Energy, Reaction, State, TreeFormulation
 from erls.equations.quasi_static.static_modes import StaticModes, static_modes
-from erls.equations.serial.state_series import StateSeries, state_series
+from erls.equations.serial.state_series import ReactionSeries, StateSeries, reaction_series, state_series
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -295,10 +295,18 @@ class QuasiStatic:
 
     def series(self, t: Array, y: Array, v: Array) -> StateSeries:
         """The same at times (k,), with coordinates and rates (k, s)."""
-        found = np.zeros((2, len(t), self.inner.size))
+        return state_series(self.inner, t, *self._all_modes_at(t, y, v)[:2])
+
+    def _all_modes_at(self, t: Array, y: Array, v: Array) -> Array:
+        """(3, k, n) coordinates, rates and accelerations of all modes at times (k,)."""
+        found = np.zeros((3, len(t), self.inner.size))
         for k, at in enumerate(t.tolist()):
-            found[:, k] = self.all_modes(at, y[k], v[k], self._accelerated(at, y[k], v[k]))[:2]
-        return state_series(self.inner, t, found[0], found[1])
+            found[:, k] = self.all_modes(at, y[k], v[k], self._accelerated(at, y[k], v[k]))
+        return found
+
+    def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
+        """Joint reactions at times (k,), with all modes under load and their accelerations."""
+        return reaction_series(self.inner, t, *self._all_modes_at(t, y, v))
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies, with those of the static deflection."""
@@ -306,7 +314,7 @@ class QuasiStatic:
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions, with all modes under load."""
-        return self.inner.reactions_at(t, *self.all_modes(t, y, v, self._accelerated(t, y, v)))
+        return self.reaction_series(np.array([t]), y[None], v[None]).reactions(0)
 
     def describe(self) -> dict[str, Any]:
         """Names and sizes for reports."""

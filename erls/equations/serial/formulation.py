@@ -7,6 +7,7 @@ follow from time.
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,9 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.equations.serial.singular import singular_mass
+from erls.equations.serial.state_series import ReactionSeries, accelerations, inboard_place, state_series
 from erls.maths.se3 import pose
-from erls.maths.so3 import Array, cross
+from erls.maths.so3 import Array, cross_all
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.loops import loop_ends
 from erls.mechanism.thermal import elastic_rest
@@ -137,24 +139,35 @@ class SerialFormulation(TreeFormulation):
         """The equations with wrenches that are complete in all components, for reactions."""
         return self.compiled
 
+    @cached_property
     @abstractmethod
-    def borne(self, k: int) -> tuple[Array, Array]:
-        """What a residual of `complete` left of link ``k``: the wrench (6,) on its frame of all that it bears, itself
-        included, and the forces (2,) along its joint, of `erls.equations.serial.records.JointState`.
+    def borne(self) -> list[tuple[Array, Array, Array]]:
+        """What a residual of `complete` leaves of each link: the wrench (6,) on its frame of all that it bears, itself
+        included; the force (1,) along its joint, and what of it (1,) drive, spring, damper and friction give.
         """
+
+    def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
+        """Joint reactions at times (k,) that give accelerations (k, n), those of the equations of motion unless given.
+        """
+        a = accelerations(self, t, y, v) if a is None else a
+        states, count = state_series(self, t, y, v), len(self.mechanism.joints)
+        wrenches, along = np.empty((len(t), count, 6)), np.empty((2, len(t), count))
+        for i, at in enumerate(t.tolist()):
+            residual(self.complete, at, y[i], v[i], a[i])
+            for k, (wrench, whole, given) in enumerate(self.borne):
+                wrenches[i, k], along[0, i, k], along[1, i, k] = wrench, whole[0], given[0]
+        force, moment = np.empty((len(t), count, 3)), np.empty((len(t), count, 3))
+        prescribed = np.array([joint.drive.prescribed for joint in self.mechanism.joints], dtype=bool)
+        for k, link in enumerate(self.mechanism.links):
+            place = inboard_place(link, states.modal[k])
+            turn, push = states.poses[k][:, :3, :3], wrenches[:, k, :3]
+            force[:, k] = np.einsum("tij,tj->ti", turn, push)
+            moment[:, k] = np.einsum("tij,tj->ti", turn, wrenches[:, k, 3:] - cross_all(place, push))
+        return ReactionSeries(force, moment, np.where(prescribed, along[0], along[1]))
 
     def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
         """Joint reactions that give these accelerations."""
-        state = self.state(t, y, v)
-        residual(self.complete, t, y, v, a)
-        result: list[Reaction] = []
-        for k, (joint, link) in enumerate(zip(self.mechanism.joints, self.mechanism.links, strict=True)):
-            wrench, forces = self.borne(k)
-            place = link.inboard.position + link.model.node_shape(link.inboard.node)[0] @ state.modal[k]
-            turn, moment = state.poses[k][:3, :3], wrench[3:] - cross(place, wrench[:3])
-            effort = forces[0] if joint.drive.prescribed else forces[1]
-            result.append(Reaction(turn @ wrench[:3], turn @ moment, float(effort)))
-        return result
+        return self.reaction_series(np.array([t]), y[None], v[None], a[None]).reactions(0)
 
     @property
     @abstractmethod

@@ -1,4 +1,6 @@
-"""The mechanism at many times at once, as arrays: what looks along a whole run needs no `State` of every instant."""
+"""The mechanism at many times at once, as arrays: what looks along a whole run needs no `State` or `Reaction` of every
+instant.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +9,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from erls.equations.formulation import Formulation, State
+from erls.equations.formulation import Formulation, Reaction, State
 from erls.maths.so3 import Array
+from erls.mechanism.links import Link
 
 
 @dataclass(frozen=True)
@@ -76,4 +79,66 @@ def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> Stat
         angles=np.array([s.angles for s in states]),
         rates=np.array([s.rates for s in states]),
         nodes=places if any(s.nodes is not None for s in states) else None,
+    )
+
+
+@dataclass(frozen=True)
+class ReactionSeries:
+    """Joint reactions at k times, as in `Reaction`.
+
+    Attributes
+    ----------
+    force, moment : (k, n, 3) arrays
+    effort : (k, n) array
+    """
+
+    force: Array
+    moment: Array
+    effort: Array
+
+    def reactions(self, k: int) -> list[Reaction]:
+        """Those at one time."""
+        rows = zip(self.force[k], self.moment[k], self.effort[k].tolist(), strict=True)
+        return [Reaction(*row) for row in rows]
+
+
+@runtime_checkable
+class _ReactsToAll(Protocol):
+    def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
+        """Reactions that give these accelerations (k, n), or those of the equations of motion."""
+
+
+def inboard_place(link: Link, modal: Array) -> Array:
+    """(k, 3) place of a link's inboard node in the link's frame, at modal coordinates (k, m)."""
+    return np.asarray(link.inboard.position + modal @ link.model.node_shape(link.inboard.node)[0].T)
+
+
+def accelerations(formulation: Formulation, t: Array, y: Array, v: Array) -> Array:
+    """(k, n) from the equations of motion, at k times."""
+    found = [formulation.acceleration(*at) for at in zip(t.tolist(), y, v, strict=True)]
+    return np.array(found).reshape(y.shape)
+
+
+def reaction_series(
+    formulation: Formulation, t: Array, y: Array, v: Array, a: Array | None = None
+) -> ReactionSeries:
+    """Joint reactions of a formulation at k times.
+
+    Parameters
+    ----------
+    formulation : Formulation
+        One with a method ``reaction_series`` gives them all at once.
+    t : (k,) array
+    y, v : (k, n) arrays
+    a : (k, n) array, optional
+        What `accelerations` gives, where that is known already.
+    """
+    if isinstance(formulation, _ReactsToAll):
+        return formulation.reaction_series(t, y, v, a)
+    found = [formulation.reactions(*at) for at in zip(t.tolist(), y, v, strict=True)]
+    joints = len(formulation.mechanism.joints)
+    return ReactionSeries(
+        force=np.array([[r.force for r in every] for every in found]).reshape(len(t), joints, 3),
+        moment=np.array([[r.moment for r in every] for every in found]).reshape(len(t), joints, 3),
+        effort=np.array([[r.effort for r in every] for every in found]).reshape(len(t), joints),
     )

@@ -107,11 +107,10 @@ class ChainMotion(Run):
         """(..., 3) world position of a named point [m]."""
         choose(point, self.point_names, "point", SceneError)
         number = self.point_names.index(point)
-        shape = np.shape(t)
-        return np.array([self.point_position(s, number) for s in self.states(t)]).reshape(*shape, 3)
+        return self.point_position(self.series(t), number).reshape(*np.shape(t), 3)
 
-    def point_position(self, state: State, number: int) -> Array:
-        """(3,) world position of point ``number`` in a state."""
+    def point_position(self, state: State | StateSeries, number: int) -> Array:
+        """(..., 3) world position of point ``number`` in a state, or in all of a series."""
         return point_position(self.formulation.mechanism, state, number)
 
     def joint_angle(self, joint: str, t: ArrayLike) -> Array:
@@ -129,7 +128,7 @@ class ChainMotion(Run):
     def _of_joint(self, joint: str, t: ArrayLike, what: str) -> Array:
         choose(joint, self.joint_names, "joint", SceneError)
         number = self.joint_names.index(joint)
-        return np.array([getattr(s, what)[number] for s in self.states(t)]).reshape(np.shape(t))
+        return np.asarray(getattr(self.series(t), what)[:, number]).reshape(np.shape(t))
 
     def elastic_coordinates(self, link: str, t: ArrayLike) -> Array:
         """(..., n) elastic modal coordinates of a link [m √kg]."""
@@ -139,4 +138,4 @@ class ChainMotion(Run):
         """(..., 6 + n) modal coordinates of a link, rigid-body ones first [m √kg]."""
         number = self.link_number(link)
         modes = self.formulation.mechanism.links[number].model.modes
-        return np.array([s.modal[number] for s in self.states(t)]).reshape(*np.shape(t), modes)
+        return self.series(t).modal[number].reshape(*np.shape(t), modes)

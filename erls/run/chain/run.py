@@ -10,7 +10,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from erls.equations.formulation import Energy, LoopFormulation, Reaction
+from erls.equations.formulation import Energy, LoopFormulation
+from erls.equations.serial.state_series import ReactionSeries, reaction_series
 from erls.equations.substructures import solved
 from erls.errors import SceneError
 from erls.maths.so3 import Array
@@ -78,25 +79,24 @@ class ChainRun(ChainMotion):
         """(..., 3) force [N] and (..., 3) moment [N m] on the joint's outer link, at its displaced interface node,
         world axes.
         """
-        found = self._reactions(joint, t)
+        number, found = self._joint_number(joint), self._reactions(t)
         shape = (*np.shape(t), 3)
-        return np.array([r.force for r in found]).reshape(shape), np.array([r.moment for r in found]).reshape(shape)
+        return found.force[:, number].reshape(shape), found.moment[:, number].reshape(shape)
 
     def joint_effort(self, joint: str, t: ArrayLike) -> Array:
         """(...) torque [N m] or force [N] of drive, spring, damper and friction; for a prescribed motion, what its
         motor must give.
         """
-        return np.array([r.effort for r in self._reactions(joint, t)]).reshape(np.shape(t))
+        number, found = self._joint_number(joint), self._reactions(t)
+        return found.effort[:, number].reshape(np.shape(t))
 
-    def _reactions(self, joint: str, t: ArrayLike) -> list[Reaction]:
+    def _joint_number(self, joint: str) -> int:
         choose(joint, self.joint_names, "joint", SceneError)
-        number = self.joint_names.index(joint)
-        return [found[number] for found in self._all_reactions(t)]
+        return self.joint_names.index(joint)
 
-    def _all_reactions(self, t: ArrayLike) -> list[list[Reaction]]:
+    def _reactions(self, t: ArrayLike) -> ReactionSeries:
         """Of all joints at each time: every time is solved once."""
-        _, flat, y, v = self._interpolated(t)
-        return [self.formulation.reactions(*at) for at in zip(flat.tolist(), y, v, strict=True)]
+        return reaction_series(self.formulation, *self._interpolated(t)[1:])
 
     @property
     def loop_names(self) -> tuple[str, ...]:
@@ -167,19 +167,18 @@ class ChainRun(ChainMotion):
         """Of each point x, y, z; of each joint coordinate, physical angle, its rate, effort, reaction force and moment
         on the outer link (world axes); energies.
         """
-        states = self.states(times)
+        states, reactions = self.series(times), self._reactions(times)
         columns = {"t [s]": times}
         for k, name in enumerate(self.point_names):
-            vector(columns, plain(name), "m", [self.point_position(s, k) for s in states])
-        reactions = self._all_reactions(times)
+            vector(columns, plain(name), "m", self.point_position(states, k))
         for k, joint in enumerate(self.formulation.mechanism.joints):
             name, (unit, effort) = plain(joint.name), joint.freedom.units
-            columns[f"{name}.coordinate [{unit}]"] = np.array([s.coordinates[k] for s in states])
-            columns[f"{name}.angle [{unit}]"] = np.array([s.angles[k] for s in states])
-            columns[f"{name}.rate [{unit}/s]"] = np.array([s.rates[k] for s in states])
-            columns[f"{name}.effort [{effort}]"] = np.array([r[k].effort for r in reactions])
-            vector(columns, f"{name}.force", "N", [r[k].force for r in reactions])
-            vector(columns, f"{name}.moment", "N m", [r[k].moment for r in reactions])
+            columns[f"{name}.coordinate [{unit}]"] = states.coordinates[:, k]
+            columns[f"{name}.angle [{unit}]"] = states.angles[:, k]
+            columns[f"{name}.rate [{unit}/s]"] = states.rates[:, k]
+            columns[f"{name}.effort [{effort}]"] = reactions.effort[:, k]
+            vector(columns, f"{name}.force", "N", reactions.force[:, k])
+            vector(columns, f"{name}.moment", "N m", reactions.moment[:, k])
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):
             columns[f"energy.{kind} [J]"] = np.asarray(getattr(energy, kind))
@@ -187,13 +186,12 @@ class ChainRun(ChainMotion):
 
     def curves(self, times: Array) -> dict[str, Curve]:
         """Points, joints, energies."""
-        states, found = self.states(times), {}
+        states, found = self.series(times), dict[str, Curve]()
         for k, name in enumerate(self.point_names):
-            positions = np.array([self.point_position(s, k) for s in states])
-            found[f"points/{name}"] = Curve(positions, "m", "world position; time, axis")
+            found[f"points/{name}"] = Curve(self.point_position(states, k), "m", "world position; time, axis")
         for k, name in enumerate(self.joint_names):
             for what in ("coordinates", "angles", "rates"):
-                values = np.array([getattr(s, what)[k] for s in states])
+                values = np.array(getattr(states, what)[:, k])
                 found[f"joints/{name}/{what}"] = Curve(values, "rad or m, per s", "joint motion")
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):

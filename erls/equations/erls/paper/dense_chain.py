@@ -72,9 +72,9 @@ class DenseChain(SerialFormulation):
         reals, integers, _ = self._memory
         return _see_paper(reals, integers, _see_serial(reals, integers, integers[0]).own)
 
-    @property
+    @cached_property
     def elimination(self) -> Elimination:
-        """C, C_r⁺, D, G and n of the last evaluation."""
+        """Views of C, C_r⁺, D, G and n of the last evaluation."""
         _, integers, scratch = self._memory
         return _see_elimination(scratch, integers, self._places.elimination)
 
@@ -83,15 +83,19 @@ class DenseChain(SerialFormulation):
         self.residual(t, y, v, np.zeros(0))
         return self.elimination
 
-    def link(self, k: int) -> BodyState:
-        """Motion and forces of a link, of the last evaluation."""
+    @cached_property
+    def links(self) -> list[BodyState]:
+        """Views of motion and forces of each link, of the last evaluation."""
         _, integers, scratch = self._memory
-        return _see_link(scratch, integers, self._places.body_states + k * BODY_STATE)
+        first = self._places.body_states
+        return [_see_link(scratch, integers, first + k * BODY_STATE) for k in range(self.joints)]
 
-    def joint(self, k: int) -> RowState:
-        """Compatibility and physical angle of a joint, of the last evaluation."""
+    @cached_property
+    def turns(self) -> list[RowState]:
+        """Views of compatibility and physical angle of each joint, of the last evaluation."""
         _, integers, scratch = self._memory
-        return _see_joint(scratch, integers, self._places.row_states + k * ROW_STATE)
+        first = self._places.row_states
+        return [_see_joint(scratch, integers, first + k * ROW_STATE) for k in range(self.joints)]
 
     def full_mass_matrix(self, t: float, y: Array) -> Array:
         """(joints + elastic)² mass matrix over (θ, q_d), prescribed joints included."""
@@ -102,12 +106,11 @@ class DenseChain(SerialFormulation):
     def state(self, t: float, y: Array, v: Array) -> State:
         """Poses, modal coordinates and joint angles at a state."""
         self.residual(t, y, v, np.zeros(0))
-        turns = np.array([self.joint(k).turn for k in range(self.joints)])
-        links = [self.link(k) for k in range(self.joints)]
+        turns = np.array([joint.turn for joint in self.turns])
         return State(
             time=t,
-            poses=[_pose(link.world) for link in links],
-            modal=[link.q.copy() for link in links],
+            poses=[_pose(link.world) for link in self.links],
+            modal=[link.q.copy() for link in self.links],
             coordinates=self.elimination.place[: self.joints].copy(),
             angles=turns[:, 0],
             rates=turns[:, 1],
@@ -123,20 +126,22 @@ class DenseChain(SerialFormulation):
         self.residual(t, y, v, np.zeros(0))
         place, rate = self.elimination.place[self.joints :], self.elimination.rate
         springs = 0.0
-        for k, joint in enumerate(self.mechanism.joints):
-            springs += joint.forces.stiffness * (self.joint(k).turn[0] - joint.forces.rest) ** 2 / 2
+        for joint, turns in zip(self.mechanism.joints, self.turns, strict=True):
+            springs += joint.forces.stiffness * (turns.turn[0] - joint.forces.rest) ** 2 / 2
         return Energy(
             kinetic=float(rate @ mass @ rate / 2),
             elastic=self.elastic_energy(place),
-            gravity=float(sum(self.link(k).potential[0] for k in range(self.joints))),
+            gravity=float(sum(link.potential[0] for link in self.links)),
             springs=float(springs),
         )
 
-    def borne(self, k: int) -> tuple[Array, Array]:
-        """What a residual left; see `SerialFormulation.borne`."""
+    @cached_property
+    def borne(self) -> list[tuple[Array, Array, Array]]:
+        """What a residual leaves; see `SerialFormulation.borne`."""
         _, integers, scratch = self._memory
-        balance = _see_balance(scratch, integers, self._places.balance)
-        return self.link(k).borne, np.array([balance.force[k], self.joint(k).turn[3]])
+        force = _see_balance(scratch, integers, self._places.balance).force
+        joints = enumerate(zip(self.links, self.turns, strict=True))
+        return [(link.borne, force[k : k + 1], joint.turn[3:]) for k, (link, joint) in joints]
 
     @property
     def kind(self) -> dict[str, Any]:
