@@ -18,13 +18,15 @@ import pytest
 import stiffened_cases
 from chain_cases import State
 
-from erls.equations.compiled_system import CompiledSystem
+from erls.equations.compiled_system import MASS_MATRIX, CompiledSystem
 from erls.equations.erls.formulation import Erls
 from erls.equations.erls.pack import pack_chain
 from erls.equations.ffr.formulation import Ffr
+from erls.equations.loops import actuated
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.loops.compiled import CompiledLoops
-from erls.maths.jit import any_scalar, plain
+from erls.equations.loops.records import call_mass_matrix
+from erls.maths.jit import any_scalar, kernel, plain
 from erls.mechanism.thermal import elastic_rest
 
 CASES: list[tuple[Any, str]] = [
@@ -57,21 +59,15 @@ def _loops(folder: Path, name: str, form: str) -> tuple[CompiledSystem, State]:
     return closed.compiled, loop_cases.states(closed, name)[1]
 
 
-@pytest.mark.parametrize(
-    ("form", "names", "of"), [("erls", ("controlled turn", "screw"), any_scalar), ("ffr", ("two loops",), plain)]
-)
-def test_complex_steps_through_loops(form: str, names: tuple[str, ...], of: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("form", "name"), [("erls", "controlled turn"), ("erls", "screw"), ("ffr", "two loops")])
+def test_complex_steps_through_loops(form: str, name: str, tmp_path: Path) -> None:
     """Of a residual whose tree is called by address; to 1e-6 along random directions of all states together.
 
-    Compiled for complex numbers, which for half a dozen evaluations of another tree would take 50 s: that in Python.
+    In Python: to compile a tree and its loops for complex numbers takes half a minute, for half a dozen evaluations.
     """
-    for name in names:
-        _agree_through_loops(*_loops(tmp_path, name, form), of)
-
-
-def _agree_through_loops(system: CompiledSystem, at: State, of: Any) -> None:
+    system, at = _loops(tmp_path, name, form)
     assert isinstance(system, CompiledLoops)
-    residual = of(system.residual, called=system.called)
+    residual = plain(system.residual, called=system.called)
     arguments, rng = [at.y, at.v, at.a], np.random.default_rng(4)
     whole = system.reals.astype(complex)
     for _ in range(3):
@@ -84,6 +80,26 @@ def _agree_through_loops(system: CompiledSystem, at: State, of: Any) -> None:
             sides.append(_real(system, at.t, moved, system.reals))
         slope = (8 * (sides[1] - sides[2]) - sides[0] + sides[3]) / (12 * size)
         assert np.abs(found - slope).max() <= AGREE * np.abs(slope).max()
+
+
+@kernel(MASS_MATRIX, counted=False)
+def _constants(
+    reals: np.ndarray, integers: np.ndarray, scratch: np.ndarray, t: float, y: np.ndarray, out: np.ndarray
+) -> None:
+    for i in range(len(out)):
+        for j in range(len(out)):
+            out[i, j] = t * reals[i] * y[j]
+
+
+def test_complex_steps_through_addresses(tmp_path: Path) -> None:
+    """What a kernel calls by address is compiled for complex numbers with it: another tree's than that of the loops."""
+    system, at = _loops(tmp_path, "controlled turn", "erls")
+    masses = any_scalar(actuated.masses, called={call_mass_matrix: _constants})
+    reals, place = system.reals.astype(complex), at.y.astype(complex)
+    place[1] += 1j * STEP
+    out = np.zeros((2, 2), dtype=complex)
+    masses(reals, system.integers, system.scratch.astype(complex), 3.0, place[:2], out)
+    np.testing.assert_array_equal(out.imag / STEP, [[0, 3 * reals[0].real], [0, 3 * reals[1].real]])
 
 
 @pytest.mark.parametrize(("cases", "name"), CASES, ids=[name for _, name in CASES])
