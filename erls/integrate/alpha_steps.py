@@ -31,12 +31,15 @@ from erls.integrate.base import Leg
 from erls.integrate.driver import Pace, Recorder
 from erls.integrate.stepping import alpha_memory as alpha
 from erls.maths.jit import plain
+from erls.maths.records import Memory, overwrite, python_reader
 from erls.maths.so3 import Array
 from erls.scene.integrators import MATRICES
 
 _SAFETY, _LARGEST_CHANGE = 0.9, 4.0  # of an adaptive step
 _FIRST, _SMALLEST = 1 / 64, 1e-6  # adaptive steps, of the largest
 _AT_ONCE, _HELD = 4096, 8  # steps that are asked for, and those after a rejected one, which do not grow
+
+_see_course, _see_memory = python_reader(alpha.Course), python_reader(alpha.Memory)
 
 
 class Steps:
@@ -60,9 +63,6 @@ class Steps:
         self._advance = loop.advance if system.compiled else plain(loop.advance)
         self._pace = Pace(recorder, system.compiled, single=True)
         self._metres, self._reach = metres, float(metres.max(initial=1.0))
-        self._progress = alpha.Course(np.zeros(6), np.zeros(7, dtype=np.int64))
-        self._progress.rates[alpha.RATE] = SLOWEST_KNOWN
-        self._progress.counts[alpha.USUAL] = MAX_ITERATIONS
         self._memory: Any = None
         self.h, self.error = 0.0, 0.0
         """Step [s], and local error of the last one [m]."""
@@ -71,18 +71,29 @@ class Steps:
         """Start a leg with consistent accelerations and multipliers (n + m,), which the algorithmic ones equal."""
         start = self._system.pack(q)
         if self._memory is None:
-            self._memory = self._room(start)
+            self._make_room()
+            self._start, self._tried = start.copy(), start.copy()
         memory = self._memory
-        memory.start[:], memory.v[:], memory.a[:], memory.alg[:] = start, v, a, a[: len(v)]
+        self._start[:], memory.v[:], memory.a[:], memory.alg[:] = start, v, a, a[: len(v)]
 
-    def _room(self, start: Array) -> Any:
+    def _make_room(self) -> None:
+        """Records of a run in flat memory."""
+        places = [0, 0, 0]
+        flat = Memory(places)
+        blank = alpha.Settings(*[0] * len(alpha.Settings._fields))
+        course = alpha.Course(np.zeros(6), np.zeros(7, dtype=np.int64))
+        course.rates[alpha.RATE], course.counts[alpha.USUAL] = SLOWEST_KNOWN, MAX_ITERATIONS
+        places[:3] = [flat.put(record) for record in (blank, course, self._room())]
+        self._own, self._places = flat.numbers, np.array(places, dtype=np.int64)
+        self._progress = _see_course(self._own, self._places, places[1])
+        self._memory = _see_memory(self._own, self._places, places[2])
+
+    def _room(self) -> alpha.Memory:
         n, m, own = self._system.size, self._system.conditions, self._system.factoring
         dense = n if own is None else 0
         rows = [np.zeros(n) for _ in range(6)]
         v, alg, increment, v1, change, guess = rows
         return alpha.Memory(
-            start=start.copy(),
-            tried=start.copy(),
             v=v,
             alg=alg,
             a=np.zeros(n + m),
@@ -113,7 +124,8 @@ class Steps:
 
     def stretch(self, times: Array, last: float, limit: Limit) -> tuple[int, int]:
         """Steps to ``times``, with forces up to ``last``, in chunks; how many were recorded, and what ended them."""
-        settings = self._settings(last, limit)
+        overwrite(self._settings(last, limit), self._own, self._places, int(self._places[0]))
+        own = self._own, self._places, self._start, self._tried
         done, status = 0, alpha.DONE
         while done < len(times) and status == alpha.DONE:
             part = times[done : done + self._pace.size()]
@@ -123,21 +135,21 @@ class Steps:
             try:
                 with self._pace:
                     status = self._advance(
-                        *self._arguments, settings, self._progress, self._memory, part, samples, knots, beside
+                        *self._arguments, *own, part, samples, knots, beside
                     )
             finally:
                 made = self._count()
             self._recorder.extend(part[:made], knots[:made], beside=beside[:made])
             done += made
         if status == alpha.REFUSED:
-            self._system.refuse(float(times[done]), self._system.unpack(self._memory.tried), self._memory.v1)
+            self._system.refuse(float(times[done]), self._system.unpack(self._tried), self._memory.v1)
             status = alpha.FAILED  # it does not insist
         self.error = float(self._progress.rates[alpha.ERROR])
         return done, status
 
     def end(self) -> tuple[Any, Array]:
         """Configuration and velocity."""
-        return self._system.unpack(self._memory.start), self._memory.v.copy()
+        return self._system.unpack(self._start), self._memory.v.copy()
 
     def failure(self, t: float) -> SimulationError:
         """Why the step to ``t`` failed."""
@@ -147,7 +159,7 @@ class Steps:
         size, suspect = self._system.size, self._memory.correction
         return newton_failure(self._words, size, self._rules, t, self.h, suspect, reason)
 
-    def _settings(self, last: float, limit: Limit) -> Any:
+    def _settings(self, last: float, limit: Limit) -> alpha.Settings:
         use, rules = Formulas.of(self._rules, self.h), self._rules
         shared = ("h", "beta", "gamma", "share", "pull", "keep", "to_v", "to_a", "tolerance")
         return alpha.Settings(

@@ -122,6 +122,15 @@ def python_reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
     return read
 
 
+def overwrite(record: NamedTuple, numbers: Array, integers: IntArray, at: int) -> None:
+    """Put a record of single numbers in the place of the one at ``at``."""
+    for place, (value, (_, axes, _)) in enumerate(zip(record, _fields(type(record)), strict=True), at):
+        if axes is None:
+            integers[place] = value
+        else:
+            numbers[integers[place]] = value
+
+
 class Memory:
     """Flat numbers that grow by records, whose tables go to integers shared with other memories.
 

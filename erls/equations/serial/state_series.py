@@ -69,16 +69,18 @@ def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> Stat
     if found is not None:
         return found
     states = [formulation.state(*at) for at in zip(t.tolist(), y, v, strict=True)]
-    links = range(len(formulation.mechanism.links))
-    places = [np.array([s.nodes[k] for s in states if s.nodes is not None]) for k in links]
+    models = [link.model for link in formulation.mechanism.links]
+    placed = any(s.nodes is not None for s in states)
+    places = [np.array([s.nodes[k] for s in states if s.nodes is not None]) for k in range(len(models))]
+    joints = len(formulation.mechanism.joints)
     return StateSeries(
-        times=t,
-        poses=[np.array([s.poses[k] for s in states]) for k in links],
-        modal=[np.array([s.modal[k] for s in states]) for k in links],
-        coordinates=np.array([s.coordinates for s in states]),
-        angles=np.array([s.angles for s in states]),
-        rates=np.array([s.rates for s in states]),
-        nodes=places if any(s.nodes is not None for s in states) else None,
+        t,
+        [np.array([s.poses[k] for s in states]).reshape(-1, 4, 4) for k in range(len(models))],
+        [np.array([s.modal[k] for s in states]).reshape(-1, m.modes) for k, m in enumerate(models)],
+        np.array([s.coordinates for s in states]).reshape(-1, joints),
+        np.array([s.angles for s in states]).reshape(-1, joints),
+        np.array([s.rates for s in states]).reshape(-1, joints),
+        nodes=places if placed else None,
     )
 
 

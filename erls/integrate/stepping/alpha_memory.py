@@ -1,11 +1,13 @@
-"""What steps of generalized-α (`erls.integrate.stepping.generalized_alpha`) are told, leave to each other and keep."""
+"""What steps of generalized-α (`erls.integrate.stepping.generalized_alpha`) are told, leave to each other and keep.
+
+Records in flat memory (`erls.maths.records`), whose first integers are their places: `Settings`, `Course`, `Memory`.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from erls.maths.so3 import Array
-from fe_import.model import IntArray
+from erls.maths.records import Indices, Stack, Vector, reader
 
 DONE, FAILED, INACCURATE, TIMID, REFUSED = range(5)
 """Ends of a stretch: all steps made; Newton's method failed; too large a local error; a larger step would do; the
@@ -78,7 +80,7 @@ class Settings(NamedTuple):
     guess: int
 
 
-class Course(NamedTuple):  # no other record may have this name and these types: to Numba they would be one
+class Course(NamedTuple):
     """What steps leave to each other and to whoever called for them.
 
     Attributes
@@ -91,8 +93,8 @@ class Course(NamedTuple):  # no other record may have this name and these types:
         iterations, factorizations.
     """
 
-    rates: Array
-    counts: IntArray
+    rates: Vector
+    counts: Indices
 
 
 class Memory(NamedTuple):
@@ -100,8 +102,6 @@ class Memory(NamedTuple):
 
     Attributes
     ----------
-    start, tried : (c,) arrays
-        Configurations.
     v, alg, a : (n,), (n,), (n + m,) arrays
         Velocity, algorithmic acceleration, acceleration and multipliers of the last knot.
     increment, v1, a1 : arrays
@@ -117,20 +117,21 @@ class Memory(NamedTuple):
         Of dense factors; empty where the system has its own.
     """
 
-    start: Array
-    tried: Array
-    v: Array
-    alg: Array
-    a: Array
-    increment: Array
-    v1: Array
-    a1: Array
-    change: Array
-    guess: Array
-    metres: Array
-    per_metre: Array
-    right: Array
-    correction: Array
-    factors: Array
-    matrices: Array
-    pivots: IntArray
+    v: Vector
+    alg: Vector
+    a: Vector
+    increment: Vector
+    v1: Vector
+    a1: Vector
+    change: Vector
+    guess: Vector
+    metres: Vector
+    per_metre: Vector
+    right: Vector
+    correction: Vector
+    factors: Vector
+    matrices: Stack
+    pivots: Indices
+
+
+read_settings, read_course, read_memory = reader(Settings), reader(Course), reader(Memory)

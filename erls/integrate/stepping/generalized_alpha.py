@@ -55,6 +55,9 @@ from erls.integrate.stepping.alpha_memory import (
     Course,
     Memory,
     Settings,
+    read_course,
+    read_memory,
+    read_settings,
 )
 from erls.maths import dense
 from erls.maths.jit import ENABLED, kernel, part
@@ -63,18 +66,19 @@ _ADVANCE: Any = None
 if ENABLED:
     from numba import types as _t
 
-    _cube, _reals, _flag = _t.float64[:, :, ::1], contract.REALS, _t.int64
+    _reals, _integers = contract.REALS, contract.INTEGERS
     _ADVANCE = _t.int64(
         STEP_FUNCTIONS,
         _reals,
-        contract.INTEGERS,
+        _integers,
         _reals,
-        _t.NamedTuple((*(_t.float64,) * 21, *(_t.int64,) * 5), Settings),
-        _t.NamedTuple((_reals, contract.INTEGERS), Course),
-        _t.NamedTuple((*(_reals,) * 15, _cube, contract.INTEGERS), Memory),
+        _reals,
+        _integers,
+        _reals,
+        _reals,
         _reals,
         contract.MATRIX,
-        _cube,
+        _t.float64[:, :, ::1],
         contract.MATRIX,
     )
 
@@ -86,16 +90,17 @@ def predict(settings: Settings, memory: Memory) -> None:
     y_old, y_new = h * h * (0.5 - beta), h * h * beta
     v_old, v_new = h * (1 - gamma), h * gamma
     v, algorithmic, a, a1, guess = memory.v, memory.alg, memory.a, memory.a1, memory.guess
-    n = len(v)
+    increment, v1, n = memory.increment, memory.v1, len(v)
+    share, pull, keep, kind = settings.share, settings.pull, settings.keep, settings.guess
     for i in range(len(a1)):
-        a1[i] = 0.0 if settings.guess == ZERO else a[i]
-        if settings.guess == EXTRAPOLATED and i < n:
+        a1[i] = 0.0 if kind == ZERO else a[i]
+        if kind == EXTRAPOLATED and i < n:
             a1[i] += guess[i]
     for i in range(n):
         alg = algorithmic[i]
-        alg1 = settings.pull * a[i] + settings.keep * alg + settings.share * a1[i]
-        memory.increment[i] = h * v[i] + y_old * alg + y_new * alg1
-        memory.v1[i] = v[i] + v_old * alg + v_new * alg1
+        alg1 = pull * a[i] + keep * alg + share * a1[i]
+        increment[i] = h * v[i] + y_old * alg + y_new * alg1
+        v1[i] = v[i] + v_old * alg + v_new * alg1
 
 
 @part
@@ -105,6 +110,7 @@ def dense_factors(
     integers: IntArray,
     scratch: Array,
     t: float,
+    y: Array,
     alpha: float,
     beta: float,
     memory: Memory,
@@ -112,7 +118,7 @@ def dense_factors(
     """Factors of M + α C + β K, scaled to metres; 0, or 1 + the number of a coordinate."""
     n, per = len(memory.v), memory.per_metre
     mass, stiffness, damping = memory.matrices[0], memory.matrices[1], memory.matrices[2]
-    y, v = memory.tried, memory.v1
+    v = memory.v1
     call_stiffness_and_damping(system.stiffness_and_damping, reals, integers, scratch, t, y, v, stiffness, damping)
     call_mass_matrix(system.mass_matrix, reals, integers, scratch, t, y, mass)
     factors = memory.factors.reshape(n, n)
@@ -149,13 +155,16 @@ def correct(system: StepFunctions, reals: Array, integers: IntArray, settings: S
     # forces square what they are given: a size whose square overflows is as good as infinite
     if not math.isfinite(size * size + total * total):
         return math.inf
+    to_a, to_v, a1, v1, increment, metres = (
+        settings.to_a, settings.to_v, memory.a1, memory.v1, memory.increment, memory.metres
+    )  # fmt: skip
     for i in range(len(correction)):
         move = correction[i]
-        memory.a1[i] -= settings.to_a * move
+        a1[i] -= to_a * move
         if i < n:
-            memory.increment[i] -= move
-            memory.v1[i] -= settings.to_v * move
-            correction[i] = memory.metres[i] * move
+            increment[i] -= move
+            v1[i] -= to_v * move
+            correction[i] = metres[i] * move
         else:
             correction[i] = memory.factors[i - n] * move
     return size
@@ -214,22 +223,23 @@ def judge(settings: Settings, progress: Course, memory: Memory) -> int:
 
 
 @part
-def accept(settings: Settings, memory: Memory) -> None:
+def accept(settings: Settings, memory: Memory, start: Array, tried: Array) -> None:
     """Move on to the end of the step, and foretell the next change of the acceleration.
 
     It is extrapolated where that would have foretold it better; unresolved modes keep what they have.
     """
+    share, pull, keep = settings.share, settings.pull, settings.keep
     for i in range(len(memory.v)):
         a, a1 = memory.a[i], memory.a1[i]
-        memory.alg[i] = settings.pull * a + settings.keep * memory.alg[i] + settings.share * a1
+        memory.alg[i] = pull * a + keep * memory.alg[i] + share * a1
         change = a1 - a
         memory.guess[i] = change if abs(change - memory.change[i]) < abs(change) else 0.0
         memory.change[i] = change
         memory.v[i] = memory.v1[i]
     for i in range(len(memory.a)):
         memory.a[i] = memory.a1[i]
-    for i in range(len(memory.start)):
-        memory.start[i] = memory.tried[i]
+    for i in range(len(start)):
+        start[i] = tried[i]
 
 
 @kernel(_ADVANCE, counted=False)
@@ -238,23 +248,26 @@ def advance(
     reals: Array,
     integers: IntArray,
     scratch: Array,
-    settings: Settings,
-    progress: Course,
-    memory: Memory,
+    own: Array,
+    places: IntArray,
+    start: Array,
+    tried: Array,
     times: Array,
     samples: Array,
     knots: Array,
     beside: Array,
 ) -> int:
-    """Steps to ``times`` (k,), with a row of ``samples`` each at the head of ``scratch``.
+    """Steps to ``times`` (k,), with a row of ``samples`` each at the head of ``scratch``; ``own`` and ``places`` hold
+    `Settings`, `Course` and `Memory`, ``start`` the configuration, ``tried`` (c,) that of the step that is tried.
 
     What the system keeps of each goes into ``knots`` (k, 3, s), accelerations and multipliers into ``beside`` unless it
     has no columns. Iterations have converged when the remaining error, rate/(1 − rate) |Δ|, is estimated within
     tolerance, with the rate of earlier steps at first (E. Hairer & G. Wanner, Solving ODEs II, sec. IV.8), which counts
     for less the older it gets; or when the residual is small against its terms.
     """
-    rates, counts, use = progress.rates, progress.counts, settings
-    n, most = len(memory.v), settings.iterations
+    use, progress = read_settings(own, places, places[0]), read_course(own, places, places[1])
+    memory, rates, counts = read_memory(own, places, places[2]), progress.rates, progress.counts
+    n, most = len(memory.v), use.iterations
     m = len(memory.a) - n
     counts[STEPS] = 0
     for row in range(len(times)):
@@ -272,9 +285,8 @@ def advance(
             before = earlier = largest = size = rounding = goal = 0.0
             rates[BEFORE] = 0.0
             for k in range(most + 1):
-                tried = memory.tried
                 extent = call_compose(
-                    system.compose, reals, integers, scratch, memory.metres, memory.start, memory.increment, tried
+                    system.compose, reals, integers, scratch, memory.metres, start, memory.increment, tried
                 )
                 if k == 0:
                     rounding = use.rounding * extent
@@ -300,7 +312,7 @@ def advance(
                 if fresh:
                     alpha, beta = use.to_v / use.to_a, 1 / use.to_a
                     if len(memory.pivots) > 0:
-                        status = dense_factors(system, reals, integers, scratch, t, alpha, beta, memory)
+                        status = dense_factors(system, reals, integers, scratch, t, tried, alpha, beta, memory)
                     else:
                         status = call_factor(
                             system.factor,
@@ -335,7 +347,7 @@ def advance(
                 rates[SIZE] = size
                 if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
                     call_compose(
-                        system.compose, reals, integers, scratch, memory.metres, memory.start, memory.increment, tried
+                        system.compose, reals, integers, scratch, memory.metres, start, memory.increment, tried
                     )
                     note(use, progress, k + 1, rate)
                     converged = True
@@ -361,9 +373,9 @@ def advance(
         if status == INACCURATE:
             return status
         v1, a1 = memory.v1, memory.a1
-        if call_settle(system.settle, reals, integers, scratch, t, memory.tried, v1, a1, knots[row]) != 0:
+        if call_settle(system.settle, reals, integers, scratch, t, tried, v1, a1, knots[row]) != 0:
             return REFUSED
-        accept(use, memory)
+        accept(use, memory, start, tried)
         for i in range(beside.shape[1]):
             beside[row, i] = memory.a[i]
         counts[STEPS] = row + 1
