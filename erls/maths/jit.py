@@ -141,8 +141,8 @@ def plain(function: Callable[..., Any], within: bool = True, called: Mapping[Any
     function : callable
     within : bool, optional
     called : mapping, optional
-        What it calls by address, by what calls it, as for `any_scalar`. Unless it is told, an address may be a function
-        of Python (`erls.maths.calls.handed`).
+        What it calls by address, by what calls it, as for `any_scalar`. An address of which neither this nor the caller
+        tells may be a function of Python (`erls.maths.calls.handed`).
     """
     return _in_python(function, within, tuple((called or {}).items()))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,20 @@ def test_shape_of_times_stands_in_front(run: ChainRun, question: str) -> None:
         np.testing.assert_array_equal(one, found[index])
     np.testing.assert_array_equal(ask(run, TIMES[1].tolist()), found[1])
     assert ask(run, []).shape == (0, *shape)
+
+
+@pytest.mark.parametrize("settings", [["formulation=ffr"], ["gauge=minimum-norm"], []])
+def test_a_copy_answers_from_its_own_memory(settings: list[str]) -> None:
+    """Reactions of a copy, and of the run that was copied, after the other one has been asked about another time."""
+    path = Path(__file__).parents[2] / "data/robot/two_link.toml"
+    overrides = [f"simulation.{each}" for each in ("duration=0.02", *settings)]
+    run = erls.simulate(erls.load_scene(path, overrides))
+    expected = run.reaction(run.joint_names[0], TIMES.ravel() * 0.02 / TIMES.max())
+    twin = deepcopy(run)
+    for one, other in ((twin, run), (run, twin)):
+        other.reaction(run.joint_names[0], 0.0)
+        found = one.reaction(run.joint_names[0], TIMES.ravel() * 0.02 / TIMES.max())
+        np.testing.assert_array_equal(found, expected)
 
 
 def test_position_from_first_principles(run: ChainRun) -> None:

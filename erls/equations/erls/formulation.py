@@ -131,7 +131,6 @@ class Erls(SerialFormulation):
         energy(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), out)
         return Energy(*out.tolist())
 
-    @cached_property
     def borne(self) -> list[tuple[Array, Array, Array]]:
         """What a residual leaves; see `SerialFormulation.borne`."""
         system, result = self.complete, []

@@ -155,7 +155,6 @@ class Ffr(SerialFormulation):
         places = [frames.body_states + k * BODY_STATE for k in range(self.joints)]
         return [_read_body_state(system.scratch, system.integers, place) for place in places]
 
-    @cached_property
     def borne(self) -> list[tuple[Array, Array, Array]]:
         """What a residual leaves; see `SerialFormulation.borne`."""
         system, result = self.complete, []

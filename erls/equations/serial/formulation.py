@@ -7,7 +7,6 @@ follow from time.
 from __future__ import annotations
 
 from abc import abstractmethod
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -139,11 +138,11 @@ class SerialFormulation(TreeFormulation):
         """The equations with wrenches that are complete in all components, for reactions."""
         return self.compiled
 
-    @cached_property
     @abstractmethod
     def borne(self) -> list[tuple[Array, Array, Array]]:
-        """What a residual of `complete` leaves of each link: the wrench (6,) on its frame of all that it bears, itself
-        included; the force (1,) along its joint, and what of it (1,) drive, spring, damper and friction give.
+        """Views of what a residual of `complete` leaves of each link: the wrench (6,) on its frame of all that it
+        bears, itself included; the force (1,) along its joint, and what of it (1,) drive, spring, damper and friction
+        give.
         """
 
     def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
@@ -151,10 +150,11 @@ class SerialFormulation(TreeFormulation):
         """
         a = accelerations(self, t, y, v) if a is None else a
         states, count = state_series(self, t, y, v), len(self.mechanism.joints)
+        borne = self.borne()
         wrenches, along = np.empty((len(t), count, 6)), np.empty((2, len(t), count))
         for i, at in enumerate(t.tolist()):
             residual(self.complete, at, y[i], v[i], a[i])
-            for k, (wrench, whole, given) in enumerate(self.borne):
+            for k, (wrench, whole, given) in enumerate(borne):
                 wrenches[i, k], along[0, i, k], along[1, i, k] = wrench, whole[0], given[0]
         force, moment = np.empty((len(t), count, 3)), np.empty((len(t), count, 3))
         prescribed = np.array([joint.drive.prescribed for joint in self.mechanism.joints], dtype=bool)

@@ -51,8 +51,8 @@ class StateSeries:
 
 @runtime_checkable
 class _ManyAtOnce(Protocol):
-    def series(self, t: Array, y: Array, v: Array) -> StateSeries | None:
-        """States at times (k,) with coordinates and rates (k, n); None where they are found one by one."""
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries:
+        """States at times (k,) with coordinates and rates (k, n)."""
 
 
 def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> StateSeries:
@@ -65,9 +65,8 @@ def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> Stat
     t : (k,) array
     y, v : (k, n) arrays
     """
-    found = formulation.series(t, y, v) if isinstance(formulation, _ManyAtOnce) else None
-    if found is not None:
-        return found
+    if isinstance(formulation, _ManyAtOnce):
+        return formulation.series(t, y, v)
     states = [formulation.state(*at) for at in zip(t.tolist(), y, v, strict=True)]
     models = [link.model for link in formulation.mechanism.links]
     placed = any(s.nodes is not None for s in states)

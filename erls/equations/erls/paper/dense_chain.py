@@ -72,7 +72,7 @@ class DenseChain(SerialFormulation):
         reals, integers, _ = self._memory
         return _see_paper(reals, integers, _see_serial(reals, integers, integers[0]).own)
 
-    @cached_property
+    @property
     def elimination(self) -> Elimination:
         """Views of C, C_r⁺, D, G and n of the last evaluation."""
         _, integers, scratch = self._memory
@@ -83,14 +83,14 @@ class DenseChain(SerialFormulation):
         self.residual(t, y, v, np.zeros(0))
         return self.elimination
 
-    @cached_property
+    @property
     def links(self) -> list[BodyState]:
         """Views of motion and forces of each link, of the last evaluation."""
         _, integers, scratch = self._memory
         first = self._places.body_states
         return [_see_link(scratch, integers, first + k * BODY_STATE) for k in range(self.joints)]
 
-    @cached_property
+    @property
     def turns(self) -> list[RowState]:
         """Views of compatibility and physical angle of each joint, of the last evaluation."""
         _, integers, scratch = self._memory
@@ -105,20 +105,21 @@ class DenseChain(SerialFormulation):
 
     def state(self, t: float, y: Array, v: Array) -> State:
         """Poses, modal coordinates and joint angles at a state."""
-        self.residual(t, y, v, np.zeros(0))
-        turns = np.array([joint.turn for joint in self.turns])
-        return State(
-            time=t,
-            poses=[_pose(link.world) for link in self.links],
-            modal=[link.q.copy() for link in self.links],
-            coordinates=self.elimination.place[: self.joints].copy(),
-            angles=turns[:, 0],
-            rates=turns[:, 1],
-        )
+        return self.series(np.array([t]), y[None], v[None]).states()[0]
 
-    def series(self, t: Array, y: Array, v: Array) -> StateSeries | None:
-        """None: states are found one by one."""
-        return None
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries:
+        """States at times (k,)."""
+        links, turns, place = self.links, self.turns, self.elimination.place
+        poses = [np.tile(np.eye(4), (len(t), 1, 1)) for _ in links]
+        modal = [np.empty((len(t), len(link.q))) for link in links]
+        coordinates = np.empty((3, len(t), self.joints))
+        for i, at in enumerate(t.tolist()):
+            self.residual(at, y[i], v[i], np.zeros(0))
+            coordinates[0, i] = place[: self.joints]
+            for k, (link, joint) in enumerate(zip(links, turns, strict=True)):
+                poses[k][i, :3, :3], poses[k][i, :3, 3] = link.world[:9].reshape(3, 3), link.world[9:]
+                modal[k][i], coordinates[1:, i, k] = link.q, joint.turn[:2]
+        return StateSeries(np.asarray(t), poses, modal, *coordinates)
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state; the mass matrix is that of the kinetic energy."""
@@ -135,7 +136,6 @@ class DenseChain(SerialFormulation):
             springs=float(springs),
         )
 
-    @cached_property
     def borne(self) -> list[tuple[Array, Array, Array]]:
         """What a residual leaves; see `SerialFormulation.borne`."""
         _, integers, scratch = self._memory
@@ -147,10 +147,3 @@ class DenseChain(SerialFormulation):
     def kind(self) -> dict[str, Any]:
         """Name of the formulation and of its gauge."""
         return {"formulation": "erls", "gauge": self.gauge}
-
-
-def _pose(world: Array) -> Array:
-    """(4, 4) of twelve numbers."""
-    result = np.eye(4)
-    result[:3, :3], result[:3, 3] = world[:9].reshape(3, 3), world[9:]
-    return result
