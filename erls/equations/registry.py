@@ -21,7 +21,7 @@ from erls.scene.settings import Simulation
 
 
 def _erls(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
-    if settings.gauge == "minimum-norm" or "modal_inertia" in mechanism.effects:
+    if settings.gauge == "minimum-norm":
         from erls.equations.erls.paper.dense_chain import DenseChain  # here: a run imports what it needs
 
         return DenseChain(mechanism, settings.gauge)

@@ -1,33 +1,29 @@
 """Forces out of balance on the independent coordinates: outward for the motion, inward for the forces.
 
 A virtual displacement is δν_k = J_k δθ, δq = (D δq_d + G δθ, δq_d) (ERLS-CMS paper, eq. 69-75); instead of forming J, D
-and G, forces on ν and on u go from link to parent with the transposes of what carries motions outward.
+and G, forces on ν and on u go from link to parent with the transposes of what carries motions outward. Anchored
+(`erls.equations.erls.anchored_frames`) both are one: forces on w.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from erls.equations.erls.anchored_frames import move_anchored
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.link_forces import link_forces, weigh_displaced
 from erls.equations.erls.records import (
-    BEND,
-    BEND_STATE,
     LINK,
     LINK_STATE,
-    Bend,
-    BendState,
     Chain,
-    LinkState,
-    read_bend,
-    read_bend_state,
     read_chain,
     read_link,
     read_link_state,
 )
-from erls.equations.erls.second_order import bend_frames, correct_twist, feel_curvature, set_arm
+from erls.equations.erls.second_order import bent_forces
 from erls.equations.serial.elastic import elastic_force
 from erls.equations.serial.joints import effort
+from erls.equations.serial.nodes import NODE, NODE_STATE, from_node_axes, read_node, read_node_state
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
@@ -40,9 +36,9 @@ from erls.equations.serial.records import (
     read_serial,
 )
 from erls.maths.jit import part
-from erls.maths.products import add_rows, clear
+from erls.maths.products import add_columns, add_rows, clear
 from erls.maths.so3 import Array
-from erls.maths.spatial import add_cross, add_force_cross, add_motion_cross, dot6, transform_force_back
+from erls.maths.spatial import add_force_cross, add_motion_cross, dot6, transform_force_back
 from fe_import.model import IntArray
 
 
@@ -54,53 +50,17 @@ def _forces_of_links(
     for k in range(serial.links):
         link = read_link(reals, integers, chain.links + k * LINK)
         state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
-        twist, rate = state.twist, state.twist_rate
-        if bends is not None:
-            bend = read_bend(reals, integers, chain.bends + k * BEND)
-            bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
-            if bend.curved:
-                correct_twist(bend, state, bent)
-                twist, rate = bent.full, bent.full_rate
-        link_forces(chain, link, state, twist, rate, accelerated)
-        if bends is not None:
-            bend = read_bend(reals, integers, chain.bends + k * BEND)
-            bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
-            if bend.curved:
-                feel_curvature(bend, link, state, bent)
+        if bends is None:
+            link_forces(chain, link, state, state.twist, state.twist_rate, accelerated)
+        else:
+            bent_forces(chain, reals, integers, scratch, k, accelerated)
         if chain.weight:
             weigh_displaced(link, state)
-        if link.parent >= 0 or chain.complete:  # on the ground it moves along the joint, which does not feel this
+        # on the ground it moves along the joint, which does not feel this
+        if link.parent >= 0 or chain.complete:
             add_force_cross(state.twist, state.momentum, state.wrench)
         for i in range(6):
             state.force[i] = state.modal[i]
-        if bends is not None:
-            push = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).push
-            for i in range(6):
-                push[i] = state.modal[i]
-
-
-@part
-def _turn_arm_back(bend: Bend, state: LinkState, bent: BendState, coordinate: Any) -> None:
-    """What ``push`` does to the turn of a link, by the arm from its inboard interface to its joint."""
-    back = bent.share[:3]
-    set_arm(bend.slide, bend.arm, coordinate, state.u[3:], bent.d, bent.b)
-    clear(back)
-    add_cross(bent.push, state.u[3:], 1.0, back)
-    add_cross(bent.b, bent.push, 0.5, state.force[3:])
-    add_cross(bent.d, back, 0.5, state.force[3:])
-
-
-@part
-def _push_along(bend: Bend, state: LinkState, bent: BendState, screw: Array) -> Any:
-    """Force of ``push`` along a joint, which turns second-order displacements along."""
-    path, turned = bent.share, bent.share_rate[:3]
-    clear(path)
-    add_motion_cross(bent.carried, screw, 1.0, path)
-    if bend.armed:
-        clear(turned)
-        add_cross(state.u[3:], bend.slide, 1.0, turned)
-        add_cross(state.u[3:], turned, 0.5, path)
-    return dot6(path, bent.push)
 
 
 @part
@@ -111,17 +71,11 @@ def push_joint(
     motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
     state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
     total = dot6(motion.screw, state.wrench)
-    if read_link(reals, integers, chain.links + k * LINK).parent < 0:
+    if bends is not None or read_link(reals, integers, chain.links + k * LINK).parent < 0:
         return total
     # the joint turns the displacement along: u̇ holds -ad(S θ̇) u
     clear(state.point)
     add_motion_cross(state.u, motion.screw, 1.0, state.point)
-    if bends is not None:
-        bend = read_bend(reals, integers, chain.bends + k * BEND)
-        bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
-        if bend.armed:
-            _turn_arm_back(bend, state, bent, motion.coordinate[0])
-        total += _push_along(bend, state, bent, motion.screw)
     return total + dot6(state.point, state.force)
 
 
@@ -135,31 +89,21 @@ def hand_back(
     before = read_link_state(scratch, integers, chain.states + link.parent * LINK_STATE)
     pose, point = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose, state.point
     transform_force_back(pose, state.wrench, point)
-    for i in range(6):
-        before.wrench[i] += point[i]
-    transform_force_back(pose, state.force, point)
-    for i in range(6):
-        before.force[i] += point[i]
-    add_rows(link.out, point, 1.0, before.modal[6:])
-    if bends is not None:
-        bend = read_bend(reals, integers, chain.bends + k * BEND)
-        bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
-        bent_before = read_bend_state(scratch, integers, chain.bend_states + link.parent * BEND_STATE)
-        transform_force_back(pose, bent.push, point)
+    if bends is None:
         for i in range(6):
-            bent_before.push[i] += point[i]
-        if bend.bows:
-            m = bent.bow.shape[1]
-            forces, turns = bent.spare[:m], m - (len(before.q) - 6)
-            clear(forces)
-            for r in range(6):
-                row, weight = bent.bow[r], point[r]
-                for i in range(m):
-                    forces[i] += weight * row[i]
-            for i in range(turns):
-                before.force[3 + i] += forces[i]
-            for i in range(turns, m):
-                before.modal[6 + i - turns] += forces[i]
+            before.wrench[i] += point[i]
+        transform_force_back(pose, state.force, point)
+        for i in range(6):
+            before.force[i] += point[i]
+        add_rows(link.out, point, 1.0, before.modal[6:])
+    else:
+        if read_node(reals, integers, chain.seats + k * NODE).moves:
+            moved = read_node_state(scratch, integers, chain.seat_states + k * NODE_STATE)
+            from_node_axes(moved.pose, moved.tangent, point, state.other)
+            add_columns(moved.rows, state.other, 1.0, before.modal[6:])
+            transform_force_back(moved.pose, point, point)
+        for i in range(6):
+            before.wrench[i] += point[i]
 
 
 @part
@@ -175,9 +119,10 @@ def balance(
     chain = read_chain(reals, integers, serial.own)
     if serial.feeds >= 0:
         call_feed_forward(serial.feeds, at, reals, integers, scratch, t)
-    move_frames(serial, chain, reals, integers, scratch, t, y, v, a)
-    if bends is not None:
-        bend_frames(serial, chain, reals, integers, scratch, True)
+    if bends is None:
+        move_frames(serial, chain, reals, integers, scratch, t, y, v, a)
+    else:
+        move_anchored(serial, chain, reals, integers, scratch, t, y, v, a)
     _forces_of_links(serial, chain, reals, integers, scratch, len(a) > 0, bends)
     for k in range(serial.links - 1, -1, -1):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)

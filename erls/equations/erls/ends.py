@@ -9,19 +9,17 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations import compiled_system as contract
+from erls.equations.erls.anchored_frames import move_anchored, pose_from_parent
 from erls.equations.erls.balance import hand_back, push_joint
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import (
-    BEND_STATE,
     LINK,
     LINK_STATE,
     Chain,
-    read_bend_state,
     read_chain,
     read_link,
     read_link_state,
 )
-from erls.equations.erls.second_order import bend_frames
 from erls.equations.serial.ends import END, END_STATE, column_of, move_end, read_end, read_end_state
 from erls.equations.serial.records import (
     JOINT_STATE,
@@ -40,8 +38,9 @@ from fe_import.model import IntArray
 
 @part
 def _move_end(
-    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, number: int, found: Array
-) -> None:
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, number: int, found: Array,
+    bends: Any,
+) -> None:  # fmt: skip
     """Pose, twist and its derivative into the first 24 numbers of ``found``."""
     end = read_end(reals, integers, chain.ends + number * END)
     moved = read_end_state(scratch, integers, chain.end_states + number * END_STATE)
@@ -51,8 +50,12 @@ def _move_end(
     k = end.link
     while k >= 0:
         copy(pose, moved.spare)
-        motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
-        compose_poses(motion.pose, moved.spare, pose)
+        if bends is None:
+            compose_poses(
+                read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose, moved.spare, pose
+            )
+        else:
+            compose_poses(pose_from_parent(serial, chain, reals, integers, scratch, k), moved.spare, pose)
         k = read_link(reals, integers, chain.links + k * LINK).parent
 
 
@@ -71,7 +74,7 @@ def _put_row(
     transform_force_back(end.offset, force, force)
     k = end.link
     while k >= 0:
-        _clear_forces(chain, integers, scratch, k, bends)
+        _clear_forces(chain, integers, scratch, k)
         k = read_link(reals, integers, chain.links + k * LINK).parent
     state = read_link_state(scratch, integers, chain.states + end.link * LINK_STATE)
     transform_force_back(moved.pose, force, state.wrench)
@@ -80,10 +83,6 @@ def _put_row(
             state.modal[j] += force[m] * moved.rows[m, j]
     for j in range(6):
         state.force[j] = state.modal[j]
-    if bends is not None:
-        push = read_bend_state(scratch, integers, chain.bend_states + end.link * BEND_STATE).push
-        for j in range(6):
-            push[j] = state.modal[j]
     k = end.link
     while k >= 0:
         modal = read_link_state(scratch, integers, chain.states + k * LINK_STATE).modal
@@ -98,13 +97,11 @@ def _put_row(
 
 
 @part
-def _clear_forces(chain: Chain, integers: IntArray, scratch: Array, k: int, bends: Any) -> None:
+def _clear_forces(chain: Chain, integers: IntArray, scratch: Array, k: int) -> None:
     state = read_link_state(scratch, integers, chain.states + k * LINK_STATE)
     clear(state.wrench)
     clear(state.force)
     clear(state.modal)
-    if bends is not None:
-        clear(read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).push)
 
 
 @part
@@ -114,12 +111,13 @@ def put_frames(
     """Of all ends; ``bends`` as in `erls.equations.erls.balance`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
-    move_frames(serial, chain, reals, integers, scratch, t, y, v, y[0:0])
-    if bends is not None:
-        bend_frames(serial, chain, reals, integers, scratch, True)
+    if bends is None:
+        move_frames(serial, chain, reals, integers, scratch, t, y, v, y[0:0])
+    else:
+        move_anchored(serial, chain, reals, integers, scratch, t, y, v, y[0:0])
     for number in range(chain.end_count):
         found = out[number]
-        _move_end(serial, chain, reals, integers, scratch, number, found)
+        _move_end(serial, chain, reals, integers, scratch, number, found, bends)
         size = (len(found) - 24) // 6
         for i in range(6):
             row = found[24 + i * size : 24 + (i + 1) * size]

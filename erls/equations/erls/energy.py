@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations import compiled_system as contract
+from erls.equations.erls.anchored_frames import move_anchored, pose_from_parent
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.link_forces import deform, pair_of
 from erls.equations.erls.records import (
@@ -21,8 +22,16 @@ from erls.equations.erls.records import (
     read_link,
     read_link_state,
 )
-from erls.equations.erls.second_order import bend_frames, correct_twist
+from erls.equations.erls.second_order import correct_twist
 from erls.equations.serial.elastic import elastic_energy
+from erls.equations.serial.modal_inertia_kernels import (
+    WARP,
+    WARP_STATE,
+    read_warp,
+    read_warp_state,
+    set_warp,
+    warp_energy,
+)
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
@@ -68,9 +77,10 @@ def add_energies(
     """Energies; ``bends`` as in `erls.equations.erls.balance`."""
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
-    move_frames(serial, chain, reals, integers, scratch, t, y, v, y[0:0])
-    if bends is not None:
-        bend_frames(serial, chain, reals, integers, scratch, True)
+    if bends is None:
+        move_frames(serial, chain, reals, integers, scratch, t, y, v, y[0:0])
+    else:
+        move_anchored(serial, chain, reals, integers, scratch, t, y, v, y[0:0])
     clear(out)
     for k in range(serial.links):
         link = read_link(reals, integers, chain.links + k * LINK)
@@ -78,9 +88,10 @@ def add_energies(
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)
         modes = read_modes(reals, integers, serial.modes + k * MODES)
-        twist, moment = state.twist, state.point[:3]
+        twist, moment, pose = state.twist, state.point[:3], motion.pose
         clear(moment)
         if bends is not None:
+            pose = pose_from_parent(serial, chain, reals, integers, scratch, k)
             bend = read_bend(reals, integers, chain.bends + k * BEND)
             if bend.curved:
                 bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)
@@ -88,16 +99,21 @@ def add_energies(
                 twist = bent.full
                 for i in range(3):
                     moment[i] = bent.moment[i]
+            if bend.warped:
+                warp = read_warp(reals, integers, chain.warps + k * WARP)
+                warp_state = read_warp_state(scratch, integers, chain.warp_states + k * WARP_STATE)
+                set_warp(warp, warp_state, state.q[6:])
+                out[0] += warp_energy(warp, warp_state, state.q_rate[6:])
         out[0] += _kinetic(chain, link, state, twist) + joint.rotor * motion.coordinate[1] ** 2 / 2
         for i in range(len(modes.stiffness)):
             out[1] += elastic_energy(modes.stiffness[i], y[modes.first + i], modes.rest[i])
         # g · place of the frame, from link to link
         height = state.other
         if link.parent < 0:
-            height[0] = dot3(serial.gravity, motion.pose[9:])
+            height[0] = dot3(serial.gravity, pose[9:])
         else:
             before = read_link_state(scratch, integers, chain.states + link.parent * LINK_STATE)
-            height[0] = before.other[0] + dot3(before.down, motion.pose[9:])
+            height[0] = before.other[0] + dot3(before.down, pose[9:])
         for j in range(len(state.q)):
             for i in range(3):
                 moment[i] += link.mass[j, i] * state.q[j]

@@ -21,7 +21,6 @@ from erls.equations.serial.modal_inertia import stiffened
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.state_series import StateSeries
-from erls.errors import Cause, SceneError
 from erls.maths.records import python_reader
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -36,24 +35,11 @@ class Erls(SerialFormulation):
     Parameters
     ----------
     mechanism : Mechanism
-
-    Raises
-    ------
-    SceneError
-        Effects that only the dense form has.
     """
 
     gauge = "joint-angle"
 
     def __init__(self, mechanism: Mechanism) -> None:
-        if "modal_inertia" in mechanism.effects:
-            raise SceneError(
-                Cause.BAD_FIELD,
-                "the recursion of ERLS has no inertia of modes that changes with the deformation",
-                where="effects",
-                value="modal_inertia",
-                remedy="take DenseChain(mechanism, 'joint-angle'), as `erls.equations.registry` does, or leave it out",
-            )
         super().__init__(mechanism)
         self.stiffened = stiffened(mechanism)
 
@@ -89,11 +75,17 @@ class Erls(SerialFormulation):
         system, (y, _) = self.compiled, self.undeformed_start()
         states = self._links(system)
         d = np.empty((6 * self.joints, self.elastic))
-        for i, v in enumerate(np.eye(self.size)[len(self.free_joints) :]):
+
+        def moved(v: Array) -> Array:
+            """Rates of the rigid-body modal coordinates of all links, those of ν included."""
             residual(system, 0.0, y, v, np.zeros(0))
-            d[:, i] = np.concatenate(
-                [shape[:6] @ state.q_rate for shape, state in zip(self._shapes, states, strict=True)]
-            )
+            rates = [np.concatenate([state.w, state.q_rate[6:]]) for state in states]
+            return np.concatenate([shape[:6] @ rate for shape, rate in zip(self._shapes, rates, strict=True)])
+
+        rest = np.zeros(self.size)
+        still = moved(rest)  # where a prescribed motion begins with a rate
+        for i, v in enumerate(np.eye(self.size)[len(self.free_joints) :]):
+            d[:, i] = moved(v) - still
         return np.asarray(reach_of_nodes(self.mechanism, d)[self.free])
 
     def _links(self, system: CompiledSystem) -> list[LinkState]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from erls.equations.erls.anchored_segments import set_anchored_segments
 from erls.equations.erls.records import read_chain
 from erls.equations.erls.segments import set_segments
 from erls.equations.serial.elimination import eliminate, set_compliance, substitute
@@ -30,7 +31,10 @@ def factor_links(
     status = set_compliance(serial, chain.condensed, reals, integers, scratch, t, y, v, alpha, beta, factors)
     if status != 0:
         return int(status)
-    set_segments(serial, chain, reals, integers, scratch, t, y, True, accelerates, bends)
+    if bends is None:
+        set_segments(serial, chain, reals, integers, scratch, t, y, True, accelerates)
+    else:
+        set_anchored_segments(serial, chain, reals, integers, scratch, t, y, True, accelerates)
     return int(eliminate(serial, chain.segments, chain.condensed, reals, integers, scratch, factors, accelerates))
 
 

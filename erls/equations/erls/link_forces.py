@@ -14,7 +14,7 @@ mass matrix. Five parts may be left out (`erls.mechanism.effects`), with s₀ = 
 - ``spin_softening``: -Σ_ab ω_a ω_b Z_ab q on the modes.
 
 With one axis of rotation the wrench holds the moment about that axis only: no joint feels the others. Where the link
-has second-order displacements, ν + M₀⁻¹ (C q̇ + H ν) takes the place of ν (`erls.equations.erls.second_order`).
+has second-order displacements, w + M₀⁻¹ (C q̇ + H w) takes the place of ν (`erls.equations.erls.second_order`).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def pair_of(axes: int, a: int, b: int) -> int:
 @part
 def deform(chain: Chain, link: Link, state: LinkState) -> None:
     """X q about the axes of a link, Z q and qᵀ Z q of their pairs, as far as the inertia of a link needs them."""
-    axes, skip = len(link.axes), 6 if link.parent < 0 else 0  # u = 0 on the ground
+    axes, skip = len(link.axes), 6 if link.parent < 0 or chain.bends >= 0 else 0  # u = 0 on the ground and anchored
     if chain.first_order:
         for a in range(axes):
             clear(state.turned[a])
@@ -62,7 +62,7 @@ def link_forces(chain: Chain, link: Link, state: LinkState, twist: Array, rate: 
     ``twist`` and ``rate`` are those that inertia knows; without ``accelerated`` q̈_d is zero.
     """
     axes, n, ground = len(link.axes), len(state.q), link.parent < 0
-    skip = 6 if ground else 0
+    skip = 6 if ground or chain.bends >= 0 else 0  # u = 0 on the ground and anchored
     q, qd, qdd, modal, w, w_rate = state.q, state.q_rate, state.q_acceleration, state.modal, state.w, state.w_rate
     wrench, momentum = state.wrench, state.momentum
     for i in range(6):

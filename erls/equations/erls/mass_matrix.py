@@ -12,4 +12,4 @@ from fe_import.model import IntArray
 @kernel(contract.MASS_MATRIX, counted=False)
 def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
     """M."""
-    fill(reals, integers, scratch, t, y, out, None)
+    fill(reals, integers, scratch, t, y, out)

@@ -13,10 +13,12 @@ from erls.equations.serial import pack, segments
 from erls.equations.serial.condensed import condensed as elimination_memory
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.ends import end_state
-from erls.equations.serial.modal_inertia import compliance, stiffened
+from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
+from erls.equations.serial.modal_inertia_kernels import warp_record, warp_state
+from erls.equations.serial.nodes import RESTING, Node, node_record, node_state
 from erls.equations.serial.records import Serial
 from erls.maths.records import Memory
-from erls.maths.se3 import inverse, twist_transform
+from erls.maths.se3 import inverse, pose, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joints import Joint
@@ -112,58 +114,75 @@ def _columns(matrices: Array) -> Array:
     return np.ascontiguousarray(matrices.transpose(2, 0, 1)).reshape(columns, count * rows)
 
 
-def _momenta(link: Link, modes: Array, axes: Array, turning: slice) -> tuple[Array, Array]:
-    """`Bend.rows` and `Bend.odd`, before they are laid out."""
-    m = modes[:, turning].shape[1]
-    if link.second_order is None:
-        return np.zeros((6 + 3 * len(axes), m, m)), np.zeros((3, m, m))
-    momenta = (modes.T @ link.second_order.momentum @ modes)[:, turning, turning]
-    spin = np.einsum("nd,cdab->ncab", axes, link.second_order.spin).reshape(3 * len(axes), len(modes), len(modes))
-    spin = (modes.T @ spin @ modes)[:, turning, turning]
-    return np.concatenate([momenta.transpose(0, 2, 1), spin]), (momenta - momenta.transpose(0, 2, 1))[3:]
-
-
-def _bow(before: Link, joint: Joint, modes: Array, turning: slice) -> Array:
-    """(6, m, m) second-order displacement of the parent's interface, as motions of the parent's frame."""
-    m = modes[:, turning].shape[1]
-    if joint.seat is None or before.second_order is None:
-        return np.zeros((6, m, m))
-    found = before.second_order.interface(joint.seat, joint.before)
-    whole = np.einsum("ij,jab->iab", twist_transform(inverse(joint.before)), modes.T @ found @ modes)
-    return np.asarray(whole[:, turning, turning])
-
-
-def _turning(parent: int) -> slice:
-    """Coordinates of (u, q_d) that second-order displacements know."""
-    return slice(6 if parent < 0 else 3, None)
-
-
-def _bend(mechanism: Mechanism, k: int, found: list[Shapes], axes: Array) -> own.Bend:
-    link, joint, parent = mechanism.links[k], mechanism.joints[k], mechanism.joints[k].parent
-    ground = parent < 0
-    rows, odd = _momenta(link, found[k].modes, axes, _turning(parent))
-    bow = np.zeros((6, 0, 0))
-    if not ground:
-        turning = _turning(mechanism.joints[parent].parent)
-        bow = _bow(mechanism.links[parent], joint, found[parent].modes, turning)
-    slide, arm = np.zeros(3), np.zeros(3)
-    if not ground:
-        slide = joint.after[:3, :3].T @ joint.freedom.advance
-    if not ground and link.second_order is not None:
-        arm = inverse(joint.after)[:3, 3] - link.inboard.position
+def _bend(mechanism: Mechanism, k: int, basis: Array, axes: Array) -> own.Bend:
+    link = mechanism.links[k]
+    curved = _curved(link)
+    rows, odd, e = np.zeros((6 + 3 * len(axes), 0, 0)), np.zeros((3, 0, 0)), basis.shape[1]
+    if curved:
+        assert link.second_order is not None
+        momenta = basis.T @ link.second_order.momentum @ basis
+        spin = np.einsum("nd,cdab->ncab", axes, basis.T @ link.second_order.spin @ basis)
+        rows = np.concatenate([momenta.transpose(0, 2, 1), spin.reshape(3 * len(axes), e, e)])
+        odd = (momenta - momenta.transpose(0, 2, 1))[3:]
     return own.Bend(
-        curved=int(link.second_order is not None),
-        bows=int(bow.any()),
-        armed=int(slide.any() or arm.any()),
-        turns=0 if ground else 3,
+        curved=int(curved),
+        warped=int(curved and "modal_inertia" in mechanism.effects),
         axes=axes,
         rows=_columns(rows),
         odd=_columns(odd),
         compliance=compliance(link.invariants.rigid_mass_matrix),
-        bow=_columns(bow),
-        slide=slide,
-        arm=arm,
     )
+
+
+def _before(mechanism: Mechanism, k: int, bends: bool) -> Array:
+    """Pose of a joint from the frame of the parent; where that is anchored, from the interface which it stands on."""
+    joint = mechanism.joints[k]
+    if not bends or joint.seat is None or not mechanism.links[joint.parent].elastic_modes:
+        return joint.before
+    return pose(position=-mechanism.links[joint.parent].model.nodes[joint.seat.node]) @ joint.before
+
+
+def _curved(link: Link) -> bool:
+    """Whether a link has second-order displacements."""
+    return link.second_order is not None and link.elastic_modes > 0
+
+
+def _seat(mechanism: Mechanism, k: int, found: Sequence[Shapes]) -> Node:
+    """The interface of its parent on which the joint of link k stands."""
+    joint = mechanism.joints[k]
+    if joint.seat is None:
+        return RESTING
+    link = mechanism.links[joint.parent]
+    return node_record(joint.parent, link, found[joint.parent].modes[:, 6:], joint.seat.node, _curved(link))
+
+
+def _bends(
+    mechanism: Mechanism, found: Sequence[Shapes], axes: Sequence[Array], constants: Memory, scratch: Memory
+) -> dict[str, int]:
+    """Places of what chains with second-order displacements have, by the names of fields of `Chain`."""
+    links, count, places = mechanism.links, range(len(mechanism.links)), {}
+    modes = [link.elastic_modes for link in links]
+    bends = [_bend(mechanism, k, found[k].modes[:, 6:], axes[k]) for k in count]
+    seats = [_seat(mechanism, k, found) for k in count]
+    warps = [
+        warp_record(modal_inertia(link, mechanism.effects, found[k].modes[:, 6:]) if bends[k].warped else None)
+        for k, link in enumerate(links)
+    ]
+    places["bends"] = pack.put_all(constants, bends)
+    places["seats"] = pack.put_all(constants, seats)
+    places["warps"] = pack.put_all(constants, warps)
+    before = [modes[parent] if parent >= 0 else 0 for parent in mechanism.parents]
+    states = [own.bend_state(modes[k], before[k], len(axes[k])) for k in count]
+    places["bend_states"] = pack.put_all(scratch, states)
+    places["seat_states"] = pack.put_all(
+        scratch, [node_state(seat.shapes.shape[1], len(seat.second_order) > 0) for seat in seats]
+    )
+    places["warp_states"] = pack.put_all(scratch, [warp_state(modes[k] * bends[k].warped) for k in count])
+    places["changes"] = pack.put_all(scratch, [own.change(modes[k]) for k in count])
+    return places
+
+
+_UNBENT = dict.fromkeys(("bends", "seats", "warps", "bend_states", "seat_states", "warp_states", "changes"), -1)
 
 
 def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False) -> CompiledSystem:
@@ -186,7 +205,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     found = shapes(mechanism)
     axes = [np.eye(3)] * count if complete else rotation_axes(mechanism.joints)
     bends = stiffened(mechanism)
-    curved = [bends and link.second_order is not None for link in links]
+    curved = [bends and _curved(link) for link in links]
     ends = loop_ends(mechanism.loops)
     integers: list[int] = [0]
     constants, scratch, condensed = Memory(integers), Memory(integers), Memory(integers)
@@ -200,20 +219,21 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
             constants,
             joint,
             free.index(k) if k in free else -1,
-            pack.step_parts(joint.before, joint.freedom, joint.after),
+            pack.step_parts(_before(mechanism, k, bends), joint.freedom, joint.after),
             joint.screw,
         )
         for k, joint in enumerate(mechanism.joints)
     ]
+    parents = mechanism.parents
+    # anchored links turn as displacements make them turn
+    axes = [np.eye(3) if bends and parent >= 0 else each for each, parent in zip(axes, parents, strict=True)]
     inertial = [np.eye(3) if curved[k] else axes[k] for k in range(count)]
     vectors = [each.vectors for each in decoupled]
-    parents = mechanism.parents
     # on the ground a link moves along its joint alone
     sizes = [
-        6 + (3 if bends else 0) + len(each) if bends or parent >= 0 else 1
-        for each, parent in zip(axes, parents, strict=True)
+        6 + (0 if bends else len(axes[k])) if parent >= 0 or curved[k] else 1 for k, parent in enumerate(parents)
     ]
-    kept = [e + (3 if parents[k] >= 0 else 0) for k, e in enumerate(modes)]
+    warped = bends and "modal_inertia" in mechanism.effects
     rooms = [
         segments.segment(
             parent,
@@ -221,8 +241,8 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
             modes[k],
             sizes[parent] if parent >= 0 else 0,
             modes[parent] if parent >= 0 else 0,
-            (9 if bends else 6) if parent >= 0 and modes[parent] else 0,
-            6 if curved[k] and modes[k] else 0,
+            6 if parent >= 0 and modes[parent] else 0,
+            6 + warped * modes[k] if curved[k] else 0,
         )
         for k, parent in enumerate(parents)
     ]
@@ -235,18 +255,8 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
             ],
         ),
         states=pack.put_all(scratch, [own.link_state(modes[k], len(inertial[k])) for k in range(count)]),
-        bends=pack.put_all(constants, [_bend(mechanism, k, found, axes[k]) for k in range(count)]) if bends else -1,
-        bend_states=pack.put_all(
-            scratch,
-            [
-                own.bend_state(kept[k], kept[parent] if parent >= 0 else 0, len(axes[k]))
-                for k, parent in enumerate(parents)
-            ],
-        )
-        if bends
-        else -1,
+        **(_bends(mechanism, found, axes, constants, scratch) if bends else _UNBENT),
         segments=pack.put_all(scratch, rooms),
-        changes=pack.put_all(scratch, [own.change(sizes[k], modes[k]) for k in range(count)]) if bends else -1,
         condensed=pack.put_all(condensed, elimination_memory(rooms)),
         factors=0,
         left=0,

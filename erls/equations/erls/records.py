@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from erls.maths.records import Matrix, Stack, Vector, reader, room, table_size
+from erls.maths.records import Matrix, Stack, reader, room, table_size
 from erls.maths.so3 import Array
 
 
@@ -22,8 +22,11 @@ class Chain(NamedTuple):
         Places of the first `Link` and `LinkState`.
     bends, bend_states : int
         Places of the first `Bend` and `BendState`; -1 without second-order displacements.
+    seats, seat_states, warps, warp_states : int
+        Likewise of `erls.equations.serial.nodes`: for each link the interface of its parent that its joint stands on;
+        and of `erls.equations.serial.modal_inertia_kernels`.
     segments, changes, condensed : int
-        Places of the first records of `erls.equations.serial.segments`, of `erls.equations.erls.segments.Change` and of
+        Places of the first records of `erls.equations.serial.segments`, of `Change` and of
         `erls.equations.serial.condensed`.
     factors, left : int
         Where in working memory the factors of an acceleration lie, and what it leaves of the forces.
@@ -41,6 +44,10 @@ class Chain(NamedTuple):
     states: int
     bends: int
     bend_states: int
+    seats: int
+    seat_states: int
+    warps: int
+    warp_states: int
     segments: int
     changes: int
     condensed: int
@@ -100,7 +107,8 @@ class LinkState(NamedTuple):
     twist, twist_rate : (6,) arrays
         ν of the frame of the rigid link.
     w, w_rate : (6,) arrays
-        ν + u̇ as inertia knows it, and its derivative.
+        ν + u̇ as inertia knows it, and its derivative. Where equivalent rigid links are anchored at every instant
+        (`erls.equations.erls.anchored_frames`), u and its derivatives are zero, and the twist is w.
     down : (3,) array
         Gravity.
     wrench, force : (6,) arrays
@@ -112,7 +120,7 @@ class LinkState(NamedTuple):
     moments : (6,) array
         qᵀ Z q of each pair of axes.
     q, q_rate, q_acceleration : (n,) arrays
-        (u, q_d), second-order displacements of the frame included, and derivatives.
+        (u, q_d) and derivatives.
     modal : (n,) array
         Out of balance on them.
     speeds : (n,) array
@@ -153,44 +161,30 @@ def link_state(modes: int, axes: int) -> LinkState:
 
 
 class Bend(NamedTuple):
-    """Second-order displacements ½ xᵀ P x of a link, x its last m coordinates of (u, q_d): of rigid-body displacements
-    only turns are of second order, and none on the ground.
+    """Second-order displacements ½ qᵀ Ψ q of a link with e elastic coordinates, in its frame.
 
     Attributes
     ----------
     curved : int
-        Whether its inertia has second-order terms.
-    bows : int
-        Whether the parent's interface is displaced to second order.
-    armed : int
-        Whether its interface lies at an arm from its joint, or slides.
-    turns : int
-        Turning coordinates among x: 3, or 0 on the ground.
+        Whether there are any; tables over elastic coordinates are empty otherwise.
+    warped : int
+        Whether the inertia of its modes changes with them.
     axes : (B, 3) array
         About which its frame can turn.
-    rows : (m, (6 + 3 B) m) array
-        Per coordinate: transposed second-order momenta (6, m), then for each axis W along it (3, m).
-    odd : (m, 3 m) array
+    rows : (e, (6 + 3 B) e) array
+        Per coordinate: transposed second-order momenta (6, e), then for each axis W along it (3, e).
+    odd : (e, 3 e) array
         Per coordinate: P - Pᵀ of the last three momenta.
     compliance : (6, 6) array
         M₀⁻¹ of the undeformed link.
-    bow : (m of the parent, 6 m of the parent) array
-        Per coordinate of the parent: second-order displacement of its interface, as a motion of its frame.
-    slide, arm : (3,) arrays
-        Axis of a slide, and arm from the inboard interface to the joint.
     """
 
     curved: int
-    bows: int
-    armed: int
-    turns: int
+    warped: int
     axes: Matrix
     rows: Matrix
     odd: Matrix
     compliance: Matrix
-    bow: Matrix
-    slide: Vector
-    arm: Vector
 
 
 class BendState(NamedTuple):
@@ -198,16 +192,12 @@ class BendState(NamedTuple):
 
     Attributes
     ----------
-    e, e_rate, e_acceleration : (6,) arrays
-        Second-order displacement of the frame, and derivatives.
-    carried : (6,) array
-        What the parent's interface hands on of it.
-    push : (6,) array
-        Force on virtual e.
+    pose : (12,) array
+        Of the link's frame from that of its parent, displaced interface and joint.
     full, full_rate : (6,) arrays
-        The twist that inertia knows, ν + M₀⁻¹ (C q̇ + H ν), and its derivative.
+        The twist that inertia knows, w + M₀⁻¹ (C q̇ + H w), and its derivative.
     added, added_rate : (6,) arrays
-        C q̇ + H ν and its derivative.
+        C q̇ + H w and its derivative.
     share, share_rate : (6,) arrays
         M₀⁻¹ times momentum, and its derivative.
     moment, moment_rate : (3,) arrays
@@ -216,23 +206,13 @@ class BendState(NamedTuple):
         ½ qᵀ W q along each axis, and derivatives.
     weights : (6 + 3 B,) array
         Of rows in the modal forces.
-    rows, rows_rate : (6 + 3 B, m), (6, m) arrays
-        `Bend.rows` times x, and ẋ.
-    bow, bow_rate : (6, m of the parent) arrays
-        `Bend.bow` times x of the parent, and ẋ.
-    x, x_rate, x_acceleration : (m,) arrays
-        Coordinates, linear in the elastic ones.
-    pulls, turning : (6, m), (6, 3) arrays
-        M₀⁻¹ C, and M₀⁻¹ H on ω.
-    d, b : (3,) arrays
-        Arm at the joint's coordinate, and φ × d.
+    rows, rows_rate : (6 + 3 B, e), (6, e) arrays
+        `Bend.rows` times q, and q̇.
+    spare : (s,) array
+        Of the elastic coordinates of the link or of its parent, whichever has more.
     """
 
-    e: Annotated[Array, "6"]
-    e_rate: Annotated[Array, "6"]
-    e_acceleration: Annotated[Array, "6"]
-    carried: Annotated[Array, "6"]
-    push: Annotated[Array, "6"]
+    pose: Annotated[Array, "12"]
     full: Annotated[Array, "6"]
     full_rate: Annotated[Array, "6"]
     added: Annotated[Array, "6"]
@@ -244,48 +224,39 @@ class BendState(NamedTuple):
     spin: Annotated[Array, "B"]
     spin_rate: Annotated[Array, "B"]
     weights: Annotated[Array, "6+B"]
-    rows: Annotated[Array, "6+B m"]
-    rows_rate: Annotated[Array, "6 m"]
-    bow: Annotated[Array, "6 p"]
-    bow_rate: Annotated[Array, "6 p"]
-    x: Annotated[Array, "m"]
-    x_rate: Annotated[Array, "m"]
-    x_acceleration: Annotated[Array, "m"]
-    pulls: Annotated[Array, "6 m"]
-    turning: Annotated[Array, "6 3"]
-    d: Annotated[Array, "3"]
-    b: Annotated[Array, "3"]
+    rows: Annotated[Array, "6+B e"]
+    rows_rate: Annotated[Array, "6 e"]
     spare: Annotated[Array, "s"]
 
 
-def bend_state(kept: int, kept_before: int, axes: int) -> BendState:
-    """Memory for a link with m = ``kept``, and its parent's."""
-    return room(BendState, m=kept, p=kept_before, B=3 * axes, s=max(kept, kept_before))
+def bend_state(modes: int, modes_before: int, axes: int) -> BendState:
+    """Memory for a link, and what its parent has."""
+    return room(BendState, e=modes, B=3 * axes, s=max(modes, modes_before))
 
 
 class Change(NamedTuple):
-    """Working memory of a link with second-order inertia.
+    """Working memory of a link with second-order inertia: of W = w + M₀⁻¹ (C q̇ + H w).
 
     Attributes
     ----------
-    inertia, product : (9, 9), (9, p) arrays
-        Inertia over (W, Ω), and times ``map``.
-    map : (9, p) array
-        (W, Ω) per unit of μ.
-    coupling, whole : (9, e) arrays
-        Of (W, Ω) with q̇_d at given (W, Ω), and with the part of these that q̇_d makes.
+    inertia, product : (6, 6) arrays
+        Inertia over W, and times ``map``.
+    map : (6, 6) array
+        W per unit of w.
+    coupling, whole : (6, e) arrays
+        Of W with q̇_d at given W, and with the part of W that q̇_d makes.
     """
 
-    inertia: Annotated[Array, "9 9"]
-    map: Annotated[Array, "9 p"]
-    product: Annotated[Array, "9 p"]
-    coupling: Annotated[Array, "9 e"]
-    whole: Annotated[Array, "9 e"]
+    inertia: Annotated[Array, "6 6"]
+    map: Annotated[Array, "6 6"]
+    product: Annotated[Array, "6 6"]
+    coupling: Annotated[Array, "6 e"]
+    whole: Annotated[Array, "6 e"]
 
 
-def change(size: int, modes: int) -> Change:
-    """Memory for a link with p = ``size``."""
-    return room(Change, p=size, e=modes)
+def change(modes: int) -> Change:
+    """Memory for a link."""
+    return room(Change, e=modes)
 
 
 read_chain, read_link, read_link_state = reader(Chain), reader(Link), reader(LinkState)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations import compiled_system as contract
+from erls.equations.erls.anchored_frames import move_anchored, pose_from_parent
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import LINK, LINK_STATE, read_chain, read_link, read_link_state
-from erls.equations.erls.second_order import bend_frames
 from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
 from erls.maths.jit import kernel, part
 from erls.maths.so3 import Array
@@ -23,9 +23,10 @@ def put_states(
     serial = read_serial(reals, integers, integers[0])
     chain = read_chain(reals, integers, serial.own)
     for row in range(len(t)):
-        move_frames(serial, chain, reals, integers, scratch, t[row], y[row], v[row], y[row, 0:0])
-        if bends is not None:
-            bend_frames(serial, chain, reals, integers, scratch, True)
+        if bends is None:
+            move_frames(serial, chain, reals, integers, scratch, t[row], y[row], v[row], y[row, 0:0])
+        else:
+            move_anchored(serial, chain, reals, integers, scratch, t[row], y[row], v[row], y[row, 0:0])
         at, found = 12 * serial.links, out[row]
         for k in range(serial.links):
             parent = read_link(reals, integers, chain.links + k * LINK).parent
@@ -36,7 +37,10 @@ def put_states(
                 for i in range(12):
                     pose[i] = motion.pose[i]
             else:
-                compose_poses(found[12 * parent : 12 * parent + 12], motion.pose, pose)
+                step = motion.pose
+                if bends is not None:
+                    step = pose_from_parent(serial, chain, reals, integers, scratch, k)
+                compose_poses(found[12 * parent : 12 * parent + 12], step, pose)
             for values in (state.q, state.q_rate, motion.coordinate[:2]):
                 for i in range(len(values)):
                     found[at + i] = values[i]

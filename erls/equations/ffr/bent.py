@@ -20,6 +20,7 @@ from erls.equations.ffr.records import (
     BENT_BODY,
     BENT_FORCES,
     BENT_STATE,
+    BODY,
     BODY_STATE,
     CORRECT_ARRIVAL,
     CORRECT_TWIST,
@@ -29,8 +30,17 @@ from erls.equations.ffr.records import (
     Frames,
     read_bent_body,
     read_bent_state,
+    read_body,
     read_body_state,
     read_frames,
+)
+from erls.equations.serial.modal_inertia_kernels import (
+    WARP,
+    WARP_STATE,
+    read_warp,
+    read_warp_state,
+    set_warp,
+    warp_forces,
 )
 from erls.equations.serial.records import read_serial
 from erls.maths.jit import kernel, part
@@ -62,10 +72,9 @@ def bend_link(k: int, reals: Array, integers: IntArray, scratch: Array, q: Array
     clear(square)
     add_rows(state.bending[:3], q, 0.5, state.moment)
     add_rows(state.spun, q, 0.5, square)
-    if len(bent.per_modal) > 0:
-        warp = state.warp.reshape(e * e)
-        clear(warp)
-        add_columns(bent.warp, q, 1.0, warp)
+    if read_body(reals, integers, frames.bodies + k * BODY).warped:
+        warp = read_warp(reals, integers, frames.warps + k * WARP)
+        set_warp(warp, read_warp_state(scratch, integers, frames.warp_states + k * WARP_STATE), q)
 
 
 @part
@@ -147,33 +156,6 @@ def _put_back(bent: BentBody, bending: BentState, state: BodyState, rates: Array
         add_columns(bending.spun[3 * i : 3 * i + 3], state.twist[3:], -share[3 + i], forces)
 
 
-@part
-def _modal_forces(bent: BentBody, bending: BentState, rates: Array, moved: Array, forces: Array) -> None:
-    """Add d/dt ∂T₃/∂η̇ - ∂T₃/∂η; ``moved`` is η̈, empty for zero."""
-    e, lag = len(rates), bending.lag
-    warp_rate, twisted = bending.warp_rate.reshape(e * e), bending.twisted.reshape(e * e)
-    clear(warp_rate)
-    clear(twisted)
-    add_columns(bent.warp, rates, 1.0, warp_rate)
-    add_columns(bent.warp_skew, rates, 1.0, twisted)
-    for i in range(e):
-        bending.pushed[i], lag[i] = rates[i], 0.0
-        bending.pushed_rate[i] = 0.0
-    add_rows(bending.warp, rates, 1.0, lag)  # k
-    add_rows(bent.per_modal, lag, 1.0, bending.pushed)
-    clear(lag)  # of which the derivative comes next
-    add_rows(bending.warp_rate, rates, 1.0, lag)
-    if len(moved) > 0:
-        add_rows(bending.warp, moved, 1.0, lag)
-        for i in range(e):
-            bending.pushed_rate[i] = moved[i]
-    add_rows(bent.per_modal, lag, 1.0, bending.pushed_rate)
-    add_columns(bending.warp, bending.pushed_rate, 1.0, forces)
-    add_columns(bending.twisted, bending.pushed, 1.0, forces)
-    for i in range(e):
-        forces[i] += lag[i]
-
-
 @kernel(BENT_FORCES, counted=False)
 def bent_forces(
     k: int, reals: Array, integers: IntArray, scratch: Array, rates: Array, moved: Array, forces: Array
@@ -183,8 +165,10 @@ def bent_forces(
     bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
     bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
     _put_back(bent, bending, read_body_state(scratch, integers, frames.body_states + k * BODY_STATE), rates, forces)
-    if len(bent.per_modal) > 0:
-        _modal_forces(bent, bending, rates, moved, forces)
+    if read_body(reals, integers, frames.bodies + k * BODY).warped:
+        warp = read_warp(reals, integers, frames.warps + k * WARP)
+        warp_state = read_warp_state(scratch, integers, frames.warp_states + k * WARP_STATE)
+        warp_forces(warp, warp_state, rates, moved, forces)
 
 
 @kernel(CORRECT_ARRIVAL, counted=False)

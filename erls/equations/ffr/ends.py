@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from erls.equations import compiled_system as contract
 from erls.equations.ffr.motion import move_frames
-from erls.equations.ffr.nodes import move_node, place_node
 from erls.equations.ffr.records import (
     BODY,
     BODY_STATE,
     END,
-    NODE,
-    NODE_STATE,
     EndRoom,
     Frames,
     read_body,
@@ -22,11 +19,10 @@ from erls.equations.ffr.records import (
     read_end,
     read_end_room,
     read_frames,
-    read_node,
-    read_node_state,
 )
 from erls.equations.ffr.residual import hand_back, pass_joint, pull_node
 from erls.equations.serial.ends import carry_end, column_of
+from erls.equations.serial.nodes import NODE, NODE_STATE, move_node, place_node, read_node, read_node_state
 from erls.equations.serial.records import JOINT_STATE, MODES, Serial, read_joint_state, read_modes, read_serial
 from erls.maths.jit import kernel, part
 from erls.maths.products import clear, copy

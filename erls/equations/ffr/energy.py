@@ -8,17 +8,14 @@ from erls.equations.ffr.records import (
     BENT_STATE,
     BODY,
     BODY_STATE,
-    NODE,
-    NODE_STATE,
     read_bent_state,
     read_body,
     read_body_state,
     read_frames,
-    read_node,
-    read_node_state,
 )
 from erls.equations.ffr.segments import fill_segments
 from erls.equations.serial.elastic import elastic_energy
+from erls.equations.serial.nodes import NODE, NODE_STATE, read_node, read_node_state
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,

@@ -9,24 +9,28 @@ from __future__ import annotations
 
 from erls.equations import compiled_system as contract
 from erls.equations.ffr.inertia import inertia_blocks, link_forces
-from erls.equations.ffr.nodes import move_node, place_node, to_node_axes
 from erls.equations.ffr.records import (
     BODY,
     BODY_STATE,
     END,
-    NODE,
-    NODE_STATE,
     Frames,
     call_bend_link,
     read_body,
     read_body_state,
     read_end,
     read_frames,
-    read_node,
-    read_node_state,
 )
 from erls.equations.ffr.segments import free_segment
 from erls.equations.serial.ends import carry_end
+from erls.equations.serial.nodes import (
+    NODE,
+    NODE_STATE,
+    move_node,
+    place_node,
+    read_node,
+    read_node_state,
+    to_node_axes,
+)
 from erls.equations.serial.records import MODES, Serial, call_feed_forward, read_modes, read_serial
 from erls.equations.serial.segments import SEGMENT, read_segment
 from erls.maths.jit import kernel, part

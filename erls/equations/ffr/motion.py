@@ -6,23 +6,18 @@ from that, displaced by its inboard node, the floating frame of the next link: t
 
 from __future__ import annotations
 
-from erls.equations.ffr.nodes import move_node, place_node
-from erls.equations.ffr.records import (
-    BODY,
-    BODY_STATE,
+from erls.equations.ffr.records import BODY, BODY_STATE, BodyState, Frames, call_bend_link, read_body, read_body_state
+from erls.equations.serial.joints import move_joint
+from erls.equations.serial.nodes import (
     NODE,
     NODE_STATE,
-    BodyState,
-    Frames,
     Node,
     NodeState,
-    call_bend_link,
-    read_body,
-    read_body_state,
+    move_node,
+    place_node,
     read_node,
     read_node_state,
 )
-from erls.equations.serial.joints import move_joint
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,

@@ -10,23 +10,14 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, acceleration_in, function_in
 from erls.equations.ffr import records
-from erls.equations.ffr.records import (
-    BentBody,
-    Body,
-    End,
-    EndRoom,
-    Frames,
-    Node,
-    Room,
-    bent_state,
-    body_state,
-    node_state,
-)
+from erls.equations.ffr.records import BentBody, Body, End, EndRoom, Frames, Room, bent_state, body_state
 from erls.equations.ffr.standard_data import StandardData
 from erls.equations.serial import pack
 from erls.equations.serial.condensed import condensed
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.modal_inertia import modal_inertia
+from erls.equations.serial.modal_inertia_kernels import Warp, warp_record, warp_state
+from erls.equations.serial.nodes import RESTING, Node, node_record, node_state
 from erls.equations.serial.records import Serial
 from erls.equations.serial.segments import segment
 from erls.maths.calls import address_for
@@ -34,7 +25,6 @@ from erls.maths.records import Memory
 from erls.maths.se3 import pose, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.links import node_shape6
 from erls.mechanism.loops import LoopEnd
 from fe_import.model import InterfaceNode
 
@@ -81,15 +71,8 @@ class Given:
         return self.stiffened and link.elastic_modes > 0 and link.second_order is not None
 
 
-def node_record(given: Given, k: int, node: int) -> Node:
-    """A node of link k."""
-    link, basis = given.mechanism.links[k], given.bases[k]
-    shapes = np.vstack(node_shape6(link.model, node)) @ basis
-    second, e = np.zeros((0, 0)), link.elastic_modes
-    if given.bent(k):
-        assert link.second_order is not None
-        second = (basis.T @ link.second_order.node(node) @ basis).transpose(2, 0, 1).reshape(e, 6 * e)
-    return Node(k, int(e > 0), link.model.nodes[node], shapes, second)
+def _node(given: Given, k: int, node: int) -> Node:
+    return node_record(k, given.mechanism.links[k], given.bases[k], node, given.bent(k))
 
 
 def _end(node: Node, number: int, end: LoopEnd) -> End:
@@ -98,11 +81,8 @@ def _end(node: Node, number: int, end: LoopEnd) -> End:
     return End(node.link, number, pack.pose_numbers(offset))
 
 
-_RESTING = Node(-1, 0, np.zeros(3), np.zeros((6, 0)), np.zeros((0, 0)))
-
-
 def _interface(given: Given, k: int, interface: InterfaceNode | None) -> Node:
-    return _RESTING if k < 0 or interface is None else node_record(given, k, interface.node)
+    return RESTING if k < 0 or interface is None else _node(given, k, interface.node)
 
 
 class _Nodes(NamedTuple):
@@ -164,29 +144,23 @@ def _body(given: Given, k: int) -> Body:
 def _bent_body(given: Given, k: int) -> BentBody:
     empty = np.zeros((0, 0))
     if not given.bent(k):
-        return BentBody(empty, empty, empty, empty, empty, empty, empty)
+        return BentBody(empty, empty, empty, empty)
     link, basis, e = given.mechanism.links[k], given.bases[k], given.data[k].size
     assert link.second_order is not None
     bend = basis.T @ link.second_order.momentum @ basis
     spin = (basis.T @ link.second_order.spin @ basis).reshape(9, e, e)
     skew = bend[3:] - bend[3:].transpose(0, 2, 1)
-    warp: Array = empty
-    warp_skew: Array = empty
-    per_modal: Array = empty
-    modal = modal_inertia(link, given.mechanism.effects, basis)
-    if modal is not None:
-        per_modal = np.asarray(modal.per_mass, dtype=float)
-        warp = modal.tensor.transpose(1, 0, 2).reshape(e, e * e)
-        warp_skew = warp - modal.tensor.transpose(2, 0, 1).reshape(e, e * e)
     return BentBody(
         bend=bend.transpose(1, 0, 2).reshape(e, 6 * e),
         spin=spin.transpose(2, 0, 1).reshape(e, 9 * e),
         skew=skew.transpose(1, 0, 2).reshape(e, 3 * e),
         per_mass=np.asarray(np.linalg.inv(given.data[k].rigid), dtype=float),
-        warp=warp,
-        warp_skew=warp_skew,
-        per_modal=per_modal,
     )
+
+
+def _warp(given: Given, k: int) -> Warp:
+    link, effects = given.mechanism.links[k], given.mechanism.effects
+    return warp_record(modal_inertia(link, effects, given.bases[k]) if given.bent(k) else None)
 
 
 class _Sizes(NamedTuple):
@@ -245,7 +219,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
     rigid_links, rigid_states = pack.rigid_links(mechanism, constants, working)
     pairs = [node for found in nodes for node in (found.base, found.inner)]
     ends, own_nodes = given.ends, len(pairs)
-    pairs += [node_record(given, k, end.node) for k, end in ends]
+    pairs += [_node(given, k, end.node) for k, end in ends]
     sizes = _sizes(given, bodies, nodes)
     none = _Sizes(0, 0, 0)
     segments = []
@@ -269,9 +243,9 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         ),
         end_room=working.put(EndRoom(np.zeros(12), np.zeros(6), np.zeros(6))),
         bent_bodies=pack.put_all(constants, [_bent_body(given, k) for k in links]),
-        bent_states=pack.put_all(
-            working, [bent_state(sizes[k].modes if b.bent else 0, bool(b.warped)) for k, b in enumerate(bodies)]
-        ),
+        bent_states=pack.put_all(working, [bent_state(sizes[k].modes if b.bent else 0) for k, b in enumerate(bodies)]),
+        warps=pack.put_all(constants, [_warp(given, k) for k in links]),
+        warp_states=pack.put_all(working, [warp_state(sizes[k].modes * b.warped) for k, b in enumerate(bodies)]),
         bend_link=address_for(records.call_bend_link, bent),
         correct_twist=address_for(records.call_correct_twist, bent),
         bent_forces=address_for(records.call_bent_forces, bent),

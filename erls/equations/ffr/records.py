@@ -12,8 +12,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-import numpy as np
-
 from erls.equations import compiled_system as contract
 from erls.maths.calls import caller
 from erls.maths.jit import ENABLED
@@ -50,7 +48,7 @@ class Frames(NamedTuple):
         Without those that loops hold.
     end_count, ends, end_room : int
         Frames that loops hold, the place of the first `End`, and of the `EndRoom`.
-    bent_bodies, bent_states : int
+    bent_bodies, bent_states, warps, warp_states : int
         Places of the first ones; empty records of links without second-order displacements.
     bend_link, correct_twist, bent_forces, correct_arrival : int
         Addresses of `erls.equations.ffr.bent`, where a link has second-order displacements; otherwise -1, and nothing
@@ -73,6 +71,8 @@ class Frames(NamedTuple):
     end_room: int
     bent_bodies: int
     bent_states: int
+    warps: int
+    warp_states: int
     bend_link: int
     correct_twist: int
     bent_forces: int
@@ -143,46 +143,12 @@ class BentBody(NamedTuple):
         P less its transpose, rows (3, e), likewise.
     per_mass : (6, 6) array
         M₀⁻¹.
-    warp : (e, e e) array
-        K of modal inertia (`erls.equations.serial.modal_inertia`), rows (e, e), likewise; (0, 0) without it, like
-        ``warp_skew`` and ``per_modal``.
-    warp_skew : (e, e e) array
-        K less the same with the coordinates exchanged that it is multiplied with.
-    per_modal : (e, e) array
-        σ⁻¹.
     """
 
     bend: Matrix
     spin: Matrix
     skew: Matrix
     per_mass: Matrix
-    warp: Matrix
-    warp_skew: Matrix
-    per_modal: Matrix
-
-
-class Node(NamedTuple):
-    """A node of a link that its elastic coordinates move.
-
-    Attributes
-    ----------
-    link : int
-        Number of the link that it belongs to.
-    moves : int
-        Whether the elastic coordinates move it in the floating frame.
-    position : (3,) array
-        Undeformed, in the floating frame.
-    shapes : (6, e) array
-        Displacement u and rotation vector φ per elastic coordinate.
-    second_order : (e, 6 e) array
-        Ψ of u and φ, rows (6, e), for each coordinate that they are multiplied with; (0, 0) without.
-    """
-
-    link: int
-    moves: int
-    position: Vector
-    shapes: Matrix
-    second_order: Matrix
 
 
 class BodyState(NamedTuple):
@@ -270,9 +236,6 @@ class BentState(NamedTuple):
         W η.
     skewed : (3, e) array
         Working memory.
-    warp, warp_rate, twisted : (e, e) arrays
-        K(η), K(η̇) and its skew companion of modal inertia; columns over η̇.
-    pushed, pushed_rate, lag : (e,) arrays
     spare : (6,) array
         Working memory.
     """
@@ -292,63 +255,12 @@ class BentState(NamedTuple):
     bending_rate: Annotated[Array, "6 e"]
     spun: Annotated[Array, "9 e"]
     skewed: Annotated[Array, "3 e"]
-    warp: Annotated[Array, "n n"]
-    warp_rate: Annotated[Array, "n n"]
-    twisted: Annotated[Array, "n n"]
-    pushed: Annotated[Array, "n"]
-    pushed_rate: Annotated[Array, "n"]
-    lag: Annotated[Array, "n"]
     spare: Annotated[Array, "6"]
 
 
-def bent_state(e: int, warped: bool) -> BentState:
-    """Memory for a link with so many elastic coordinates, with modal inertia or without."""
-    return room(BentState, e=e, n=e if warped else 0)
-
-
-class NodeState(NamedTuple):
-    """Motion of a node in its floating frame.
-
-    Attributes
-    ----------
-    pose, back : (12,) arrays
-        Of the node, and its inverse.
-    phi, phi_rate : (3,) arrays
-        Rotation vector and its derivative.
-    tangent : (3, 3) array
-        T(φ), which turns φ̇ into the angular velocity in the node's axes.
-    turning : (3,) array
-        da/ds, b and db/ds, see `erls.equations.ffr.nodes`.
-    twist, twist_rate : (6,) arrays
-        Against the floating frame, in the node's axes.
-    rows : (6, e) array
-        u̇ and φ̇ per η̇.
-    slope, slope_rate : (6, e) arrays
-        Ψ η and Ψ η̇.
-    moves : (6, e) array
-        Twist per η̇.
-    """
-
-    pose: Vector
-    back: Vector
-    phi: Vector
-    phi_rate: Vector
-    tangent: Matrix
-    turning: Vector
-    twist: Vector
-    twist_rate: Vector
-    rows: Matrix
-    slope: Matrix
-    slope_rate: Matrix
-    moves: Matrix
-
-
-def node_state(e: int, bent: bool) -> NodeState:
-    """Memory for a node that so many elastic coordinates move, by second-order displacements or not."""
-    rows, slope = np.zeros((6, e)), np.zeros((6, e if bent else 0))
-    rest = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
-    six, three = np.zeros(6), np.zeros(3)
-    return NodeState(rest, rest, three, three, np.eye(3), three, six, six, rows, slope, slope, rows)
+def bent_state(e: int) -> BentState:
+    """Memory for a link with so many elastic coordinates."""
+    return room(BentState, e=e)
 
 
 class End(NamedTuple):
@@ -374,8 +286,8 @@ class Room(NamedTuple):
     factors: Vector
 
 
-read_frames, read_body, read_bent_body, read_node = reader(Frames), reader(Body), reader(BentBody), reader(Node)
-read_body_state, read_bent_state, read_node_state = reader(BodyState), reader(BentState), reader(NodeState)
+read_frames, read_body, read_bent_body = reader(Frames), reader(Body), reader(BentBody)
+read_body_state, read_bent_state = reader(BodyState), reader(BentState)
 read_room, read_end, read_end_room = reader(Room), reader(End), reader(EndRoom)
-BODY, BENT_BODY, NODE, END = table_size(Body), table_size(BentBody), table_size(Node), table_size(End)
-BODY_STATE, BENT_STATE, NODE_STATE = table_size(BodyState), table_size(BentState), table_size(NodeState)
+BODY, BENT_BODY, END = table_size(Body), table_size(BentBody), table_size(End)
+BODY_STATE, BENT_STATE = table_size(BodyState), table_size(BentState)

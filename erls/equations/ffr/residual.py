@@ -10,20 +10,9 @@ from typing import Any
 from erls.equations import compiled_system as contract
 from erls.equations.ffr.inertia import link_forces
 from erls.equations.ffr.motion import move_frames
-from erls.equations.ffr.nodes import from_node_axes
-from erls.equations.ffr.records import (
-    BODY,
-    BODY_STATE,
-    NODE,
-    NODE_STATE,
-    Frames,
-    read_body,
-    read_body_state,
-    read_frames,
-    read_node,
-    read_node_state,
-)
+from erls.equations.ffr.records import BODY, BODY_STATE, Frames, read_body, read_body_state, read_frames
 from erls.equations.serial.joints import effort
+from erls.equations.serial.nodes import NODE, NODE_STATE, from_node_axes, read_node, read_node_state
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,

@@ -14,25 +14,25 @@ from typing import Any
 
 from erls.equations.ffr.inertia import inertia_blocks
 from erls.equations.ffr.motion import place_frames
-from erls.equations.ffr.nodes import node_moves
 from erls.equations.ffr.records import (
-    BENT_BODY,
     BENT_STATE,
     BODY,
     BODY_STATE,
-    NODE,
-    NODE_STATE,
     BodyState,
     Frames,
-    NodeState,
     call_correct_arrival,
-    read_bent_body,
     read_bent_state,
     read_body,
     read_body_state,
-    read_node,
-    read_node_state,
 )
+from erls.equations.serial.modal_inertia_kernels import (
+    WARP,
+    WARP_STATE,
+    read_warp,
+    read_warp_state,
+    warp_rows,
+)
+from erls.equations.serial.nodes import NODE, NODE_STATE, NodeState, node_moves, read_node, read_node_state
 from erls.equations.serial.records import (
     JOINT_STATE,
     MODES,
@@ -42,7 +42,7 @@ from erls.equations.serial.records import (
 )
 from erls.equations.serial.segments import SEGMENT, Segment, read_segment
 from erls.maths.jit import part
-from erls.maths.products import add_columns, add_product, add_transposed_product, clear, copy, copy_matrix
+from erls.maths.products import add_product, add_transposed_product, copy, copy_matrix
 from erls.maths.so3 import Array
 from erls.maths.spatial import transform_motion
 from fe_import.model import IntArray
@@ -136,7 +136,6 @@ def _weights(
     """I, B, E and F of link k."""
     body = read_body(reals, integers, frames.bodies + k * BODY)
     state = read_body_state(scratch, integers, frames.body_states + k * BODY_STATE)
-    bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
     bending = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
     own = read_segment(scratch, integers, frames.segments + k * SEGMENT)
     e = state.coupling.shape[1]
@@ -165,13 +164,9 @@ def _weights(
             own.change[i, j] = carried[i, j]
             own.partner[i, j] = state.spare_coupling[i, j] + state.coupling[i, j]
     if body.warped:
-        for i in range(e):
-            partner = own.partner[6 + i]
-            for j in range(e):
-                own.change[6 + i, j] = bending.warp[i, j]
-            clear(partner)
-            partner[i] = 2.0
-            add_columns(bending.warp, bent.per_modal[i], 1.0, partner)
+        warp = read_warp(reals, integers, frames.warps + k * WARP)
+        warp_state = read_warp_state(scratch, integers, frames.warp_states + k * WARP_STATE)
+        warp_rows(warp, warp_state, own.change[6:], own.partner[6:])
 
 
 @part

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from erls.equations import compiled_system as contract
 from erls.equations.ffr.motion import place_frames
-from erls.equations.ffr.records import BODY, NODE, NODE_STATE, read_body, read_frames, read_node, read_node_state
+from erls.equations.ffr.records import BODY, read_body, read_frames
+from erls.equations.serial.nodes import NODE, NODE_STATE, read_node, read_node_state
 from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
 from erls.maths.jit import kernel, part
 from erls.maths.so3 import Array

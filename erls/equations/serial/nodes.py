@@ -1,4 +1,6 @@
-"""Displaced nodes: pose and motion in the floating frame, moved by u, turned by exp(φ), linear in η or of second order.
+"""Displaced nodes: pose and motion in the frame of their link, moved by u, turned by exp(φ).
+
+u and φ are linear in the elastic coordinates η of the link, with ½ ηᵀ Ψ η where they are of second order.
 
 With s = φ², a = (1 - cos φ)/φ² and b = (φ - sin φ)/φ³ the turn is 1 + (1 - s b) φ̃ + a φ̃², and ω = T(φ) φ̇ with
 T = 1 - a φ̃ + b φ̃² in the node's axes (A. Iserles, H. Munthe-Kaas, S. Nørsett, A. Zanna, Acta Numerica 2000, app. B).
@@ -7,15 +9,115 @@ T = 1 - a φ̃ + b φ̃² in the node's axes (A. Iserles, H. Munthe-Kaas, S. Nø
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from erls.equations.ffr.records import Node, NodeState
 from erls.maths.jit import part
 from erls.maths.products import add_columns, add_rows, clear
+from erls.maths.records import Matrix, Vector, reader, table_size
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, dot3, invert_pose
+from erls.mechanism.links import Link, node_shape6
+
+
+class Node(NamedTuple):
+    """A node of a link that its elastic coordinates move.
+
+    Attributes
+    ----------
+    link : int
+        Number of the link that it belongs to.
+    moves : int
+        Whether the elastic coordinates move it in the frame of its link.
+    position : (3,) array
+        Undeformed, in the frame of its link.
+    shapes : (6, e) array
+        Displacement u and rotation vector φ per elastic coordinate.
+    second_order : (e, 6 e) array
+        Ψ of u and φ, rows (6, e), for each coordinate that they are multiplied with; (0, 0) without.
+    """
+
+    link: int
+    moves: int
+    position: Vector
+    shapes: Matrix
+    second_order: Matrix
+
+
+class NodeState(NamedTuple):
+    """Motion of a node in the frame of its link.
+
+    Attributes
+    ----------
+    pose, back : (12,) arrays
+        Of the node, and its inverse.
+    phi, phi_rate : (3,) arrays
+        Rotation vector and its derivative.
+    tangent : (3, 3) array
+        T(φ), which turns φ̇ into the angular velocity in the node's axes.
+    turning : (3,) array
+        da/ds, b and db/ds, above.
+    twist, twist_rate : (6,) arrays
+        Against that frame, in the node's axes.
+    rows : (6, e) array
+        u̇ and φ̇ per η̇.
+    slope, slope_rate : (6, e) arrays
+        Ψ η and Ψ η̇.
+    moves : (6, e) array
+        Twist per η̇.
+    """
+
+    pose: Vector
+    back: Vector
+    phi: Vector
+    phi_rate: Vector
+    tangent: Matrix
+    turning: Vector
+    twist: Vector
+    twist_rate: Vector
+    rows: Matrix
+    slope: Matrix
+    slope_rate: Matrix
+    moves: Matrix
+
+
+def node_state(e: int, bent: bool) -> NodeState:
+    """Memory for a node that so many elastic coordinates move, by second-order displacements or not."""
+    rows, slope = np.zeros((6, e)), np.zeros((6, e if bent else 0))
+    rest = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
+    six, three = np.zeros(6), np.zeros(3)
+    return NodeState(rest, rest, three, three, np.eye(3), three, six, six, rows, slope, slope, rows)
+
+
+RESTING = Node(-1, 0, np.zeros(3), np.zeros((6, 0)), np.zeros((0, 0)))
+"""A node of no link, which nothing moves."""
+
+
+def node_record(k: int, link: Link, basis: Array, node: int, bent: bool) -> Node:
+    """A node of link k.
+
+    Parameters
+    ----------
+    k : int
+    link : Link
+    basis : (m, e) array
+        Modal coordinates of the link per elastic coordinate.
+    node : int
+        Number in the link's model.
+    bent : bool
+        Whether the link has second-order displacements.
+    """
+    shapes = np.vstack(node_shape6(link.model, node)) @ basis
+    second, e = np.zeros((0, 0)), basis.shape[1]
+    if bent:
+        assert link.second_order is not None
+        second = (basis.T @ link.second_order.node(node) @ basis).transpose(2, 0, 1).reshape(e, 6 * e)
+    return Node(k, int(e > 0), link.model.nodes[node], shapes, second)
+
+
+read_node, read_node_state = reader(Node), reader(NodeState)
+NODE, NODE_STATE = table_size(Node), table_size(NodeState)
 
 _SERIES = 0.5  # rad²; below, nine terms give full precision
 _SMALL = 0.01  # rad²; below, six
