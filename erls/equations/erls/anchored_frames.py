@@ -35,6 +35,7 @@ from erls.equations.serial.records import (
     read_modes,
 )
 from erls.maths.jit import part
+from erls.maths.products import copy
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_motion_cross, compose_poses, rotate_back, transform_motion
 from fe_import.model import IntArray
@@ -125,14 +126,12 @@ def _leave(
 
 
 @part
-def pose_from_parent(
-    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int
-) -> Array:
-    """(12,) pose of a link's frame from that of its parent, displaced interface and joint."""
+def set_pose(serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int) -> None:
+    """``pose`` of `BendState`: displaced interface and joint."""
     pose = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose
-    if not read_node(reals, integers, chain.seats + k * NODE).moves:
-        return pose
-    moved = read_node_state(scratch, integers, chain.seat_states + k * NODE_STATE)
     whole = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).pose
-    compose_poses(moved.pose, pose, whole)
-    return whole
+    if read_node(reals, integers, chain.seats + k * NODE).moves:
+        moved = read_node_state(scratch, integers, chain.seat_states + k * NODE_STATE)
+        compose_poses(moved.pose, pose, whole)
+    else:
+        copy(pose, whole)

@@ -9,13 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations import compiled_system as contract
-from erls.equations.erls.anchored_frames import move_anchored, pose_from_parent
+from erls.equations.erls.anchored_frames import move_anchored, set_pose
 from erls.equations.erls.balance import hand_back, push_joint
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import (
+    BEND_STATE,
     LINK,
     LINK_STATE,
     Chain,
+    read_bend_state,
     read_chain,
     read_link,
     read_link_state,
@@ -50,12 +52,11 @@ def _move_end(
     k = end.link
     while k >= 0:
         copy(pose, moved.spare)
-        if bends is None:
-            compose_poses(
-                read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose, moved.spare, pose
-            )
-        else:
-            compose_poses(pose_from_parent(serial, chain, reals, integers, scratch, k), moved.spare, pose)
+        step = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose
+        if bends is not None:
+            set_pose(serial, chain, reals, integers, scratch, k)
+            step = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).pose
+        compose_poses(step, moved.spare, pose)
         k = read_link(reals, integers, chain.links + k * LINK).parent
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations import compiled_system as contract
-from erls.equations.erls.anchored_frames import move_anchored, pose_from_parent
+from erls.equations.erls.anchored_frames import move_anchored, set_pose
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.link_forces import deform, pair_of
 from erls.equations.erls.records import (
@@ -91,7 +91,8 @@ def add_energies(
         twist, moment, pose = state.twist, state.point[:3], motion.pose
         clear(moment)
         if bends is not None:
-            pose = pose_from_parent(serial, chain, reals, integers, scratch, k)
+            set_pose(serial, chain, reals, integers, scratch, k)
+            pose = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).pose
             bend = read_bend(reals, integers, chain.bends + k * BEND)
             if bend.curved:
                 bent = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE)

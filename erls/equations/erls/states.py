@@ -5,9 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations import compiled_system as contract
-from erls.equations.erls.anchored_frames import move_anchored, pose_from_parent
+from erls.equations.erls.anchored_frames import move_anchored, set_pose
 from erls.equations.erls.frames import move_frames
-from erls.equations.erls.records import LINK, LINK_STATE, read_chain, read_link, read_link_state
+from erls.equations.erls.records import (
+    BEND_STATE,
+    LINK,
+    LINK_STATE,
+    read_bend_state,
+    read_chain,
+    read_link,
+    read_link_state,
+)
 from erls.equations.serial.records import JOINT_STATE, read_joint_state, read_serial
 from erls.maths.jit import kernel, part
 from erls.maths.so3 import Array
@@ -39,7 +47,8 @@ def put_states(
             else:
                 step = motion.pose
                 if bends is not None:
-                    step = pose_from_parent(serial, chain, reals, integers, scratch, k)
+                    set_pose(serial, chain, reals, integers, scratch, k)
+                    step = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).pose
                 compose_poses(found[12 * parent : 12 * parent + 12], step, pose)
             for values in (state.q, state.q_rate, motion.coordinate[:2]):
                 for i in range(len(values)):
