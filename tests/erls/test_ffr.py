@@ -14,9 +14,8 @@ import erls
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.body_frame import BODY_FRAMES
 from erls.equations.ffr.formulation import Ffr
-from erls.equations.ffr.nodes import move_node, place_node
-from erls.equations.ffr.records import Node, NodeState, node_state
 from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.serial.nodes import Node, NodeState, move_node, node_state, place_node
 from erls.errors import Cause, SimulationError
 from erls.maths.jit import plain
 from erls.maths.so3 import Array, skew

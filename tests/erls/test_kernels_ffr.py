@@ -14,8 +14,8 @@ from twins import Plain, distance, uncompiled
 
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.formulation import Ffr
-from erls.equations.ffr.nodes import turn_factors
 from erls.equations.registry import formulate
+from erls.equations.serial.nodes import turn_factors
 from erls.equations.substructures import Substructured
 from erls.integrate.base import Options
 from erls.integrate.generalized_alpha import generalized_alpha
