@@ -12,7 +12,6 @@ import numpy as np
 import platformdirs
 
 from erls.errors import Cause, SceneError
-from erls.maths.se3 import inverse
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.compound_joints import expand
@@ -26,6 +25,7 @@ from erls.scene.build_joints import build_joints, stands_on
 from erls.scene.build_loops import build_loops
 from erls.scene.build_substructures import piece_links, piece_models, piece_warnings
 from erls.scene.chain import Scene
+from erls.scene.interface_gaps import interface_gaps
 from erls.scene.links import Link as LinkRecord
 from fe_import.cache import reduce_cached
 from fe_import.description.link import LinkFile, load_link
@@ -100,7 +100,7 @@ def build_mechanism(
         replace(link, pieces=piece_links(given, link, own, f"{file}: links[{k}]")) if own else link
         for k, (link, given, own) in enumerate(zip(links, record.links, pieces or [()] * len(links), strict=True))
     ]
-    warnings = [w for row, link in zip(rows, links, strict=True) for w in _arm_warnings(row[-1], link)]
+    warnings = interface_gaps(record, rows, links)
     warnings += [w for link in links for w in piece_warnings(link)]
     points = [_point(scene, k, links) for k in range(len(record.points))]
     whole = expand(rows, _with_payloads(scene, rows, links, points))
@@ -268,23 +268,6 @@ def _interface(model: ModalModel, name: str, where: str) -> InterfaceNode:
     if found is None:
         raise ReportedError(Cause.BAD_REFERENCE, "no such interface", where=where, value=name)
     return found
-
-
-def _arm_warnings(joint: Joint, link: Link) -> list[str]:
-    """A joint axis that misses its interface is bridged by a rigid arm; often a wrong mesh pose."""
-    if joint.fixed:
-        return []
-    frame = inverse(joint.after)
-    arm = link.inboard.position - frame[:3, 3]
-    axis = frame[:3, joint.freedom.axis]
-    off_axis = arm - (arm @ axis) * axis
-    size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
-    if np.linalg.norm(off_axis) <= 1e-6 * max(size, 1e-9):
-        return []
-    return [
-        f"link {link.name!r}: interface {link.inboard.name!r} lies {np.linalg.norm(off_axis):.4g} m off the axis of "
-        f"joint {joint.name!r}; a rigid arm bridges the gap (check mesh_pose if this is not meant)"
-    ]
 
 
 def _point(scene: Scene, k: int, links: list[Link]) -> Point:
