@@ -18,6 +18,7 @@ from fe_import.health.report import check_basis, check_model, check_reduction, m
 from fe_import.health.static_flexibility import check_static
 from fe_import.health.thermal_expansion import check_expansion
 from fe_import.modal.damping import damping_ratios
+from fe_import.modal.equal_frequencies import KEPT_WHOLE
 from fe_import.modal.inertia import inertia_invariants, mass_properties
 from fe_import.modal.model import HealthCheck, ModalModel
 from fe_import.model import Array, FEModel, IntArray
@@ -28,7 +29,7 @@ from fe_import.reduction.modes import mode_kinds, mode_shapes, orthonormal_modes
 from fe_import.reduction.thermal import with_thermal_shape
 from fe_import.second_order.compute import second_order
 from fe_import.solver import chosen_solver
-from fe_import.solver.watch import telling
+from fe_import.solver.watch import say, telling
 
 
 def reduce_link(link: LinkFile | Path | str, tell: Callable[[str], None] | None = None) -> ModalModel:
@@ -78,6 +79,10 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     modes = orthonormal_modes(mass, stiffness, basis, options, interfaces, where, inboard)
     checks += check_basis(model, basis, mass, stiffness, modes.omega, where)
     shapes, modes = mode_shapes(model, basis, modes)
+    counts = [text for text in ((basis.selection or {}).get("whole", ""), modes.told) if text]
+    for text in counts:
+        say(text)
+    told = {KEPT_WHOLE: "; ".join(counts)} if counts else {}
     invariants = inertia_invariants(model.mass, shapes, model.dof_map, modes.rigid)
     reduced_stiffness = shapes.T @ (model.stiffness @ shapes)
     reference = modes.flexibility if basis.flexibility is None else basis.flexibility
@@ -122,7 +127,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
         health=checks,
         lines=model.lines,
         triangles=model.triangles,
-        provenance={**provenance(link, model, basis.selection), "second_order": statement},
+        provenance={**provenance(link, model, basis.selection), "second_order": statement, **told},
         second_order=field,
         recovery=None if wanted is None else recovery_maps(model, shapes, wanted, where),
         thermal=thermal,

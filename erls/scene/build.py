@@ -33,6 +33,7 @@ from fe_import.description.records import LinkDescription
 from fe_import.errors import FEImportError, ReportedError
 from fe_import.files.toml import choose
 from fe_import.modal.damping import damping_ratios
+from fe_import.modal.equal_frequencies import KEPT_WHOLE, kept_whole, whole_count
 from fe_import.modal.file import read_modal_file
 from fe_import.modal.model import ModalModel
 from fe_import.model import InterfaceNode
@@ -101,6 +102,7 @@ def build_mechanism(
         for k, (link, given, own) in enumerate(zip(links, record.links, pieces or [()] * len(links), strict=True))
     ]
     warnings = interface_gaps(record, rows, links)
+    warnings += [f"link {link.name!r}: {text}" for link in links if (text := link.model.provenance.get(KEPT_WHOLE))]
     warnings += [w for link in links for w in piece_warnings(link)]
     points = [_point(scene, k, links) for k in range(len(record.points))]
     whole = expand(rows, _with_payloads(scene, rows, links, points))
@@ -205,7 +207,11 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
             limit=model.elastic_modes,
             remedy="ask for fewer, or reduce with more",
         )
-    return truncated(model if wanted else unwarmed(model), wanted)
+    kept = 6 + whole_count(model.frequencies_hz[6:], wanted)
+    if kept - 6 != wanted:
+        told = kept_whole(model.frequencies_hz[6:], wanted, kept - 6, f"links.{link.name}.elastic_modes")
+        model = replace(model, provenance={**model.provenance, KEPT_WHOLE: told})
+    return truncated(model if wanted else unwarmed(model), kept - 6)
 
 
 def _warmed(model: ModalModel, link: LinkRecord, place: str) -> ModalModel:

@@ -68,4 +68,4 @@ def _fixed_interface_modes(
     if options.selection == "ranking" and options.ranking is not None:
         return best_ranked(model, parts, constraint, lowest, options.ranking, where)
     field = f"{where}: reduction.fixed_interface_modes"
-    return *lowest_by_count(lowest, options.fixed_interface_modes, available, field), {}
+    return lowest_by_count(lowest, options.fixed_interface_modes, available, field)

@@ -27,7 +27,7 @@ def choose_free_modes(body: FreeBody, options: Reduction, where: str) -> tuple[A
     available = body.mass.shape[0] - 6
     if options.selection == "frequency":
         return below_frequency(body.modes, options, available, where)
-    return *lowest_by_count(body.modes, options.free_modes, available, f"{where}: reduction.free_modes"), {}
+    return lowest_by_count(body.modes, options.free_modes, available, f"{where}: reduction.free_modes")
 
 
 def with_rigid_modes(body: FreeBody, fields: Array) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ import scipy.linalg as la
 
 from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
+from fe_import.modal.equal_frequencies import LONGEST, kept_whole, whole_count
 from fe_import.model import Array, FEModel
 from fe_import.reduction import Basis
 from fe_import.reduction.rigid_modes import MASSLESS, rigid_modes
@@ -21,13 +22,14 @@ class OrthonormalModes:
     """Coordinates of the modes in the basis (k, m), circular frequencies (m,) [rad/s], rigid motions (m, 6).
 
     ``flexibility`` (b, b), where fewer modes are kept than the basis has, or static correction is asked for: of the
-    whole basis between the interfaces, inertia-relieved.
+    whole basis between the interfaces, inertia-relieved. ``told``: how many are kept where that is not as asked.
     """
 
     coordinates: Array
     omega: Array
     rigid: Array
     flexibility: Array | None = None
+    told: str = ""
 
 
 def reduced_matrices(model: FEModel, basis: Basis) -> tuple[Array, Array]:
@@ -104,12 +106,21 @@ def orthonormal_modes(
             remedy="ask for fewer, keep more modes in the basis (fixed_interface_modes, free_modes), or give the mass "
             "matrix rotary inertia",
         )
+    kept, told = wanted, ""
+    if options.elastic_modes is not None:
+        kept = len(omega) if complement is not whole else whole_count(omega, wanted)
+        told = _kept_whole(omega, wanted, kept) if kept != wanted else ""
+    wanted = kept
     lost = len(interfaces) > 0 and wanted < whole.shape[1]
     flexibility = _flexibility(scaled, whole) if lost or options.static_correction else None
     coordinates = scale[:, None] * np.hstack([rigid, complement @ elastic[:, :wanted]])
     motions = np.zeros((6 + wanted, 6))
     motions[:6] = rigid_coordinates
-    return OrthonormalModes(coordinates, np.concatenate([np.zeros(6), omega[:wanted]]), motions, flexibility)
+    return OrthonormalModes(coordinates, np.concatenate([np.zeros(6), omega[:wanted]]), motions, flexibility, told)
+
+
+def _kept_whole(omega: Array, wanted: int, kept: int) -> str:
+    return kept_whole(omega / (2 * np.pi), wanted, kept, "reduction.elastic_modes")
 
 
 def mode_shapes(model: FEModel, basis: Basis, modes: OrthonormalModes) -> tuple[Array, OrthonormalModes]:
@@ -158,11 +169,13 @@ def _kept_span(link: _Scaled, complement: Array, inboard: int, options: Reductio
     count = options.elastic_modes or 0
     k, m = complement.T @ link.stiffness @ complement, complement.T @ link.mass @ complement
     if options.truncation == "clamped":
-        lowest = complement.T @ _clamped_modes(link, slice(6 * inboard, 6 * inboard + 6), count)
+        frequencies, clamped = _clamped_modes(link, slice(6 * inboard, 6 * inboard + 6), count + LONGEST + 1)
+        lowest = complement.T @ clamped
     else:
-        lowest = dense_modes(k, m, count, "free link")[1]
+        frequencies, lowest = dense_modes(k, m, count + LONGEST + 1, "free link")
     if not len(link.kept_loads):
-        return np.asarray(complement @ la.qr(lowest, mode="economic")[0])
+        count = whole_count(frequencies, min(count, len(frequencies)))
+        return np.asarray(complement @ la.qr(lowest[:, :count], mode="economic")[0])
     static = static_span(k, link.kept_loads @ complement, link.kept_loads @ link.rigid)
     if static.shape[1] > count:
         what, remedy = "thermal expansion", "or remove temperature_change"
@@ -176,22 +189,27 @@ def _kept_span(link: _Scaled, complement: Array, inboard: int, options: Reductio
             limit=static.shape[1],
             remedy=f"ask for at least as many, {remedy}",
         )
-    return np.asarray(complement @ completed(static, lowest, k, count))
+    # beside the static fields: as many of the lowest modes as part none of equal frequency
+    used, found = 0, static
+    while found.shape[1] < count and used < len(frequencies):
+        used = whole_count(frequencies, used + 1)
+        found = completed(static, lowest[:, :used], k, len(k))
+    return np.asarray(complement @ found)
 
 
-def _clamped_modes(link: _Scaled, rows: slice, count: int) -> Array:
-    """Lowest modes with some interface displacements held, less their rigid-body motion."""
+def _clamped_modes(link: _Scaled, rows: slice, count: int) -> tuple[Array, Array]:
+    """Circular frequencies and lowest modes with some interface displacements held, less their rigid-body motion."""
     mass, stiffness, held = link.mass, link.stiffness, link.interfaces[rows]
     moving = held.any(axis=0)
     if moving.sum() == len(held):  # columns of the basis: leave them out
         free = np.eye(len(mass))[:, ~moving]
     else:
         free = la.qr((held / np.abs(held).max(axis=1, keepdims=True)).T)[0][:, len(held) :]
-    _, modes = dense_modes(
+    omega, modes = dense_modes(
         free.T @ stiffness @ free, free.T @ mass @ free, count, "link with its inboard interface clamped"
     )
     span = free @ modes
-    return np.asarray(span - link.rigid @ (link.rigid.T @ mass @ span))
+    return omega, np.asarray(span - link.rigid @ (link.rigid.T @ mass @ span))
 
 
 def mode_kinds(model: FEModel, shapes: Array, basis: Basis, coordinates: Array, stiffness: Array) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from fe_import.description.reduction import Reduction
 from fe_import.errors import Cause, FEImportError
+from fe_import.modal.equal_frequencies import LONGEST, kept_whole, whole_count
 from fe_import.model import Array
 
 DEFAULT_MODES = 12
@@ -24,8 +25,11 @@ LowestModes = Callable[[int], tuple[Array, Array]]
 """The lowest modes by count: circular frequencies (m,) and shapes (f, m); fewer when there are no more."""
 
 
-def lowest_by_count(lowest: LowestModes, asked: int | None, available: int, field: str) -> tuple[Array, Array]:
-    """As many modes as asked for; `DEFAULT_MODES`, or all there are, when not asked.
+def lowest_by_count(
+    lowest: LowestModes, asked: int | None, available: int, field: str
+) -> tuple[Array, Array, dict[str, Any]]:
+    """As many modes as asked for; `DEFAULT_MODES`, or all there are, when not asked; a few more where that would part
+    modes of equal frequency, which what is told of the selection says.
 
     Raises
     ------
@@ -33,7 +37,7 @@ def lowest_by_count(lowest: LowestModes, asked: int | None, available: int, fiel
         MODE_COUNT when there are fewer.
     """
     wanted = DEFAULT_MODES if asked is None else asked
-    omega, modes = lowest(min(wanted, available))
+    omega, modes = lowest(min(wanted + 1, available))
     if asked is not None and len(omega) < asked:
         raise FEImportError(
             Cause.MODE_COUNT,
@@ -43,7 +47,13 @@ def lowest_by_count(lowest: LowestModes, asked: int | None, available: int, fiel
             limit=len(omega),
             remedy="ask for fewer, refine the mesh, or give the mass matrix rotary inertia",
         )
-    return omega, modes
+    if whole_count(omega, wanted) != wanted:
+        omega, modes = lowest(min(wanted + LONGEST + 1, available))
+    kept = whole_count(omega, min(wanted, len(omega)))
+    told = {}
+    if asked is not None and kept != asked:
+        told = {"whole": kept_whole(omega / (2 * np.pi), asked, kept, field.rpartition(": ")[2])}
+    return omega[:kept], modes[:, :kept], told
 
 
 def below_frequency(

@@ -192,15 +192,6 @@ def test_motors_sit_at_the_end_of_the_link_before(tmp_path: Path) -> None:
     assert [j.rotor_inertia for j in loaded.joints] == pytest.approx([1e-3, 2e-6 * 2500])
 
 
-def test_an_axis_that_misses_its_interface_is_warned_of(tmp_path: Path) -> None:
-    """Only the distance from the axis counts, and the warning names link, interface, joint and distance."""
-    path = robot(tmp_path)
-    along = "links.0.mesh_pose={frame='joint', position=[0, 0, 0.1]}"
-    assert built(path, along).warnings == ()
-    (warning,) = built(path, "links.1.mesh_pose={frame='joint', position=[0.03, 0.04, 0.1]}").warnings
-    assert all(word in warning for word in ("'forearm'", "'root'", "'elbow_joint'", "0.05 m", "mesh_pose"))
-
-
 def test_links_of_one_source_share_one_model(tmp_path: Path) -> None:
     """Reduced once; other modes, or another source, are another model."""
     path = robot(tmp_path)
@@ -297,3 +288,19 @@ def test_unknown_interface(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="did you mean 'root'") as caught:
         built(robot(tmp_path), "links.0.inboard=rooot")
     assert caught.value.cause == Cause.BAD_REFERENCE
+
+
+def test_modes_of_equal_frequency_stay_together(tmp_path: Path) -> None:
+    """A count of a scene that would part a pair takes one more, and the run says so."""
+    square = {"width": 0.01, "height": 0.01}
+    scenes.arm_link(tmp_path, sections={"s": square}, reduction={"fixed_interface_modes": 4, "elastic_modes": 8})
+    data = {
+        "simulation": {"duration": 1.0},
+        "joints": [{"name": "j", "dh": {"convention": "standard"}}],
+        "links": [{"name": "arm", "model": "arm.toml", "mesh_pose": {"frame": "joint"}, "elastic_modes": 3}],
+    }
+    built = build_mechanism(load_scene(scenes.write_toml(tmp_path / "pair.toml", data)))
+    assert built.mechanism.links[0].elastic_modes == 4
+    (told,) = built.warnings
+    assert told.startswith("link 'arm': links.arm.elastic_modes = 3 would part modes of equal frequency (")
+    assert told.endswith("4 are kept")

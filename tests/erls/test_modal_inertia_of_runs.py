@@ -23,6 +23,7 @@ def test_runs_get_the_inertia_of_modes_that_they_ask_for(gauge: str, tmp_path: P
     judge = DenseChain(asked, gauge) if gauge == "minimum-norm" else Ffr(asked)
     state = 0.0, np.full(judge.size, 0.01), np.full(judge.size, 1.0)
     found = formulate(asked, Simulation(duration=1.0, gauge=gauge)).energy(*state).kinetic
-    assert found == pytest.approx(judge.energy(*state).kinetic, rel=1e-10)  # through numbers whose squares are 1e5 times it
+    # through numbers that are 1e5 times as large
+    assert found == pytest.approx(judge.energy(*state).kinetic, rel=1e-10)
     without = formulate(plain, Simulation(duration=1.0, gauge=gauge)).energy(*state).kinetic
     assert found != pytest.approx(without, rel=1e-6)
