@@ -10,7 +10,7 @@ import numpy as np
 
 from fe_import.model import Array
 
-EQUAL = 1e-2  # relative difference of neighbours that count as equal: what cuts them turns by 1e-2 per 1e-4 of a size
+EQUAL = 1e-4  # relative difference of neighbours that count as equal; legs of one length part theirs by 5e-4
 KEPT_WHOLE = "kept whole"  # what the provenance of a modal file calls it
 LONGEST = 6  # neighbours looked at; where a spectrum is as dense as that all along, the widest gap among them serves
 

@@ -22,11 +22,11 @@ ROOT = Path(__file__).parents[2]
         ([1.0, 1.0, 2.0, 3.0], 2, 2),
         ([1.0, 1.0, 2.0, 3.0], 3, 3),
         ([1.0, 1.0, 2.0, 3.0], 0, 0),
-        ([1.0, 1.005, 1.009, 3.0], 1, 3),
+        ([1.0, 1.00005, 1.00009, 3.0], 1, 3),
         ([1.0, 2.0, 2.0], 2, 3),
         ([1.0, 2.0, 2.0], 3, 3),
         # as dense as that all along: the widest gap among the next
-        ([1 + 1e-3 * k + 5e-3 * (k > 4) for k in range(30)], 3, 5),
+        ([1 + 1e-5 * k + 5e-5 * (k > 4) for k in range(30)], 3, 5),
     ],
 )
 def test_counts_that_part_no_group(frequencies: list[float], wanted: int, kept: int) -> None:

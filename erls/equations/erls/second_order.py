@@ -37,7 +37,7 @@ from erls.equations.serial.modal_inertia_kernels import (
     WARP_STATE,
     read_warp,
     read_warp_state,
-    set_warp,
+    set_warp_rates,
     warp_forces,
 )
 from erls.maths.jit import part, reordered
@@ -165,6 +165,6 @@ def bent_forces(
     if bend.warped:
         warp = read_warp(reals, integers, chain.warps + k * WARP)
         warp_state = read_warp_state(scratch, integers, chain.warp_states + k * WARP_STATE)
-        set_warp(warp, warp_state, state.q[6:])
+        set_warp_rates(warp, warp_state, state.q[6:], state.q_rate[6:])
         moved = state.q_acceleration[6:] if accelerated else state.q_acceleration[6:6]
         warp_forces(warp, warp_state, state.q_rate[6:], moved, state.modal[6:])

@@ -39,12 +39,12 @@ from erls.equations.serial.modal_inertia_kernels import (
     WARP_STATE,
     read_warp,
     read_warp_state,
-    set_warp,
+    set_warp_rates,
     warp_forces,
 )
 from erls.equations.serial.records import read_serial
 from erls.maths.jit import kernel, part
-from erls.maths.products import add_columns, add_rows, clear
+from erls.maths.products import add_columns, add_rows, clear, copy
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross
 from fe_import.model import IntArray
@@ -57,7 +57,7 @@ def _frames(reals: Array, integers: IntArray) -> Frames:
 
 @kernel(BEND_LINK, counted=False)
 def bend_link(k: int, reals: Array, integers: IntArray, scratch: Array, q: Array) -> None:
-    """C₂, W η, S and ½ ηᵀ W η, and K of link k."""
+    """C₂, W η, S and ½ ηᵀ W η of link k."""
     frames = _frames(reals, integers)
     bent = read_bent_body(reals, integers, frames.bent_bodies + k * BENT_BODY)
     state = read_bent_state(scratch, integers, frames.bent_states + k * BENT_STATE)
@@ -73,8 +73,7 @@ def bend_link(k: int, reals: Array, integers: IntArray, scratch: Array, q: Array
     add_rows(state.bending[:3], q, 0.5, state.moment)
     add_rows(state.spun, q, 0.5, square)
     if read_body(reals, integers, frames.bodies + k * BODY).warped:
-        warp = read_warp(reals, integers, frames.warps + k * WARP)
-        set_warp(warp, read_warp_state(scratch, integers, frames.warp_states + k * WARP_STATE), q)
+        copy(q, read_warp_state(scratch, integers, frames.warp_states + k * WARP_STATE).q)
 
 
 @part
@@ -168,6 +167,7 @@ def bent_forces(
     if read_body(reals, integers, frames.bodies + k * BODY).warped:
         warp = read_warp(reals, integers, frames.warps + k * WARP)
         warp_state = read_warp_state(scratch, integers, frames.warp_states + k * WARP_STATE)
+        set_warp_rates(warp, warp_state, warp_state.q, rates)
         warp_forces(warp, warp_state, rates, moved, forces)
 
 

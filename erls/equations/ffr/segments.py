@@ -30,6 +30,7 @@ from erls.equations.serial.modal_inertia_kernels import (
     WARP_STATE,
     read_warp,
     read_warp_state,
+    set_warp,
     warp_rows,
 )
 from erls.equations.serial.nodes import NODE, NODE_STATE, NodeState, node_moves, read_node, read_node_state
@@ -166,6 +167,7 @@ def _weights(
     if body.warped:
         warp = read_warp(reals, integers, frames.warps + k * WARP)
         warp_state = read_warp_state(scratch, integers, frames.warp_states + k * WARP_STATE)
+        set_warp(warp, warp_state, warp_state.q)
         warp_rows(warp, warp_state, own.change[6:], own.partner[6:])
 
 

@@ -35,8 +35,11 @@ class Warp(NamedTuple):
 
 
 class WarpState(NamedTuple):
-    """Its working memory: K(q) and K(q̇), and the same of ``skew``, (e, e); q̇ + σ⁻¹ k, its derivative, k̇, (e,)."""
+    """Its working memory: q (e,), where it is kept; K(q) and K(q̇), and the same of ``skew``, (e, e); q̇ + σ⁻¹ k, its
+    derivative, k̇, (e,).
+    """
 
+    q: Annotated[Array, "e"]
     warp: Annotated[Array, "e e"]
     warp_rate: Annotated[Array, "e e"]
     twisted: Annotated[Array, "e e"]
@@ -78,6 +81,19 @@ def set_warp(warp: Warp, state: WarpState, q: Array) -> None:
 
 
 @part
+def set_warp_rates(warp: Warp, state: WarpState, q: Array, rates: Array) -> None:
+    """K(q) and K(q̇) at once: reading the table is most of it."""
+    now, rate = state.warp.reshape(state.warp.size), state.warp_rate.reshape(state.warp.size)
+    clear(now)
+    clear(rate)
+    for j in range(len(q)):
+        row, x, y = warp.table[j], q[j], rates[j]
+        for i in range(len(row)):
+            now[i] += x * row[i]
+            rate[i] += y * row[i]
+
+
+@part
 def warp_energy(warp: Warp, state: WarpState, rates: Array) -> Any:
     """T₃, after `set_warp`."""
     lag = state.lag
@@ -91,9 +107,8 @@ def warp_energy(warp: Warp, state: WarpState, rates: Array) -> Any:
 
 @part
 def warp_forces(warp: Warp, state: WarpState, rates: Array, moved: Array, forces: Array) -> None:
-    """Add d/dt ∂T₃/∂q̇ - ∂T₃/∂q, after `set_warp`; ``moved`` is q̈, empty for zero."""
+    """Add d/dt ∂T₃/∂q̇ - ∂T₃/∂q, after `set_warp_rates`; ``moved`` is q̈, empty for zero."""
     e, lag = len(rates), state.lag
-    _add_table(warp.table, rates, state.warp_rate)
     _add_table(warp.skew, rates, state.twisted)
     for i in range(e):
         state.pushed[i], lag[i] = rates[i], 0.0
