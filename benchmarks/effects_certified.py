@@ -131,13 +131,12 @@ def timed(path: Path, changes: list[str], most: int = 6) -> tuple[float, float, 
 
     Where auto keeps all, both runs are the same but for deciding, whose time is added to that with all.
     """
-    whole = ",".join(["all", *sorted(added(path, changes))])
     best: dict[str, float] = {}
     told: list[str] = []
     runs, total = {}, 0.0
     for count in range(most):
         for effects in ("all", "auto") if count % 2 else ("auto", "all"):
-            scene = erls.load_scene(path, [*changes, TOLERANCE, f"effects={whole if effects == 'all' else effects}"])
+            scene = erls.load_scene(path, [*changes, TOLERANCE, f"effects={effects}"])
             begun = time.process_time()
             runs[effects] = erls.simulate(scene, tell=told.append)
             spent = time.process_time() - begun
@@ -151,15 +150,7 @@ def timed(path: Path, changes: list[str], most: int = 6) -> tuple[float, float, 
         best["all"] = min(best.values())
         best["auto"] = best["all"] + min(deciding(path, changes) for _ in range(8))
     decision = [text.removeprefix("effects: ") for text in told if text.startswith("effects: a")][-1]
-    if "," in whole:
-        decision = f"added {whole.removeprefix('all,')}; {decision}"
     return best["all"], best["auto"], runs["auto"], decision
-
-
-def added(path: Path, changes: list[str]) -> frozenset[str]:
-    """Effects that auto adds."""
-    scene = erls.load_scene(path, [*changes, TOLERANCE, "effects=auto"])
-    return choose_effects(scene, build_mechanism(scene).mechanism).addition.names
 
 
 def deciding(path: Path, changes: list[str]) -> float:
@@ -205,10 +196,6 @@ def errors(path: Path, changes: list[str]) -> list[float]:
     """Ratios of actual to certified errors of what a scene may leave out, printed."""
     scene = erls.load_scene(path, changes)
     whole = build_mechanism(scene).mechanism
-    more = choose_effects(scene, whole, thrifty=False).addition
-    if more.names:
-        whole = more.applied(whole)
-        scene = named(scene, whole, Choice())
     try:
         reference = erls.simulate(scene)
     except SimulationError as problem:  # a random chain may be too soft for its own weight

@@ -10,11 +10,10 @@ import msgspec
 
 from erls.auto.certify import certify
 from erls.auto.choice import Choice, choose_effects
-from erls.auto.stiffening import Addition, addition, can_stiffen, off_by, unstable
 from erls.errors import Cause, SimulationError
 from erls.maths.jit import announcing
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import Certificate, in_order
+from erls.mechanism.effects import SECOND_KINEMATICS, Certificate, in_order
 from erls.mechanism.without_effects import present
 from erls.run.all_modes import with_all_modes
 from erls.run.chain.run import ChainRun
@@ -56,33 +55,34 @@ def automatic(
     begun = time.perf_counter()
     choice = choose_effects(scene, whole)
     spent = time.perf_counter() - begun
-    physics = _Physics(scene, whole, choice.addition, tell)
     tell(choice.note)
     while True:
         try:
-            run = integrate(named(scene, physics.whole, choice), choice.applied(physics.whole))
+            run = integrate(named(scene, whole, choice), choice.applied(whole))
         except SimulationError as problem:
             if problem.cause == Cause.INTERRUPTED:
                 raise
-            if choice.cuts:
-                tell(f"effects: the run failed without {_left(choice)} ({problem}); repeated with all")
-                choice = Choice()
-            elif not physics.cures(problem):
+            if not choice.cuts:
                 raise
+            tell(f"effects: the run failed without {_left(choice)} ({problem}); repeated with all")
+            choice = Choice()
             continue
         begun = time.perf_counter()
         with announcing(tell):
-            certificate = _certified(run, physics.whole, choice)
+            certificate = _certified(run, whole, choice)
         spent += time.perf_counter() - begun
-        if physics.stiffens(run, strict):
-            continue
-        if certificate.ok or not strict:
+        lost = any(UNSTABLE in text for text in run.warnings) and not choice.off.isdisjoint(SECOND_KINEMATICS)
+        if not lost and (certificate.ok or not strict):
             break
+        if lost:
+            tell(f"effects: links lose their stability without {_left(choice)}; repeated with all")
+            choice = Choice()
+            continue
         choice = _less(choice, certificate)
         tell(f"effects: estimated error {certificate.error:.2g} m; repeated with {_on(choice)}")
     if certificate.ok and certificate.error:
         tell(f"effects: what was left out changes named points by about {certificate.error:.2g} m")
-    warnings = [*run.warnings, *([] if certificate.ok else [_warning(certificate)]), *physics.warnings(run)]
+    warnings = [*run.warnings, *([] if certificate.ok else [_warning(certificate)]), *_links_warnings(run)]
     for text in warnings[len(run.warnings) :]:
         tell(f"warning: {text}")
     result = replace(run, warnings=tuple(warnings), certificate=replace(certificate, wall_s=spent))
@@ -109,56 +109,15 @@ def _with_bandwidth(
     return replace(runs[-1], warnings=found.warnings, certificate=found.certificate)
 
 
-class _Physics:
-    """The effects among which there is a choice, and what makes them more."""
-
-    def __init__(self, scene: Scene, whole: Mechanism, added: Addition, tell: Callable[[str], None]) -> None:
-        self.scene, self.tell, self.bare, self.whole = scene, tell, whole, whole
-        self.settings = scene.record.simulation
-        self.refused = False
-        if added.names:
-            self._add(added)
-
-    def _add(self, added: Addition) -> None:
-        self.whole = added.applied(self.whole)
-        self.tell(added.note)
-
-    @property
-    def _may_add(self) -> bool:
-        return not self.refused and can_stiffen(self.whole, self.settings)
-
-    def cures(self, problem: SimulationError) -> bool:
-        """Whether a run that failed may do better with more, or with less."""
-        if self.whole is not self.bare:
-            self.tell(f"effects: the run failed with what was added ({problem}); repeated without")
-            self.whole, self.refused = self.bare, True
-            return True
-        if problem.cause != Cause.RUNAWAY or not self._may_add:
-            return False
-        self._add(addition(self.whole, f"without them the run fails ({problem.message})"))
-        return True
-
-    def stiffens(self, run: ChainRun, strict: bool) -> bool:
-        """Whether a run without stiffening needs it: for lost stability and, strictly, by its own estimate."""
-        if not self._may_add:
-            return False
-        error, tolerance = run.second_order_error or 0.0, self.settings.effects_tolerance
-        lost = unstable(run.warnings)
-        if not lost and not (strict and error > tolerance):
-            return False
-        self._add(addition(self.whole, lost or off_by(error, tolerance)))
-        return True
-
-    def warnings(self, run: ChainRun) -> list[str]:
-        """That the estimate passes the tolerance."""
-        error, tolerance = run.second_order_error or 0.0, self.settings.effects_tolerance
-        if error <= tolerance:
-            return []
-        remedy = "--strict adds geometric_stiffening and foreshortening" if self._may_add else _BEYOND
-        return [
-            f"effects: links, linear in their own frames, are estimated to be off by about {error:.2g} m in all; the "
-            f"tolerance is {tolerance:.2g} m ({remedy})"
-        ]
+def _links_warnings(run: ChainRun) -> list[str]:
+    """That what linear links leave out passes the tolerance."""
+    error, tolerance = run.second_order_error or 0.0, run.scene.record.simulation.effects_tolerance
+    if error <= tolerance:
+        return []
+    return [
+        f"effects: links, linear in their own frames, are estimated to be off by about {error:.2g} m in all; the "
+        f"tolerance is {tolerance:.2g} m ({_BEYOND})"
+    ]
 
 
 _BEYOND = "links of beams can take formulation nodal or substructures; or give a larger simulation.effects_tolerance"

@@ -3,7 +3,6 @@
 Deciding costs coarse looks at the scene before the run, and a certificate after it. Both, and the run itself, are
 estimated by counting (`erls.auto.cost`); where the run saves less than that, all effects stay. Vibrations that
 prescribed motions set off need no look (`erls.auto.forced`): where they do not matter, links follow statically.
-Links that lose their stability to planned speeds are stiffened first (`erls.auto.stiffening`).
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from erls.auto.probe import coarse_run, deformation, difference, look_steps, nee
 from erls.auto.purse import Purse
 from erls.auto.resolution import Vibrations
 from erls.auto.static import may_follow, static_cut
-from erls.auto.stiffening import Addition, stiffening
 from erls.equations.formulation import Formulation
 from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
@@ -41,13 +39,10 @@ class Choice:
         What to leave out.
     note : str
         What the user should know.
-    addition : Addition
-        What to add before; the cuts are those of the mechanism with it.
     """
 
     cuts: tuple[Cut, ...] = ()
     note: str = ""
-    addition: Addition = field(default_factory=Addition)
 
     @property
     def off(self) -> frozenset[str]:
@@ -71,7 +66,7 @@ class Choice:
 
 
 def choose_effects(scene: Scene, mechanism: Mechanism, thrifty: bool = True) -> Choice:
-    """Decide what to add, and what to leave out.
+    """Decide what to leave out.
 
     Parameters
     ----------
@@ -87,11 +82,6 @@ def choose_effects(scene: Scene, mechanism: Mechanism, thrifty: bool = True) -> 
     SimulationError
         INTERRUPTED.
     """
-    added = stiffening(scene, mechanism)
-    return replace(_cut(scene, added.applied(mechanism), thrifty), addition=added)
-
-
-def _cut(scene: Scene, mechanism: Mechanism, thrifty: bool) -> Choice:
     settings = scene.record.simulation
     cuts = possible_cuts(mechanism, settings.formulation)
     if not cuts:

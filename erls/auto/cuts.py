@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import EFFECTS, FIRST, SECOND, in_order
+from erls.mechanism.effects import EFFECTS, FIRST, SECOND, SECOND_KINEMATICS, in_order
 from erls.mechanism.substructures import is_split
 from erls.mechanism.without_effects import present, with_rigid, without
 
@@ -56,14 +56,15 @@ RIGID = frozenset(name for name in EFFECTS if name == "flexibility" or EFFECTS[n
 
 
 def possible_cuts(mechanism: Mechanism, formulation: str) -> list[Cut]:
-    """What a mechanism holds and could leave out, what saves most first: all flexibility, that of single links, the
-    effects of inertia with the deformation, those of them that are quadratic in it.
+    """What a mechanism holds and could leave out, what saves most first: all flexibility, that of single links,
+    second-order displacements, the effects of inertia with the deformation, those of them that are quadratic in it.
     """
     if formulation == "nodal" or "flexibility" not in present(mechanism):
         return []
     result = [] if is_split(mechanism) else [Cut(RIGID & mechanism.effects)]
     result += [Cut(link=link) for link in flexible_links(mechanism)]
-    for off in dict.fromkeys((mechanism.effects & (FIRST | SECOND), mechanism.effects & SECOND)):
+    second = SECOND_KINEMATICS & present(mechanism)
+    for off in dict.fromkeys((second, mechanism.effects & (FIRST | SECOND), mechanism.effects & SECOND)):
         if off:
             result.append(Cut(off))
     return result
@@ -81,6 +82,8 @@ def partners(name: str) -> frozenset[str]:
         return RIGID
     if name in SECOND:
         return SECOND
+    if name in SECOND_KINEMATICS:
+        return SECOND_KINEMATICS
     return FIRST | SECOND if name in FIRST else frozenset({name})
 
 

@@ -8,7 +8,7 @@ equations of motion counts
 - the products of its matrices with a vector, 2 m² operations each: M a; for effects of first order in the deformation
   X_a q, X_a q̇ and X_aᵀ v for each axis; for those of second order Z_ab q for each pair;
 - with geometric stiffening and foreshortening, products of second-order tensors, 2 e² each: six of momentum, three of
-  spin for each axis, and six of the interface that carries the next link;
+  spin for each axis, and six of the interface that carries the next link; with modal inertia three for each mode;
 - the motion of the interface that carries the next link with its two derivatives, and its force on the modes, 12 e
   each;
 - twist, acceleration and wrench carried from link to link;
@@ -27,7 +27,7 @@ factor of three on it (``tests/erls/test_effects_worth.py``).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -114,11 +114,6 @@ def operations(mechanism: Mechanism) -> Operations:
     return Operations(len(links), size, evaluation, solution, factors)
 
 
-def stiffened_operations(mechanism: Mechanism) -> Operations:
-    """The same with geometric stiffening and foreshortening."""
-    return operations(replace(mechanism, effects=mechanism.effects | {"geometric_stiffening", "foreshortening"}))
-
-
 def _sizes(links: tuple[Link, ...], axes: list[int]) -> list[tuple[int, int]]:
     return [(link.elastic_modes, r) for link, r in zip(links, axes, strict=True)]
 
@@ -130,7 +125,7 @@ def _evaluation(mechanism: Mechanism, number: int, r: int) -> float:
     products = 1 + 3 * r * (not FIRST.isdisjoint(effects)) + r * (r + 1) // 2 * (not SECOND.isdisjoint(effects))
     tensors, carries = 0, len(mechanism.standing_on(number))
     if link.second_order is not None and not {"geometric_stiffening", "foreshortening"}.isdisjoint(effects):
-        tensors = 6 + 3 * r + 6 * carries
+        tensors = 6 + 3 * r + 6 * carries + 3 * e * ("modal_inertia" in effects)
     return _CARRIED + 48 * e * carries + 2 * products * (6 + e) ** 2 + 2 * tensors * e**2
 
 

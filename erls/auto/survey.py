@@ -26,7 +26,7 @@ class Survey:
     ----------
     scene : Scene
     sizes : tuple of EffectSize
-        Of the effects that the scene asks for, and of those that ``auto`` adds.
+        Of the effects that the scene asks for.
     choice : Choice
         What ``auto`` decides, which also asks what deciding costs.
     allowed : Choice
@@ -52,8 +52,6 @@ class Survey:
         """Why ``auto`` keeps an effect, in a few words; empty where it does not."""
         if not size.present or not self.keeps(size):
             return ""
-        if size.name in self.choice.addition.names:
-            return "added"
         if not _keeps(self.allowed, size):
             return "deciding costs more"
         of_it = [c for c in self.cuts if (c.link == size.link if size.link else size.name in c.off and not c.link)]
@@ -103,10 +101,9 @@ def survey(path: Path | str, overrides: Iterable[str] = (), tell: Callable[[str]
     reduced = build_mechanism(scene, tell).mechanism
     mechanism = replace(reduced, bandwidth=None)  # other effects are judged with all modes
     choice = choose_effects(scene, mechanism)
-    mechanism = choice.addition.applied(mechanism)
     sizes = effect_sizes(scene, mechanism, in_order(mechanism.effects))
     if reduced.bandwidth is not None:
-        own = effect_sizes(scene, choice.addition.applied(reduced), {"static_correction"} & reduced.effects)
+        own = effect_sizes(scene, reduced, {"static_correction"} & reduced.effects)
         sizes = tuple(next((o for o in own if o.name == s.name), s) for s in sizes)
     cuts = tuple(_sized(cut, sizes) for cut in possible_cuts(mechanism, settings.formulation))
     allowed = Choice(affordable(cuts, settings.effects_tolerance, settings.effects_effort_tolerance))

@@ -128,8 +128,8 @@ def cost(
         Ours and dop853 unless given.
     effects
         Sets of effects, separated by commas, or the option repeated; names of a set joined by +, what it leaves out by
-        -: all,all+geometric_stiffening,all-coriolis. That of the scene is always tried; all,auto unless given, and,
-        where links have second-order displacements, all+geometric_stiffening+foreshortening.
+        -: all,linear,all-coriolis. That of the scene is always tried; all,auto unless given, and, where links have
+        second-order displacements, linear.
     points
         Named points that the error is taken over; all unless given.
     norm

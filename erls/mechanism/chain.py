@@ -13,7 +13,7 @@ import numpy as np
 from erls.maths.rotation_maps import exp, tangent, tangent_derivative
 from erls.maths.se3 import pose, twist_cross, twist_transform
 from erls.maths.so3 import Array
-from erls.mechanism.effects import DEFAULT
+from erls.mechanism.effects import ALL
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
 from erls.mechanism.loops import Loop
@@ -57,7 +57,7 @@ class Mechanism:
     gravity: Array
     static_start: bool = False
     loops: tuple[Loop, ...] = ()
-    effects: frozenset[str] = DEFAULT
+    effects: frozenset[str] = ALL
     bandwidth: float | None = None
 
     @property

@@ -81,14 +81,19 @@ EFFECTS: dict[str, Effect] = {
 }
 
 ALL = frozenset(EFFECTS)
-"""Every effect there is."""
+"""Every effect there is: what acts unless a scene says otherwise."""
 
-DEFAULT = ALL - {"geometric_stiffening", "foreshortening", "modal_inertia"}
-"""What acts unless a scene says otherwise: links are linear in their own frame."""
+SECOND_KINEMATICS = frozenset({"geometric_stiffening", "foreshortening", "modal_inertia"})
+"""What second-order displacements of links do."""
+
+LINEAR = ALL - SECOND_KINEMATICS
+"""Links are linear in their own frame, as in the papers."""
 
 SECOND = frozenset(name for name, effect in EFFECTS.items() if effect.product == "Z")
 FIRST = frozenset(name for name, effect in EFFECTS.items() if effect.product == "X")
 """Effects that share the products Z q, and X q; without the second nothing of the first is left that matters."""
+
+_SETS = {"all": ALL, "linear": LINEAR}
 
 
 def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:
@@ -97,8 +102,9 @@ def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:
     Parameters
     ----------
     value : str or sequence of str
-        ``all`` (`DEFAULT`), ``auto``, or names in a list or separated by commas. Among names ``all`` stands for all of
-        these, and a minus in front leaves an effect out; names with a minus alone leave them out of all.
+        ``all``, ``linear`` (`LINEAR`), ``auto``, or names in a list or separated by commas. Among names ``all`` and
+        ``linear`` stand for all of these, and a minus in front leaves an effect out; names with a minus alone leave
+        them out of all.
     where : str
         Field, for messages.
 
@@ -106,27 +112,27 @@ def named_effects(value: str | Sequence[str], where: str) -> frozenset[str]:
     ------
     SceneError
         BAD_REFERENCE: unknown name, with a suggestion; BAD_FIELD: names with and without a minus, the same one with
-        both, or a minus in front of ``all`` or ``auto``.
+        both, or a minus in front of ``all``, ``linear`` or ``auto``.
     """
     if value == "auto":
-        return DEFAULT
+        return ALL
     given = [name.strip() for name in value.split(",")] if isinstance(value, str) else list(value)
-    known = ("all", "auto", *EFFECTS) if given == [value] else ("all", *EFFECTS)
+    known = (*_SETS, "auto", *EFFECTS) if given == [value] else (*_SETS, *EFFECTS)
     for name in given:
         choose(name.removeprefix("-"), known, where, SceneError)
     off = {name[1:] for name in given if name.startswith("-")}
     on = {name for name in given if not name.startswith("-")}
-    for name in sorted(off & {"all", "auto"}):
+    for name in sorted(off & {*_SETS, "auto"}):
         message = f"a minus leaves out one effect, not {name!r}"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="[] is no effect at all")
     if off & on:
         message = f"{_list(sorted(off & on))} both on and off"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one of the two")
-    if off and on and "all" not in on:
+    if off and on and on.isdisjoint(_SETS):
         message = "either names of what is on, or, with a minus, of what is off"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy="keep one kind, or add 'all'")
-    every = DEFAULT if "all" in on or off else frozenset()
-    return frozenset((every | on) - off - {"all"})
+    every = frozenset().union(*(_SETS[name] for name in (on & set(_SETS) or ({"all"} if off else ()))))
+    return frozenset((every | on) - off - set(_SETS))
 
 
 def inconsistencies(effects: Set[str], formulation: str = "erls") -> tuple[str, ...]:

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from erls.mechanism.effects import DEFAULT, EFFECTS
+from erls.mechanism.effects import EFFECTS, LINEAR
 from erls.report.fields import field_tables
 from erls.scene.integrators import INTEGRATORS
 from fe_import.exports import EXPORTS
@@ -35,9 +35,9 @@ def tables() -> dict[str, str]:
 
 
 def effects() -> str:
-    """Effects, and whether ``all`` stands for them."""
-    rows = ((f"`{e.name}`", e.summary, "yes" if e.name in DEFAULT else "no") for e in EFFECTS.values())
-    return _table(("effect", "what it is", "in `all`"), rows)
+    """Effects, and whether ``linear`` has them."""
+    rows = ((f"`{e.name}`", e.summary, "yes" if e.name in LINEAR else "no") for e in EFFECTS.values())
+    return _table(("effect", "what it is", "in `linear`"), rows)
 
 
 def integrators() -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from erls.auto.sizes import FAILS, UNSTABLE, EffectSize
 from erls.auto.survey import Survey
-from erls.mechanism.effects import EFFECTS, in_order
+from erls.mechanism.effects import EFFECTS
 from erls.report.tables import table
 
 _LARGEST = 1e12  # N: beyond, a motion means nothing
@@ -40,8 +40,7 @@ def effects_summary(found: Survey) -> dict[str, Any]:
         ],
         "left_out": found.left,
         "missing": list(found.missing),
-        "added": in_order(found.choice.addition.names),
-        "decision": _decision(found),
+        "decision": found.choice.note,
     }
 
 
@@ -83,12 +82,8 @@ def effects_text(found: Survey) -> str:
             "products. kept: why; effects that save nothing, or only with others that are needed, stay on."
         )
     )
-    parts.append("\n".join(_filled(line) for line in _decision(found).split("\n")))
+    parts.append("\n".join(_filled(line) for line in found.choice.note.split("\n")))
     return "\n\n".join(parts)
-
-
-def _decision(found: Survey) -> str:
-    return "\n".join(text for text in (found.choice.addition.note, found.choice.note) if text)
 
 
 def _filled(text: str) -> str:

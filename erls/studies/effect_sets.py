@@ -6,11 +6,9 @@ import json
 from collections.abc import Iterable, Sequence
 
 from erls.errors import Cause, SceneError
-from erls.mechanism.effects import DEFAULT, EFFECTS, in_order, named_effects
+from erls.mechanism.effects import ALL, EFFECTS, LINEAR, SECOND_KINEMATICS, in_order, named_effects
 
-STIFFENING = ("geometric_stiffening", "foreshortening")
 NOTHING = "none"
-STIFFENED = "+".join(("all", *STIFFENING))
 
 
 def parse_sets(values: Iterable[str], where: str = "effects") -> tuple[str, ...]:
@@ -19,8 +17,8 @@ def parse_sets(values: Iterable[str], where: str = "effects") -> tuple[str, ...]
     Parameters
     ----------
     values : iterable of str
-        Each holds one set, or several separated by commas. A set is ``all``, ``auto``, or names joined by ``+``, those
-        to leave out by ``-``: ``all+geometric_stiffening-coriolis``.
+        Each holds one set, or several separated by commas. A set is ``all``, ``linear``, ``auto``, or names joined by
+        ``+``, those to leave out by ``-``: ``linear+geometric_stiffening-coriolis``.
     where : str
         For messages.
 
@@ -74,6 +72,7 @@ def each_once(labels: Iterable[str]) -> tuple[str, ...]:
 
 
 def label_of(effects: Iterable[str]) -> str:
-    """The shortest label that counts from ``all``."""
+    """A label that counts from ``linear`` where links are, otherwise from ``all``."""
     given = set(effects)
-    return "+".join(["all", *in_order(given - DEFAULT)]) + "".join(f"-{name}" for name in in_order(DEFAULT - given))
+    name, base = ("linear", LINEAR) if given.isdisjoint(SECOND_KINEMATICS) else ("all", ALL)
+    return name + "".join(f"-{name}" for name in in_order(base - given))

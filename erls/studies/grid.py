@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from erls.errors import Cause, SceneError
 from erls.scene.chain import Scene
 from erls.scene.integrators import INTEGRATORS
-from erls.studies.effect_sets import STIFFENED, each_once, own_set, parse_sets
+from erls.studies.effect_sets import each_once, own_set, parse_sets
 from erls.studies.ladder import Setting
 from fe_import.files.toml import choose
 
@@ -65,7 +65,7 @@ def ladders(scene: Scene, grid: Grid, tolerance: float, most: int, stiffening: b
     most : int
         Elastic modes that every link has.
     stiffening : bool
-        Whether links know second-order displacements, which are then tried with all modes.
+        Whether links know second-order displacements: then all modes are tried without them, too.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def ladders(scene: Scene, grid: Grid, tolerance: float, most: int, stiffening: b
         counts = (None,)
     own = own_set(scene.record.simulation.effects)
     sets = each_once((own, *(grid.effects or ("all", "auto"))))
-    tried = each_once((own, STIFFENED, *sets)) if stiffening and most and not grid.effects else sets
+    tried = each_once((own, "linear", *sets)) if stiffening and most and not grid.effects else sets
     models = [(effects, counts[0]) for effects in tried]
     models += [(effects, count) for count in counts[1:] for effects in sets]
     stated = scene.record.simulation.formulation

@@ -18,10 +18,10 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.mechanism.effects import DEFAULT, in_order, named_effects
+from erls.mechanism.effects import ALL, in_order
 from erls.run.chain.run import ChainRun
 from erls.scene.chain import Scene
-from erls.studies.effect_sets import STIFFENING, label_of
+from erls.studies.effect_sets import label_of
 from erls.studies.refinement import Level, TooShort, refine
 from fe_import.errors import ReportedError
 
@@ -109,12 +109,11 @@ def make_reference(scene: Scene, kind: Kind, points: tuple[str, ...], tolerance:
     s = scene.record.simulation
     known = knows_second_order(scene)
     stiffened = kind == "tight" and known is True
-    effects = DEFAULT | named_effects(s.effects, f"{scene.path}: simulation.effects")
     # floating frames leave less out; links that are linear are judged by what the scene itself calls for
     formulation = "nodal" if kind == "nodal" else "ffr" if stiffened or s.formulation == "nodal" else s.formulation
     fixed: dict[str, Any] = {
         "formulation": formulation,
-        "effects": in_order(effects | set(STIFFENING) if stiffened else effects),
+        "effects": in_order(ALL),
         "coordinates": "independent",
         "bandwidth": None,
     }

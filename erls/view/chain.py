@@ -16,7 +16,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.joint_types import single
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
-from erls.run.chain.places import node_positions
+from erls.run.chain.places import node_positions, rigid_frames, rigid_positions
 from erls.run.chain.run import ChainRun
 from erls.view.figure import Figure, Part, PartMesh, Pose
 from erls.view.shapes import SHARP, JointPlace, chains, ground_surface, joints_surface, part_surface, polylines
@@ -133,8 +133,7 @@ class ChainPose(Pose):
 
     def _displacement(self, link: int) -> Array:
         """(n, 3) against the equivalent rigid link, world axes [m]."""
-        model, turn = self.mechanism.links[link].model, self.state.poses[link][:3, :3]
-        return np.asarray((model.translation_shapes @ self.state.modal[link]) @ turn.T)
+        return self._nodes(link, 1.0) - rigid_positions(self.mechanism, self.state, link)
 
 
 def joint_places(mechanism: Mechanism, state: State, magnification: float) -> list[JointPlace]:
@@ -144,10 +143,10 @@ def joint_places(mechanism: Mechanism, state: State, magnification: float) -> li
         inner, inner_node = joint.before, None
         if joint.seat is not None:
             below = joint.parent
-            inner = _displaced(mechanism.links[below], joint.seat, joint.before, state, below, magnification)
+            inner = _displaced(mechanism, joint.seat, joint.before, state, below, magnification)
             inner_node = node_positions(mechanism, state, below, [joint.seat.node], magnification)[0]
         after = mechanism.links[k]
-        outer = _displaced(after, after.inboard, inverse(joint.after), state, k, magnification)
+        outer = _displaced(mechanism, after.inboard, inverse(joint.after), state, k, magnification)
         outer_node = node_positions(mechanism, state, k, [after.inboard.node], magnification)[0]
         kind = "fixed" if joint.fixed else single(joint.freedom).name
         along = pose(np.roll(np.eye(3), joint.freedom.axis - 2, axis=0))  # z along the axis of the motion
@@ -155,8 +154,20 @@ def joint_places(mechanism: Mechanism, state: State, magnification: float) -> li
     return result
 
 
-def _displaced(link: Link, interface: Any, frame: Array, state: State, number: int, factor: float) -> Array:
-    """(4, 4) world pose of a frame that rides on an interface of a deformed link."""
-    u = factor * (link.interface_shape(interface, frame) @ state.modal[number])
-    step = pose(Rotation.from_rotvec(u[3:]).as_matrix(), u[:3])
-    return np.asarray(state.poses[number] @ frame @ step)
+def _displaced(
+    mechanism: Mechanism, interface: Any, frame: Array, state: State, number: int, factor: float
+) -> Array:
+    """(4, 4) world pose of a frame that rides on an interface of a deformed link, its displacement against the rigid
+    chain magnified.
+    """
+    link, q = mechanism.links[number], state.modal[number]
+    u = link.interface_shape(interface, frame) @ q
+    if "foreshortening" in mechanism.effects and link.second_order is not None:
+        u = u + link.second_order.interface(interface, frame) @ q @ q / 2
+    true = state.poses[number] @ frame @ pose(Rotation.from_rotvec(u[3:]).as_matrix(), u[:3])
+    if factor == 1.0:
+        return np.asarray(true)
+    rigid = rigid_frames(mechanism, state)[number] @ frame
+    turned = factor * Rotation.from_matrix(rigid[:3, :3].T @ true[:3, :3]).as_rotvec()
+    place = rigid[:3, 3] + factor * (true[:3, 3] - rigid[:3, 3])
+    return pose(rigid[:3, :3] @ Rotation.from_rotvec(turned).as_matrix(), place)

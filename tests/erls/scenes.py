@@ -86,8 +86,9 @@ def l_scene(folder: Path, **changes: Any) -> Path:
 
 
 def mechanism(path: Path) -> Mechanism:
-    """The mechanism of a scene file."""
-    return build_mechanism(load_scene(path)).mechanism
+    """The mechanism of a scene file, its links linear unless it names its effects."""
+    scene = load_scene(path)
+    return build_mechanism(scene if scene.record.simulation.effects != "all" else load_scene(path, [LINEAR])).mechanism
 
 
 def erls(mechanism: Mechanism, gauge: str = "joint-angle") -> Any:
@@ -100,6 +101,8 @@ def equations(path: Path, gauge: str = "joint-angle") -> Any:
     return erls(mechanism(path), gauge)
 
 
+LINEAR = "simulation.effects=linear"
+"""Links as in the papers: for what is said of linear equations."""
 ARM = {"model": "arm.toml"}
 """The link of `arm_link` as a link of a scene names it."""
 ARM_LINK: dict[str, Any] = {

@@ -14,10 +14,10 @@ import scenes
 
 from erls.equations.erls.formulation import Erls
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import DEFAULT
+from erls.mechanism.effects import LINEAR
 from erls.mechanism.without_effects import with_rigid
 
-STIFFENED = DEFAULT | {"geometric_stiffening", "foreshortening"}
+STIFFENED = LINEAR | {"geometric_stiffening", "foreshortening"}
 SOFT = 1e-4  # of the links' stiffness is left: otherwise it hides what second order adds
 DEFLECTION = 2.0  # times that of `chain_cases`: a centimetre
 ARMS = {f"arms, {kind}": kind for kind in ("revolute", "mixed", "prescribed")}  # joints away from interfaces

@@ -13,7 +13,7 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
-from erls.mechanism.effects import DEFAULT, Certificate
+from erls.mechanism.effects import ALL, Certificate
 from erls.report.cost_page import cost_page, cost_text
 from erls.scene.chain import Scene
 from erls.studies import ladder, refinement
@@ -155,7 +155,7 @@ def test_tight_reference_has_all_that_the_scene_and_its_links_know(
     assert not found.linear
     used = levels[0].scene.record.simulation
     own = set(STIFFENING) if knows_second_order(scene) or (path == FAST and "effects" not in changes[0]) else set()
-    assert set(used.effects) == DEFAULT | own
+    assert set(used.effects) == ALL | own
     tolerances = [level.scene.record.simulation.tolerance for level in levels]
     assert tolerances == pytest.approx([1e-5, 1e-6, 1e-7, 1e-8])
 
@@ -386,5 +386,5 @@ def test_labels_of_a_scene() -> None:
     assert own_set("all, geometric_stiffening,foreshortening") == STIFFENED == own_set(["all", *STIFFENING])
     assert own_set([]) == "none"
     assert as_field("none") == "[]"
-    assert label_of(DEFAULT | set(STIFFENING)) == STIFFENED
-    assert label_of(DEFAULT - {"gravity"}) == "all-gravity"
+    assert label_of(ALL | set(STIFFENING)) == STIFFENED
+    assert label_of(ALL - {"gravity"}) == "all-gravity"

@@ -42,7 +42,8 @@ def _mechanism(folder: Path, kind: str, case: str) -> Mechanism:
         for kind, cases in (PLAIN, STIFFENED, MODAL)
         for case in cases
         for gauge in GAUGES
-        if gauge == "joint-angle" or case in stiffened_cases.SERIAL
+        # second-order displacements of the joint-angle gauge are anchored: `test_kernels_stiffened`
+        if (kind == "chains" if gauge == "joint-angle" else case in stiffened_cases.SERIAL)
     ],
 )
 def test_equations_are_those_of_the_tables(kind: str, case: str, gauge: str, tmp_path: Path) -> None:

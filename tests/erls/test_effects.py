@@ -20,7 +20,7 @@ from erls.equations.ffr.formulation import Ffr
 from erls.equations.ffr.standard_data import StandardData
 from erls.errors import Cause, SceneError, SimulationError
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import ALL, DEFAULT, EFFECTS, conserves_energy, in_order, inconsistencies, named_effects
+from erls.mechanism.effects import ALL, EFFECTS, conserves_energy, in_order, inconsistencies, named_effects
 from erls.mechanism.links import Link
 from erls.mechanism.without_effects import present, without
 from erls.scene.build import build_mechanism
@@ -230,7 +230,7 @@ def test_leaving_out_is_like_a_scene_without(scene_file: Path, name: str) -> Non
     less = build_mechanism(load_scene(scene_file, [f"effects=-{name}"])).mechanism
     never = build_mechanism(load_scene(scene_file, CHANGED[name])).mechanism
     whole = build_mechanism(load_scene(scene_file)).mechanism
-    assert less.effects == DEFAULT - {name}
+    assert less.effects == ALL - {name}
     assert name in present(whole)
     assert name not in present(less)
     assert present(never) == present(less)
@@ -253,15 +253,15 @@ def test_payload_leaves_the_motor(scene_file: Path) -> None:
 
 
 GOOD: tuple[tuple[Any, frozenset[str]], ...] = (
-    ("all", DEFAULT),
-    ("auto", DEFAULT),
-    (["all", *sorted(ALL - DEFAULT)], ALL),
-    ("all,-gravity", DEFAULT - {"gravity"}),
+    ("all", ALL),
+    ("auto", ALL),
+    (["all", *sorted(ALL - ALL)], ALL),
+    ("all,-gravity", ALL - {"gravity"}),
     ("gravity", frozenset({"gravity"})),
     ("gravity, flexibility", frozenset({"gravity", "flexibility"})),
     (["gravity", "gravity"], frozenset({"gravity"})),
     ([], frozenset()),
-    ("-coriolis,-gravity", DEFAULT - {"coriolis", "gravity"}),
+    ("-coriolis,-gravity", ALL - {"coriolis", "gravity"}),
 )
 
 
@@ -274,7 +274,7 @@ def test_names(value: Any, expected: frozenset[str]) -> None:
 
 BAD = [
     ('"colioris"', Cause.BAD_REFERENCE, "did you mean 'coriolis'?"),
-    ('["gravity", "al"]', Cause.BAD_REFERENCE, "known: all, gravity"),
+    ('["gravity", "al"]', Cause.BAD_REFERENCE, "known: all, linear, gravity"),
     ('"al"', Cause.BAD_REFERENCE, "did you mean 'all'?"),
     ('["gravity", "-coriolis"]', Cause.BAD_FIELD, "keep one kind"),
     ("3", Cause.BAD_FIELD, ""),
@@ -301,18 +301,18 @@ def test_tolerances_are_positive(scene_file: Path) -> None:
 
 
 WARNINGS = [
-    (DEFAULT, "erls", ""),
+    (ALL, "erls", ""),
     (frozenset({"gravity", "flexibility"}), "erls", ""),
-    (DEFAULT - LINEAR - SQUARE, "erls", ""),
-    (DEFAULT - {"inertia_first_order"}, "erls", "'centrifugal_load' without 'inertia_first_order'"),
-    (DEFAULT - {"centrifugal_load", "inertia_first_order"} - SQUARE, "erls", "'coriolis' without 'centrifugal_load'"),
-    (DEFAULT - {"coriolis"}, "erls", ""),
-    (DEFAULT - SQUARE, "erls", "'inertia_first_order' without 'inertia_second_order': the mass matrix may turn"),
-    (DEFAULT - {"spin_softening"}, "erls", "'inertia_second_order' without 'spin_softening'"),
-    (DEFAULT - {"flexibility"}, "erls", "links are rigid without 'flexibility'"),
+    (ALL - LINEAR - SQUARE, "erls", ""),
+    (ALL - {"inertia_first_order"}, "erls", "'centrifugal_load' without 'inertia_first_order'"),
+    (ALL - {"centrifugal_load", "inertia_first_order"} - SQUARE, "erls", "'coriolis' without 'centrifugal_load'"),
+    (ALL - {"coriolis"}, "erls", ""),
+    (ALL - SQUARE, "erls", "'inertia_first_order' without 'inertia_second_order': the mass matrix may turn"),
+    (ALL - {"spin_softening"}, "erls", "'inertia_second_order' without 'spin_softening'"),
+    (ALL - {"flexibility"}, "erls", "links are rigid without 'flexibility'"),
     (frozenset({"gravity"}), "erls", ""),
-    (DEFAULT - {"coriolis"}, "nodal", "no part that is 'coriolis'"),
-    (DEFAULT - {"gravity"}, "nodal", ""),
+    (ALL - {"coriolis"}, "nodal", "no part that is 'coriolis'"),
+    (ALL - {"gravity"}, "nodal", ""),
 ]
 
 
@@ -329,7 +329,7 @@ def test_warnings_reach_the_run(scene_file: Path) -> None:
     scene = load_scene(scene_file, ["effects=-inertia_first_order", "simulation.duration=0.002"])
     run = erls.simulate(scene)
     assert any("without 'inertia_first_order'" in w for w in run.warnings)
-    assert run.summary()["effects"] == [name for name in EFFECTS if name in DEFAULT - {"inertia_first_order"}]
+    assert run.summary()["effects"] == [name for name in EFFECTS if name in ALL - {"inertia_first_order"}]
     assert "certified_error" not in run.summary()
 
 
@@ -339,7 +339,8 @@ def test_an_indefinite_mass_matrix_is_the_cause(tmp_path: Path, integrator: str)
     of this chain turns about an axis along it, so that its inertia is nearly all deformation.
     """
     changes = ["simulation.duration=0.05", f"simulation.integrator={integrator}"]
-    scene = load_scene(random_chain(tmp_path, 0), [*changes, "effects=-inertia_second_order,-spin_softening"])
+    changes.append('effects=["linear", "-inertia_second_order", "-spin_softening"]')
+    scene = load_scene(random_chain(tmp_path, 0), changes)
     told: list[str] = []
     with pytest.raises(SimulationError) as caught:
         erls.simulate(scene, tell=told.append)

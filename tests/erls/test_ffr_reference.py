@@ -55,7 +55,7 @@ def test_against_nonlinear_beam(scene: str, table: str, point: str, prefix: str,
 def test_against_an_independent_prototype(tmp_path: Path) -> None:
     """Tip of the L with 12 elastic modes over 0.3 s; 2e-6: 1e-6 of the prototype and 1e-6 of the step."""
     scenes.l_link(tmp_path, 2, frame=EULER, reduction={"fixed_interface_modes": 18, "elastic_modes": 12})
-    simulation = {"duration": 0.3, "step": 1e-4, "spectral_radius": 1.0, "formulation": "ffr"}
+    simulation = {"duration": 0.3, "step": 1e-4, "spectral_radius": 1.0, "formulation": "ffr", "effects": "linear"}
     run = erls.simulate(scenes.l_scene(tmp_path, simulation=simulation))
     assert _distance(run, "tip", _table("l_shape_modal_ffr"), "tip") <= 2e-6
 
@@ -110,7 +110,12 @@ def test_formulations_and_frames_differ_in_second_order(tmp_path: Path, links: i
         ends = []
         for formulation, body_frame in variants:
             changes: dict[str, Any] = {
-                "simulation": {"duration": 1e-3, "formulation": formulation, "body_frame": body_frame},
+                "simulation": {
+                    "duration": 1e-3,
+                    "formulation": formulation,
+                    "body_frame": body_frame,
+                    "effects": "linear",
+                },
                 "initial": {"deformation": "static"},
             }
             if links == 1:

@@ -273,7 +273,8 @@ def test_formulations_agree_to_second_order(tmp_path: Path) -> None:
         shutil.copy(path / "parallel_robot.toml", tmp_path / "robot.toml")
         runs = []
         for name, rigid in (("erls", False), ("ffr", False), ("erls", True)):
-            changes = ["simulation.duration=0.03", "simulation.step=5e-3", f"simulation.formulation={name}"]
+            changes = ["simulation.duration=0.03", "simulation.step=5e-3", scenes.LINEAR]
+            changes.append(f"simulation.formulation={name}")
             changes += ["joints.left_motor.drive.motion.duration=2.0", "loops.right_motor.drive.motion.duration=2.0"]
             changes += [f"links.{link}.flexible=false" for link in NAMES if rigid]
             runs.append(simulate(load_scene(tmp_path / "robot.toml", changes)).position("hand", t))

@@ -27,11 +27,11 @@ STATIC_START = 'initial.deformation="static"'
 
 
 def _run(path: Path, *overrides: str) -> ChainRun:
-    return erls.simulate(erls.load_scene(path, overrides))
+    return erls.simulate(erls.load_scene(path, [scenes.LINEAR, *overrides]))
 
 
 def _reduced(path: Path, *overrides: str) -> QuasiStatic:
-    scene = erls.load_scene(path, overrides)
+    scene = erls.load_scene(path, [scenes.LINEAR, *overrides])
     found = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
     assert isinstance(found, QuasiStatic)
     return found
@@ -157,7 +157,7 @@ def test_closer_than_truncation(path: Path, overrides: list[str], bandwidth: flo
     """Named points of the robot, which starts smoothly, and of the L, which is let go."""
     given = [*overrides, *TIGHT, f"simulation.bandwidth={bandwidth}"]
     whole, run = _run(path, *overrides, *TIGHT), _run(path, *given)
-    truncated = _run(path, *given, 'effects="-static_correction"')
+    truncated = _run(path, *given, 'effects=["linear", "-static_correction"]')
     found = _error(run, whole)
     assert truncated.formulation.size == run.formulation.size < whole.formulation.size / 3
     assert found <= error
@@ -181,7 +181,7 @@ def test_payload_on_the_robot(tmp_path: Path) -> None:
         return np.concatenate([np.hstack(run.reaction(name, times)) for name in run.joint_names])
 
     run = _run(path, *common, "simulation.bandwidth=60")
-    truncated = _run(path, *common, "simulation.bandwidth=60", 'effects="-static_correction"')
+    truncated = _run(path, *common, "simulation.bandwidth=60", 'effects=["linear", "-static_correction"]')
     assert _error(run, whole) <= min(5e-7, _error(truncated, whole) / 5)
     for quantity in (efforts, reactions):
         expected = quantity(whole)
@@ -283,7 +283,7 @@ def test_floating_frames() -> None:
     common = [STATIC_START, "simulation.duration=0.2", "simulation.integrator=lobatto", "simulation.tolerance=1e-6"]
     common += ['simulation.formulation="ffr"', 'simulation.body_frame="mean-axis"']
     whole, run = _run(ROBOT, *common), _run(ROBOT, *common, "simulation.bandwidth=60")
-    truncated = _run(ROBOT, *common, "simulation.bandwidth=60", 'effects="-static_correction"')
+    truncated = _run(ROBOT, *common, "simulation.bandwidth=60", 'effects=["linear", "-static_correction"]')
     assert (whole.formulation.size, run.formulation.size) == (24, 4)
     found = _error(run, whole, 8)
     assert found <= min(4e-7, _error(truncated, whole, 8) / 8)

@@ -31,7 +31,7 @@ def test_estimate_against_known_errors(monkeypatch: pytest.MonkeyPatch, scene: s
     """Distance of a converged modal model from exact beams (README): the estimate is right within a factor of 2.5, and
     none is worth a warning. Where the link knows no second order, it is the same within a factor of 1.6.
     """
-    run = erls.simulate(DATA / scene)
+    run = erls.simulate(erls.load_scene(DATA / scene, [scenes.LINEAR]))
     estimate = sum(found.error for found in deflection_errors(run).values())
     assert known / 2.5 < estimate < 2.5 * known
     assert not deflection_warnings(run)

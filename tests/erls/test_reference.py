@@ -108,7 +108,7 @@ def test_mode_counts_of_the_reference_table(
         frame={**EULER, "torsion": "polar"},
         reduction={"fixed_interface_modes": 18, "elastic_modes": modes - 6},
     )
-    run = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.5, "step": 2.5e-5}))
+    run = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.5, "step": 2.5e-5, "effects": "linear"}))
     assert np.degrees(run.joint_angle("shoulder", 0.5)) == pytest.approx(angle, abs=2e-4)
     assert run.position("elbow", 0.5)[1] == pytest.approx(elbow_y, abs=2e-6)
     assert run.position("tip", 0.5)[2] == pytest.approx(tip_z, abs=2e-6)
@@ -122,7 +122,7 @@ def test_gauges_agree_to_second_order(tmp_path: Path) -> None:
     times = np.linspace(0, 2, 401)
     tips = []
     for gauge in ("joint-angle", "minimum-norm"):
-        run = erls.simulate(scenes.l_scene(tmp_path, simulation={"step": 2e-4, "gauge": gauge}))
+        run = erls.simulate(scenes.l_scene(tmp_path, simulation={"step": 2e-4, "gauge": gauge, "effects": "linear"}))
         tips.append(run.position("tip", times))
     distance = np.linalg.norm(tips[0] - tips[1], axis=1).max()
     assert 1e-6 < distance <= 5e-5

@@ -35,7 +35,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> ChainRun:
     path = scenes.three_links(folder, "prescribed", payloads=[{"point": "end", "mass": 0.1}])
     data = scenes.read_toml(path)
     data["joints"][2] |= {"stiffness": 3.0, "rest": 0.2, "damping": 0.01}
-    data["simulation"] = {"duration": END, "step": 2e-4, "gauge": "minimum-norm"}
+    data["simulation"] = {"duration": END, "step": 2e-4, "gauge": "minimum-norm", "effects": "linear"}
     data["points"] = [{"name": "middle", "link": "a", "node": "tip"}, *data["points"]]
     return erls.simulate(scenes.write_toml(path, data))
 

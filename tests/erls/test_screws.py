@@ -196,7 +196,7 @@ def _flexible(folder: Path, loop: bool) -> dict[str, Any]:
     arms = [{"name": name, **scenes.ARM, **ARM_AXIS} for name in ("upper", "fore")]
     points = [{"name": "end", "link": "fore", "node": "tip"}]
     data = _chain([first, elbow], arms, points=points, base={"rotation_deg": [30.0, 0.0, 0.0]})
-    data["simulation"] = {"duration": 0.02, "step": 1e-4, "spectral_radius": 1.0}
+    data["simulation"] = {"duration": 0.02, "step": 1e-4, "spectral_radius": 1.0, "effects": "linear"}
     if loop:
         axis = [0.0, -0.5, np.sqrt(0.75)]
         data["loops"] = [

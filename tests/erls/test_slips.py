@@ -9,7 +9,7 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError
-from erls.mechanism.effects import DEFAULT, named_effects
+from erls.mechanism.effects import ALL, named_effects
 from fe_import.errors import Cause as LinkCause
 from fe_import.errors import FEImportError
 
@@ -35,7 +35,7 @@ def test_effects_that_cannot_be_meant(value: Any, words: str) -> None:
 
 def test_no_effect_and_all_but_one() -> None:
     assert named_effects([], "effects") == frozenset()
-    assert named_effects("-gravity", "effects") == named_effects("all,-gravity", "effects") == DEFAULT - {"gravity"}
+    assert named_effects("-gravity", "effects") == named_effects("all,-gravity", "effects") == ALL - {"gravity"}
 
 
 FIELDS = [

@@ -19,7 +19,7 @@ from erls.equations.ffr.constrained import ConstrainedFfr
 from erls.equations.ffr.formulation import Ffr
 from erls.errors import SimulationError
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.effects import ALL, DEFAULT
+from erls.mechanism.effects import ALL
 from erls.mechanism.links import Link, Payload, payload_invariants
 from erls.mechanism.second_order import link_second_order
 from erls.run.chain.places import node_positions
@@ -62,7 +62,7 @@ def test_spin_up_beam(formulation: str) -> None:
 @pytest.mark.parametrize("formulation", ["erls", "ffr"])
 def test_lost_stability_is_told_before_the_start(formulation: str) -> None:
     """Without stiffening: the speed is the lowest bending frequency of the beam at rest, 3.516 √(EI/ρA) / L²."""
-    changes = [f"simulation.formulation={formulation}", "simulation.effects=all", "simulation.duration=2.0"]
+    changes = [f"simulation.formulation={formulation}", scenes.LINEAR, "simulation.duration=2.0"]
     changes.append("joints.hub.drive.motion.duration=2.0")
     told: list[str] = []
     scene = erls.load_scene(DATA / "spin_up/beam.toml", changes)
@@ -178,7 +178,7 @@ def test_l_pendulum_comes_near_nonlinear_beams() -> None:
     at = table["t"] <= 1.0
     expected = np.stack([table[f"{case}_{axis}"][at] for axis in "xyz"], axis=1)
     found = []
-    for changes in ([], [STIFF, "simulation.formulation=ffr"]):
+    for changes in ([scenes.LINEAR], ["simulation.formulation=ffr"]):
         run = erls.simulate(erls.load_scene(DATA / f"l_shape/{case}.toml", ["simulation.duration=1.0", *changes]))
         found.append(float(np.linalg.norm(run.position("tip", table["t"][at]) - expected, axis=1).max()))
     assert found[0] > 5e-5
@@ -317,7 +317,7 @@ def test_inboard_interface_is_free_to_choose(tmp_path: Path) -> None:
 
 
 def test_what_has_no_second_order_data_is_told(tmp_path: Path) -> None:
-    """Asked for where a link forms a ring: a warning that says why; not asked for, nothing."""
+    """Where a link forms a ring: a warning that says why; where links are to be linear, nothing."""
     members = [
         {"from": a, "to": b, "elements": 2, "material": "m", "section": "s"}
         for a, b in (("root", "elbow"), ("elbow", "tip"), ("root", "tip"))
@@ -325,16 +325,15 @@ def test_what_has_no_second_order_data_is_told(tmp_path: Path) -> None:
     data = scenes.merged(scenes.L_LINK, {"frame": {"members": members}})
     scenes.write_toml(tmp_path / "link.toml", data)
     path = scenes.l_scene(tmp_path, simulation={"duration": 1e-3})
-    assert any("members form a ring" in w for w in erls.simulate(erls.load_scene(path, [STIFF])).warnings)
-    assert not any("ring" in w for w in erls.simulate(path).warnings)
+    assert any("members form a ring" in w for w in erls.simulate(path).warnings)
+    assert not any("ring" in w for w in erls.simulate(erls.load_scene(path, [scenes.LINEAR])).warnings)
 
 
-def test_links_are_linear_unless_asked(tmp_path: Path) -> None:
-    """The default leaves all second-order effects out; critical speeds are those of the axis asked about."""
+def test_links_are_linear_where_asked(tmp_path: Path) -> None:
+    """`linear` leaves all second-order effects out; critical speeds are those of the axis asked about."""
     mechanism = _spinning("turning", 3.0, tmp_path)
-    assert {"geometric_stiffening", "foreshortening", "modal_inertia"} == ALL - DEFAULT
     link = mechanism.links[0]
     assert critical_speed(link, np.array([0.0, 0.0, 1.0])) == pytest.approx(3.5160, rel=1e-3)
     assert critical_speed(link, np.array([1.0, 0.0, 0.0])) == pytest.approx(3.5160, rel=1e-3)
-    bare = build_mechanism(erls.load_scene(tmp_path / "turning.toml", ["simulation.effects=all"])).mechanism
-    assert bare.effects == DEFAULT
+    bare = build_mechanism(erls.load_scene(tmp_path / "turning.toml", [scenes.LINEAR])).mechanism
+    assert ALL - bare.effects == {"geometric_stiffening", "foreshortening", "modal_inertia"}

@@ -18,10 +18,10 @@ import scenes
 
 import erls
 
-SECOND = '"all,geometric_stiffening,foreshortening"'
+SECOND = "all"
 
 
-def _apart(folder: Path, stiffer: float, effects: str = "all") -> float:
+def _apart(folder: Path, stiffer: float, effects: str = "linear") -> float:
     """Largest difference of the elbow's torque within 0.4 s, of its peak; step 1 ms."""
     source = scenes.ROOT / "data/robot"
     (folder / "links").mkdir(exist_ok=True)

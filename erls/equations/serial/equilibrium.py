@@ -10,6 +10,7 @@ from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 _ITERATIONS = 20
+_STEP = 1e-6  # m, of differences
 _TOLERANCE = 1e-10  # of the deflection; one more step of quadratic convergence would reach rounding
 
 
@@ -37,6 +38,12 @@ def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray
     held = y[:f].copy()
     zero = np.zeros(size)
     scales = equations.length_scales
+    # a mode that moves no node (torsion of the last link) takes as much energy as the others
+    steps = _STEP / scales
+    elastic = np.concatenate([np.zeros(0), *(link.stiffness for link in equations.mechanism.links)])
+    if 0 < len(elastic) == size - f:
+        energies = elastic * steps[f:] ** 2
+        steps[f:] *= np.sqrt(np.minimum(1.0, np.median(energies) / energies))
 
     compiled = equations.compiled
 
@@ -58,10 +65,9 @@ def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray
         value = out_of_balance(y)
         slope = np.empty((size, size))
         for k in range(size):
-            step = 1e-6 / scales[k]
             trial = y.copy()
-            trial[k] += step
-            slope[:, k] = (out_of_balance(trial) - value) / step
+            trial[k] += steps[k]
+            slope[:, k] = (out_of_balance(trial) - value) / steps[k]
         try:
             update = np.linalg.solve(slope, -value)
         except np.linalg.LinAlgError:

@@ -9,7 +9,7 @@ import numpy as np
 from erls.equations.formulation import State
 from erls.equations.serial.state_series import StateSeries
 from erls.maths.so3 import Array
-from erls.mechanism.chain import Mechanism
+from erls.mechanism.chain import Mechanism, poses
 
 
 def node_positions(
@@ -28,19 +28,40 @@ def node_positions(
     link : int
     nodes : index array or slice
     magnification : float
-        Of the elastic and rigid-body displacement against the Equivalent Rigid Link System; 1 is true.
+        Of the displacement against the rigid chain at the same joint coordinates; 1 is true.
     """
-    model, frame = mechanism.links[link].model, state.poses[link]
-    turn, place = np.swapaxes(frame[..., :3, :3], -1, -2), frame[..., None, :3, 3]
+    if magnification != 1.0:
+        rigid = rigid_positions(mechanism, state, link, nodes)
+        return np.asarray(rigid + magnification * (node_positions(mechanism, state, link, nodes) - rigid))
     if state.nodes is not None:
-        undeformed = model.nodes[nodes] @ turn + place
-        return np.asarray(undeformed + magnification * (state.nodes[link][..., nodes, :] - undeformed))
+        return np.asarray(state.nodes[link][..., nodes, :])
+    model = mechanism.links[link].model
     moved = np.tensordot(state.modal[link], model.translation_shapes[nodes], ([-1], [2]))
     second_order = mechanism.links[link].second_order if "foreshortening" in mechanism.effects else None
     if second_order is not None:
         moved = moved + second_order.displacements(np.arange(len(model.nodes))[nodes], state.modal[link])
-    local = model.nodes[nodes] + magnification * moved
-    return np.asarray(local @ turn + place)
+    return _placed(state.poses[link], model.nodes[nodes] + moved)
+
+
+def rigid_positions(mechanism: Mechanism, state: State | StateSeries, link: int, nodes: Any = slice(None)) -> Array:
+    """(..., n, 3) world positions of nodes of a link in the Equivalent Rigid Link System: `rigid_frames`."""
+    return _placed(rigid_frames(mechanism, state)[link], mechanism.links[link].model.nodes[nodes])
+
+
+def rigid_frames(mechanism: Mechanism, state: State | StateSeries) -> list[Array]:
+    """(..., 4, 4) frames of all links in the rigid chain at the same joint coordinates; where only the places of nodes
+    are known, those that come nearest to them.
+    """
+    if state.nodes is not None:
+        return list(state.poses)
+    if isinstance(state, StateSeries):
+        at = [poses(mechanism, theta) for theta in state.coordinates]
+        return [np.array(frames) for frames in zip(*at, strict=True)]
+    return poses(mechanism, state.coordinates)
+
+
+def _placed(frame: Array, local: Array) -> Array:
+    return np.asarray(local @ np.swapaxes(frame[..., :3, :3], -1, -2) + frame[..., None, :3, 3])
 
 
 def point_position(mechanism: Mechanism, state: State | StateSeries, number: int) -> Array:
