@@ -22,6 +22,9 @@ class End(NamedTuple):
     warnings: tuple[str, ...]
 
 
+_CHOICE = "integrator chosen"
+
+
 def write_solution(group: h5py.Group, solution: Solution, unit: str, coordinates: str) -> None:
     """Knots and work; ``unit`` and meaning of the coordinates."""
     write_array(group, "knots/time", solution.t, "s", "times of the steps; twice where forces jump")
@@ -33,6 +36,8 @@ def write_solution(group: h5py.Group, solution: Solution, unit: str, coordinates
         write_array(group, f"knots/{name}", values, rate, coordinates)
     for name, count in msgspec.to_builtins(solution.work).items():
         write_attribute(group["knots"], name, int(count))
+    if solution.choice:
+        write_attribute(group["knots"], _CHOICE, solution.choice)
 
 
 def read_solution(file: Reader, size: int, failure: SimulationError | None) -> Solution:
@@ -49,4 +54,5 @@ def read_solution(file: Reader, size: int, failure: SimulationError | None) -> S
         raise file.fail("knots/time", "times must rise", None)
     work = Work(**{name: knots.attribute(name, int) for name in msgspec.to_builtins(Work())})
     y, v, a = (knots.array(name, (len(t), size)) for name in ("position", "velocity", "acceleration"))
-    return Solution(t, y, v, a, work, failure)
+    choice = knots.attribute(_CHOICE, str) if _CHOICE in knots.attribute_names() else ""
+    return Solution(t, y, v, a, work, failure, choice=choice)

@@ -60,7 +60,7 @@ def pareto_front(runs: Sequence[CostPoint]) -> tuple[CostPoint, ...]:
 
 def cheapest(runs: Sequence[CostPoint], largest: float, tolerance: float) -> CostPoint | None:
     """The run to recommend: of those off by ``largest`` at most that do not warn of more than the tolerance the
-    cheapest, or, of those as cheap within the noise, the plainest: effects that are named, and few of them.
+    cheapest, or, of those as cheap within the noise, the plainest: all effects, or a set told in few words.
     """
     met = [run for run in runs if run.failure is None and run.error <= largest and run.foretold <= tolerance]
     shortest = min((run.wall_s for run in met), default=0.0)
@@ -70,7 +70,7 @@ def cheapest(runs: Sequence[CostPoint], largest: float, tolerance: float) -> Cos
 
 def _plainness(run: CostPoint) -> tuple[bool, int, float]:
     effects = run.setting.effects
-    return effects == "auto", effects.count("+") + effects.count("-"), run.wall_s
+    return effects == "auto", (effects != "all") + effects.count("+") + effects.count("-"), run.wall_s
 
 
 def recommendation(study: CostStudy) -> str:

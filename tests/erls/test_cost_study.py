@@ -19,7 +19,6 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.report.cost_page import cost_csv, cost_page, cost_text
 from erls.studies.cost import study_cost
 from erls.studies.cost_result import CostStudy, cost_summary, pareto_front, recommendation
-from erls.studies.effect_sets import STIFFENED
 from erls.studies.grid import Grid, ladders
 from erls.studies.ladder import CostPoint, Setting, failed, overrides_of
 
@@ -102,22 +101,22 @@ def test_reports_agree_with_the_json(study: CostStudy) -> None:
 
 
 def test_what_is_tried_unless_given() -> None:
-    """Both formulations, all and half and a quarter of the modes, all and auto; for beams second order too."""
+    """Both formulations, all and half and a quarter of the modes, all and auto; for beams linear links too."""
     scene = erls.load_scene(scenes.ROOT / "data/l_shape/steel_flat.toml")
     found = {(rungs[0].effects, rungs[0].modes) for rungs in ladders(scene, Grid(), 1e-4, 18, True)}
-    assert found == {(e, n) for e in ("all", "auto") for n in (None, 9, 4)} | {(STIFFENED, None)}
+    assert found == {(e, n) for e in ("all", "auto") for n in (None, 9, 4)} | {("linear", None)}
     for grid, known in ((Grid(), False), (Grid(effects=("all",)), True)):
-        assert all(rungs[0].effects != STIFFENED for rungs in ladders(scene, grid, 1e-4, 18, known))
+        assert all(rungs[0].effects != "linear" for rungs in ladders(scene, grid, 1e-4, 18, known))
 
 
 def test_set_of_the_scene_is_always_tried() -> None:
     """First of all, in its own formulation; in other words it is the same set."""
     scene = erls.load_scene(scenes.ROOT / "data/slider_crank/fast.toml")
-    for asked in ((), ("all",), ("auto", "all+foreshortening+geometric_stiffening")):
+    for asked in ((), ("linear",), ("auto", "all+foreshortening")):
         found = [rungs[0] for rungs in ladders(scene, Grid(effects=asked), 1e-4, 12, True)]
-        assert (found[0].formulation, found[0].effects, found[0].modes) == ("ffr", STIFFENED, None)
+        assert (found[0].formulation, found[0].effects, found[0].modes) == ("ffr", "all", None)
         sets = {setting.effects for setting in found}
-        assert sets == {STIFFENED, *(asked or ("all", "auto"))} - {"all+foreshortening+geometric_stiffening"}
+        assert sets == {"all", *(asked or ("linear", "auto"))} - {"all+foreshortening"}
     split = erls.load_scene(scene.path, ["links.rod.substructures=4"])
     assert {rungs[0].formulation for rungs in ladders(split, Grid(), 1e-4, 12, True)} == {"ffr"}
 

@@ -13,14 +13,14 @@ import scenes
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
-from erls.mechanism.effects import ALL, Certificate
+from erls.mechanism.effects import ALL, LINEAR, Certificate
 from erls.report.cost_page import cost_page, cost_text
 from erls.scene.chain import Scene
 from erls.studies import ladder, refinement
 from erls.studies.cost import study_cost
 from erls.studies.cost_result import CostStudy, cheapest, cost_summary, recommendation
 from erls.studies.doubts import foretold_error
-from erls.studies.effect_sets import STIFFENED, STIFFENING, as_field, each_once, label_of, own_set, parse_sets
+from erls.studies.effect_sets import as_field, each_once, label_of, own_set, parse_sets
 from erls.studies.grid import Grid
 from erls.studies.ladder import CostPoint, Ladder, Setting, climb, overrides_of
 from erls.studies.reference import Reference, knows_second_order, make_reference
@@ -48,9 +48,9 @@ def point(wall: float, error: float, effects: str = "all", foretold: float = 0.0
         ([point(1.0, 1e-3), point(2.0, 5e-5), point(3.0, 1e-6)], 1),
         ([point(1.0, 5e-5, foretold=2e-4), point(2.0, 5e-5)], 1),  # warns of more than the tolerance
         ([point(1.0, 5e-5, foretold=9e-5), point(2.0, 5e-5)], 0),
-        ([point(1.0, 5e-5, "auto"), point(1.1, 5e-5), point(1.15, 5e-5, STIFFENED)], 1),  # as cheap, and plainer
+        ([point(1.0, 5e-5, "auto"), point(1.1, 5e-5), point(1.15, 5e-5, "linear")], 1),  # as cheap, and plainer
         ([point(1.0, 5e-5, "auto"), point(1.3, 5e-5)], 0),
-        ([point(1.0, 5e-5, STIFFENED), point(1.1, 5e-5), point(1.15, 5e-5, "auto")], 1),
+        ([point(1.0, 5e-5, "linear"), point(1.1, 5e-5), point(1.15, 5e-5, "auto")], 1),
         ([point(1.0, 5e-5, foretold=np.inf), point(1.0, 2e-4)], None),
     ],
 )
@@ -87,19 +87,19 @@ def test_linear_rod_of_the_slider_crank_is_not_recommended(monkeypatch: pytest.M
     monkeypatch.setattr("erls.studies.grid._STEP_SHARES", (2.0,))
     fine = [(f"{step:g} s", {"integrator": "generalized_alpha", "step": step}) for step in (2e-4, 1e-4)]
     monkeypatch.setattr("erls.studies.reference._levels", lambda *rest: fine)  # lobatto first compiles for seconds
-    grid = Grid(("ffr",), ("generalized_alpha",), ("all",), (2,))
+    grid = Grid(("ffr",), ("generalized_alpha",), ("linear",), (2,))
     changes = ("simulation.duration=0.015", "simulation.step=2e-4", "links.rod.elastic_modes=2")
     study = study_cost(FAST, 1e-4, grid=grid, overrides=changes, points=["middle"], workers=1)
-    assert STIFFENED in study.reference.made_by
+    assert "effects all" in study.reference.made_by
     assert not study.reference.linear
     assert study.reference.error < 1e-5
-    linear = [run for run in study.runs if run.setting.effects == "all" and run.failure is None]
-    stiffened = [run for run in study.runs if run.setting.effects == STIFFENED and run.failure is None]
+    linear = [run for run in study.runs if run.setting.effects == "linear" and run.failure is None]
+    stiffened = [run for run in study.runs if run.setting.effects == "all" and run.failure is None]
     assert min(run.error for run in linear) > 5e-4 > 1e-4 > min(run.error for run in stiffened)
     assert min(run.foretold for run in linear) > 5e-4  # that is above 0.2 % of the rod
     assert {run.foretold for run in stiffened} == {0.0}
     assert study.chosen is not None
-    assert study.chosen.setting.effects == STIFFENED
+    assert study.chosen.setting.effects == "all"
     scene = erls.load_scene(FAST, (*changes, *overrides_of(study.chosen.setting, ["links.rod.elastic_modes"])))
     own = erls.simulate(erls.load_scene(FAST, changes))
     times = np.linspace(0.0, 0.015, 61)
@@ -109,7 +109,7 @@ def test_linear_rod_of_the_slider_crank_is_not_recommended(monkeypatch: pytest.M
 
 def test_estimates_too_small_for_a_warning_count_where_the_judge_shares_them() -> None:
     """The tall L is off by 1.6e-4 m over 2 s, by its own estimate: no warning, and no doubt beside exact beams."""
-    run = erls.simulate(erls.load_scene(DATA / "l_shape/steel_tall.toml", ["simulation.duration=0.2"]))
+    run = erls.simulate(erls.load_scene(DATA / "l_shape/steel_tall.toml", ["simulation.duration=0.2", scenes.LINEAR]))
     assert run.warnings == ()
     assert foretold_error(run, linear=False) == 0.0
     assert 1e-6 < foretold_error(run, linear=True) < 2e-4
@@ -117,7 +117,7 @@ def test_estimates_too_small_for_a_warning_count_where_the_judge_shares_them() -
 
 def test_lost_stability_and_certificates_are_doubts() -> None:
     """Of a beam that spins too fast any error can be expected; of what auto left out, what the certificate says."""
-    changes = ["simulation.effects=all", "simulation.duration=10.0", "simulation.step=0.05"]
+    changes = [scenes.LINEAR, "simulation.duration=10.0", "simulation.step=0.05"]
     run = erls.simulate(erls.load_scene(DATA / "spin_up/beam.toml", changes))
     assert foretold_error(run, linear=False) == np.inf
     calm = erls.simulate(erls.load_scene(DATA / "l_shape/steel_tall.toml", SHORT))
@@ -132,9 +132,9 @@ def test_lost_stability_and_certificates_are_doubts() -> None:
 @pytest.mark.parametrize(
     ("path", "changes", "made_by"),
     [
-        (FAST, ("simulation.effects=-gravity",), f"ffr with all modes, effects {STIFFENED}, lobatto"),
-        (DATA / "l_shape/steel_tall.toml", (), f"ffr with all modes, effects {STIFFENED}, lobatto"),
-        (FAST, ("links.rod.flexible=false",), "ffr with all modes, effects all+geometric"),
+        (FAST, ("simulation.effects=-gravity",), "ffr with all modes, effects all, lobatto"),
+        (DATA / "l_shape/steel_tall.toml", (), "ffr with all modes, effects all, lobatto"),
+        (FAST, ("links.rod.flexible=false",), "ffr with all modes, effects all, lobatto"),
         (DATA / "l_shape/steel_tall.toml", ("links.l.flexible=false",), "erls with all modes, effects all, lobatto"),
     ],
 )
@@ -154,8 +154,7 @@ def test_tight_reference_has_all_that_the_scene_and_its_links_know(
     assert made_by in found.made_by
     assert not found.linear
     used = levels[0].scene.record.simulation
-    own = set(STIFFENING) if knows_second_order(scene) or (path == FAST and "effects" not in changes[0]) else set()
-    assert set(used.effects) == ALL | own
+    assert set(used.effects) == ALL
     tolerances = [level.scene.record.simulation.tolerance for level in levels]
     assert tolerances == pytest.approx([1e-5, 1e-6, 1e-7, 1e-8])
 
@@ -349,7 +348,8 @@ def test_what_cannot_run_at_all_fails_once() -> None:
 
 def test_what_runs_away_twice_is_not_tried_further() -> None:
     """The linear beam that spins too fast does so with any step."""
-    rungs = tuple(Setting("erls", "generalized_alpha", "all", None, "step", step) for step in (0.08, 0.04, 0.02, 0.01))
+    steps = (0.08, 0.04, 0.02, 0.01)
+    rungs = tuple(Setting("erls", "generalized_alpha", "linear", None, "step", step) for step in steps)
     truth = Reference(np.zeros(1), np.zeros((1, 1, 3)), "nothing", 1e-9)
     beam = str(DATA / "spin_up/beam.toml")
     found = climb(Ladder(beam, (), (), rungs, ("tip",), "max", truth, 1e-4, 1e9, 1e12))
@@ -363,12 +363,12 @@ def test_what_runs_away_twice_is_not_tried_further() -> None:
     ("given", "labels", "fields"),
     [
         (["all,auto"], ("all", "auto"), ("all", "auto")),
-        (["all", "all+geometric_stiffening"], ("all", "all+geometric_stiffening"),
-         ("all", '["all", "geometric_stiffening"]')),
+        (["all", "linear+geometric_stiffening"], ("all", "linear+geometric_stiffening"),
+         ("all", '["linear", "geometric_stiffening"]')),
         (["all-coriolis", "-coriolis"], ("all-coriolis",), ('["all", "-coriolis"]',)),
-        (["all+foreshortening", "foreshortening + all"], ("all+foreshortening",), ('["all", "foreshortening"]',)),
+        (["linear+foreshortening", "foreshortening + linear"], ("linear+foreshortening",),
+         ('["linear", "foreshortening"]',)),
         (["gravity+flexibility"], ("gravity+flexibility",), ('["gravity", "flexibility"]',)),
-        ([STIFFENED], (STIFFENED,), ('["all", "geometric_stiffening", "foreshortening"]',)),
     ],
 )  # fmt: skip
 def test_sets_are_written_as_reported(given: list[str], labels: tuple[str, ...], fields: tuple[str, ...]) -> None:
@@ -383,8 +383,10 @@ def test_sets_are_written_as_reported(given: list[str], labels: tuple[str, ...],
 
 def test_labels_of_a_scene() -> None:
     """As text, list, or nothing at all."""
-    assert own_set("all, geometric_stiffening,foreshortening") == STIFFENED == own_set(["all", *STIFFENING])
+    assert own_set("linear, foreshortening") == "linear+foreshortening" == own_set(["linear", "foreshortening"])
     assert own_set([]) == "none"
     assert as_field("none") == "[]"
-    assert label_of(ALL | set(STIFFENING)) == STIFFENED
+    assert label_of(ALL) == "all"
+    assert label_of(LINEAR) == "linear"
+    assert label_of(LINEAR - {"gravity"}) == "linear-gravity"
     assert label_of(ALL - {"gravity"}) == "all-gravity"

@@ -35,6 +35,7 @@ WITHIN = 3.0  # actual error over certified one, from the specification
 L_SHAPE, ROBOT = scenes.ROOT / "data/l_shape/steel_flat.toml", scenes.ROOT / "data/robot/two_link.toml"
 STATIC_START = 'initial.deformation="static"'
 SLOW = ["joints.shoulder.drive.motion.duration=40.0", "joints.elbow_joint.drive.motion.duration=40.0", STATIC_START]
+SLOW.append("simulation.step=5e-4")
 
 # (1) amplitudes, in closed form: a mass on a spring, f per unit of mass from rest
 
@@ -109,7 +110,9 @@ def led(tmp_path: Path) -> Path:
 
 
 def test_slow_links_follow_statically_without_a_coarse_run(led: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same decision each time: nothing is measured."""
+    """The same decision each time: nothing is measured. What the equilibrium of the start has of second order counts as
+    a vibration about the linear one.
+    """
     monkeypatch.setattr(choice_module, "coarse_run", None)
     for path, changes in ((led, ()), (ROBOT, ("simulation.duration=60.0", *SLOW))):
         choices = [_choice(path, *changes) for _ in range(2)]
@@ -118,7 +121,7 @@ def test_slow_links_follow_statically_without_a_coarse_run(led: Path, monkeypatc
         assert not choices[0].off
         assert not choices[0].rigid
         assert "vibrations of links" in choices[0].note
-        assert sum(cut.error for cut in choices[0].cuts) < 1e-6
+        assert sum(cut.error for cut in choices[0].cuts) < 5e-6
 
 
 @pytest.mark.parametrize(
