@@ -73,6 +73,7 @@ def scene(folder: Path, links: int, mass: str, gauge: str, modes: int, seconds: 
         f"duration = {seconds}",
         'integrator = "dop853"',
         f'gauge = "{gauge}"',
+        'effects = "linear"',
         "[base]",
         "rotation_deg = [-90.0, 0.0, 0.0]",
     ]

@@ -101,7 +101,8 @@ def compare_formulations(quick: bool, explicit: bool) -> None:
         method = 'step = 0.1\nintegrator = "dop853"\nrtol = 1e-9' if explicit else "step = 5e-5\nspectral_radius = 1.0"
         times = np.linspace(0, seconds, 1001)
         with tempfile.TemporaryDirectory() as folder:
-            path = write_scene(Path(folder), links, modes, stiffer, f"duration = {seconds}\n{method}")
+            settings = f'duration = {seconds}\neffects = "linear"\n{method}'
+            path = write_scene(Path(folder), links, modes, stiffer, settings)
             runs = {name: erls.simulate(erls.load_scene(path, changes)) for name, changes in VARIANTS.items()}
         tips = {name: run.position("tip", times) for name, run in runs.items()}
         away = [np.linalg.norm(tips[n] - tips["erls"], axis=1).max() for n in list(VARIANTS)[1:]]

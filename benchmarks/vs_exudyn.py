@@ -6,11 +6,11 @@ since exudyn's flexible bodies know translations only; `benchmarks/exudyn_models
 same nodes, masses, shapes and stiffness.
 
 Each program runs a ladder of steps or tolerances; error is the largest distance of the last named point from a tight
-run of the program's own equations (erls: Equivalent Rigid Link System; exudyn: floating frame of reference). How far
-the two tight runs are apart is printed: it is of second order in the deflection, and no error of either program. Time
-is the median of the integration alone. exudyn runs generalized-alpha with modified Newton and its best settings found
-here: rotation Rxyz for one link, Euler parameters for more, spectral radius 0.95, relative tolerance 1e-5; gravity as
-forces on nodal masses.
+run of the program's own equations (erls: Equivalent Rigid Link System; exudyn: floating frame of reference; links
+linear in both). How far the two tight runs are apart is printed: it is of second order in the deflection, and no error
+of either program. Time is the median of the integration alone. exudyn runs generalized-alpha with modified Newton and
+its best settings found here: rotation Rxyz for one link, Euler parameters for more, spectral radius 0.95, relative
+tolerance 1e-5; gravity as forces on nodal masses.
 
 Run: python benchmarks/vs_exudyn.py [--scenes l,robot2,robot3] [--runs 5]
 """
@@ -112,7 +112,7 @@ def ours(path: Path, point: str, times: np.ndarray, runs: int) -> tuple[np.ndarr
     """Tight positions, and (time, error) for every integrator of ours."""
 
     def simulate(*overrides: str, repeat: int = 1) -> tuple[np.ndarray, float]:
-        scene = load_scene(path, overrides)
+        scene = load_scene(path, ["simulation.effects=linear", *overrides])
         done = [erls.simulate(scene) for _ in range(repeat)]
         return done[0].position(point, times), float(np.median([run.wall_s for run in done]))
 
