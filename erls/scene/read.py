@@ -114,6 +114,6 @@ def _with_integrator(record: SceneRecord) -> SceneRecord:
     s = record.simulation
     if s.integrator:
         return record
-    fixed = s.step is not None or record.loops or s.formulation == "nodal" or s.coordinates == "absolute"
+    fixed = s.step is not None or s.formulation == "nodal" or s.coordinates == "absolute"
     settings = msgspec.structs.replace(s, integrator=FIXED_STEP if fixed else "auto")
     return msgspec.structs.replace(record, simulation=settings)

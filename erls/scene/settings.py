@@ -27,8 +27,8 @@ class Simulation(Stepping, frozen=True):
     integrator : str
         ``generalized_alpha``, ``lobatto``, one of SciPy's (``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``), or
         ``auto``: the one that fits; of ``nodal``, steps of generalized-α with a local error of ``tolerance`` / 1000.
-        Unless given ``generalized_alpha`` where there is a ``step`` or where conditions tie the coordinates (loops,
-        ``nodal``, absolute coordinates), otherwise ``auto``; reading a scene puts its name here.
+        Unless given ``generalized_alpha`` where there is a ``step``, for ``nodal`` and absolute coordinates, otherwise
+        ``auto``; reading a scene puts its name here.
     step : float, optional
         Step of generalized-α [s], largest step of SciPy's; ``lobatto`` and ``auto`` go by ``tolerance`` alone.
     rtol, atol : float

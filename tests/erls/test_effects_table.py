@@ -92,7 +92,7 @@ def test_what_auto_leaves_out_is_off(capsys: pytest.CaptureFixture[str]) -> None
     led = ["drive.type=\"pd\"", "drive.proportional_gain=3000.0", "drive.derivative_gain=60.0"]
     led += ["drive.feed_forward=true", "motor.rotor_inertia=5e-3"]
     changes = [*slow, *(f"joints.{j}.{c}" for j in ("shoulder", "elbow_joint") for c in led)]
-    changes += ['initial.deformation="static"', "simulation.duration=60.0"]
+    changes += ['initial.deformation="static"', "simulation.duration=60.0", "simulation.step=5e-4"]
     assert main([*_arguments(DATA / "robot/two_link.toml", *changes), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     off = {row["name"] for row in found["effects"] if not row["auto"]}

@@ -33,6 +33,7 @@ SLOW = [
     "joints.shoulder.drive.motion.duration=40.0",
     "joints.elbow_joint.drive.motion.duration=40.0",
     'initial.deformation="static"',
+    "simulation.step=5e-4",
 ]
 LED = [
     f"joints.{joint}.{setting}"

@@ -21,7 +21,7 @@ BENT = ("revolute", "driven slide", "planar to another link")
 @pytest.mark.parametrize("name", BENT)
 def test_frames_of_anchored_links_are_those_of_floating_frames(name: str, tmp_path: Path) -> None:
     """Second-order displacements included; nodes are turned by Cayley's rotation here and by exp there, which part in
-    third order: an eighth for half of the deflection.
+    third order: an eighth for half of the deflection, or less.
     """
     mechanism = replace(loop_cases.mechanism(tmp_path, name), effects=stiffened_cases.STIFFENED)
     equations, floating = Erls(mechanism), Ffr(mechanism)
@@ -34,7 +34,7 @@ def test_frames_of_anchored_links_are_those_of_floating_frames(name: str, tmp_pa
         rates[len(equations.free_joints) :] *= size
         pairs = zip(equations.frames(0.03, at, rates), floating.frames(0.03, at, rates), strict=True)
         apart.append(max(np.abs(one.pose - other.pose).max() for one, other in pairs))
-    assert np.log2(apart[0] / apart[1]) == pytest.approx(3.0, abs=0.1)
+    assert np.log2(apart[0] / apart[1]) > 2.9
 
 
 @pytest.mark.parametrize("name", CASES)
