@@ -10,8 +10,13 @@ import pytest
 import scenes
 
 import erls
+from erls.equations.erls.formulation import Erls
 from erls.equations.formulation import Formulation, State
-from erls.equations.serial.state_series import state_series
+from erls.equations.registry import formulate
+from erls.equations.serial.state_series import accelerations, state_series
+from erls.errors import Cause, SimulationError
+from erls.scene.build import build_mechanism
+from erls.scene.read import load_scene
 
 TIMES = np.array([0.0, 0.03, 0.11, 0.4])
 
@@ -59,3 +64,30 @@ def test_what_goes_one_by_one(scene: str, overrides: list[str]) -> None:
     _, flat, y, v = run._interpolated(times)
     _close(run.states(times), [run.formulation.state(*at) for at in zip(flat.tolist(), y, v, strict=True)])
     assert run.states([]) == []
+
+
+@pytest.mark.parametrize("formulation", ["erls", "ffr"])
+def test_accelerations_at_many_times_are_those_at_each(formulation: str, tmp_path: Path) -> None:
+    """To rounding; where a mass matrix is not positive, the message of that time."""
+    path = scenes.three_links(tmp_path, "mixed")
+    scene = load_scene(path, [f"simulation.formulation={formulation}"])
+    system = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
+    rng = np.random.default_rng(3)
+    t, y, v = np.linspace(0.0, 0.1, 7), *rng.uniform(-0.01, 0.01, (2, 7, system.size))
+    found = accelerations(system, t, y, v)
+    expected = np.array([system.acceleration(*at) for at in zip(t.tolist(), y, v, strict=True)])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_what_nothing_resists_is_named_among_many(tmp_path: Path) -> None:
+    """A massless link that turns freely: the message of the first such time."""
+    data = {
+        "simulation": {"duration": 1.0},
+        "joints": [{"name": "j", "dh": {"convention": "standard"}}],
+        "links": [{"name": "light", "rigid": {"mass": 0.0, "points": {"start": [0, 0, 0], "end": [1, 0, 0]}}}],
+    }
+    system = Erls(scenes.mechanism(scenes.write_toml(tmp_path / "light.toml", data)))
+    with pytest.raises(SimulationError) as caught:
+        accelerations(system, np.array([0.5, 0.6]), *np.zeros((2, 2, 1)))
+    assert caught.value.cause is Cause.SINGULAR_MASS
+    assert "0.5" in caught.value.where

@@ -16,7 +16,7 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.equations.serial.singular import singular_mass
-from erls.equations.serial.state_series import ReactionSeries, accelerations, inboard_place, state_series
+from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, cross_all
 from erls.mechanism.chain import Mechanism
@@ -101,6 +101,24 @@ class SerialFormulation(TreeFormulation):
         except la.LinAlgError:
             raise singular_mass(self, t, mass, self.elastic_name) from None
 
+    def acceleration_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, n) accelerations at k times, solved for together.
+
+        Raises
+        ------
+        SimulationError
+            As `acceleration`.
+        """
+        forces, masses = np.empty(y.shape), np.empty((*y.shape, y.shape[1]))
+        for i, at in enumerate(t.tolist()):
+            forces[i], masses[i] = self.residual(at, y[i], v[i], np.zeros(0)), self.mass_matrix(at, y[i])
+        try:
+            lower = np.linalg.cholesky(masses)
+        except np.linalg.LinAlgError:  # one of them: the method for one names what is wrong with it
+            return np.array([self.acceleration(*at) for at in zip(t.tolist(), y, v, strict=True)]).reshape(y.shape)
+        half = np.linalg.solve(lower, -forces[..., None])
+        return np.asarray(np.linalg.solve(lower.swapaxes(1, 2), half)[..., 0])
+
     def elastic_name(self, place: int) -> str:
         """What messages call an elastic coordinate, by its place among them."""
         return f"elastic coordinate {place + 1}"
@@ -148,7 +166,7 @@ class SerialFormulation(TreeFormulation):
     def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
         """Joint reactions at times (k,) that give accelerations (k, n), those of the equations of motion unless given.
         """
-        a = accelerations(self, t, y, v) if a is None else a
+        a = self.acceleration_series(t, y, v) if a is None else a
         states, count = state_series(self, t, y, v), len(self.mechanism.joints)
         borne = self.borne()
         wrenches, along = np.empty((len(t), count, 6)), np.empty((2, len(t), count))

@@ -114,8 +114,16 @@ def inboard_place(link: Link, modal: Array) -> Array:
     return np.asarray(link.inboard.position + modal @ link.model.node_shape(link.inboard.node)[0].T)
 
 
+@runtime_checkable
+class _AcceleratesAtAll(Protocol):
+    def acceleration_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, n) from the equations of motion."""
+
+
 def accelerations(formulation: Formulation, t: Array, y: Array, v: Array) -> Array:
-    """(k, n) from the equations of motion, at k times."""
+    """(k, n) from the equations of motion, at k times; a method ``acceleration_series`` gives them all at once."""
+    if isinstance(formulation, _AcceleratesAtAll):
+        return formulation.acceleration_series(t, y, v)
     found = [formulation.acceleration(*at) for at in zip(t.tolist(), y, v, strict=True)]
     return np.array(found).reshape(y.shape)
 
