@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import chain_cases
@@ -9,17 +10,28 @@ import pytest
 import quasi_static_cases as cases
 from twins import distance, uncompiled
 
+from erls.equations.erls.formulation import Erls
+from erls.equations.quasi_static.formulation import QuasiStatic, quasi_static
+from erls.mechanism.effects import SECOND_KINEMATICS
+
 LIKE_NUMPY = 1e-10  # relative: two orders of summation, through about a hundred terms
 # relative: sums in another order change mass matrices by 1e-15 of each entry, and that changes these results, through
 # the modes of the mechanism, by up to 7.4e-12 ("controllers", damping; measured by such disturbances); ten times that
 LIKE_TWIN = 7.4e-11
 
 
-@pytest.mark.parametrize("static", [True, False])
-@pytest.mark.parametrize("name", cases.BANDWIDTHS)
-def test_kernels_equal_the_numpy_equations(name: str, static: bool, tmp_path: Path) -> None:
-    """Residual, mass, stiffness, damping, acceleration; with static modes, and with these left out."""
-    system = cases.equations(tmp_path, name, static)
+WAYS = [(name, static, frozenset[str]()) for name in cases.BANDWIDTHS for static in (True, False)]
+WAYS += [(name, static, SECOND_KINEMATICS) for name in ("one link", "controllers") for static in (True, False)]
+
+
+@pytest.mark.parametrize(("name", "static", "more"), WAYS)
+def test_kernels_equal_the_numpy_equations(name: str, static: bool, more: frozenset[str], tmp_path: Path) -> None:
+    """Residual, mass, stiffness, damping, acceleration; with static modes, and with these left out; with second-order
+    displacements too.
+    """
+    mechanism = cases.mechanism(tmp_path, name, static)
+    system = quasi_static(Erls, replace(mechanism, effects=mechanism.effects | more), 1.0)
+    assert isinstance(system, QuasiStatic)
     assert system.compiled is not None
     assert (len(system.modes.stiffness) > 0) == static
     for at in cases.states(system, name):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, function_in
-from erls.equations.erls import residual as chain_residual
+from erls.equations.erls.formulation import Erls
 from erls.equations.erls.records import Chain
 from erls.equations.quasi_static.records import Reduced, reduced_state
 from erls.equations.serial.records import Serial
@@ -26,12 +26,11 @@ def compile_quasi_static(inner: CompiledSystem, outer: Any) -> CompiledSystem | 
     Returns
     -------
     CompiledSystem or None
-        None where ``inner`` is no chain of `erls.equations.erls` without second-order displacements.
+        None where ``inner`` is no chain of `erls.equations.erls` in the joint-angle gauge.
     """
-    if inner.residual is not chain_residual.residual:
+    if not isinstance(outer.inner, Erls):
         return None
-    from erls.equations.quasi_static import chain  # here: it is compiled
-
+    name = f"erls.equations.quasi_static.{'stiffened_' if outer.inner.stiffened else ''}chain"
     slow, static = outer.modes.slow, outer.modes.static
     n, s, h = outer.inner.size, slow.shape[1], static.shape[1]
     links = outer.mechanism.links
@@ -65,8 +64,8 @@ def compile_quasi_static(inner: CompiledSystem, outer: Any) -> CompiledSystem | 
         reals=constants.numbers,
         integers=np.array(integers, dtype=np.int64),
         scratch=scratch.numbers,
-        residual=chain.residual,
-        mass_matrix=chain.mass_matrix,
-        stiffness_and_damping=chain.stiffness_and_damping,
-        load_acceleration=function_in("erls.equations.quasi_static.chain", "acceleration"),
+        residual=function_in(name, "residual")(),
+        mass_matrix=function_in(name, "mass_matrix")(),
+        stiffness_and_damping=function_in("erls.equations.quasi_static.stiffness", "stiffness_and_damping")(),
+        load_acceleration=function_in(name, "acceleration"),
     )

@@ -50,7 +50,7 @@ _EXACT, _MOST_EXACT = 1e-12, 30  # NEAR and MOST for states
 _FOUND = 1e-6  # of η: what a state may lack
 _CORRECTIONS = 3  # of an acceleration
 _HAIR = 2e-12  # of a run, before its end
-_LEFT_OUT = {"coriolis", "inertia_first_order", "inertia_second_order", "spin_softening", "geometric_stiffening"}
+_LEFT_OUT = {"coriolis", "inertia_first_order", "inertia_second_order", "spin_softening"}
 
 
 def quasi_static(
