@@ -8,14 +8,11 @@ several runs taken in turn; where nothing is left out, that with `all` and the t
 longer with `auto` (5 % count as measurement), and the long ones led by prescribed motions at most 1 / 1.5 of the time.
 With controllers joints keep coordinates that have to be integrated; what is saved there is told.
 
-Where the tolerance needs geometric stiffening and foreshortening, `auto` adds them, and `all` is taken with both: the
-same physics. That it was needed, a coarse run had to find out; what this takes of a run so short is told apart.
-
 Errors: for shipped scenes and random chains of one to three links, a third of them led by prescribed motions, what the
-tolerance allows to leave out, whatever deciding costs, and every single cut, of the effects that `all` has or, where
-`auto` adds to them, of those; the largest distance of named points against a run with all of them at the same settings
-should be at most three times the certified one. Where two motions part by more than 0.3 m they have nothing in common
-any more, and no ratio counts. `SHORTER` says which scenes are cut short.
+tolerance allows to leave out, whatever deciding costs, and every single cut; the largest distance of named points
+against a run with all effects at the same settings should be at most three times the certified one. Where two motions
+part by more than 0.3 m they have nothing in common any more, and no ratio counts. `SHORTER` says which scenes are cut
+short.
 """
 
 from __future__ import annotations
@@ -163,13 +160,13 @@ def deciding(path: Path, changes: list[str]) -> float:
 
 
 def times(folder: Path) -> tuple[list[float], ...]:
-    """Ratios all / auto of shipped scenes, long ones, long ones with controllers, and of those with more, printed."""
+    """Ratios all / auto of shipped scenes, long ones, long ones with controllers, printed."""
     jobs = [(ROOT / "data" / name, _changes(name)) for name in SHIPPED]
-    ratios: tuple[list[float], ...] = ([], [], [], [])
+    ratios: tuple[list[float], ...] = ([], [], [])
     for number, (path, changes) in enumerate([*jobs, *((p, []) for p in long_scenes(folder))]):
         whole, auto, run, decision = timed(path, changes)
         kind = 0 if number < len(jobs) else 1 + path.stem.endswith(CONTROLLED)
-        ratios[3 if decision.startswith("added") else kind].append(whole / auto)
+        ratios[kind].append(whole / auto)
         print(
             f"{path.parent.name + '/' + path.stem if not kind else path.stem:27s} {run.end:6.2f} s: "
             f"all {whole:6.3f} s, auto {auto:6.3f} s, {whole / auto:5.2f} times; {decision}",
@@ -277,13 +274,12 @@ def main() -> None:
     parts = {"times", "errors"} & set(sys.argv[1:]) or {"times", "errors"}
     with tempfile.TemporaryDirectory() as name:
         if "times" in parts:
-            shipped, long, controlled, stiffened = times(Path(name))
+            shipped, long, controlled = times(Path(name))
             holds = min(shipped) >= 1 / NOISE and min(long) >= FASTER
             print(
                 f"times: auto at least {min(shipped):.2f} times as fast on {len(shipped)} shipped scenes, "
                 f"{min(long):.2f} on {len(long)} long ones: {'holds' if holds else 'DOES NOT HOLD'}; "
-                f"{min(controlled):.2f} to {max(controlled):.2f} on {len(controlled)} with controllers; "
-                f"{min(stiffened):.2f} to {max(stiffened):.2f} on {len(stiffened)} that need stiffening",
+                f"{min(controlled):.2f} to {max(controlled):.2f} on {len(controlled)} with controllers",
                 flush=True,
             )
         if "errors" in parts:

@@ -56,40 +56,9 @@ class ModalInertia:
         tensor = tensor if basis is None else basis.T @ tensor @ basis
         self.elastic, self.size = tensor.shape[:2]
         self.tensor = tensor
-        self._rows = np.ascontiguousarray(tensor.transpose(0, 2, 1)).reshape(-1, self.size)  # q meets the last index
-        self._flat = tensor.reshape(self.elastic, -1)
         rigid, coupling, own = invariants.m[:6, :6], invariants.m[:6, 6:], invariants.m[6:, 6:]
         moved = np.linalg.lstsq(rigid, coupling, rcond=_NO_INERTIA)[0]
         self.per_mass = np.linalg.inv(own - coupling.T @ moved)
-
-    def _at(self, q: Array) -> Array:
-        """(n, m) K(q): k per q̇."""
-        return (self._rows @ q).reshape(self.elastic, self.size)
-
-    def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """(m,) d/dt ∂T₃/∂q̇ - ∂T₃/∂q."""
-        n = self.size - self.elastic
-        coupling, coupling_rate = self._at(q), self._at(qd)
-        rate = coupling_rate @ qd + coupling @ qdd
-        pushed = qd[n:] + self.per_mass @ (coupling @ qd)
-        weighted = (pushed @ self._flat).reshape(self.size, self.size)
-        result = (qdd[n:] + self.per_mass @ rate) @ coupling + (weighted.T - weighted) @ qd
-        result[n:] += rate
-        return np.asarray(result)
-
-    def mass_matrix(self, q: Array) -> Array:
-        """(m, m) of T₃ = ½ q̇ᵀ M₃ q̇."""
-        coupling = self._at(q)
-        result = coupling.T @ self.per_mass @ coupling
-        n = self.size - self.elastic
-        result[n:] += coupling
-        result[:, n:] += coupling.T
-        return np.asarray(result)
-
-    def kinetic_energy(self, q: Array, qd: Array) -> float:
-        """T₃ at a state."""
-        k = self._at(q) @ qd
-        return float(qd[self.size - self.elastic :] @ k + k @ self.per_mass @ k / 2)
 
 
 def stiffened(mechanism: Mechanism) -> bool:
