@@ -20,7 +20,7 @@ from erls.parallel.workers import IDLE
 from erls.run.chain.run import ChainRun
 
 SCENE = Path(__file__).parents[1] / "data/l_shape/steel_flat.toml"
-SETTINGS = ["simulation.integrator=lobatto", "simulation.tolerance=1e-4", "simulation.duration=2.0"]
+SETTINGS = ["simulation.integrator=lobatto", "simulation.tolerance=1e-3", "simulation.duration=2.0"]
 
 
 def timed(variants: list[list[str]], workers: int | None) -> tuple[float, float]:

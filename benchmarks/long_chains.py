@@ -59,7 +59,7 @@ def main() -> None:
     for links in map(int, given.links.split(",")):
         with tempfile.TemporaryDirectory() as name:
             path = write_chain(Path(name), links, given.duration)
-            for tolerance in (1e-5, 1e-7):
+            for tolerance in (1e-4, 1e-6):
                 pair = [end_of(path, times, f"formulation={f}", f"tolerance={tolerance}") for f in ("erls", "ffr")]
                 print(
                     f"{links:2d} links, tolerance {tolerance:g} m: {pair[0][1]} and {pair[1][1]} steps, ERLS and FFR "

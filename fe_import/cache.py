@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
 from fe_import.description.link import LinkFile
-from fe_import.errors import FEImportError
+from fe_import.errors import Cause, FEImportError
 from fe_import.files.versions import package_version
+from fe_import.modal import left_out_file
 from fe_import.modal.file import SCHEMA_VERSION, read_modal_file, write_modal_file
+from fe_import.modal.left_out import LeftOut
 from fe_import.modal.model import ModalModel
 
 
@@ -51,3 +53,61 @@ def reduce_cached(
         folder.mkdir(parents=True, exist_ok=True)
         write_modal_file(path, model)
     return model, False
+
+
+_KEPT = 32
+_lately: dict[str, LeftOut] = {}
+
+
+def left_out_cached(
+    link: Callable[[], LinkFile], modal: ModalModel, folder: Path, loaded: Sequence[int] = (), mesh_only: bool = False
+) -> LeftOut:
+    """What a reduced link leaves out of its finite-element model: what this process has found lately, a file beside
+    the reductions of a cache folder, or made now.
+
+    Parameters
+    ----------
+    link : callable
+        Gives the description that ``modal`` was reduced from; called only when it has to be made.
+    modal : ModalModel
+        A reduction with its provenance, truncated to the modes in use.
+    folder : Path
+    loaded, mesh_only
+        See `fe_import.reduction.left_out.left_out_of`.
+
+    Raises
+    ------
+    FEImportError
+        MODAL_FILE: the description is no longer the one that was reduced; as `left_out_of`.
+    """
+    source = modal.provenance.get("sha256", "")
+    frequencies = hashlib.sha256(modal.frequencies_hz.tobytes()).hexdigest()
+    content = f"{source} {modal.modes} {frequencies} {sorted(loaded)} {mesh_only} {_sources_hash()}"
+    key = hashlib.sha256(f"{left_out_file.SCHEMA_VERSION} {content}".encode()).hexdigest()[:32]
+    if key in _lately:
+        return _lately[key]
+    path = folder / f"{key}.left_out.h5"
+    try:
+        found = left_out_file.read_left_out_file(path, modal)
+    except (OSError, FEImportError):  # none there, or not readable: made anew
+        found = _made(link(), modal, source, loaded, mesh_only)
+        with contextlib.suppress(OSError, FEImportError):
+            folder.mkdir(parents=True, exist_ok=True)
+            left_out_file.write_left_out_file(path, found)
+    _lately[key] = found
+    while len(_lately) > _KEPT:
+        del _lately[next(iter(_lately))]
+    return found
+
+
+def _made(link: LinkFile, modal: ModalModel, source: str, loaded: Sequence[int], mesh_only: bool) -> LeftOut:
+    from fe_import.reduction.left_out import left_out_of  # as in `reduce_cached`
+
+    if link.content_hash() != source:
+        raise FEImportError(
+            Cause.MODAL_FILE,
+            "this description is not the one that the modal model was reduced from",
+            where=str(link.path),
+            remedy="reduce the link again",
+        )
+    return left_out_of(link, modal, loaded, mesh_only)

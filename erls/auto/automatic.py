@@ -110,12 +110,12 @@ def _with_bandwidth(
 
 
 def _links_warnings(run: ChainRun) -> list[str]:
-    """That what linear links leave out passes the tolerance."""
+    """That what the model of links leaves out passes the tolerance."""
     error, tolerance = run.second_order_error or 0.0, run.scene.record.simulation.effects_tolerance
     if error <= tolerance:
         return []
     return [
-        f"effects: links, linear in their own frames, are estimated to be off by about {error:.2g} m in all; the "
+        f"effects: links are estimated to be off by about {error:.2g} m in all, bending further than they hold; the "
         f"tolerance is {tolerance:.2g} m ({_BEYOND})"
     ]
 
@@ -139,7 +139,7 @@ def refuse_beyond(run: ChainRun) -> None:
         told.append(_warning(certificate))
     if error <= tolerance and not told:
         return
-    why = told[0] if told else "links that are linear in their own frames deflect too far"
+    why = told[0] if told else "links deflect further than their model holds"
     problem = SimulationError(
         Cause.BEYOND_TOLERANCE,
         f"the run ended, with an estimated error beyond the tolerance that no effect cures: {why}",

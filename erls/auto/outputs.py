@@ -16,22 +16,11 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.drives import Drive
 from erls.mechanism.substructures import is_split
 from erls.run.chain.places import node_positions
+from erls.run.chain.places import watched_nodes as watched_nodes
 from erls.scene.chain import Scene
 from erls.scene.settings import Simulation
 
 Watched = tuple[tuple[int, int], ...]
-
-
-def watched_nodes(mechanism: Mechanism) -> Watched:
-    """(link, node) of the named points; without any, of every link where joints stand on it, or its farthest node."""
-    if mechanism.points:
-        return tuple((p.link, p.node) for p in mechanism.points)
-    result = []
-    for k, link in enumerate(mechanism.links):
-        far = np.linalg.norm(link.model.nodes - link.inboard.position, axis=1).argmax()
-        seats = [mechanism.joints[outer].seat for outer in mechanism.standing_on(k)]
-        result += [(k, seat.node) for seat in seats if seat is not None] or [(k, int(far))]
-    return tuple(result)
 
 
 def driven_joints(mechanism: Mechanism) -> list[int]:

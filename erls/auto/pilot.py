@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from erls.auto.operations import ITERATIONS
 from erls.auto.probe import fixed_steps
 from erls.equations.registry import formulate
-from erls.integrate.base import Options
-from erls.integrate.choice import integrator
+from erls.integrate.choice import integrator, options_of
 from erls.mechanism.chain import Mechanism
 from erls.scene.chain import Scene
 
@@ -29,7 +30,7 @@ def count_steps(scene: Scene, mechanism: Mechanism) -> float:
         return steps
     formulation = formulate(mechanism, settings)
     y, v = formulation.initial_state()
-    options = Options(None, settings.rtol, settings.atol, settings.spectral_radius, tolerance=settings.tolerance)
+    options = replace(options_of(settings), step=None, output_step=None)
     end = _PILOT * settings.duration
     solution = integrator(mechanism, settings)(formulation, (0.0, end), y, v, options, None)
     if solution.failure is not None:

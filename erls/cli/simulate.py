@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -22,6 +22,7 @@ def simulate(
     set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
     at: str = "",
     strict: Annotated[bool, Parameter(negative="")] = False,
+    verdict: bool = True,
     json: Json = False,
 ) -> None:
     """Simulate a scene; links are reduced on the fly and cached by content.
@@ -40,8 +41,10 @@ def simulate(
     at
         Times in seconds, separated by commas, at which to report joints and points.
     strict
-        With effects = "auto": repeat the run where what was left out passes the tolerance; exit code 4 where no effect
-        brings its own estimate within it.
+        Repeat the run where its stated error passes the tolerance, with what keeps it; exit code 4 where nothing does.
+    verdict
+        State the error of the run, part by part, and whether it can be relied on; --no-verdict does without, at no
+        cost.
     json
         Print one JSON object.
     """
@@ -61,7 +64,8 @@ def simulate(
     partial = output.with_name(f"{output.name}.partial") if output is not None else None
     try:
         with Progress("simulating") as advance:
-            run = run_simulation(loaded, progress=advance, tell=tell, checkpoint=partial, strict=strict)
+            asked: dict[str, Any] = {"checkpoint": partial, "strict": strict, "verdict": verdict}
+            run = run_simulation(loaded, progress=advance, tell=tell, **asked)
     except SimulationError as problem:
         if output is None and problem.run is not None:
             hint = "give -o RUN.h5 to keep what was computed"

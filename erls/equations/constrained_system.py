@@ -87,6 +87,9 @@ class ConstrainedSystem(Protocol):
         entries of their matrix, or as joint angles.
         """
 
+    def places(self, stored: Array) -> Array:
+        """(k, p, 3) points [m] of what is stored of k knots (k, s): the error of a run is told at these."""
+
 
 class ConstrainedState(NamedTuple):
     """Configuration, velocity (n,), acceleration (n,) and multipliers (m,)."""

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.formulation import Energy, Formulation, Reaction, State
+from erls.equations.serial.state_series import energy_series
 from erls.maths import rotation_maps
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
@@ -46,6 +47,10 @@ class Substructured:
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """(n,) that of the pieces."""
         return self.inner.acceleration(t, y, v)
+
+    def energy_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, 4) that of all pieces at times (k,)."""
+        return energy_series(self.inner, t, y, v)
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """That of all pieces."""

@@ -13,7 +13,7 @@ import numpy as np
 from erls.equations.ffr.constrained import ConstrainedFfr
 from erls.equations.ffr.formulation import Ffr
 from erls.equations.system import SecondOrderSystem
-from erls.integrate.base import Observer, Options, Solution
+from erls.integrate.base import Companion, Observer, Options, Solution
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.so3 import Array
@@ -26,8 +26,12 @@ def absolute_generalized_alpha(
     v: Array,
     options: Options,
     observer: Observer | None = None,
+    adaptive: bool = False,
 ) -> Solution:
-    """Integrate an `Ffr` as an index-3 system; see `lie_generalized_alpha`."""
+    """Integrate an `Ffr` as an index-3 system; see `lie_generalized_alpha`.
+
+    With ``adaptive``, steps are chosen for an error of ``options.tolerance`` over the whole run.
+    """
     assert isinstance(system, Ffr)
     absolute = ConstrainedFfr(system)
     settings = ConstrainedOptions(
@@ -36,7 +40,9 @@ def absolute_generalized_alpha(
         options.atol,
         options.spectral_radius,
         options.newton_tolerance,
+        tolerance=options.tolerance,
         output_step=options.output_step,
+        follows_tolerance=adaptive,
     )
     frames = 12 * absolute.links  # entries of what is stored before the elastic coordinates and the joint angles
     angles = frames + system.elastic + system.free_joints
@@ -44,7 +50,9 @@ def absolute_generalized_alpha(
 
     def independent(found: Solution) -> Solution:
         y, v, a = (np.ascontiguousarray(x[:, kept]) for x in (found.y, found.v, found.a))
-        return Solution(found.t, y, v, a, found.work, found.failure, found.warnings)
+        other = found.companion
+        companion = other and Companion(other.t, other.y[:, kept], other.v[:, kept], other.a[:, kept])
+        return Solution(found.t, y, v, a, found.work, found.failure, found.warnings, companion=companion)
 
     def watch(t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:
         return None if observer is None else observer(t, lambda: independent(knots()))

@@ -37,6 +37,9 @@ from erls.scene.integrators import MATRICES
 
 _SAFETY, _LARGEST_CHANGE = 0.9, 4.0  # of an adaptive step
 _FIRST, _SMALLEST = 1 / 64, 1e-6  # adaptive steps, of the largest
+_TWICE = 16.0  # growth of a local error when the step is doubled, and something left
+_MOST_ROUGH = 50_000  # steps: nobody can watch them
+_RECOVERY = 1.02  # growth of the largest step after Newton's method failed, in each attempt
 _AT_ONCE, _HELD = 4096, 8  # steps that are asked for, and those after a rejected one, which do not grow
 
 _see_course, _see_memory = python_reader(alpha.Course), python_reader(alpha.Memory)
@@ -134,9 +137,7 @@ class Steps:
             samples = self._system.samples(np.minimum(part, last))
             try:
                 with self._pace:
-                    status = self._advance(
-                        *self._arguments, *own, part, samples, knots, beside
-                    )
+                    status = self._advance(*self._arguments, *own, part, samples, knots, beside)
             finally:
                 made = self._count()
             self._recorder.extend(part[:made], knots[:made], beside=beside[:made])
@@ -249,6 +250,43 @@ def adaptive_steps(steps: Steps, leg: Leg, largest: float, tolerance: float, rec
         h = min(largest, steps.h * min(max(ratio, 1 / _LARGEST_CHANGE), _LARGEST_CHANGE))
         if h < _SMALLEST * largest:
             raise steps.failure(float(times[made])) if status == alpha.FAILED else _too_small(t, steps, tolerance)
+
+
+def rough_steps(steps: Steps, leg: Leg, largest: float, tolerance: float, recorder: Recorder) -> None:
+    """Steps whose local error is about ``tolerance`` [m], without repeating those that fall short: enough to find out
+    where a motion needs small steps. They are halved or doubled, a few at a time.
+
+    Raises
+    ------
+    SimulationError
+        BUDGET, beyond `_MOST_ROUGH` of them, beside what steps raise.
+    """
+    t, h, fewest, most = leg.start, min(max(steps.h, _FIRST * largest), largest), _SMALLEST * largest, largest
+    while t < leg.end:
+        count = max(1, math.ceil((leg.end - t) / h * (1 - 1e-9)))
+        ahead = min(count, _HELD)
+        if ahead == count:
+            h = (leg.end - t) / count
+        steps.set_step(h)
+        times = np.linspace(t + h, t + ahead * h, ahead)
+        if ahead == count:
+            times[-1] = leg.end
+        if recorder.steps > _MOST_ROUGH:
+            raise SimulationError(Cause.BUDGET, f"more than {_MOST_ROUGH} rough steps", remedy="shorten the run")
+        made, status = steps.stretch(times, leg.last, Limit(math.inf))
+        if made:
+            t = float(times[made - 1])
+        if status == alpha.FAILED:
+            recorder.work.rejected_steps += 1
+            if h < fewest:
+                raise steps.failure(float(times[made]))
+            largest = max(h / 2, fewest)
+            h /= _LARGEST_CHANGE
+        elif steps.error > tolerance:
+            h /= 2 if steps.error < _LARGEST_CHANGE**3 * tolerance else _LARGEST_CHANGE
+        elif steps.error * _TWICE < tolerance:
+            h = min(largest, 2 * h)
+        largest, h = min(_RECOVERY * largest, most), max(h, fewest / 2)
 
 
 def _too_small(t: float, steps: Steps, tolerance: float) -> SimulationError:

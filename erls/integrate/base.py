@@ -115,11 +115,23 @@ class Options:
                 )
 
 
+class Companion(NamedTuple):
+    """Knots of a run of the same with larger steps, whose distance tells the error of a `Solution`
+    (`erls.integrate.step_distance`).
+    """
+
+    t: Array
+    y: Array
+    v: Array
+    a: Array
+
+
 @dataclass(frozen=True)
 class Solution:
     """Knots of the motion: times (k,) in rising order (twice at a jump), y, v, a (k, n).
 
-    ``choice`` names the method that ``auto`` chose, and why.
+    ``choice`` names the method that ``auto`` chose, and why; ``nodes_per_step``: how many knots a step adds, the last
+    of them its end; ``companion`` is known where steps were chosen by it.
     """
 
     t: Array
@@ -130,6 +142,8 @@ class Solution:
     failure: SimulationError | None = None
     warnings: tuple[str, ...] = ()
     choice: str = ""
+    nodes_per_step: int = 1
+    companion: Companion | None = None
 
 
 Observer = Callable[[float, Callable[[], Solution]], Sequence[float] | None]

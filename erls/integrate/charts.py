@@ -121,4 +121,5 @@ def _joined(before: Solution | None, after: Solution) -> Solution:
             parts[field.name] = np.concatenate([first, second])
     work = Work(**{f.name: getattr(before.work, f.name) + getattr(after.work, f.name) for f in fields(Work)})
     warnings = tuple(dict.fromkeys((*before.warnings, *after.warnings)))
-    return replace(after, **parts, work=work, warnings=warnings, choice=before.choice or after.choice)
+    choice = before.choice or after.choice
+    return replace(after, **parts, work=work, warnings=warnings, choice=choice, companion=None)

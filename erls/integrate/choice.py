@@ -15,16 +15,21 @@ from erls.equations.registry import system_of
 from erls.equations.substructures import solved
 from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.charts import in_charts
+from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.registry import integrator_named
 from erls.integrate.thinning import output_step
 from erls.maths.beside import compiling_beside
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.substructures import split
+from erls.scene.bodies.analyses import Dynamics
 from erls.scene.integrators import FIXED_STEP, INTEGRATORS
 from erls.scene.settings import Simulation
 
-NODAL_STEPS = "erls.integrate.stepping.generalized_alpha"
+TIED_STEPS = "erls.integrate.stepping.generalized_alpha"
+
+INTEGRATION_SHARE = 0.1
+"""Of the error that a run is wanted to keep in all, what integration aims at."""
 
 Integrate: TypeAlias = Callable[..., Solution]
 """An `erls.integrate.base.Integrator` for one kind of system."""
@@ -83,7 +88,7 @@ def _compile_tied(system: Any, settings: Simulation) -> None:
 def _absolute(mechanism: Mechanism, settings: Simulation) -> Integrate:
     from erls.integrate.absolute import absolute_generalized_alpha
 
-    return absolute_generalized_alpha
+    return partial(absolute_generalized_alpha, adaptive=settings.integrator == "auto")
 
 
 def _named(mechanism: Mechanism, settings: Simulation) -> Integrate:
@@ -119,7 +124,7 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Integrate:
     """What integrates that which `erls.equations.registry.formulate` makes of the same."""
     kind = system_of(mechanism, settings)
     found = INTEGRATIONS[kind].integrator(mechanism, settings)
-    if kind == "pieces" or not mechanism.rotation_vectors:
+    if kind in ("pieces", "nodal") or not mechanism.rotation_vectors:
         return found
     prescribed = np.cumsum([joint.drive.prescribed for joint in mechanism.joints])
     return in_charts(found, [k - int(prescribed[k]) for k in mechanism.rotation_vectors])
@@ -127,8 +132,8 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Integrate:
 
 def compiled_steps(mechanism: Mechanism, settings: Simulation) -> str | None:
     """The module of the compiled steps that integrate; None where they are not compiled."""
-    if system_of(mechanism, settings) == "nodal":
-        return NODAL_STEPS
+    if system_of(mechanism, settings) in ("nodal", "absolute"):
+        return TIED_STEPS
     return INTEGRATORS[settings.integrator].kernels
 
 
@@ -155,6 +160,19 @@ def options_of(settings: Simulation) -> Options:
         settings.rtol,
         settings.atol,
         settings.spectral_radius,
-        tolerance=settings.tolerance,
+        tolerance=INTEGRATION_SHARE * settings.tolerance,
         output_step=output_step(settings),
+    )
+
+
+def body_options(settings: Dynamics) -> ConstrainedOptions:
+    """The same of a motion of bodies; steps that are not given follow the tolerance."""
+    return ConstrainedOptions(
+        step=settings.step,
+        spectral_radius=settings.spectral_radius,
+        newton_tolerance=settings.newton_tolerance,
+        iteration_matrix=settings.iteration_matrix,
+        residual_tolerance=settings.residual_tolerance,
+        tolerance=INTEGRATION_SHARE * settings.tolerance,
+        follows_tolerance=settings.step is None,
     )

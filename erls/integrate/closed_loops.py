@@ -52,9 +52,7 @@ class TiedCoordinates:
         """(n, n) of the chain."""
         return self.chain.loops.masses(t, q)
 
-    def stiffness_and_damping(
-        self, t: float, q: Array, v: Array, a: Array, multipliers: Array
-    ) -> tuple[Array, Array]:
+    def stiffness_and_damping(self, t: float, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array]:
         """Those of the chain."""
         return self.chain.loops.matrices(t, q, v)
 
@@ -84,6 +82,10 @@ class TiedCoordinates:
         """
         self._refuse_open(t, q, v)
         return q, v, a
+
+    def places(self, stored: Array) -> Array:
+        """(k, n, 1) coordinates in metres."""
+        return (stored * self.length_scales)[..., None]
 
     @property
     def compiled(self) -> Stepped:

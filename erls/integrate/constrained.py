@@ -30,6 +30,10 @@ class ConstrainedOptions(Options):
         Newton iterations start from ``zero`` accelerations and multipliers or from the ``last`` ones, which lie nearer.
     error_tolerance : float or None
         Largest local error of a step [m]: steps adapt to it, ``step`` being the largest. None for equal steps.
+    rough : bool
+        Steps that fall short of that are not repeated.
+    follows_tolerance : bool
+        Choose steps for an error of ``tolerance`` over the whole run; ``step`` is the largest of the first, coarse run.
     compiled : bool or None
         Whether to use compiled kernels where a system has them; None where the compiler is on (`erls.maths.jit`).
 
@@ -44,6 +48,8 @@ class ConstrainedOptions(Options):
     project_velocity: bool = False
     start_from: str = "zero"
     error_tolerance: float | None = None
+    rough: bool = False
+    follows_tolerance: bool = False
     compiled: bool | None = None
 
     def __post_init__(self) -> None:

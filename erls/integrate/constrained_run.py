@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
+
+import numpy as np
 
 from erls.equations.constrained_system import ConstrainedState, ConstrainedSystem
 from erls.errors import SimulationError
@@ -58,3 +60,20 @@ class ConstrainedRecorder(Recorder):
         rows = self._so_far()[1][:, 3 * self._size :]
         n = self._velocities
         return ConstrainedSolution(**known, accelerations=rows[:, :n], multipliers=rows[:, n:])
+
+
+_TOLD = 64  # knots of a run that is told again, between looks of the observer
+
+
+def tell_again(found: ConstrainedSolution, recorder: Recorder) -> None:
+    """Record a run that was made before anybody looked on."""
+    recorder.work = replace(found.work, steps=0)
+    recorder.warnings += found.warnings
+    beside = np.concatenate([found.accelerations, found.multipliers], axis=1)
+    for leg in np.split(np.arange(len(found.t)), np.flatnonzero(np.diff(found.t) == 0) + 1):
+        first = leg[0]
+        recorder.begin(float(found.t[first]), found.y[first], found.v[first], found.a[first], beside[first])
+        for part in np.split(leg[1:], np.arange(_TOLD, len(leg) - 1, _TOLD)):
+            if len(part):
+                knots = np.stack([found.y[part], found.v[part], found.a[part]], axis=1)
+                recorder.extend(found.t[part], knots, beside=beside[part])

@@ -17,17 +17,21 @@ has decayed.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from erls.equations.consistency import consistent_acceleration, consistent_start, refuse_redundant
 from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
 from erls.equations.system import metre_scales
 from erls.integrate.alpha_rules import Rules, Words
-from erls.integrate.alpha_steps import Steps, adaptive_steps, equal_steps
+from erls.integrate.alpha_steps import Steps, adaptive_steps, equal_steps, rough_steps
+from erls.integrate.alpha_to_tolerance import to_tolerance
 from erls.integrate.base import Leg, Observer
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
-from erls.integrate.constrained_run import ConstrainedRecorder
+from erls.integrate.constrained_run import ConstrainedRecorder, tell_again
 from erls.integrate.driver import not_finite, run_to_end
+from erls.integrate.step_plans import Plan, planned
 from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
 
@@ -43,16 +47,45 @@ def lie_generalized_alpha(
     options: ConstrainedOptions,
     observer: Observer | None = None,
 ) -> ConstrainedSolution:
-    """Integrate with fixed steps ``options.step`` (default: a thousandth of the run, at most 1 ms), or adaptive ones.
+    """Integrate with fixed steps ``options.step`` (default: a thousandth of the run, at most 1 ms), or others.
 
     Fixed steps are equal inside a leg and end on breakpoints. Where Newton's method fails they are halved for a while.
-    With ``options.error_tolerance`` they follow the local error, up to ``options.step``.
+    With ``options.error_tolerance`` they follow the local error, up to ``options.step``; where options follow the
+    tolerance, `erls.integrate.alpha_to_tolerance` chooses them.
     """
+    run = partial(_run, system, times, q, v)
+    if not options.follows_tolerance:
+        return run(options, observer)
+    return to_tolerance(run, system, times[1] - times[0], options, observer)
+
+
+def _run(
+    system: ConstrainedSystem,
+    times: tuple[float, float],
+    q: Configuration,
+    v: Array,
+    options: ConstrainedOptions,
+    observer: Observer | None = None,
+    plan: Plan | None = None,
+    known: ConstrainedSolution | None = None,
+) -> ConstrainedSolution:
+    """An `erls.integrate.alpha_to_tolerance.Attempt`."""
     step = options.step or min((times[1] - times[0]) / 1000, 1e-3) or 1e-3
     given = ConstrainedState(q, np.array(v, dtype=float), np.zeros(system.size), np.zeros(system.constraints))
     recorder = ConstrainedRecorder(system, times[0], given, observer, options.output_step)
 
+    def advance(steps: Steps, leg: Leg) -> None:
+        if options.error_tolerance is not None:
+            follow = rough_steps if options.rough else adaptive_steps
+            follow(steps, leg, step, options.error_tolerance, recorder)
+            return
+        for part, width in [(leg, step)] if plan is None else planned(plan, leg):
+            equal_steps(steps, part, width, options.iteration_matrix != "frozen", recorder)
+
     def go(walk: list[Leg]) -> None:
+        if known is not None:
+            tell_again(known, recorder)
+            return
         refuse_redundant(system, walk[0].first, q)
         place, rate = consistent_start(system, walk[0].first, q, given.v, recorder.warnings)
         steps = _steps(system, options, recorder)
@@ -61,10 +94,7 @@ def lie_generalized_alpha(
             steps.begin(place, rate, np.concatenate([start.a, start.multipliers]))
             if leg.end > leg.start:
                 before = recorder.steps
-                if options.error_tolerance is None:
-                    equal_steps(steps, leg, step, options.iteration_matrix != "frozen", recorder)
-                else:
-                    adaptive_steps(steps, leg, step, options.error_tolerance, recorder)
+                advance(steps, leg)
                 if options.project_velocity:
                     recorder.work.factorizations += recorder.steps - before
             place, rate = steps.end()

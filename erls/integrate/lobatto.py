@@ -27,6 +27,7 @@ vibrations decide when, up to a hundred times (`erls.run.watches.motor_limits` w
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -62,15 +63,16 @@ def lobatto(
     recorder = Recorder(system.size, observer, apart=options.output_step)
     if system.size == 0:  # nothing to integrate
         return integrate_legs(system, times, y, v, recorder, lambda leg, y, v, a, recorder: (y, v))
-    return integrate_legs(system, times, y, v, recorder, _Run(system, times, options, recorder).advance)
+    found = integrate_legs(system, times, y, v, recorder, _Run(system, times, options, recorder).advance)
+    return replace(found, nodes_per_step=len(NODES) - 1)
 
 
 @cache
-def tableau() -> tuple[Array, Array]:
-    """Weights (4, 4) of the accelerations in the velocities, and in the positions of the nodes."""
-    nodes = np.array(NODES)
-    powers = np.vander(nodes, increasing=True)
-    rates = (nodes[:, None] * powers / np.arange(1, 5)) @ np.linalg.inv(powers)
+def tableau(nodes: tuple[float, ...] = NODES) -> tuple[Array, Array]:
+    """Weights (s, s) of the accelerations at s nodes in the velocities, and in the positions of the nodes."""
+    at = np.array(nodes)
+    powers = np.vander(at, increasing=True)
+    rates = (at[:, None] * powers / np.arange(1, len(at) + 1)) @ np.linalg.inv(powers)
     return rates, rates @ rates
 
 
@@ -91,7 +93,7 @@ class _Run:
         self.pace = Pace(recorder, compiled is not None, single=False)
         self.functions, factoring = self.system.functions(), self.system.factoring
         self.mixed = np.zeros(n, dtype=complex)
-        self.coefficients = _coefficients()
+        self.coefficients = coefficients(NODES)
         self.stages, self.last = np.zeros((4, 3, n)), np.zeros((4, 3, n))
         size, exchanged = (n * n, n) if factoring is None else (factoring.size, 0)
         self.own = np.zeros((3, size)), np.zeros((2, size), dtype=complex), np.zeros((3, exchanged), dtype=np.int64)
@@ -182,12 +184,13 @@ class _Run:
 
 
 @cache
-def _coefficients() -> Array:
-    """Blocks of coefficients as the loop reads them."""
+def coefficients(nodes: tuple[float, ...]) -> Array:
+    """Blocks of coefficients as loops read them (`erls.integrate.stepping.stages`), of collocation at these nodes."""
     from erls.integrate.stepping import stages as at
 
-    result = np.zeros((at.ROWS + 1, 4, 4))
-    rates, places = tableau()
+    rates, places = tableau(nodes)
+    stages = len(nodes) - 1
+    result = np.zeros((at.ROWS + 1, stages + 1, stages + 1))
     result[at.RATES], result[at.PLACES] = rates, places
     values, vectors = np.linalg.eig(rates[1:, 1:])
     inverse = np.linalg.inv(vectors)
@@ -195,12 +198,12 @@ def _coefficients() -> Array:
     for row, k in enumerate(kept):
         real = abs(values[k].imag) < 1e-9
         back = vectors[:, k] * (1 if real else 2)  # a conjugate counts with its partner
-        result[at.INTO_RE, row, :3], result[at.INTO_IM, row, :3] = inverse[k].real, inverse[k].imag
-        result[at.BACK_RE, :3, row], result[at.BACK_IM, :3, row] = back.real, back.imag
+        result[at.INTO_RE, row, :stages], result[at.INTO_IM, row, :stages] = inverse[k].real, inverse[k].imag
+        result[at.BACK_RE, :stages, row], result[at.BACK_IM, :stages, row] = back.real, back.imag
         result[at.ROWS, at.LAMBDA_RE, row] = values[k].real
         result[at.ROWS, at.LAMBDA_IM, row] = 0.0 if real else values[k].imag
-    nodes = np.array(NODES)
-    result[at.ROWS, at.NODES] = nodes
-    gaps = nodes[:, None] - nodes + np.eye(4)
+    places_of_nodes = np.array(nodes)
+    result[at.ROWS, at.NODES] = places_of_nodes
+    gaps = places_of_nodes[:, None] - places_of_nodes + np.eye(stages + 1)
     result[at.ROWS, at.DIFFERENCE] = WEIGHT / gaps.prod(axis=1)
     return result

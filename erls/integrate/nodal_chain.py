@@ -19,7 +19,6 @@ from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.so3 import Array
 
-_LOCAL = 1e-3
 _LOOKS = 21
 _SHARE = 1e-2  # of the Newton tolerance: errors of a step add up, over 2 s of 1 ms steps to a million times as much
 
@@ -35,14 +34,15 @@ def nodal_generalized_alpha(
 ) -> Solution:
     """Integrate a `Nodal`; see `lie_generalized_alpha`.
 
-    With ``adaptive``, steps follow their local error, a share `_LOCAL` of ``options.tolerance``.
+    With ``adaptive``, steps are chosen for an error of ``options.tolerance`` over the whole run.
     """
     settings = ConstrainedOptions(
         options.step,
         spectral_radius=options.spectral_radius,
         newton_tolerance=_SHARE * options.newton_tolerance,
         start_from="last",
-        error_tolerance=_LOCAL * options.tolerance if adaptive else None,
+        tolerance=options.tolerance,
+        follows_tolerance=adaptive,
         output_step=options.output_step,
     )
 
@@ -51,7 +51,9 @@ def nodal_generalized_alpha(
         for _ in range(2):
             more.append(_slopes(found.t, more[-1]))
         full = [np.concatenate(pair, axis=1) for pair in zip((found.y, found.v, found.a), more, strict=True)]
-        return Solution(found.t, full[0], full[1], full[2], found.work, found.failure, found.warnings)
+        return Solution(
+            found.t, full[0], full[1], full[2], found.work, found.failure, found.warnings, companion=found.companion
+        )
 
     def watch(t: float, knots: Callable[[], ConstrainedSolution]) -> Sequence[float] | None:
         return None if observer is None else observer(t, lambda: complete(knots()))

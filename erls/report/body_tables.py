@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from erls.report.tables import table
+from erls.report.tables import statement_lines, table
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.run import BodyRun
 
@@ -31,6 +31,7 @@ def body_report(run: BodyRun, times: Sequence[float] = ()) -> str:
         )
     else:
         lines.append(_work(f"tangent {s['tangent']}", s) + f", {s['wall_s']:.2f} s")
+    lines += statement_lines(run)
     if run.failure is not None:
         lines.append(f"stopped early: {run.failure}")
     parts = ["\n".join(lines)]

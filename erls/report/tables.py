@@ -8,7 +8,9 @@ from operator import getitem
 
 import numpy as np
 
+from erls.run.accuracy import PARTS
 from erls.run.chain.run import ChainRun
+from erls.run.record import Run
 from fe_import.modal.inertia import MassProperties
 from fe_import.modal.model import HealthCheck, ModalModel
 
@@ -92,6 +94,17 @@ def _mass_table(reduced: MassProperties, full: MassProperties) -> str:
     return "Mass properties\n" + table(("", "reduced", "full model", "difference"), rows)
 
 
+def statement_lines(run: Run) -> list[str]:
+    """What a run states of its error, and its verdict."""
+    if run.accuracy is None or run.trust is None:
+        return []
+    total = run.accuracy.total
+    parts = [(name, getattr(run.accuracy, name)) for name in PARTS]
+    shown = ", ".join(f"{name} {'not known' if part is None else f'{part:.1e}'}" for name, part in parts)
+    lines = [f"error: {'not known' if total is None else f'at most {total:.1e} m'} ({shown})"]
+    return [*lines, f"verdict: {run.trust.verdict}", *(f"  {reason}" for reason in run.trust.reasons)]
+
+
 def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
     """Summary of a chain's run, and joints and points at given times (its end unless given)."""
     s = run.summary(times or [run.end])
@@ -109,6 +122,7 @@ def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
         f"energy: {s['energy']['initial']:.6g} J at the start, {s['energy']['final']:.6g} J at the end"
         + (f", drift at most {drift:.2g} J" if drift is not None else " (driven or damped: not conserved)"),
     ]
+    lines += statement_lines(run)
     if run.failure is not None:
         lines.append(f"stopped early: {run.failure}")
     lines += [

@@ -7,6 +7,7 @@ energies at even times.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,6 +16,7 @@ import msgspec
 
 from erls.errors import Cause, SceneError, SimulationError
 from erls.mechanism.tables import read_csv
+from erls.run.accuracy_file import read_statement, write_statement
 from erls.run.chain.file import read_chain, write_chain
 from erls.run.chain.run import ChainRun
 from erls.run.knots import End
@@ -64,6 +66,7 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
     scene = msgspec.json.encode(self_contained(run.scene).record).decode()
     write_strings(group, "scene", scene, "the scene as JSON")
     write_strings(group, "warnings", run.warnings, "what the user was told")
+    write_statement(group, run.accuracy, run.trust)
     if isinstance(run, ChainRun):
         write_chain(group, run)
     else:
@@ -133,11 +136,12 @@ def load_run(path: Path | str) -> Run:
             raise file.fail("scene", f"not JSON: {problem}") from None
         scene = checked(data, Path(file.attribute("scene_file", str) or path.name), f"{path}: /scene")
         end = End(_failure(file), file.attribute("wall_s", float), file.names("warnings"))
+        statement = read_statement(file)
         if not isinstance(scene, BodyScene):
-            return read_chain(file, scene, end)
+            return replace(read_chain(file, scene, end), **statement)
         from erls.run.bodies.file import read_bodies
 
-        return read_bodies(file, scene, end)
+        return replace(read_bodies(file, scene, end), **statement)
 
 
 def _failure(file: Reader) -> SimulationError | None:

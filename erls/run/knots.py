@@ -23,6 +23,7 @@ class End(NamedTuple):
 
 
 _CHOICE = "integrator chosen"
+_NODES = "nodes per step"
 
 
 def write_solution(group: h5py.Group, solution: Solution, unit: str, coordinates: str) -> None:
@@ -38,6 +39,8 @@ def write_solution(group: h5py.Group, solution: Solution, unit: str, coordinates
         write_attribute(group["knots"], name, int(count))
     if solution.choice:
         write_attribute(group["knots"], _CHOICE, solution.choice)
+    if solution.nodes_per_step != 1:
+        write_attribute(group["knots"], _NODES, solution.nodes_per_step)
 
 
 def read_solution(file: Reader, size: int, failure: SimulationError | None) -> Solution:
@@ -54,5 +57,9 @@ def read_solution(file: Reader, size: int, failure: SimulationError | None) -> S
         raise file.fail("knots/time", "times must rise", None)
     work = Work(**{name: knots.attribute(name, int) for name in msgspec.to_builtins(Work())})
     y, v, a = (knots.array(name, (len(t), size)) for name in ("position", "velocity", "acceleration"))
-    choice = knots.attribute(_CHOICE, str) if _CHOICE in knots.attribute_names() else ""
-    return Solution(t, y, v, a, work, failure, choice=choice)
+    known = knots.attribute_names()
+    choice = knots.attribute(_CHOICE, str) if _CHOICE in known else ""
+    nodes = knots.attribute(_NODES, int) if _NODES in known else 1
+    if not 1 <= nodes <= max(len(t), 1):
+        raise file.fail(f"knots/@{_NODES}", "not a number of knots", nodes)
+    return Solution(t, y, v, a, work, failure, choice=choice, nodes_per_step=nodes)

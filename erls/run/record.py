@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from erls.errors import Cause, SceneError, SimulationError
 from erls.maths.so3 import Array
+from erls.run.accuracy import Accuracy, Trust
 from erls.scene.records import SceneFile
 
 
@@ -53,12 +54,16 @@ class Run(ABC):
         Time that it took.
     warnings : tuple of str
         What the user should know before trusting it.
+    accuracy, trust : Accuracy, Trust or None
+        What it states of its error; None where that was not asked for.
     """
 
     axis: ClassVar[Axis] = Axis("time", "t", "s")
     scene: SceneFile
     wall_s: float
     warnings: tuple[str, ...]
+    accuracy: Accuracy | None
+    trust: Trust | None
 
     @property
     @abstractmethod
@@ -104,6 +109,12 @@ class Run(ABC):
     def end(self) -> float:
         """Last one that was computed."""
         return float(self.times[-1]) if len(self.times) else 0.0
+
+    def stated(self) -> dict[str, Any]:
+        """What is stated of its error, as in the JSON of ``erls simulate``."""
+        if self.accuracy is None or self.trust is None:
+            return {}
+        return {"accuracy": self.accuracy.summary(), "trust": self.trust.summary()}
 
     @property
     def title(self) -> str:

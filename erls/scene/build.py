@@ -148,7 +148,7 @@ def _pieces(scene: Scene, models: Sequence[ModalModel], tell: Message) -> list[t
         if link.substructures == 1 or not link.flexible or not solves_pieces:
             result.append(())
             continue
-        description = _description(scene, link)
+        description = link_description(scene, link)
         found = piece_models(link, description, model, cache_folder(), f"{scene.path}: links[{k}]", tell)
         result.append(tuple(_warmed(piece, link, f"{scene.path}: links[{k}]") for piece in found))
         tell(f"{link.name}: {link.substructures} substructures")
@@ -161,8 +161,8 @@ def _beam_descriptions(scene: Scene) -> list[LinkDescription | None]:
     return [d if d is not None and d.frame is not None else None for d in found]
 
 
-def _description(scene: Scene, link: LinkRecord) -> LinkFile:
-    """The link's description, its reduction as the scene asks for it."""
+def link_description(scene: Scene, link: LinkRecord) -> LinkFile:
+    """Description of a link with a ``model``, its reduction as the scene asks for it."""
     options = {**link.reduction, "form": "orthonormal"}
     return load_link(scene.folder / link.model, options, expands=link.temperature_change is not None)
 
@@ -191,7 +191,7 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
                 remedy="reduce with form = 'orthonormal'",
             )
     else:
-        description = _within(f"{place}.model", lambda: _description(scene, link))
+        description = _within(f"{place}.model", lambda: link_description(scene, link))
         model, cached = reduce_cached(description, cache_folder(), tell)
         tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({description.path.name})")
     model = _warmed(model, link, place)

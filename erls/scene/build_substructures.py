@@ -47,17 +47,22 @@ def piece_models(
     FEImportError
         The link cannot be split: see `fe_import.models.substructures.split_link`.
     """
+    pieces = piece_descriptions(record, link, whole, where)
+    models = [reduce_cached(piece, folder, tell)[0] for piece in pieces]
+    if record.elastic_modes is None:
+        return tuple(models)
+    return tuple(truncated(m, min(record.elastic_modes, m.elastic_modes)) for m in models)
+
+
+def piece_descriptions(record: LinkRecord, link: LinkFile, whole: ModalModel, where: str) -> tuple[LinkFile, ...]:
+    """Descriptions of the pieces; parameters and failures as of `piece_models`."""
     from fe_import.models.substructures import split_link  # graphs of SciPy
 
     names = [i.name for i in whole.interface_nodes]
     inboard = record.inboard or names[0]
     others = [name for name in names if name != inboard]
     outboard = record.outboard or (others[0] if others else "")
-    pieces = split_link(link, record.substructures, inboard, outboard, f"{where}.substructures")
-    models = [reduce_cached(piece, folder, tell)[0] for piece in pieces]
-    if record.elastic_modes is None:
-        return tuple(models)
-    return tuple(truncated(m, min(record.elastic_modes, m.elastic_modes)) for m in models)
+    return split_link(link, record.substructures, inboard, outboard, f"{where}.substructures")
 
 
 def piece_links(record: LinkRecord, whole: Link, models: Sequence[ModalModel], where: str) -> tuple[Link, ...]:

@@ -12,6 +12,7 @@ from fe_import.files.toml import choose
 GAUGES = ("joint-angle", "minimum-norm")
 BODY_FRAMES = ("tangent", "mean-axis")
 COORDINATES = ("independent", "absolute")
+TIED = (FIXED_STEP, "auto")  # integrators for coordinates that conditions tie
 SMALLEST_RTOL = 3e-14  # rounding
 
 
@@ -23,11 +24,12 @@ def check_settings(s: Simulation, place: str) -> None:
     choose(s.body_frame, BODY_FRAMES, f"{place}.body_frame", SceneError)
     choose(s.coordinates, COORDINATES, f"{place}.coordinates", SceneError)
     if s.coordinates == "absolute":
-        for name, value, right in (("formulation", s.formulation, "ffr"), ("integrator", s.integrator, FIXED_STEP)):
-            if value != right:
+        for name, value, right in (("formulation", s.formulation, ("ffr",)), ("integrator", s.integrator, TIED)):
+            if value not in right:
                 message = "absolute coordinates do not go with this"
-                raise bad(f"{place}.{name}", message, value, f"use {right}, or coordinates = 'independent'")
-    if s.formulation == "nodal" and s.integrator not in (FIXED_STEP, "auto"):
+                remedy = f"use {' or '.join(right)}, or coordinates = 'independent'"
+                raise bad(f"{place}.{name}", message, value, remedy)
+    if s.formulation == "nodal" and s.integrator not in TIED:
         message = "nodal frames need an integrator for constraints"
         raise bad(f"{place}.integrator", message, s.integrator, f"use {FIXED_STEP}, or auto")
     if s.elements_per_member is not None and s.elements_per_member < 1:

@@ -114,6 +114,5 @@ def _with_integrator(record: SceneRecord) -> SceneRecord:
     s = record.simulation
     if s.integrator:
         return record
-    fixed = s.step is not None or s.formulation == "nodal" or s.coordinates == "absolute"
-    settings = msgspec.structs.replace(s, integrator=FIXED_STEP if fixed else "auto")
+    settings = msgspec.structs.replace(s, integrator="auto" if s.step is None else FIXED_STEP)
     return msgspec.structs.replace(record, simulation=settings)

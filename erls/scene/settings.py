@@ -26,9 +26,9 @@ class Simulation(Stepping, frozen=True):
         Of ``nodal``: elements of each member of a link, instead of the number in its description.
     integrator : str
         ``generalized_alpha``, ``lobatto``, one of SciPy's (``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``), or
-        ``auto``: the one that fits; of ``nodal``, steps of generalized-α with a local error of ``tolerance`` / 1000.
-        Unless given ``generalized_alpha`` where there is a ``step``, for ``nodal`` and absolute coordinates, otherwise
-        ``auto``; reading a scene puts its name here.
+        ``auto``: the one that fits; of ``nodal`` and absolute coordinates, generalized-α with steps that follow
+        ``tolerance``. Unless given ``generalized_alpha`` where there is a ``step``, otherwise ``auto``; reading a scene
+        puts its name here.
     step : float, optional
         Step of generalized-α [s], largest step of SciPy's; ``lobatto`` and ``auto`` go by ``tolerance`` alone.
     rtol, atol : float
@@ -38,7 +38,8 @@ class Simulation(Stepping, frozen=True):
         more, and the steps around events, so that the memory and the file of a long run stay small; between those,
         motion is interpolated. All steps are kept unless given.
     tolerance : float
-        Error of any point over the whole run [m] that ``lobatto`` and ``auto`` aim at.
+        Wanted error of the named points over the whole run [m], all parts of `accuracy` together; integration aims at a
+        tenth of it (``lobatto`` and ``auto``).
     spectral_radius : float
         ρ∞ of generalized-α: 1 no numerical damping, 0 the most.
     effects : str or list of str
@@ -59,7 +60,7 @@ class Simulation(Stepping, frozen=True):
     output_step: float | None = None
     rtol: float = 1e-8
     atol: float = 1e-12
-    tolerance: float = 1e-5
+    tolerance: float = 1e-4
     effects: str | list[str] = "all"
     effects_tolerance: float = 1e-4
     effects_effort_tolerance: float = 1e-2

@@ -19,6 +19,7 @@ class Asked:
     checkpoint: Path | None
     strict: bool
     like: ChainRun | None
+    verdict: bool = True
 
     def watches(self) -> list[Progress | Checkpoint]:
         """What looks at each run on the caller's behalf."""

@@ -10,8 +10,8 @@ from erls.equations.nodal.redundant import refuse_open
 from erls.equations.nodal.scenes.build import Assembly, assemble
 from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
 from erls.equations.nodal.statics import Statics, solve_statics
-from erls.integrate.choice import NODAL_STEPS, compiling_steps
-from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
+from erls.integrate.choice import TIED_STEPS, body_options, compiling_steps
+from erls.integrate.constrained import ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.jit import announcing
 from erls.run.bodies.motion import BodyMotion
@@ -34,27 +34,29 @@ def run_bodies(scene: BodyScene, asked: Asked) -> BodyMotion | BodyRest:
         A failure or an interrupt; what was computed is in its attribute ``run``.
     """
     analysis = scene.record.simulation
-    with announcing(asked.tell), compiling_steps(NODAL_STEPS if isinstance(analysis, Dynamics) else None):
+    with announcing(asked.tell), compiling_steps(TIED_STEPS if isinstance(analysis, Dynamics) else None):
         assembly = assemble(scene)
     if isinstance(analysis, Dynamics):
-        return _motion(scene, assembly, analysis, asked)
+        return _stated(_motion(scene, assembly, analysis, asked), asked)
     run = _rest(scene, assembly, analysis)
     for text in run.warnings:
         asked.tell(f"warning: {text}")
     if run.failure is not None:
         run.failure.run = run
         raise run.failure
-    return run
+    return _stated(run, asked)
+
+
+def _stated(run: BodyMotion | BodyRest, asked: Asked) -> BodyMotion | BodyRest:
+    """The run with what it states of its error, where that is asked for."""
+    if not asked.verdict:
+        return run
+    from erls.accuracy.bodies import stated_bodies  # here: runs without a verdict need none of it
+
+    return stated_bodies(run)
 
 
 def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, asked: Asked) -> BodyMotion:
-    options = ConstrainedOptions(
-        step=analysis.step,
-        spectral_radius=analysis.spectral_radius,
-        newton_tolerance=analysis.newton_tolerance,
-        iteration_matrix=analysis.iteration_matrix,
-        residual_tolerance=analysis.residual_tolerance,
-    )
     begun, warnings = time.perf_counter(), Warnings(asked.tell)
     warnings(_redundancy(assembly))
     watching = Watching(BodyPlan(scene), warnings, asked.watches())
@@ -66,7 +68,7 @@ def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, asked: Ask
     times = (0.0, analysis.duration)
     system = assembly.system
     found = watching.ended(
-        lie_generalized_alpha(system, times, system.start, assembly.velocity, options, watching.observe)
+        lie_generalized_alpha(system, times, system.start, assembly.velocity, body_options(analysis), watching.observe)
     )
     assert isinstance(found, ConstrainedSolution)
     run = watching.judged(run_of(found))

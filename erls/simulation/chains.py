@@ -18,6 +18,7 @@ from erls.run.watches.watching import Warnings, Watching
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.simulation.asked import Asked
+from erls.simulation.kept import kept_to
 from fe_import.description.records import LinkDescription
 from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
@@ -36,8 +37,18 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     if settings.effects == "auto":
         from erls.auto.automatic import automatic  # here: most runs need none of it
 
-        return automatic(scene, built.mechanism, run, tell, asked.strict)
-    return run(scene, built.mechanism)
+        found = automatic(scene, built.mechanism, run, tell, asked.strict)
+    else:
+        found = run(scene, built.mechanism)
+    if not asked.verdict:
+        return found
+    from erls.accuracy.statement import stated  # here: runs without a verdict need none of it
+
+    with announcing(tell):
+        found = stated(found)
+        if asked.strict:
+            return kept_to(found, lambda scene: run(scene, found.formulation.mechanism), tell)
+    return found
 
 
 def models_of(run: ChainRun) -> tuple[list[ModalModel], list[LinkDescription | None], list[list[ModalModel]]]:

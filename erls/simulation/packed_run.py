@@ -11,6 +11,7 @@ from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
 from erls.integrate.base import Solution
 from erls.mechanism.effects import Certificate
+from erls.run.accuracy import Accuracy, Trust
 from erls.run.bodies.run import BodyRun
 from erls.run.chain.run import ChainRun
 from erls.run.record import Run
@@ -25,7 +26,7 @@ class PackedRun:
 
     Attributes
     ----------
-    scene, solution, wall_s, warnings, certificate
+    scene, solution, wall_s, warnings, certificate, accuracy, trust
         Of the run; ``solution`` in the coordinates of all modes where some follow statically, since those of the
         others depend on how modes are scaled.
     """
@@ -35,6 +36,8 @@ class PackedRun:
     wall_s: float
     warnings: tuple[str, ...]
     certificate: Certificate | None
+    accuracy: Accuracy | None
+    trust: Trust | None
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ def packed(run: Run) -> Packed:
     if isinstance(run.formulation, QuasiStatic):
         y, v, a = (run.formulation.stored(values) for values in (s.y, s.v, s.a))
         s = replace(s, y=y, v=v, a=a)
-    return PackedRun(run.scene, s, run.wall_s, run.warnings, run.certificate)
+    return PackedRun(run.scene, s, run.wall_s, run.warnings, run.certificate, run.accuracy, run.trust)
 
 
 def unpacked_bodies(run: PackedBodies) -> BodyRun:
@@ -80,7 +83,8 @@ def unpacked(run: PackedRun, like: ChainRun | None) -> ChainRun:
     if isinstance(formulation, QuasiStatic):
         y, v, a = (formulation.restored(values) for values in (s.y, s.v, s.a))
         s = replace(s, y=y, v=v, a=a)
-    return ChainRun(run.scene, formulation, s, run.wall_s, run.warnings, run.certificate)
+    shared = run.wall_s, run.warnings, run.certificate
+    return ChainRun(run.scene, formulation, s, *shared, accuracy=run.accuracy, trust=run.trust)
 
 
 def formulated(scene: Scene, like: ChainRun | None) -> Formulation:

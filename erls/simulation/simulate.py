@@ -38,6 +38,7 @@ def simulate(
     checkpoint: Path | None = ...,
     strict: bool = ...,
     like: ChainRun | None = ...,
+    verdict: bool = ...,
 ) -> ChainRun: ...
 
 
@@ -50,6 +51,7 @@ def simulate(
     checkpoint: Path | None = ...,
     strict: bool = ...,
     like: ChainRun | None = ...,
+    verdict: bool = ...,
 ) -> Run: ...
 
 
@@ -61,6 +63,7 @@ def simulate(
     checkpoint: Path | None = None,
     strict: bool = False,
     like: ChainRun | None = None,
+    verdict: bool = True,
 ) -> Run:
     """Simulate a scene.
 
@@ -74,11 +77,14 @@ def simulate(
     checkpoint : Path, optional
         Run file to which a long motion saves what it has, every 20 s of work.
     strict : bool
-        With ``effects = "auto"``: whether to repeat the run where what was left out passes the tolerance, and to fail
-        where its own estimate still does.
+        Whether to repeat a run whose stated error passes its tolerance with what keeps it, and to fail where nothing
+        does.
     like : ChainRun, optional
         A run of a scene with the same links, whose modal models serve again instead of being read. Where links are
         split, it is of the nodal formulation if the scene is.
+    verdict : bool
+        Whether the run states its error, ``accuracy``, and whether it can be relied on, ``trust``; nothing is computed
+        for it otherwise.
 
     Returns
     -------
@@ -105,4 +111,4 @@ def simulate(
     True
     """
     loaded = load_scene(scene) if isinstance(scene, (Path, str)) else scene
-    return RUNS[type(loaded)](loaded, Asked(progress, tell, checkpoint, strict, like))
+    return RUNS[type(loaded)](loaded, Asked(progress, tell, checkpoint, strict, like, verdict))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from erls.errors import Cause, SceneError
+from erls.integrate.choice import INTEGRATION_SHARE
 from erls.scene.chain import Scene
 from erls.scene.integrators import INTEGRATORS
 from erls.studies.effect_sets import each_once, own_set, parse_sets
@@ -113,4 +114,4 @@ def _rungs(scene: Scene, integrator: str, tolerance: float) -> list[tuple[str, f
     if integrator == "generalized_alpha":
         step = settings.step or min(settings.duration / 1000, 1e-3)
         return [("step", share * step) for share in _STEP_SHARES]
-    return [("tolerance", share * tolerance) for share in _TOLERANCE_SHARES]
+    return [("tolerance", share * tolerance / INTEGRATION_SHARE) for share in _TOLERANCE_SHARES]

@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 
 from erls.errors import Cause, SceneError
+from erls.integrate.choice import INTEGRATION_SHARE
 from erls.maths.so3 import Array
 from erls.mechanism.effects import ALL, in_order
 from erls.run.chain.run import ChainRun
@@ -155,7 +156,7 @@ def _levels(scene: Scene, kind: Kind, tolerance: float) -> list[tuple[str, dict[
     s = scene.record.simulation
     if kind == "tight":
         tight = [tolerance / 10 ** (k + 1) for k in _LEVELS]
-        return [(f"{value:.1g} m", {"integrator": "lobatto", "tolerance": value}) for value in tight]
+        return [(f"{x:.1g} m", {"integrator": "lobatto", "tolerance": x / INTEGRATION_SHARE}) for x in tight]
     step = s.step or min(s.duration / 1000, 1e-3)
     return [
         (

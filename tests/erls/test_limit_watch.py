@@ -27,7 +27,7 @@ def _told(folder: Path, drive: dict[str, Any], *changes: str) -> list[str]:
 def test_a_motor_that_switches_between_its_limits_is_told_of(formulation: str, lead: bool, tmp_path: Path) -> None:
     """With its joint, its limit and what to do."""
     drive = {"proportional_gain": 200.0, "derivative_gain": 4.0, "torque_limit": 3.0, "feed_forward": lead}
-    lobatto = ("simulation.integrator=lobatto", "simulation.tolerance=1e-3")
+    lobatto = ("simulation.integrator=lobatto", "simulation.tolerance=1e-2")
     (text,) = _told(tmp_path, drive, f"simulation.formulation={formulation}", *lobatto)
     assert "its limit of 3" in text
     assert "tolerance of 0.001 m" in text

@@ -23,7 +23,7 @@ def _body(folder: Path, kind: str = "spherical", **changes: Any) -> Path:
     turns = {"turn_x": {"initial": {"rate": 3.0}}, "turn_z": {"initial": {"rate": SPIN}}}
     data = {
         "gravity": [0.0, 0.0, 0.0],
-        "simulation": {"duration": 1.0, "integrator": "lobatto", "tolerance": 1e-7},
+        "simulation": {"duration": 1.0, "integrator": "lobatto", "tolerance": 1e-6},
         "joints": [{"name": "ball", "type": kind, "dh": row, "coordinates": turns}],
         "links": [
             {

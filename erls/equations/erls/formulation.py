@@ -20,7 +20,7 @@ from erls.equations.serial.formulation import SerialFormulation, contiguous, res
 from erls.equations.serial.modal_inertia import stiffened
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
-from erls.equations.serial.state_series import StateSeries
+from erls.equations.serial.state_series import StateSeries, single_energy
 from erls.maths.records import python_reader
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -116,12 +116,17 @@ class Erls(SerialFormulation):
         """Poses, modal coordinates and joint angles at a state."""
         return self.series(np.array([t]), np.array([y]), np.array([v])).states()[0]
 
+    def energy_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, 4) energies at (k,) times."""
+        system, out, y, v = self.compiled, np.empty((len(t), 4)), contiguous(y), contiguous(v)
+        energy = function_in(self._module("energy"), "energy")()
+        for i, at in enumerate(t.tolist()):
+            energy(system.reals, system.integers, system.scratch, at, y[i], v[i], out[i])
+        return out
+
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""
-        system, out = self.compiled, np.empty(4)
-        energy = function_in(self._module("energy"), "energy")()
-        energy(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), out)
-        return Energy(*out.tolist())
+        return single_energy(self.energy_series(np.array([t]), np.array([y]), np.array([v])))
 
     def borne(self) -> list[tuple[Array, Array, Array]]:
         """What a residual leaves; see `SerialFormulation.borne`."""

@@ -177,6 +177,18 @@ class ConstrainedFfr:
         absolute.settle(system.reals, system.integers, system.scratch, t, numbers, v, a, knot)
         return knot[0], knot[1], knot[2]
 
+    def places(self, stored: Array) -> Array:
+        """(k, 4 links + elastic, 3) of the frames, of the ends of their axes at the distance of the farthest node, and
+        how far each elastic coordinate moves a node.
+        """
+        k, ends = len(stored), 12 * self.links
+        frames = stored[:, :ends].reshape(k, self.links, 4, 3)
+        reach = np.array([self.length_scales[at][3] for at in self.twists])[:, None, None]
+        axes = frames[:, :, :3].swapaxes(2, 3) * reach + frames[:, :, 3:]
+        moved = np.zeros((k, self.reduced.elastic, 3))
+        moved[..., 0] = stored[:, ends : ends + self.reduced.elastic] * self.length_scales[self.elastic]
+        return np.concatenate([frames[:, :, 3], axes.reshape(k, -1, 3), moved], axis=1)
+
     def from_stored(self, stored: Array, rate: Array) -> tuple[Configuration, Array]:
         """Configuration and velocity from what `stored` gives, interpolated or not; rotations made orthogonal."""
         poses, velocity = [], np.empty(self.size)
@@ -216,9 +228,7 @@ class ConstrainedFfr:
         found, loops = self._closure(t, q, v), self.tied.given.rows.loops
         result: list[Reaction] = []
         wrenches = self.tied.given.rows.wrenches(found, multipliers)
-        for k, (loop, wrench, outer, acts) in enumerate(
-            zip(loops, wrenches, found.outer, found.efforts, strict=True)
-        ):
+        for k, (loop, wrench, outer, acts) in enumerate(zip(loops, wrenches, found.outer, found.efforts, strict=True)):
             assert loop.freedom is not None
             along = loop.freedom.freedom.row
             effort = float(loop.freedom.freedom.screw @ wrench) if loop.prescribed else acts.force

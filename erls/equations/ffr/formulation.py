@@ -21,7 +21,7 @@ from erls.equations.ffr.standard_data import StandardData
 from erls.equations.formulation import Energy, State
 from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
-from erls.equations.serial.state_series import StateSeries
+from erls.equations.serial.state_series import StateSeries, single_energy
 from erls.maths.records import python_reader
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -141,12 +141,17 @@ class Ffr(SerialFormulation):
         twists = [found.twist.copy() for found in self._bodies(system)]
         return Motion(state.coordinates, state.rates, y[f:], v[f:], state.poses, twists)
 
+    def energy_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, 4) energies at (k,) times."""
+        system, out, y, v = self.compiled, np.empty((len(t), 4)), contiguous(y), contiguous(v)
+        energy = function_in("erls.equations.ffr.energy", "energy")()
+        for i, at in enumerate(t.tolist()):
+            energy(system.reals, system.integers, system.scratch, at, y[i], v[i], out[i])
+        return out
+
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""
-        system, out = self.compiled, np.empty(4)
-        energy = function_in("erls.equations.ffr.energy", "energy")()
-        energy(system.reals, system.integers, system.scratch, t, contiguous(y), contiguous(v), out)
-        return Energy(*out.tolist())
+        return single_energy(self.energy_series(np.array([t]), np.array([y]), np.array([v])))
 
     def _bodies(self, system: CompiledSystem) -> list[BodyState]:
         """What a residual left."""

@@ -10,7 +10,6 @@ asks for a state gets the nearest one that closes the loops.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -26,8 +25,10 @@ from erls.equations.loops.tied import OPEN, Tied
 from erls.equations.serial.state_series import (
     ReactionSeries,
     StateSeries,
+    energy_series,
     inboard_place,
     reaction_series,
+    single_energy,
     state_series,
 )
 from erls.errors import SimulationError
@@ -215,16 +216,23 @@ class ClosedChain(Tied):
         """The same at times (k,)."""
         return state_series(self.bare, t, *self._closed_at(t, y, v))
 
-    def energy(self, t: float, y: Array, v: Array) -> Energy:
-        """Energies, with those of springs and rotors in closing joints."""
-        y, v = self.closed(t, y, v)
-        result = self.bare.energy(t, y, v)
-        for loop, effort in zip(self.mechanism.loops, self.closure(t, y, v).efforts, strict=True):
-            if (free := loop.freedom) is not None:
-                turning = 0.5 * free.rotor_inertia * effort.rate**2
-                stored = 0.5 * free.forces.stiffness * (effort.coordinate - free.forces.rest) ** 2
-                result = replace(result, kinetic=result.kinetic + turning, springs=result.springs + stored)
+    def energy_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, 4) energies at times (k,), with those of springs and rotors in closing joints."""
+        y, v = self._closed_at(t, y, v)
+        result = energy_series(self.bare, t, y, v)
+        free = {k: loop.freedom for k, loop in enumerate(self.mechanism.loops) if loop.freedom is not None}
+        if not any(found.rotor_inertia or found.forces.stiffness for found in free.values()):
+            return result
+        for i, at in enumerate(t.tolist()):
+            efforts = self.closure(at, y[i], v[i]).efforts
+            for k, found in free.items():
+                result[i, 0] += 0.5 * found.rotor_inertia * efforts[k].rate ** 2
+                result[i, 3] += 0.5 * found.forces.stiffness * (efforts[k].coordinate - found.forces.rest) ** 2
         return result
+
+    def energy(self, t: float, y: Array, v: Array) -> Energy:
+        """The same at one time."""
+        return single_energy(self.energy_series(np.array([t]), np.array([y]), np.array([v])))
 
     def loop_forces(self, t: float, y: Array, v: Array) -> list[LoopForce]:
         """What every closing joint does to its link."""

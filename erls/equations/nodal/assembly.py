@@ -208,6 +208,10 @@ class NodalSystem:
         self._functions.knot(*self._memory, out)
         return out[0], out[1], out[2]
 
+    def places(self, stored: Array) -> Array:
+        """(k, nodes, 3) of the nodes."""
+        return stored[:, : 12 * self.count].reshape(len(stored), self.count, 12)[..., :3]
+
     def energies(self, q: Nodes, v: Array) -> Array:
         """(5,) kinetic, elastic of beams, gravity, springs, springs in joints [J]."""
         out = np.zeros(5)

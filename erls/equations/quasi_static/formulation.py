@@ -34,7 +34,14 @@ import numpy as np
 
 from erls.equations.formulation import Energy, Reaction, State, TreeFormulation
 from erls.equations.quasi_static.static_modes import StaticModes, static_modes
-from erls.equations.serial.state_series import ReactionSeries, StateSeries, reaction_series, state_series
+from erls.equations.serial.state_series import (
+    ReactionSeries,
+    StateSeries,
+    energy_series,
+    reaction_series,
+    single_energy,
+    state_series,
+)
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -295,9 +302,9 @@ class QuasiStatic:
 
     def series(self, t: Array, y: Array, v: Array) -> StateSeries:
         """The same at times (k,), with coordinates and rates (k, s)."""
-        return state_series(self.inner, t, *self._all_modes_at(t, y, v)[:2])
+        return state_series(self.inner, t, *self.all_modes_at(t, y, v)[:2])
 
-    def _all_modes_at(self, t: Array, y: Array, v: Array) -> Array:
+    def all_modes_at(self, t: Array, y: Array, v: Array) -> Array:
         """(3, k, n) coordinates, rates and accelerations of all modes at times (k,)."""
         found = np.zeros((3, len(t), self.inner.size))
         for k, at in enumerate(t.tolist()):
@@ -306,11 +313,15 @@ class QuasiStatic:
 
     def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
         """Joint reactions at times (k,), with all modes under load and their accelerations."""
-        return reaction_series(self.inner, t, *self._all_modes_at(t, y, v))
+        return reaction_series(self.inner, t, *self.all_modes_at(t, y, v))
+
+    def energy_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, 4) energies at times (k,), with those of the static deflection."""
+        return energy_series(self.inner, t, *self.all_modes_at(t, y, v)[:2])
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
-        """Energies, with those of the static deflection."""
-        return self.inner.energy(t, *self.all_modes(t, y, v, self._accelerated(t, y, v))[:2])
+        """The same at one time."""
+        return single_energy(self.energy_series(np.array([t]), np.array([y]), np.array([v])))
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions, with all modes under load."""

@@ -174,7 +174,7 @@ def set_compliance(
             continue
         for i in range(len(work.compliance)):
             whole = 1.0 + alpha * modes.decoupled_damping[i] + beta * modes.decoupled_stiffness[i]
-            if not whole.real > 0.0:
+            if not (whole.real > 0.0 or whole.imag != 0.0):
                 return int(modes.first + i + 1)
             work.compliance[i] = 1.0 / whole
         if joint.place >= 0 and joint.acts:

@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from erls.equations.formulation import Formulation, Reaction, State
+from erls.equations.formulation import Energy, Formulation, Reaction, State
 from erls.maths.so3 import Array
 from erls.mechanism.links import Link
 
@@ -151,3 +151,25 @@ def reaction_series(
         moment=np.array([[r.moment for r in every] for every in found]).reshape(len(t), joints, 3),
         effort=np.array([[r.effort for r in every] for every in found]).reshape(len(t), joints),
     )
+
+
+@runtime_checkable
+class _StoresAtAll(Protocol):
+    def energy_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, 4) kinetic, elastic, gravity and spring energy at times (k,) [J]."""
+
+
+def energy_series(formulation: Formulation, t: Array, y: Array, v: Array) -> Array:
+    """(k, 4) kinetic, elastic, gravity and spring energy at k times [J], in the order of `Energy`.
+
+    Parameters are those of `state_series`; a method ``energy_series`` gives them all at once.
+    """
+    if isinstance(formulation, _StoresAtAll):
+        return formulation.energy_series(t, y, v)
+    found = [formulation.energy(*at) for at in zip(t.tolist(), y, v, strict=True)]
+    return np.array([(e.kinetic, e.elastic, e.gravity, e.springs) for e in found]).reshape(len(t), 4)
+
+
+def single_energy(series: Array) -> Energy:
+    """That of the only time of a series (1, 4)."""
+    return Energy(*series[0].tolist())

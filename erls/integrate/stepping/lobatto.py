@@ -15,11 +15,7 @@ from erls.equations.compiled_system import (
     Array,
     Functions,
     IntArray,
-    call_factor,
-    call_factor_complex,
-    call_mass_matrix,
     call_residual,
-    call_stiffness_and_damping,
 )
 from erls.integrate.stepping.stages import (
     BEFORE,
@@ -38,11 +34,8 @@ from erls.integrate.stepping.stages import (
     INACCURATE,
     ITERATIONS,
     KEPT,
-    LAMBDA_IM,
-    LAMBDA_RE,
     LARGEST,
     LAST,
-    MASS,
     MAX_ITERATIONS,
     METRES,
     NEXT,
@@ -72,13 +65,12 @@ from erls.integrate.stepping.stages import (
     H,
     T,
     correct,
-    factor,
+    evaluate,
+    factorize,
     foretell,
     halfway,
     is_diagonal,
     judge,
-    pairs,
-    transpose,
 )
 from erls.maths.jit import ENABLED, helper, kernel
 
@@ -244,40 +236,24 @@ def advance(
                 at = min(max(t + h / 2, known[FIRST]), known[LAST])
                 halfway(h, stages)
                 y, v, stiffness, damping = stages[1, 0], stages[0, 1], matrices[STIFFNESS], matrices[DAMPING]
-                call_mass_matrix(system.mass_matrix, reals, integers, scratch, at, y, matrices[MASS])
-                call_stiffness_and_damping(
-                    system.stiffness_and_damping, reals, integers, scratch, at, y, v, stiffness, damping
+                evaluate(system, reals, integers, scratch, at, y, v, matrices)
+                status = factorize(
+                    system,
+                    reals,
+                    integers,
+                    scratch,
+                    at,
+                    y,
+                    v,
+                    h,
+                    coefficients,
+                    matrices,
+                    own,
+                    own_complex,
+                    pivots,
                 )
-                transpose(matrices[MASS])
-                transpose(stiffness)
-                transpose(damping)
                 diagonal = is_diagonal(stiffness) and is_diagonal(damping)
                 counts[DIAGONAL] = 1 if diagonal else 0
-                if pivots.shape[1] == 0:
-                    status = call_factor(system.factor, reals, integers, scratch, at, y, v, h, h * h, own[0])
-                    for k in range(pairs(m)):
-                        p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
-                        if status == 0 and q == 0.0:
-                            status = call_factor(
-                                system.factor, reals, integers, scratch, at, y, v, p, p * p, own[k + 1]
-                            )
-                        elif status == 0:
-                            shift = p + 1j * q
-                            square = shift * shift
-                            status = call_factor_complex(
-                                system.factor_complex,
-                                reals,
-                                integers,
-                                scratch,
-                                at,
-                                y,
-                                v,
-                                shift,
-                                square,
-                                own_complex[k],
-                            )
-                else:
-                    status = factor(h, coefficients, matrices, own, own_complex, pivots)
                 counts[FACTORIZATIONS] += 1
                 known[RATE], counts[USUAL], counts[EXCESS] = SLOWEST, counts[MAX_ITERATIONS], 0
                 factored = h

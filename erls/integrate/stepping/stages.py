@@ -12,7 +12,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from erls.equations.compiled_system import Array, IntArray, call_solve, call_solve_complex
+from erls.equations.compiled_system import (
+    Array,
+    Functions,
+    IntArray,
+    call_factor,
+    call_factor_complex,
+    call_mass_matrix,
+    call_solve,
+    call_solve_complex,
+    call_stiffness_and_damping,
+)
 from erls.maths import dense
 from erls.maths.jit import helper, part
 
@@ -199,11 +209,71 @@ def correct(
 
 
 @helper
+def evaluate(
+    system: Functions,
+    reals: Array,
+    integers: IntArray,
+    scratch: Array,
+    at: float,
+    y: Array,
+    v: Array,
+    matrices: Array,
+) -> None:
+    """Mass, damping and stiffness at a state, transposed."""
+    stiffness, damping = matrices[STIFFNESS], matrices[DAMPING]
+    call_mass_matrix(system.mass_matrix, reals, integers, scratch, at, y, matrices[MASS])
+    call_stiffness_and_damping(system.stiffness_and_damping, reals, integers, scratch, at, y, v, stiffness, damping)
+    transpose(matrices[MASS])
+    transpose(stiffness)
+    transpose(damping)
+
+
+@helper
+def factorize(
+    system: Functions,
+    reals: Array,
+    integers: IntArray,
+    scratch: Array,
+    at: float,
+    y: Array,
+    v: Array,
+    h: float,
+    coefficients: Array,
+    matrices: Array,
+    own: Array,
+    own_complex: Any,
+    pivots: IntArray,
+) -> int:
+    """Factors for steps of ``h`` after `evaluate`; 0, or 1 + where elimination broke down.
+
+    Without room for real factors those of all eigenvalues are complex, and nothing is judged by `judge`.
+    """
+    if pivots.shape[1] > 0:
+        return int(factor(h, coefficients, matrices, own, own_complex, pivots))
+    status = 0
+    if own.shape[0] > 0:
+        status = call_factor(system.factor, reals, integers, scratch, at, y, v, h, h * h, own[0])
+    for k in range(pairs(coefficients[RATES].shape[0] - 1)):
+        p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
+        if status == 0 and q == 0.0:
+            status = call_factor(system.factor, reals, integers, scratch, at, y, v, p, p * p, own[k + 1])
+        elif status == 0:
+            shift = p + 1j * q
+            square = shift * shift
+            status = call_factor_complex(
+                system.factor_complex, reals, integers, scratch, at, y, v, shift, square, own_complex[k]
+            )
+    return status
+
+
+@helper
 def factor(h: float, coefficients: Array, matrices: Array, real: Array, mixed: Any, pivots: IntArray) -> int:
     """Dense factors for steps of ``h``; 0, or 1 + the coordinate at which elimination broke down."""
     n = matrices.shape[1]
     mass, damping, stiffness = matrices[MASS], matrices[DAMPING], matrices[STIFFNESS]
-    status = factor_one(mass, damping, stiffness, h, real[0].reshape(n, n), pivots[0])
+    status = 0
+    if real.shape[0] > 0:
+        status = int(factor_one(mass, damping, stiffness, h, real[0].reshape(n, n), pivots[0]))
     for k in range(pairs(coefficients[RATES].shape[0] - 1)):
         p, q = h * coefficients[ROWS, LAMBDA_RE, k], h * coefficients[ROWS, LAMBDA_IM, k]
         if q == 0.0:

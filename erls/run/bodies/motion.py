@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from erls.equations.nodal.nodes import Nodes
 from erls.errors import SimulationError
 from erls.integrate.base import hermite
 from erls.integrate.constrained import ConstrainedSolution
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
 from erls.run.bodies.run import BodyRun
+from fe_import.model import IntArray
 
 _MOST_ENERGIES = 2001
 
@@ -62,15 +64,27 @@ class BodyMotion(BodyRun):
 
     def energies(self) -> tuple[Array, Array]:
         """Times (k,) of knots, and total energy (k,) there [J]."""
-        s, system = self.solution, self.assembly.system
+        s = self.solution
         pick = np.unique(np.linspace(0, len(s.t) - 1, min(len(s.t), _MOST_ENERGIES)).astype(np.int64))
-        knots = (x[pick].reshape(len(pick), -1, 12) for x in (s.y[:, : 12 * system.count], s.v[:, : 12 * system.count]))
-        poses, twists = frames_and_twists(*knots)
-        q, totals = system.start, []
-        for t, pose, velocity in zip(s.t[pick], poses, self._of_group(poses, twists), strict=True):
+        return s.t[pick], self.energies_at(pick).sum(axis=1)
+
+    def energies_at(self, knots: IntArray) -> Array:
+        """(k, 2) kinetic and potential energy at some knots [J]."""
+        system, t, kinds = self.assembly.system, self.solution.t[knots].tolist(), []
+        for at, q, velocity in zip(t, *self.configurations_at(knots), strict=True):
+            kinds.append(system.energy(at, q, velocity))
+        return np.array(kinds).reshape(len(t), 2)
+
+    def configurations_at(self, knots: IntArray) -> tuple[list[Nodes], Array]:
+        """Configurations and velocities (k, 6 n) at some knots."""
+        s, system, found = self.solution, self.assembly.system, list[Nodes]()
+        stored = (x[knots, : 12 * system.count].reshape(len(knots), -1, 12) for x in (s.y, s.v))
+        poses, twists = frames_and_twists(*stored)
+        q = system.start
+        for pose in poses:
             q = system.at(pose, q)
-            totals.append(sum(system.energy(float(t), q, velocity)))
-        return s.t[pick], np.array(totals)
+            found.append(q)
+        return found, self._of_group(poses, twists)
 
     @property
     def conservative(self) -> bool:
@@ -98,6 +112,7 @@ class BodyMotion(BodyRun):
                 "final": float(totals[-1]),
                 "max_drift": float(np.ptp(totals)) if self.conservative else None,
             },
+            **self.stated(),
             "samples": self.samples(times),
             "warnings": list(self.warnings),
         }

@@ -128,7 +128,7 @@ class BodyRest(BodyRun):
                 }
                 for value, moved in zip(self.modes.values.tolist(), self.modes.moved, strict=True)
             ]
-        return {**found, "samples": samples, "warnings": list(self.warnings)}
+        return {**found, **self.stated(), "samples": samples, "warnings": list(self.warnings)}
 
     def _steps(self, t: ArrayLike) -> list[int]:
         """Load steps at load parameters."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.scenes.build import Assembly
 from erls.errors import SceneError
 from erls.maths.so3 import Array
+from erls.run.accuracy import Accuracy, Trust
 from erls.run.bodies.connections import ONE_COORDINATE, connection_forces, joint_coordinate
 from erls.run.record import Curve, Run, plain, vector
 from erls.scene.bodies.schema import BodyScene
@@ -40,6 +41,8 @@ class BodyRun(Run):
     assembly: Assembly
     wall_s: float
     warnings: tuple[str, ...]
+    accuracy: Accuracy | None = field(default=None, kw_only=True)
+    trust: Trust | None = field(default=None, kw_only=True)
 
     @abstractmethod
     def poses(self, t: ArrayLike, nodes: Sequence[int] | None = None) -> Array:

@@ -14,6 +14,7 @@ from erls.errors import SceneError, SimulationError
 from erls.integrate.base import Solution, hermite
 from erls.maths.so3 import Array
 from erls.mechanism.effects import Certificate
+from erls.run.accuracy import Accuracy, Trust
 from erls.run.chain.places import point_position
 from erls.run.record import Run
 from erls.scene.chain import Scene
@@ -31,6 +32,8 @@ class ChainMotion(Run):
     warnings: tuple[str, ...] = field(default=())
     certificate: Certificate | None = None
     second_order_error: float | None = None
+    accuracy: Accuracy | None = None
+    trust: Trust | None = None
 
     @property
     def failure(self) -> SimulationError | None:

@@ -68,3 +68,15 @@ def point_position(mechanism: Mechanism, state: State | StateSeries, number: int
     """(..., 3) world position of named point ``number``."""
     point = mechanism.points[number]
     return np.asarray(node_positions(mechanism, state, point.link, np.array([point.node]))[..., 0, :])
+
+
+def watched_nodes(mechanism: Mechanism) -> tuple[tuple[int, int], ...]:
+    """(link, node) of the named points; without any, of every link where joints stand on it, or its farthest node."""
+    if mechanism.points:
+        return tuple((p.link, p.node) for p in mechanism.points)
+    result = []
+    for k, link in enumerate(mechanism.links):
+        far = np.linalg.norm(link.model.nodes - link.inboard.position, axis=1).argmax()
+        seats = [mechanism.joints[outer].seat for outer in mechanism.standing_on(k)]
+        result += [(k, seat.node) for seat in seats if seat is not None] or [(k, int(far))]
+    return tuple(result)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from erls.equations.formulation import Energy, LoopFormulation
-from erls.equations.serial.state_series import ReactionSeries, reaction_series
+from erls.equations.serial.state_series import ReactionSeries, energy_series, reaction_series
 from erls.equations.substructures import solved
 from erls.errors import SceneError
 from erls.maths.so3 import Array
@@ -45,6 +45,8 @@ class ChainRun(ChainMotion):
         Of a run with ``effects = "auto"``.
     second_order_error : float or None
         Estimate of `erls.run.watches.deflection_range`, of all links [m]; None where it was not made.
+    accuracy, trust : Accuracy, Trust or None
+        What the run states of its error; None where that was not asked for.
 
     Examples
     --------
@@ -72,8 +74,8 @@ class ChainRun(ChainMotion):
     def energy(self, t: ArrayLike) -> Energy:
         """Kinetic, elastic, gravity and spring energy [J], each of the shape of ``t``."""
         shape, flat, y, v = self._interpolated(t)
-        found = [self.formulation.energy(*at) for at in zip(flat.tolist(), y, v, strict=True)]
-        return Energy(*(np.array([getattr(e, kind) for e in found]).reshape(shape) for kind in _ENERGIES))  # type: ignore[arg-type]
+        found = energy_series(self.formulation, flat, y, v).T
+        return Energy(*(kind.reshape(shape) for kind in found))
 
     def reaction(self, joint: str, t: ArrayLike) -> tuple[Array, Array]:
         """(..., 3) force [N] and (..., 3) moment [N m] on the joint's outer link, at its displaced interface node,
@@ -219,6 +221,7 @@ class ChainRun(ChainMotion):
                 "final": float(np.asarray(totals)[-1]),
                 "max_drift": float(np.ptp(totals)) if self.conservative else None,
             },
+            **self.stated(),
             "samples": self.samples(times),
             **({"events": [asdict(happening) for happening in self.events]} if self.scene.record.events else {}),
             "warnings": list(self.warnings),

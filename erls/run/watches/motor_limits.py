@@ -30,7 +30,8 @@ class MotorLimits(Watch):
     def after(self, ended: Ended) -> Finding:
         """Motors that reached their limit and left it."""
         run = ended.run
-        return Finding(limit_warnings(run.formulation, run.solution, run.scene.record.simulation.tolerance))
+        tolerance = options_of(run.scene.record.simulation).tolerance
+        return Finding(limit_warnings(run.formulation, run.solution, tolerance))
 
 
 def limit_warnings(formulation: Formulation, solution: Solution, tolerance: float) -> list[str]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from erls.equations.serial.state_series import state_series
 from erls.errors import SimulationError
 from erls.integrate.base import hermite
+from erls.integrate.choice import INTEGRATION_SHARE
 from erls.integrate.thinning import output_step
 from erls.maths.so3 import Array
 from erls.run.chain.places import node_positions
@@ -63,7 +64,7 @@ def output_warnings(run: ChainRun) -> list[str]:
     """At most one: between stored states motion is not resolved to the tolerance of the scene."""
     settings = run.scene.record.simulation
     found = output_error(run)
-    if found <= settings.tolerance:
+    if found <= INTEGRATION_SHARE * settings.tolerance:
         return []
     return [
         f"simulation.output_step = {settings.output_step:.4g} s: between stored states, {output_step(settings):.4g} s "

@@ -19,7 +19,9 @@ class Dynamics(Stepping, frozen=True, kw_only=True, tag_field="type", tag="dynam
     duration : float
         [s]
     step : float, optional
-        [s]; a thousandth of the duration, at most 1 ms, unless given.
+        Fixed steps [s]; unless given, steps go by ``tolerance``.
+    tolerance : float
+        Wanted error of any node over the whole run [m], of which integration aims at a tenth.
     formulation : str
         ``nodal``: elements with a frame per node are the only ones for bodies and beams of their own.
     group : str
@@ -34,6 +36,7 @@ class Dynamics(Stepping, frozen=True, kw_only=True, tag_field="type", tag="dynam
         What a small residual is, against the inertia and loads of the nodes and the forces of the connections.
     """
 
+    tolerance: float = 1e-4
     formulation: str = "nodal"
     group: str = "SE(3)"
     iteration_matrix: str = "auto"
@@ -52,8 +55,11 @@ class _AtRest(Record, frozen=True, kw_only=True, tag_field="type"):
         Equal steps of the load parameter.
     tangent : str
         ``full``, ``material`` or ``frozen``, see `erls.equations.nodal.statics`.
+    tolerance : float
+        Wanted error of any reported node [m].
     """
 
+    tolerance: float = 1e-4
     formulation: str = "nodal"
     load_steps: int = 1
     tangent: str = "full"

@@ -14,6 +14,7 @@ from erls.scene.checks import (
     check_tables,
     directed,
     not_negative,
+    positive,
 )
 from erls.scene.integrators import MATRICES
 from fe_import.description.check import check_expansion, check_temperature
@@ -69,6 +70,7 @@ def _check_simulation(s: Analysis, place: str) -> None:
     choose(s.formulation, FORMULATIONS, f"{place}.formulation", SceneError)
     if isinstance(s, Dynamics):
         check_stepping(s, place)
+        positive(f"{place}.tolerance", s.tolerance)
         choose(s.group, GROUPS, f"{place}.group", SceneError)
         choose(s.iteration_matrix, MATRICES, f"{place}.iteration_matrix", SceneError)
         not_negative(f"{place}.newton_tolerance", s.newton_tolerance)

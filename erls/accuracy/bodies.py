@@ -1,0 +1,166 @@
+"""What a run of bodies and beams states about its error: of the integration of motions, and of the mesh of beams.
+
+Beams are geometrically exact and nothing is left out, so that ``links`` and ``effects`` are zero. Their elements err at
+second order in their length: the same with twice the elements is closer by three quarters of the error. Motions are
+repeated with larger steps on the finer mesh, which leaves the error of these in the distance, to the safe side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+
+from erls.accuracy.body_audits import body_audits
+from erls.accuracy.constrained_integration import constrained_integration_error
+from erls.equations.nodal.scenes.build import assemble
+from erls.equations.nodal.statics import solve_statics
+from erls.errors import Cause, SimulationError
+from erls.integrate.base import hermite
+from erls.integrate.choice import body_options
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths.so3 import Array
+from erls.run.accuracy import BROKEN, GOOD, LIMITED, Accuracy, Trust
+from erls.run.bodies.motion import BodyMotion
+from erls.run.bodies.rest import BodyRest
+from erls.run.bodies.run import BodyRun
+from erls.scene.bodies.analyses import Buckling, Dynamics, Frequencies
+from erls.scene.bodies.schema import BodyScene
+
+_FINER = 2
+_LARGER = 2.0  # steps on the finer mesh
+_SAFETY = 1.5
+_LOOKS = 101
+
+
+def stated_bodies(run: BodyMotion | BodyRest) -> BodyMotion | BodyRest:
+    """The run with ``accuracy`` and ``trust``.
+
+    Raises
+    ------
+    SimulationError
+        INTERRUPTED.
+    """
+    tolerance, horizon = run.scene.record.simulation.tolerance, None
+    unjudged: dict[str, str] = {}
+    found: float | None = 0.0
+    if isinstance(run, BodyMotion):
+        known = constrained_integration_error(run)
+        if isinstance(known, str):
+            found, unjudged["integration"] = None, known
+        else:
+            found = known.total
+            if found > tolerance:
+                horizon = known.horizon(tolerance)
+    mesh, why = mesh_error(run)
+    if mesh is None:
+        unjudged["modes"] = why
+    accuracy = Accuracy(
+        found, mesh, 0.0, 0.0, 0.0, horizon=horizon, judged_at=run.point_names, unjudged=unjudged
+    )
+    return replace(run, accuracy=accuracy, trust=_trust(run, accuracy, tolerance))
+
+
+def mesh_error(run: BodyRun) -> tuple[float | None, str]:
+    """Of the reported nodes [m], from a mesh of twice the elements; None, and why, where that has no solution."""
+    scene = run.scene
+    if not scene.record.beams:
+        return 0.0, ""
+    try:
+        own, finer = _both(run, _refined(scene))
+    except SimulationError as problem:
+        if problem.cause == Cause.INTERRUPTED:
+            raise
+        return None, f"the same with twice the elements fails: {problem}"
+    apart = float(np.linalg.norm(own - finer, axis=-1).max(initial=0.0))
+    share = _FINER**2 / (_FINER**2 - 1)
+    return _SAFETY * share * apart, ""
+
+
+def _refined(scene: BodyScene) -> BodyScene:
+    """The same with `_FINER` times the elements; inner nodes that are named keep their places."""
+    record = scene.record
+    beams = {beam.name for beam in record.beams}
+
+    def renamed(name: str) -> str:
+        beam, slash, number = name.rpartition("/")
+        return f"{beam}/{_FINER * int(number)}" if slash and beam in beams and number.isdigit() else name
+
+    def moved(item: object) -> object:
+        own = {key: renamed(getattr(item, key)) for key in ("node", "to") if hasattr(item, key)}
+        return msgspec.structs.replace(item, **own)  # type: ignore[type-var]
+
+    finer = msgspec.structs.replace(
+        record,
+        beams=[msgspec.structs.replace(beam, elements=_FINER * beam.elements) for beam in record.beams],
+        masses=[moved(x) for x in record.masses],
+        connections=[moved(x) for x in record.connections],
+        springs=[moved(x) for x in record.springs],
+        loads=[moved(x) for x in record.loads],
+        report=[renamed(name) for name in record.report],
+    )
+    return replace(scene, record=finer)
+
+
+def _both(run: BodyRun, scene: BodyScene) -> tuple[Array, Array]:
+    """(k, p, 3) places of reported nodes in both meshes [m].
+
+    Raises
+    ------
+    SimulationError
+        The finer one has no solution.
+    """
+    finer = assemble(scene)
+    beams = {beam.name for beam in scene.record.beams}
+    nodes, others = [], []
+    for name in run.point_names:
+        beam, slash, number = name.rpartition("/")
+        inner = bool(slash) and beam in beams and number.isdigit()
+        nodes.append(run.assembly.numbers[name])
+        others.append(finer.numbers[f"{beam}/{_FINER * int(number)}" if inner else name])
+    if isinstance(run, BodyRest):
+        analysis = run.scene.record.simulation
+        assert not isinstance(analysis, Dynamics)
+        end = analysis.load if isinstance(analysis, (Buckling, Frequencies)) else 1.0
+        statics = solve_statics(finer.system, finer.system.start, analysis.load_steps, analysis.tangent, end=end)
+        if statics.failure is not None:
+            raise statics.failure
+        here, there = run.statics.path[-1].q.poses, statics.path[-1].q.poses
+        return here[nodes, :3, 3][None], there[others, :3, 3][None]
+    assert isinstance(run, BodyMotion)
+    settings, s = run.scene.record.simulation, run.solution
+    assert isinstance(settings, Dynamics)
+    step = _LARGER * (run.end - float(s.t[0])) / max(s.work.steps, 1)
+    options = body_options(msgspec.structs.replace(settings, step=step))
+    times = float(s.t[0]), run.end
+    found = lie_generalized_alpha(finer.system, times, finer.system.start, finer.velocity, options)
+    if found.failure is not None:
+        raise found.failure
+    looks = run.spread(_LOOKS)
+    columns = (12 * np.array(others)[:, None] + np.arange(3)).ravel()
+    y, v, a = (x[:, columns] for x in (found.y, found.v, found.a))
+    there = hermite(found.t, y, v, a, looks)[0].reshape(len(looks), len(others), 3)
+    return run.poses(looks, nodes)[..., :3, 3], there
+
+
+def _trust(run: BodyRun, accuracy: Accuracy, tolerance: float) -> Trust:
+    """The verdict."""
+    if isinstance(run, BodyMotion):
+        breaches = [audit.text for audit in body_audits(run, accuracy.integration) if not audit.ok]
+        if breaches:
+            return Trust(BROKEN, tuple(f"audit: {text}" for text in breaches))
+    if accuracy.total is None:
+        return Trust(BROKEN, tuple(f"the part {name} is not known: {why}" for name, why in accuracy.unjudged.items()))
+    if accuracy.total <= tolerance:
+        return Trust(GOOD)
+    coarse = (accuracy.modes or 0.0) > (accuracy.integration or 0.0)
+    remedy = "more elements per beam" if coarse else "a smaller simulation.tolerance, or a smaller step"
+    part = "the mesh of the beams (modes)" if coarse else "the integration"
+    return Trust(
+        LIMITED,
+        (
+            f"the stated error is {accuracy.total:.2g} m, the tolerance {tolerance:.2g} m; the largest part is that of "
+            f"{part}: use {remedy}",
+        ),
+    )

@@ -1,0 +1,184 @@
+"""The error of generalized-α over a whole run, of systems with conditions and without, from a run with larger steps.
+
+Motions of bodies, nodal chains and absolute coordinates choose their steps by such companions and keep the last one.
+Runs of fixed steps, and those read from files, get one here, with `LARGER` times their steps: about a quarter of their
+work; where Newton's method does not bear that, one with half as large ones, at twice their work.
+`erls.integrate.step_distance` says how the distance of both becomes an error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from erls.auto.outputs import watched_nodes
+from erls.equations.nodal.assembly import NodalSystem
+from erls.equations.nodal.equations import Nodal
+from erls.equations.serial.state_series import state_series
+from erls.errors import Cause
+from erls.integrate.base import Companion, Solution, hermite
+from erls.integrate.choice import body_options, integrator, options_of
+from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.integrate.step_distance import STATED, Track, distance_bands, errors_over_time, samples, step_ratio
+from erls.maths.so3 import Array
+from erls.run.bodies.motion import BodyMotion
+from erls.run.chain.places import node_positions
+from erls.run.chain.run import ChainRun
+from erls.scene.bodies.analyses import Dynamics
+from erls.scene.integrators import FIXED_STEP
+from fe_import.model import IntArray
+
+LARGER = 4.0
+"""Steps of a companion, of those of the run."""
+
+SMALLER = 0.5
+"""The same where larger steps cannot be made."""
+
+_HALVED = 0.02  # of the steps of a companion, at most, that Newton's method may refuse
+_TOO_LIKE = 1.4  # ratio of steps below which a distance says nothing
+
+
+@dataclass(frozen=True)
+class ConstrainedError:
+    """Error of the integration at points.
+
+    Attributes
+    ----------
+    points : tuple of str
+    times : (k,) array
+        [s]
+    errors : (k, points) array
+        Largest of each point up to each time [m].
+    evaluations : int
+        Of residuals, that finding it took; 0 where the run had its companion.
+    """
+
+    points: tuple[str, ...]
+    times: Array
+    errors: Array
+    evaluations: int
+
+    @property
+    def error(self) -> Array:
+        """(k,) of any point up to each time [m]."""
+        return np.asarray(self.errors.max(axis=1, initial=0.0))
+
+    @property
+    def total(self) -> float:
+        """Over the run [m]."""
+        return float(self.error[-1])
+
+    def horizon(self, tolerance: float) -> float:
+        """Last time up to which all points stay within a tolerance [s]."""
+        beyond = np.flatnonzero(self.error > tolerance)
+        return float(self.times[max(int(beyond[0]) - 1, 0)] if len(beyond) else self.times[-1])
+
+
+def constrained_integration_error(run: ChainRun | BodyMotion) -> ConstrainedError | str:
+    """Estimate it, or say in words why it is not known.
+
+    Parameters
+    ----------
+    run : ChainRun or BodyMotion
+        Of generalized-α, in any coordinates.
+
+    Raises
+    ------
+    SimulationError
+        INTERRUPTED.
+    """
+    s = run.solution
+    if len(s.t) < 2 or not s.work.steps:
+        return "the run has no steps"
+    companion, evaluations = s.companion, 0
+    if companion is None:
+        companion, evaluations = _companion(run, LARGER)
+    ratio = 0.0 if companion is None else _ratio(s, companion)
+    if ratio < _TOO_LIKE:
+        companion, more = _companion(run, SMALLER)
+        evaluations += more
+    if companion is None:
+        return "Newton's method converges neither at larger nor at smaller steps"
+    looks = samples(s.t)
+    t, radius = s.t[looks], run.scene.record.simulation.spectral_radius  # type: ignore[union-attr]  # a motion's
+    if isinstance(run, BodyMotion):
+        names, places, other = _of_bodies(run, looks, companion)
+    else:
+        names, places, other = _of_chain(run, looks, companion)
+    if ratio < _TOO_LIKE:
+        apart = np.maximum.accumulate(np.linalg.norm(places - other, axis=2), axis=0)
+        return ConstrainedError(names, t, STATED / (1 - SMALLER**2) * apart, evaluations)
+    bands = distance_bands(t, places, other, s.work.steps, ratio, radius)
+    return ConstrainedError(names, bands.t, STATED * errors_over_time(bands), evaluations)
+
+
+def _ratio(s: Solution, companion: Companion) -> float:
+    """Of steps; their numbers tell it where not all of the run are kept."""
+    if np.count_nonzero(np.diff(s.t)) >= s.work.steps:
+        return step_ratio(s.t, companion.t)
+    return s.work.steps / max(int(np.count_nonzero(np.diff(companion.t))), 1)
+
+
+def _companion(run: ChainRun | BodyMotion, larger: float) -> tuple[Companion | None, int]:
+    """The same with steps so many times as large, None where it fails; and its evaluations."""
+    made = _with_steps(run, larger)
+    if made.failure is not None and made.t[-1] < run.solution.t[-1]:
+        if made.failure.cause == Cause.INTERRUPTED:
+            raise made.failure
+        return None, made.work.rhs_calls
+    if larger > 1 and made.work.rejected_steps > _HALVED * made.work.steps:  # no proportion of steps any more
+        return None, made.work.rhs_calls
+    return Companion(made.t, made.y, made.v, made.a), made.work.rhs_calls
+
+
+def _with_steps(run: ChainRun | BodyMotion, larger: float) -> Solution:
+    """The same with steps so many times as large, up to where the run ended."""
+    s = run.solution
+    times = float(s.t[0]), float(s.t[-1])
+    step = larger * (times[1] - times[0]) / s.work.steps
+    if isinstance(run, BodyMotion):
+        system, analysis = run.assembly.system, run.scene.record.simulation
+        assert isinstance(analysis, Dynamics)
+        own = body_options(msgspec.structs.replace(analysis, step=step))
+        return lie_generalized_alpha(system, times, system.start, run.assembly.velocity, own)
+    settings = msgspec.structs.replace(run.scene.record.simulation, integrator=FIXED_STEP, step=step, output_step=None)
+    integrate = integrator(run.formulation.mechanism, settings)
+    return integrate(run.formulation, times, *run.formulation.initial_state(), options_of(settings), None)
+
+
+def _of_bodies(run: BodyMotion, looks: IntArray, companion: Companion) -> tuple[tuple[str, ...], Array, Array]:
+    """Names of the points, and their places (k, p, 3) in both runs."""
+    numbers = run.assembly.numbers
+    names = run.point_names or tuple(numbers)
+    nodes = [numbers[name] for name in names]
+    return names, *_of_nodes(run.assembly.system, run.solution, looks, companion, nodes)
+
+
+def _of_nodes(
+    system: NodalSystem, s: Solution, looks: IntArray, companion: Companion, nodes: list[int]
+) -> tuple[Array, Array]:
+    places = system.places
+    other = Track(companion.t, *(places(part)[:, nodes] for part in (companion.y, companion.v, companion.a)))
+    return places(s.y[looks])[:, nodes], other.at(s.t[looks])
+
+
+def _of_chain(run: ChainRun, looks: IntArray, companion: Companion) -> tuple[tuple[str, ...], Array, Array]:
+    """The same; points of nodal chains are taken to be their nearest nodes."""
+    formulation, s = run.formulation, run.solution
+    mechanism, watched = formulation.mechanism, watched_nodes(formulation.mechanism)
+    names = run.point_names or tuple(f"{mechanism.links[k].name}, node {n}" for k, n in watched)
+
+    def positions(t: Array, y: Array, v: Array) -> Array:
+        series = state_series(formulation, t, y, v)
+        return np.stack([node_positions(mechanism, series, k, np.array([n]))[..., 0, :] for k, n in watched], axis=1)
+
+    t = s.t[looks]
+    if isinstance(formulation, Nodal):
+        wanted = positions(s.t[:1], s.y[:1], s.v[:1])[0]
+        built = formulation.system.places(s.y[:1])[0]
+        nodes = [int(np.linalg.norm(built - place, axis=1).argmin()) for place in wanted]
+        return names, *_of_nodes(formulation.system, s, looks, companion, nodes)
+    at = hermite(companion.t, companion.y, companion.v, companion.a, np.clip(t, companion.t[0], companion.t[-1]))
+    return names, positions(t, s.y[looks], s.v[looks]), positions(t, *at)

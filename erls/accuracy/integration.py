@@ -1,0 +1,212 @@
+"""The error of the integration of a chain's run: over the whole run, at points, and of efforts and reactions.
+
+What the error equation follows (`erls.integrate.global_error`) and what vibrations too fast for it lose
+(`erls.accuracy.vibrations`) are turned into distances of the judged points and differences of forces, and multiplied by
+`SAFETY`, since an estimate should err to the safe side.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from erls.accuracy.vibrations import FastModes, fast_modes, wrong_table
+from erls.auto.outputs import Watched
+from erls.equations.loops.tied import Tied
+from erls.equations.serial.state_series import ReactionSeries, StateSeries, reaction_series, state_series
+from erls.equations.substructures import solved
+from erls.errors import SimulationError
+from erls.integrate.choice import options_of
+from erls.integrate.global_error import ENDS, ENDS_STIFF, GlobalError, global_error
+from erls.maths.so3 import Array
+from erls.run.chain.places import node_positions
+from erls.run.chain.run import ChainRun
+
+SAFETY = 1.5
+_SUDDEN = 3.0  # where forces change all at once, at an instant that small vibrations decide
+_MANY = 200  # steps from which on positions alone tell a motion better than with rates, which vibrations spoil
+_EXPECTED = 3.0  # times what the integration aimed at
+_PLACES, _FORCES = 40, 8  # instants at which points, and forces, are compared
+_ROUNDING = 1e-16
+_SMALL_PEAK = 1e-3  # of the largest of any joint: forces that are nothing but errors are measured by that
+_MODES_OF_FORCES = 2  # fast modes, of each instant
+
+
+@dataclass(frozen=True)
+class IntegrationError:
+    """Of points and forces.
+
+    Attributes
+    ----------
+    times : (k,) array
+        [s]
+    error : (k,) array
+        Largest error of a point up to each time [m].
+    effort, reaction : (joints,) arrays
+        Relative to the peak of each over the run.
+    evaluations : int
+        Of residuals.
+    whole : bool
+        Whether it could be followed to the end of the run.
+    """
+
+    times: Array
+    error: Array
+    effort: Array
+    reaction: Array
+    evaluations: int
+    whole: bool
+
+    @property
+    def total(self) -> float:
+        """Over the run [m]."""
+        return float(self.error[-1])
+
+
+def integration_error(run: ChainRun, watched: Watched) -> IntegrationError:
+    """Estimate it, of a run by `erls.integrate.lobatto` of which all steps were kept.
+
+    Parameters
+    ----------
+    run : ChainRun
+    watched : tuple of (int, int)
+        Link and node of each judged point.
+
+    Raises
+    ------
+    SimulationError
+        The equations cannot be evaluated beside the motion.
+    """
+    system, s = solved(run.formulation), run.solution
+    tied = isinstance(system, Tied)
+    rigid = not any(link.elastic_modes for link in run.formulation.mechanism.links)
+    found = global_error(
+        system,  # type: ignore[arg-type]
+        s,
+        options_of(run.scene.record.simulation).tolerance,
+        run.formulation.mechanism.reach,
+        _ROUNDING,
+        [k - n for k, n in _vectors(run)],
+        tied,
+        ENDS if tied or rigid or s.work.steps < _MANY else ENDS_STIFF,
+    )
+    return _estimate(run, watched, system, found)
+
+
+def expected(run: ChainRun) -> float:
+    """Error of the integration up to which an estimate needs no other beside it [m]."""
+    return _EXPECTED * options_of(run.scene.record.simulation).tolerance
+
+
+def _estimate(run: ChainRun, watched: Watched, system: Any, found: GlobalError) -> IntegrationError:
+    """Of points and forces, from the error of coordinates."""
+    settings = run.scene.record.simulation
+    looks = _spread(found, _PLACES)
+    slow = _apart(run, watched, found.t[looks], (found.y[looks], found.v[looks]), (found.error, found.rate), looks)
+    table = wrong_table(run.solution, settings.integrator)
+    tau = float(np.median(found.filter)) if len(found.filter) else 0.0
+    fast = [] if table is None else fast_modes(system, run.solution, table, tau)
+    vibrating = _of_vibrations(run, watched, fast)
+    along = (found.t[looks] - found.t[0]) / max(float(run.end - found.t[0]), 1e-300)
+    safety = SAFETY * (_SUDDEN if _sudden(run) else 1.0)
+    error = safety * (np.maximum.accumulate(slow) + along * vibrating)
+    effort, reaction = _forces(run, found, fast)
+    return IntegrationError(
+        found.t[looks], error, safety * effort, safety * reaction, found.evaluations, found.whole
+    )
+
+
+def _sudden(run: ChainRun) -> bool:
+    """Whether friction or motors at their limits act."""
+    joints = run.formulation.mechanism.joints
+    return any(joint.forces.friction or np.isfinite(joint.drive.torque_limit) for joint in joints)
+
+
+def _vectors(run: ChainRun) -> list[tuple[int, int]]:
+    """Place of each rotation vector among the joints, and how many before it are prescribed."""
+    mechanism = solved(run.formulation).mechanism
+    prescribed = np.cumsum([joint.drive.prescribed for joint in mechanism.joints])
+    return [(k, int(prescribed[k])) for k in mechanism.rotation_vectors]
+
+
+def _spread(found: GlobalError, count: int) -> Array:
+    """Numbers of instants: the largest error in each of some stretches, and the last one."""
+    sizes = np.abs(found.error).max(axis=1, initial=0.0)
+    parts = np.array_split(np.arange(len(sizes)), min(count, len(sizes)))
+    return np.unique([*(int(part[np.argmax(sizes[part])]) for part in parts), len(sizes) - 1])
+
+
+def _positions(run: ChainRun, watched: Watched, series: StateSeries) -> Array:
+    """(k, points, 3) in the world [m]."""
+    mechanism = run.formulation.mechanism
+    return np.stack([node_positions(mechanism, series, k, np.array([n]))[..., 0, :] for k, n in watched], axis=1)
+
+
+def _apart(
+    run: ChainRun, watched: Watched, t: Array, at: tuple[Array, Array], error: tuple[Array, Array], looks: Array
+) -> Array:
+    """(k,) largest distance of a point with the error from one without [m]."""
+    times = np.concatenate([t, t])
+    y = np.concatenate([at[0], at[0] + error[0][looks]])
+    v = np.concatenate([at[1], at[1] + error[1][looks]])
+    here, there = np.split(_positions(run, watched, state_series(run.formulation, times, y, v)), 2)
+    return np.asarray(np.linalg.norm(there - here, axis=-1).max(axis=1))
+
+
+def _of_vibrations(run: ChainRun, watched: Watched, fast: list[FastModes]) -> float:
+    """What fast vibrations are wrong by at any point [m]."""
+    if not fast:
+        return 0.0
+    s = run.solution
+    knots = np.concatenate([np.full(len(f.shapes), f.knot) for f in fast])
+    shapes = np.concatenate([f.shapes for f in fast])
+    t, v = s.t[knots], s.v[knots]
+    y, v = np.concatenate([s.y[knots], s.y[knots] + shapes]), np.concatenate([v, v])
+    series = state_series(run.formulation, np.concatenate([t, t]), y, v)
+    here, there = np.split(_positions(run, watched, series), 2)
+    moved = np.linalg.norm(there - here, axis=-1)
+    ends = np.cumsum([0, *(len(f.shapes) for f in fast)])
+    sums = [np.sqrt((moved[a:b] ** 2).sum(axis=0)).max() for a, b in itertools.pairwise(ends.tolist())]
+    return float(max(sums))
+
+
+def _forces(run: ChainRun, found: GlobalError, fast: list[FastModes]) -> tuple[Array, Array]:
+    """Errors of efforts and reactions of all joints relative to their peaks."""
+    s, looks = run.solution, _spread(found, _FORCES)
+    few = [(f.knot, shape) for f in fast for shape in f.shapes[:_MODES_OF_FORCES]]
+    knots = np.array([knot for knot, _ in few], dtype=np.int64)
+    shapes = np.array([shape for _, shape in few]).reshape(-1, s.y.shape[1])
+    t = np.concatenate([found.t[looks], found.t[looks], s.t[knots], s.t[knots]])
+    y = np.concatenate(
+        [found.y[looks], found.y[looks] + found.error[looks], s.y[knots], s.y[knots] + shapes]
+    )
+    v = np.concatenate([found.v[looks], found.v[looks] + found.rate[looks], s.v[knots], s.v[knots]])
+    try:
+        with np.errstate(all="ignore"):
+            every = reaction_series(run.formulation, t, y, v)
+    except (SimulationError, np.linalg.LinAlgError):
+        joints = len(run.formulation.mechanism.joints)
+        return np.full(joints, np.nan), np.full(joints, np.nan)
+    count, modes = len(looks), len(knots)
+    slow = _difference(every, slice(0, count), slice(count, 2 * count)).max(axis=1, initial=0.0)
+    first, second = slice(2 * count, 2 * count + modes), slice(2 * count + modes, None)
+    quick = np.sqrt((_difference(every, first, second) ** 2).sum(axis=1) / max(len(fast), 1))
+    peaks = np.stack([np.abs(every.effort), *(np.linalg.norm(x, axis=-1) for x in (every.force, every.moment))])
+    peak = peaks.max(axis=1)
+    peak = np.maximum(peak, _SMALL_PEAK * peak.max(axis=1, initial=0.0)[:, None])
+    relative = np.where(peak > 0, (slow + quick) / np.where(peak > 0, peak, 1.0), 0.0)
+    return relative[0], relative[1:].max(axis=0)
+
+
+def _difference(every: ReactionSeries, first: slice, second: slice) -> Array:
+    """(3, k, joints) of effort, force and moment."""
+    return np.stack(
+        [
+            np.abs(every.effort[first] - every.effort[second]),
+            np.linalg.norm(every.force[first] - every.force[second], axis=-1),
+            np.linalg.norm(every.moment[first] - every.moment[second], axis=-1),
+        ]
+    )

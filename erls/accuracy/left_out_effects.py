@@ -1,0 +1,53 @@
+"""The part ``effects`` of a stated error: what physical effects that a run left out would have changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+
+from erls.auto.certify import certify
+from erls.errors import Cause, SimulationError
+from erls.mechanism.effects import LINEAR, in_order
+from erls.mechanism.without_effects import present
+from erls.run.all_modes import with_all_modes
+from erls.run.chain.run import ChainRun
+from erls.scene.build import build_mechanism
+
+NODAL_EFFECTS = frozenset({"gravity", "joint_stiffness", "joint_damping", "joint_friction", "motor_inertia", "payload"})
+"""What may be left out of beam elements."""
+
+
+def effects_error(run: ChainRun) -> tuple[float | None, str]:
+    """Error of named points [m], or None, and why it is not known.
+
+    Second-order displacements belong to the part ``links``, unless ``auto`` left them out: its certificate judges that.
+    """
+    if run.certificate is not None:
+        if not np.isfinite(run.certificate.error):
+            return None, "what auto left out could not be followed along the run; use effects = 'all'"
+        return run.certificate.error, ""
+    mechanism, settings = run.formulation.mechanism, run.scene.record.simulation
+    missing = LINEAR - mechanism.effects
+    if settings.formulation == "nodal":
+        missing &= NODAL_EFFECTS
+    static = mechanism.bandwidth is not None
+    if not missing and not static:
+        return 0.0, ""
+    wanted = in_order(mechanism.effects | LINEAR)
+    record = run.scene.record
+    every = msgspec.structs.replace(record.simulation, effects=wanted)
+    whole = build_mechanism(replace(run.scene, record=msgspec.structs.replace(record, simulation=every))).mechanism
+    whole = replace(whole, bandwidth=None)
+    if not static and missing.isdisjoint(present(whole)):
+        return 0.0, ""
+    if settings.formulation == "nodal" or settings.coordinates == "absolute" or run.formulation.mechanism.loops:
+        names = ", ".join(in_order(missing & present(whole)))
+        return None, f"what {names} would have changed is not estimated in these coordinates; use effects = 'all'"
+    try:
+        return certify(with_all_modes(run), whole).error, ""
+    except SimulationError as problem:
+        if problem.cause == Cause.INTERRUPTED:
+            raise
+        return None, f"what the effects left out would have changed could not be followed ({problem})"

@@ -1,0 +1,115 @@
+"""What the steps of a run lose of vibrations that are too fast for the error equation to follow.
+
+At some instants the modes of K φ = ω² M φ have amplitudes A = |φᵀM a|/ω², by the accelerations of the run. Over the run
+a mode goes wrong by the part d = min(2, Σ μ(ωh)) of its amplitude (`erls.accuracy.phase`), a damped one for as long as
+it lasts; errors of modes are independent, so that their squares add up. Points move by what their places make of φ.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.linalg as la
+
+from erls.accuracy.phase import lobatto_wrong, wrong_over_run
+from erls.equations.loops.tied import Tied
+from erls.equations.quick import quick
+from erls.equations.system import metre_scales
+from erls.integrate.base import Solution
+from erls.maths.so3 import Array
+
+_INSTANTS = 4
+_NEAR = 12  # knots around an instant, of which the largest acceleration counts
+_MOST = 8  # modes
+_RIGID = 1e-9  # of the largest ω²
+_LARGEST_PART = 2.0
+_LASTING = 3.0  # time constants
+
+
+class FastModes(NamedTuple):
+    """Vibrations at an instant that count most.
+
+    Attributes
+    ----------
+    knot : int
+        Of the run.
+    shapes : (k, n) array
+        Displacements of the coordinates by which each is wrong at the end of the run.
+    """
+
+    knot: int
+    shapes: Array
+
+
+def wrong_table(solution: Solution, integrator: str) -> tuple[Array, Array] | None:
+    """x and μ(x) of what integrated, `erls.integrate.lobatto`; None for others."""
+    return lobatto_wrong() if (solution.choice.partition(":")[0] or integrator) == "lobatto" else None
+
+
+def fast_modes(system: Any, solution: Solution, table: tuple[Array, Array], tau: float) -> list[FastModes]:
+    """At some instants of a run.
+
+    Parameters
+    ----------
+    system : SecondOrderSystem
+    solution : Solution
+        With all steps.
+    table : (k,), (k,) arrays
+        Of `wrong_table`.
+    tau : float
+        Of the filter before which the error equation follows vibrations [s].
+    """
+    s = solution
+    if len(s.t) < 2 or not system.size:
+        return []
+    metres, span = metre_scales(system), float(s.t[-1] - s.t[0])
+    ends = np.unique(s.t[:: s.nodes_per_step])
+    steps = np.diff(ends)
+    found = []
+    for knot in np.unique(np.linspace(0, len(s.t) - 1, 2 * _INSTANTS + 1)[1::2].astype(int)).tolist():
+        squares, modes, mass, damping = _modes(system, float(s.t[knot]), s.y[knot], s.v[knot])
+        fast = squares > _RIGID * squares.max(initial=0.0)
+        squares, modes = squares[fast], modes[:, fast]
+        if not len(squares):
+            continue
+        omega = np.sqrt(squares)
+        near = np.unique(np.linspace(*_around(knot, len(s.t)), _NEAR).astype(int))
+        amplitude = np.abs(s.a[near] @ mass @ modes).max(axis=0) / squares
+        decay = np.einsum("ij,ik,kj->j", modes, damping, modes) / 2
+        lasting = np.minimum(1.0, _LASTING / np.maximum(decay * span, _LASTING))
+        part = np.minimum(wrong_over_run(table, omega, steps) * lasting, _LARGEST_PART)
+        followed = 1 / (1 + (omega * tau) ** 4)
+        wrong = amplitude * part * (1 - followed)
+        weight = wrong * np.abs(metres[:, None] * modes).max(axis=0)
+        most = np.argsort(-weight)[:_MOST]
+        rest = float(np.sqrt(np.maximum((weight**2).sum() - (weight[most] ** 2).sum(), 0.0)))
+        scale = np.sqrt(1 + (rest / max(float(np.linalg.norm(weight[most])), 1e-300)) ** 2)
+        found.append(FastModes(knot, scale * (wrong[most] * modes[:, most]).T))
+    return found
+
+
+def _around(knot: int, count: int) -> tuple[int, int]:
+    """First and last knot of the part of a run that an instant stands for."""
+    half = max(count // (2 * _INSTANTS), 1)
+    return max(knot - half, 0), min(knot + half, count - 1)
+
+
+def _modes(system: Any, t: float, y: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+    """(m,) rising ω², (n, m) modes of unit modal mass, (n, n) mass and damping; of tied coordinates those that their
+    conditions allow.
+    """
+    if isinstance(system, Tied):
+        mass, (stiffness, damping) = system.loops.masses(t, y), system.loops.matrices(t, y, v)  # type: ignore[attr-defined]
+        rows = system.scaled_rows(system.closure(t, y, v), system.kept)  # type: ignore[attr-defined]
+        free = la.null_space(rows) / system.metres[:, None]
+        squares, modes = _of(free.T @ stiffness @ free, free.T @ mass @ free)
+        return squares, free @ modes, mass, damping
+    fast = quick(system)
+    mass, (stiffness, damping) = fast.mass_matrix(t, y), fast.stiffness_and_damping(t, y, v)
+    return *_of(stiffness, mass), mass, damping
+
+
+def _of(stiffness: Array, mass: Array) -> tuple[Array, Array]:
+    squares, modes = la.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2, check_finite=False)
+    return squares, modes

@@ -1,0 +1,1 @@
+"""How far off links are that bend: what orders beyond those of their model would make of the motion of a run."""
