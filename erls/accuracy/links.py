@@ -8,7 +8,7 @@ from erls.run.chain.run import ChainRun
 from erls.run.deflection.errors import link_errors
 
 MARGIN = 2.5
-"""Of the statement over the estimate, which lies between 0.45 and 4 times the distance from exact beams
+"""Of the statement over the estimate, which lies between 0.5 and 5 times the distance from exact beams
 (`benchmarks/links_error.py`)."""
 
 

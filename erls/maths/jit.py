@@ -33,6 +33,7 @@ _IMPORT = re.compile(r"^\s*from (erls[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
 _listeners: list[Callable[[str], None]] = []
 _told: set[str] = set()  # subjects
 _fixed: set[Any] = set()  # kernels, whose signatures are fixed
+_guiding: set[Any] = set()  # helpers that call functions of a system
 ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
 
 
@@ -121,6 +122,14 @@ def helper(function: F) -> F:
     return _njit(function) if ENABLED else function
 
 
+def guide(function: F) -> F:
+    """A helper that calls functions of a system, by address: where these are Python, so is it (`plain`)."""
+    made = helper(function)
+    if ENABLED:
+        _guiding.add(made)
+    return made
+
+
 def part(function: F) -> F:
     """A helper of kernels that are not ``counted``: no way in from Python, and optimized within its callers alone."""
     return _njit(function, **_PART) if ENABLED else function
@@ -132,7 +141,7 @@ def reordered(function: F) -> F:
 
 
 def plain(function: Callable[..., Any], within: bool = True, called: Mapping[Any, Any] | None = None) -> Any:
-    """The same source as plain Python, with all that it calls by name unless ``within`` is False.
+    """The same source as plain Python, with all that it calls by name; unless ``within``, with `guide` functions alone.
 
     Arrays may stand for its numbers where it does not choose by them, nor keeps what it makes in tables.
 
@@ -158,7 +167,7 @@ def _in_python(function: Any, within: bool, called: tuple[tuple[Any, Any], ...])
             own[name] = partial(_without_address, _in_python(target, within, called))
         elif hasattr(found, "in_python"):
             own[name] = found.in_python
-        elif within and hasattr(found, "py_func"):
+        elif hasattr(found, "py_func") and (within or found in _guiding):
             own[name] = _in_python(found, within, called)
     names = {**source.__globals__, **own}
     return FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__)

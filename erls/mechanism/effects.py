@@ -206,8 +206,8 @@ class Certificate:
     def summary(self) -> dict[str, float | None]:
         """Part of the JSON of ``erls simulate``."""
         return {
-            "certified_error": self.error,
-            "certified_effort_error": self.effort_error,
+            "left_out_error": self.error,
+            "left_out_effort_error": self.effort_error,
             "effects_tolerance": self.tolerance,
             "effects_wall_s": self.wall_s,
         }

@@ -144,7 +144,7 @@ def test_auto_leaves_out_what_the_tolerance_allows(pendulum: Path) -> None:
         assert any(text.startswith("effects: auto leaves") for text in told)
         summary = run.summary()
         assert summary["effects"] == [n for n in EFFECTS if n in run.formulation.mechanism.effects]
-        assert summary["certified_error"] == certificate.error <= tolerance
+        assert summary["left_out_error"] == certificate.error <= tolerance
         assert summary["effects_wall_s"] > 0
         kept.append(run.formulation.mechanism.effects)
     assert kept[0] == ALL

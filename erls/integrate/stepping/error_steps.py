@@ -31,7 +31,7 @@ from erls.integrate.stepping.stages import (
     solve,
 )
 from erls.maths import dense
-from erls.maths.jit import ENABLED, helper, kernel
+from erls.maths.jit import ENABLED, guide, helper, kernel
 
 # known: times between which forces may be asked for, where iterations stop, the largest error so far, what the filter
 # keeps (steps over τ), what is too far, and how much of a change the next iteration leaves
@@ -195,7 +195,7 @@ def foretell(h: float, coefficients: Array, stages: Array, matrices: Array, vect
     correct(h, coefficients, stages, matrices, vectors, way)
 
 
-@helper
+@guide
 def drives(
     system: Functions,
     reals: Array,
@@ -228,7 +228,7 @@ def drives(
         counts[EVALUATIONS] += 1
 
 
-@helper
+@guide
 def balance(
     system: Functions,
     scratch: Array,
@@ -269,7 +269,7 @@ def balance(
             held[q] -= drive[q]
 
 
-@helper
+@guide
 def settle(
     system: Functions,
     scratch: Array,

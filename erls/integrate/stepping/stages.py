@@ -24,7 +24,7 @@ from erls.equations.compiled_system import (
     call_stiffness_and_damping,
 )
 from erls.maths import dense
-from erls.maths.jit import helper, part
+from erls.maths.jit import guide, helper, part
 
 # known: the leg, settings of a run, then what steps leave behind
 END, FIRST, LAST = 0, 1, 2
@@ -121,7 +121,7 @@ def combine(h: float, coefficients: Array, stages: Array) -> None:
                 v_out[q] += to_v * a[q]
 
 
-@part
+@helper
 def pairs(stages: int) -> int:
     """Eigenvalues, of which conjugate ones count once."""
     return (stages + 1) // 2
@@ -208,7 +208,7 @@ def correct(
     return largest
 
 
-@helper
+@guide
 def evaluate(
     system: Functions,
     reals: Array,
@@ -228,7 +228,7 @@ def evaluate(
     transpose(damping)
 
 
-@helper
+@guide
 def factorize(
     system: Functions,
     reals: Array,

@@ -110,8 +110,8 @@ def _certificate(file: Reader, record: SceneRecord) -> Certificate | None:
     known = file.attribute_names()
     if "effects_wall_s" not in known:
         return None
-    error = file.attribute("certified_error", float) if "certified_error" in known else float("inf")
-    effort = file.attribute("certified_effort_error", float) if "certified_effort_error" in known else None
+    error = file.attribute("left_out_error", float) if "left_out_error" in known else float("inf")
+    effort = file.attribute("left_out_effort_error", float) if "left_out_effort_error" in known else None
     settings = record.simulation
     tolerances = settings.effects_tolerance, settings.effects_effort_tolerance
     return Certificate(error, effort, *tolerances, file.attribute("effects_wall_s", float))
