@@ -77,7 +77,7 @@ def _vibrations(compared: Compared, motion: Motion, stretch: IntArray) -> _Vibra
         rows = compared.tied.closure(t, y, v).rows[:, compared.whole.free]
     allowed = _allowed(rows[:, kept], np.diag(mass)[kept])
     values, modes = la.eigh(allowed.T @ stiffness[own] @ allowed, allowed.T @ mass[own] @ allowed)
-    elastic = values > _RIGID * values[-1]
+    elastic = values > _RIGID * values.max(initial=0.0)
     squares, modes = values[elastic], allowed @ modes[:, elastic]
     omega = np.sqrt(squares)
 

@@ -200,11 +200,14 @@ def in_frozen_modes(system: QuasiStatic, frozen: Values) -> QuasiStatic:
     return QuasiStatic(system.mechanism, system.inner, system.light, modes, 1.0)
 
 
+_DISTURBANCES = 12  # where rows of a loop depend on others, few of them show how far its forces move
+
+
 def disturbed(system: Any, at: State) -> Values:
     """Ten times what disturbances of a state by 1e-14 do to `outputs`: what closing a loop makes of rounding."""
     rng, reference = np.random.default_rng(1), outputs(system, at)
     result = dict.fromkeys(reference, 0.0)
-    for _ in range(3):
+    for _ in range(_DISTURBANCES):
         y, v = (x * (1 + 1e-14 * rng.uniform(-1, 1, len(x))) for x in (at.y, at.v))
         for name, values in outputs(system, replace(at, y=y, v=v)).items():
             result[name] = max(result[name], 10 * float(np.abs(values - reference[name]).max(initial=0.0)))

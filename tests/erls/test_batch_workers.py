@@ -246,4 +246,6 @@ def test_scripts_need_no_guard(tmp_path: Path, piped: bool) -> None:
 
 def test_a_run_is_packed_without_its_equations() -> None:
     run = erls.simulate(erls.load_scene(DATA / "l_shape/steel_tall.toml", [SHORT]))
-    assert set(vars(packed(run))) == {"scene", "solution", "wall_s", "warnings", "certificate"}
+    assert set(vars(packed(run))) == {
+        *("scene", "solution", "wall_s", "warnings", "certificate", "accuracy", "trust")
+    }

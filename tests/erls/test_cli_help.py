@@ -14,7 +14,7 @@ from erls.cli.main import main
 
 OPTIONS = {
     "reduce": ["--output", "-o", "--method", "--modes", "--json"],
-    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--json"],
+    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict", "--json"],
     "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--json"],
     "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
                     "--beside", "--set", "--workers", "--json"],
@@ -67,9 +67,9 @@ def test_help_needs_no_heavy_package() -> None:
 
 
 def test_runs_on_reduced_links_load_no_solver(tmp_path: Path) -> None:
-    """Elements, reductions and sparse matrices are for links that were never reduced before."""
+    """Elements, reductions and sparse matrices are for links that were never reduced before, and for the verdict."""
     code = (
-        "import sys\nfrom erls.cli.main import main\nassert main(['simulate', sys.argv[1]]) == 0\n"
+        "import sys\nfrom erls.cli.main import main\nassert main(['simulate', sys.argv[1], '--no-verdict']) == 0\n"
         "print('loaded', *sorted({'fe_import.reduce', 'fe_import.solver', 'scipy.sparse'} & set(sys.modules)))"
     )
     scene = str(Path(__file__).parents[2] / "data/l_shape/steel_flat.toml")
