@@ -28,7 +28,8 @@ from erls.run.chain.run import ChainRun
 SAFETY = 1.5
 _SUDDEN = 3.0  # where forces change all at once, at an instant that small vibrations decide
 _MANY = 200  # steps from which on positions alone tell a motion better than with rates, which vibrations spoil
-_EXPECTED = 3.0  # times what the integration aimed at
+_ITERATED = 0.03  # of what the integration aims at: what Newton's iterations leave, which is no smooth error
+_EXPECTED = 5.0  # times what the integration aimed at
 _PLACES, _FORCES = 40, 8  # instants at which points, and forces, are compared
 _ROUNDING = 1e-16
 _SMALL_PEAK = 1e-3  # of the largest of any joint: forces that are nothing but errors are measured by that
@@ -112,7 +113,8 @@ def _estimate(run: ChainRun, watched: Watched, system: Any, found: GlobalError) 
     vibrating = _of_vibrations(run, watched, fast)
     along = (found.t[looks] - found.t[0]) / max(float(run.end - found.t[0]), 1e-300)
     safety = SAFETY * (_SUDDEN if _sudden(run) else 1.0)
-    error = safety * (np.maximum.accumulate(slow) + along * vibrating)
+    aim = options_of(settings).tolerance
+    error = safety * (np.maximum.accumulate(slow) + along * vibrating) + _ITERATED * aim
     effort, reaction = _forces(run, found, fast)
     return IntegrationError(
         found.t[looks], error, safety * effort, safety * reaction, found.evaluations, found.whole

@@ -15,6 +15,7 @@ from erls.maths.so3 import Array
 
 _GRID = np.concatenate([np.geomspace(1e-3, 1.0, 60), np.linspace(1.05, 40.0, 780)])
 _SMALL = 0.3  # rad per step below which rounding hides the error: its order carries it on
+_ORDER = 7
 _UNKNOWN = 2.0  # beyond the grid
 
 
@@ -39,8 +40,7 @@ def lobatto_wrong() -> tuple[Array, Array]:
 def _carried_on(wrong: Array) -> tuple[Array, Array]:
     """The grid and μ, by its order where rounding hides it."""
     first = int(np.searchsorted(_GRID, _SMALL))
-    order = np.log(wrong[first + 8] / wrong[first]) / np.log(_GRID[first + 8] / _GRID[first])
-    wrong[:first] = wrong[first] * (_GRID[:first] / _GRID[first]) ** order
+    wrong[:first] = wrong[first] * (_GRID[:first] / _GRID[first]) ** _ORDER
     return _GRID, wrong
 
 
@@ -57,7 +57,6 @@ def wrong_over_run(table: tuple[Array, Array], frequencies: Array, steps: Array)
     counts, _ = np.histogram(steps, edges)
     middle = np.sqrt(edges[1:] * edges[:-1])
     x = np.outer(frequencies, middle)
-    slope = np.log(wrong[1] / wrong[0]) / np.log(grid[1] / grid[0])
     found = np.interp(x, grid, wrong, right=_UNKNOWN)
-    found = np.where(x < grid[0], wrong[0] * (np.maximum(x, 1e-300) / grid[0]) ** slope, found)
+    found = np.where(x < grid[0], wrong[0] * (np.maximum(x, 1e-300) / grid[0]) ** _ORDER, found)
     return np.asarray(found @ counts)

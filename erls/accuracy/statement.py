@@ -127,7 +127,9 @@ def _integrated(run: ChainRun, watched: Watched) -> Integrated:
     found: IntegrationError | None = None
     if settings.output_step is None and wrong_table(s, settings.integrator) is not None:
         found = integration_error(run, watched)
-    if found is not None and found.whole and found.total <= expected(run):
+    mechanism = run.formulation.mechanism
+    smooth = not mechanism.loops and not any(link.elastic_modes for link in mechanism.links)
+    if found is not None and found.whole and (smooth or found.total <= expected(run)):
         return _followed(run, found)
     second = second_run_error(run, watched)
     if found is None or not found.whole:

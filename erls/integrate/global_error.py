@@ -48,13 +48,16 @@ STAGES = 6
 ENDS, ENDS_STIFF = 6, 10
 """Ends of steps through which P goes, with rates or without."""
 
-_MERGED, _MERGED_LARGE = 6, 8  # steps of the run in one of the error, at the least: of systems up to, and above
+_MERGED_SMOOTH = 4  # steps of the run in one of the error, of motions without noise, which steps just resolve
+_MERGED, _MERGED_LARGE = 6, 8  # the same of others, at the least: of systems up to, and above
+_SHARP = 4  # times the frequency of the filter, of motions without noise
 _LARGE = 15  # coordinates, whose factors cost more than evaluations
 _COST = 0.2  # of the run's evaluations: what more steps are merged for
 _ITERATIONS = 1.3  # per step, about
-_SHARES = 0.1, 1e-4  # of the error so far: where the iterations of a step stop, at most and at least
-_ALL_STEPS = 0.5  # the same over all steps of a run
+_SHARES = 0.1, 1e-6  # of the error so far: where the iterations of a step stop, at most and at least
+_ALL_STEPS, _ALL_STEPS_SMOOTH = 0.5, 0.02  # the same over all steps of a run, of motions without noise
 _NEGLIGIBLE = 0.02  # of the tolerance of integration: errors that need no iteration
+_ROUNDING = 1e-15  # of the reach: the same of motions without noise, where disturbances of this size may grow
 _HAIR = 2e-12  # of the run: forces jump at the ends of a leg
 
 
@@ -182,7 +185,8 @@ class _Follower:
         self.kind = loop.BETWEEN if tied else loop.UNTIED
         self.coefficients = coefficients(nodes())
         wanted = int(np.ceil(STAGES * _ITERATIONS * steps / (_COST * calls)))
-        merged = max(_MERGED_LARGE if n > _LARGE else _MERGED, wanted)
+        smooth = ends == ENDS and not tied
+        merged = _MERGED_SMOOTH if smooth else max(_MERGED_LARGE if n > _LARGE else _MERGED, wanted)
         if tied and solution.nodes_per_step == len(NODES) - 1:
             self.kind, self.coefficients, merged = loop.AT_NODES, coefficients(NODES), 1
         stages = self.coefficients.shape[1] - 1
@@ -200,8 +204,10 @@ class _Follower:
         self.counts[[loop.MERGED, loop.TIED, loop.ENDS]] = merged, self.kind, ends
         most, least = _SHARES
         self.known = np.zeros(loop.KNOWN)
-        self.known[loop.SHARE] = min(most, max(least, _ALL_STEPS * merged / steps))
-        self.known[loop.LARGEST], self.known[loop.CUT] = _NEGLIGIBLE * tolerance, stages
+        all_steps = _ALL_STEPS_SMOOTH if smooth else _ALL_STEPS
+        self.known[loop.SHARE] = min(most, max(least, all_steps * merged / steps))
+        self.known[loop.LARGEST] = _ROUNDING * reach if smooth else _NEGLIGIBLE * tolerance
+        self.known[loop.CUT] = _SHARP * stages if smooth else stages
         self.known[loop.BOUND], self.known[loop.RATE] = reach, loop.SLOWEST
         self.first, self.last, self.at_nodes = loop.FIRST, loop.LAST, self.kind == loop.AT_NODES
 
