@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from functools import partial
 
+from erls.accuracy.kernels import kernels_of
 from erls.equations.registry import FORMULATIONS, formulate
 from erls.errors import SceneError
 from erls.integrate.base import Solution
 from erls.integrate.choice import compile_kernels, compiled_steps, compiling_steps, integrator, options_of
+from erls.maths.beside import compiling_beside
 from erls.maths.jit import announcing
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
@@ -64,7 +66,9 @@ def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -
     settings, plan, told = scene.record.simulation, Plan(scene, mechanism), warnings.beside()
     watching = Watching(plan, told, asked.watches())
     watching.before()
-    with announcing(asked.tell), compiling_steps(compiled_steps(mechanism, settings)):
+    later = kernels_of(mechanism, settings) if asked.verdict else ()
+    steps = compiled_steps(mechanism, settings)
+    with announcing(asked.tell), compiling_beside(*later), compiling_steps(steps):
         formulation = formulate(mechanism, settings)
         compile_kernels(formulation, settings)
     y, v = formulation.initial_state()

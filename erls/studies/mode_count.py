@@ -95,5 +95,5 @@ def study_modes(
 
 def _run(task: tuple[str, tuple[str, ...]]) -> Outputs:
     path, overrides = task
-    run = simulate(load_chain(path, overrides))
+    run = simulate(load_chain(path, overrides), verdict=False)
     return run_outputs(run, np.linspace(0.0, run.end, _SAMPLES + 1))

@@ -124,7 +124,7 @@ def refine(
             break
         watch = _Watch(clock, left)
         try:
-            run = simulate(level.scene, progress=watch)
+            run = simulate(level.scene, progress=watch, verdict=False)
             made.append((level.label, sample(run)))
             last, warnings = watch.spent, run.warnings
         except _OutOfTime as problem:
