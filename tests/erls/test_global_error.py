@@ -27,16 +27,16 @@ def _largest(values: Array) -> float:
     return float(np.abs(values).max())
 
 
-@pytest.mark.parametrize("tolerance", [1e-4, 3e-5])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5])
 def test_a_resolved_vibration_is_off_by_what_is_found(tolerance: float) -> None:
-    """3 rad/s over 60 s: the exact motion is a cosine; to a half."""
+    """3 rad/s over 60 s: the exact motion is a cosine; within a factor of two."""
     system, start = Modes([3.0]), np.array([1.0])
     run = lobatto(system, (0.0, 60.0), start, np.zeros(1), Options(tolerance=tolerance))
     found = global_error(system, run, tolerance, 10.0)
     actual = np.cos(3.0 * found.t)[:, None] - found.y
     assert found.whole
     assert _largest(actual) > 1e-3 * tolerance
-    assert _largest(found.error - actual) <= 0.5 * _largest(actual)
+    assert 1 / 2 <= _largest(found.error) / _largest(actual) <= 2
     assert found.evaluations <= 0.8 * run.work.rhs_calls
 
 
