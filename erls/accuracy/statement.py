@@ -83,6 +83,8 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
         "links": _judged(lambda: links_error(run)),
         "output": _judged(lambda: (output_error(run), "")),
     }
+    for name in ("modes", "links"):
+        found[name] = found[name]._replace(error=_within(found[name].error, reach))
     others = [found[name].error for name in PARTS if name != "integration"]
     horizon = _horizon(integrated, tolerance, sum(part or 0.0 for part in others))
     accuracy = Accuracy(
@@ -94,6 +96,11 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
         unjudged={name: part.note for name, part in found.items() if part.error is None},
     )
     return replace(run, accuracy=accuracy, trust=_trust(run, accuracy, integrated, tolerance))
+
+
+def _within(error: float | None, reach: float) -> float | None:
+    """No point is farther off than the mechanism reaches."""
+    return None if error is None else min(error, reach)
 
 
 def _judged(find: Callable[[], tuple[float | None, str]]) -> Judged:
