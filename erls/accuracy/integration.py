@@ -26,7 +26,9 @@ from erls.run.chain.places import node_positions
 from erls.run.chain.run import ChainRun
 
 SAFETY = 1.5
-_SUDDEN = 3.0  # where forces change all at once, at an instant that small vibrations decide
+SUDDEN = 3.0
+"""Times as large an error where forces change all at once, at an instant that small vibrations decide."""
+
 _MANY = 200  # steps from which on positions alone tell a motion better than with rates, which vibrations spoil
 _ITERATED = 0.03  # of what the integration aims at: what Newton's iterations leave, which is no smooth error
 _EXPECTED = 5.0  # times what the integration aimed at
@@ -112,7 +114,7 @@ def _estimate(run: ChainRun, watched: Watched, system: Any, found: GlobalError) 
     fast = [] if table is None else fast_modes(system, run.solution, table, tau)
     vibrating = _of_vibrations(run, watched, fast)
     along = (found.t[looks] - found.t[0]) / max(float(run.end - found.t[0]), 1e-300)
-    safety = SAFETY * (_SUDDEN if _sudden(run) else 1.0)
+    safety = SAFETY * (SUDDEN if sudden(run) else 1.0)
     aim = options_of(settings).tolerance
     error = safety * (np.maximum.accumulate(slow) + along * vibrating) + _ITERATED * aim
     effort, reaction = _forces(run, found, fast)
@@ -121,7 +123,7 @@ def _estimate(run: ChainRun, watched: Watched, system: Any, found: GlobalError) 
     )
 
 
-def _sudden(run: ChainRun) -> bool:
+def sudden(run: ChainRun) -> bool:
     """Whether friction or motors at their limits act."""
     joints = run.formulation.mechanism.joints
     return any(joint.forces.friction or np.isfinite(joint.drive.torque_limit) for joint in joints)

@@ -11,7 +11,7 @@ import numpy as np
 
 from erls.accuracy.audits import audits
 from erls.accuracy.constrained_integration import constrained_integration_error
-from erls.accuracy.integration import IntegrationError, expected, integration_error
+from erls.accuracy.integration import SUDDEN, IntegrationError, expected, integration_error, sudden
 from erls.accuracy.left_out_effects import effects_error
 from erls.accuracy.links import links_error
 from erls.accuracy.modes import modes_error
@@ -154,7 +154,7 @@ def _of_constrained(run: ChainRun, none: dict[str, float | None]) -> Integrated:
     known = constrained_integration_error(run)
     if isinstance(known, str):
         return Integrated(np.zeros(0), np.zeros(0), none, none, known)
-    return Integrated(known.times, known.error, none, none)
+    return Integrated(known.times, (SUDDEN if sudden(run) else 1.0) * known.error, none, none)
 
 
 def _followed(run: ChainRun, found: IntegrationError) -> Integrated:
