@@ -29,6 +29,7 @@ from erls.scene.integrators import FIXED_STEP
 CONSTRAINED = ("nodal", "absolute")
 """Kinds of systems whose integration is generalized-α with conditions."""
 
+_FARTHEST = 4.0  # times the reach: two points at opposite ends of it, on links that deflect as far again
 _CHAOTIC = 3.0  # e-folds of the error over the second half of a run: more than drift makes
 
 
@@ -74,7 +75,7 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
         INTERRUPTED.
     """
     watched = watched_nodes(run.formulation.mechanism)
-    tolerance, reach = tolerance or run.scene.record.simulation.tolerance, 2 * run.formulation.mechanism.reach
+    tolerance, reach = tolerance or run.scene.record.simulation.tolerance, _FARTHEST * run.formulation.mechanism.reach
     integrated = _integrated(run, watched)
     found = {
         "integration": _capped(integrated, reach),
@@ -99,7 +100,7 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
 
 
 def _within(error: float | None, reach: float) -> float | None:
-    """No point is farther off than the mechanism reaches."""
+    """No point is farther off than that."""
     return None if error is None else min(error, reach)
 
 

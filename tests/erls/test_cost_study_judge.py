@@ -209,7 +209,7 @@ class Clock:
 def fake_runs(clock: Clock, costs: dict[str, float], fails: tuple[str, ...] = ()) -> Callable[..., Any]:
     """A `simulate` whose runs take what is given, in ten steps, after a second of preparation."""
 
-    def run(label: Any, progress: Callable[[float, float], None]) -> Any:
+    def run(label: Any, progress: Callable[[float, float], None], verdict: bool) -> Any:
         clock.now += 1.0
         progress(0.0, 1.0)
         for k in range(10):
@@ -320,7 +320,7 @@ def test_choosing_effects_and_certifying_count(
     off = erls.simulate(erls.load_scene(scene.path, (*SHORT, "effects=-gravity")))
     waiting = iter([(off, 5.0, None), (off, 2.0, None), *((done, *run) for run in runs)])
 
-    def simulated(scene: Scene, progress: Any) -> Any:
+    def simulated(scene: Scene, progress: Any, verdict: bool) -> Any:
         run, wall, more = next(waiting)
         certificate = None if more is None else Certificate(0.0, None, 1e-4, 1e-2, more)
         return replace(run, wall_s=wall, certificate=certificate)
