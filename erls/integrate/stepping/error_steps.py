@@ -12,13 +12,13 @@ from typing import Any
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, Functions, IntArray, call_factor_complex, call_residual
+from erls.integrate.stepping.low_pass import TURN_IM, TURN_RE, factor_filter, smooth
+from erls.integrate.stepping.newton_form import differences, interpolate
 from erls.integrate.stepping.stages import (
     DAMPING,
     MASS,
     METRES,
     NODES,
-    PART_IM,
-    PART_RE,
     PLACES,
     RESIDUALS,
     ROWS,
@@ -28,7 +28,6 @@ from erls.integrate.stepping.stages import (
     evaluate,
     factorize,
     pairs,
-    solve,
 )
 from erls.maths import dense
 from erls.maths.jit import ENABLED, guide, helper, kernel
@@ -44,8 +43,6 @@ COUNTS = 4
 UNTIED, BETWEEN, AT_NODES = range(3)  # tied coordinates, their error between nodes of the run, and at them
 CONDITIONS = 12  # of interpolation, at the most: rows of a table
 MOST_ITERATIONS = 12
-# cos φ and sin φ of the filter: at 90° it is sharpest, but M alone may be nearly singular
-TURN_RE, TURN_IM = math.cos(math.radians(75.0)), math.sin(math.radians(75.0))
 FASTEST, SLOWEST = 1e-3, 0.5  # bounds on what an iteration leaves
 NEAR = 0.3  # of the error so far: what the last of many iterations may change in a step of the run
 FORGOTTEN = 0.7  # of that, from one step to the next
@@ -79,67 +76,6 @@ if ENABLED:
         contract.INTEGERS,
         _CUBE,
     )
-
-
-@helper
-def differences(t: Array, knots: Array, first: int, ends: int, given: int, table: Array) -> None:
-    """Newton's coefficients of Hermite interpolation, ``given`` values and derivatives at each end, into ``table``.
-
-    (J. Stoer, R. Bulirsch, Introduction to Numerical Analysis, sec. 2.1.5.)
-    """
-    rows, n = ends * given, table.shape[1]
-    for i in range(rows):
-        for q in range(n):
-            table[i, q] = knots[first + i // given, 0, q]
-    for order in range(1, rows):
-        for i in range(rows - 1, order - 1, -1):
-            right, left = first + i // given, first + (i - order) // given
-            if right == left:
-                factor = 1.0 if order == 1 else 0.5
-                for q in range(n):
-                    table[i, q] = factor * knots[right, order, q]
-            else:
-                per = 1.0 / (t[right] - t[left])
-                for q in range(n):
-                    table[i, q] = (table[i, q] - table[i - 1, q]) * per
-
-
-@helper
-def interpolate(t: Array, first: int, ends: int, given: int, table: Array, time: float, out: Array) -> None:
-    """Value and two derivatives (3, n) of Newton's polynomial."""
-    n = table.shape[1]
-    for q in range(n):
-        p, p1, p2 = 0.0, 0.0, 0.0
-        for i in range(ends * given - 1, -1, -1):
-            x = time - t[first + i // given]
-            p2 = p2 * x + 2.0 * p1
-            p1 = p1 * x + p
-            p = p * x + table[i, q]
-        out[0, q], out[1, q], out[2, q] = p, p1, p2
-
-
-@helper
-def factor_filter(matrices: Array, square: Any, out: Any, pivots: IntArray) -> int:
-    """Dense factors of M + ``square`` K; 0, or 1 + the coordinate at which elimination broke down."""
-    mass, stiffness = matrices[MASS], matrices[STIFFNESS]
-    for i in range(len(out)):
-        m, k, row = mass[i], stiffness[i], out[i]
-        for j in range(len(row)):
-            row[j] = m[j] + square * k[j]
-    return int(dense.factor(out, pivots))
-
-
-@helper
-def smooth(force: Array, matrices: Array, vectors: Array, way: Any, filtered: int) -> None:
-    """Replace a force by M Re (1 - i cot φ) (M + τ² exp(iφ) K)⁻¹ of it."""
-    re, im = vectors[PART_RE], vectors[PART_IM]
-    for q in range(len(force)):
-        re[q], im[q] = force[q], 0.0
-        force[q] = 0.0
-    solve(filtered, False, re, im, way)
-    for q in range(len(force)):
-        re[q] += TURN_RE / TURN_IM * im[q]
-    dense.add_product(matrices[MASS], re, force)
 
 
 @helper
