@@ -1,7 +1,8 @@
 """The error of an integration from a second run at a larger tolerance: where the error equation cannot be followed.
 
 Errors grow with the tolerance, about as its power 0.6 to 1, but not where vibrations that either run does not resolve
-decide: over random scenes the run was off by 0.27 of the distance between the two in the median, by 0.9 in one of ten.
+decide: over 39 random and shipped scenes the run was off by 0.27 of the distance between the two in the median, by more
+than 0.9 in one of ten, which `_SHARE` is set by.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ class Accuracy:
     output : float or None
         Of interpolation between stored states [m].
     efforts, reactions : mapping of str to float or None
-        By joint, relative to the peak over the run.
+        By joint, relative to the peak over the run: what the integration alone makes of them, without other parts.
     horizon : float or None
         Time up to which all this holds, where disturbances grow beyond the tolerance after it [s].
     judged_at : tuple of str
