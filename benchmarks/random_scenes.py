@@ -1,7 +1,7 @@
 """Random scenes: what their runs state of their accuracy against what they are off.
 
-    python benchmarks/random_scenes.py [--seeds 0:2000] [--json rows.jsonl] [--workers 2]
-        [--parts all|integration|none] [--nodal-every 0] [--write-references] [--only-table]
+    python benchmarks/random_scenes.py [--seeds 0:2000] [--json rows.jsonl] [--workers 2] [--again]
+        [--parts all|integration|statement] [--nodal-every 0] [--write-references] [--only-table]
 
 Scenes, references and what parts of an error are: tests/erls/random_scenes.py and random_references.py. Rows go to the
 file as they come, one JSON object a line; seeds that stand there are not run again, so that Ctrl-C loses nothing. A
@@ -12,7 +12,8 @@ Prints coverage (stated total at least the actual one, up to the stated horizon)
 stated over actual (floor 1e-7 m), verdicts, refusals and failures by cause, the cost of the statement; by part and by
 class of scene; of each integrator the actual error of integration over the tolerance. ``--write-references`` writes
 the actual errors to tests/data/random_scenes.csv, by which tests judge the first seeds; ``--nodal-every 10`` judges
-each tenth scene by beam elements too, in up to ``--nodal-budget`` seconds.
+each tenth scene by beam elements too, in up to ``--nodal-budget`` seconds. References take nearly all of the time:
+``--again --parts statement`` runs the scenes again, and holds what is stated now against those that stand in the file.
 """
 
 from __future__ import annotations
@@ -97,8 +98,10 @@ class Worker:
         self._process = None
 
 
-def judge_all(tasks: list[dict[str, Any]], file: Path, workers: int, hang_s: float) -> None:
-    """Judge seeds in several processes; rows are added to the file as they come."""
+def judge_all(
+    tasks: list[dict[str, Any]], known: dict[int, dict[str, Any]], file: Path, workers: int, hang_s: float
+) -> None:
+    """Judge seeds in several processes; rows, with what was known and stays, are added to the file as they come."""
     todo, lock, begun, done = SimpleQueue[dict[str, Any]](), threading.Lock(), time.monotonic(), Counter[str]()
     for task in tasks:
         todo.put(task)
@@ -111,7 +114,7 @@ def judge_all(tasks: list[dict[str, Any]], file: Path, workers: int, hang_s: flo
                 task = todo.get_nowait()
             except Empty:
                 return
-            row = worker.judge(task)
+            row = {**known.get(task["seed"], {}), **worker.judge(task)}
             if stopped.is_set():
                 return
             with lock, file.open("a", encoding="utf-8") as stream:
@@ -165,7 +168,8 @@ def main() -> int:
     parser.add_argument("--seeds", default="0:2000", help="the first one, and the one behind the last")
     parser.add_argument("--json", type=Path, default=Path("random_scenes.jsonl"), help="file of the rows")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--parts", choices=("all", "integration", "none"), default="all", help="which references")
+    parser.add_argument("--parts", choices=("all", "integration", "statement"), default="all", help="which references")
+    parser.add_argument("--again", action="store_true", help="also seeds that stand in the file")
     parser.add_argument("--nodal-every", type=int, default=0, help="of so many scenes one is judged by beam elements")
     parser.add_argument("--nodal-budget", type=float, default=120.0, help="for each of these, in seconds")
     parser.add_argument("--hang", type=float, default=900.0, help="seconds without an answer")
@@ -183,10 +187,10 @@ def main() -> int:
     tasks = [
         {"seed": k, "parts": given.parts, "nodal_s": given.nodal_budget if k in by_beams else 0.0}
         for k in seeds
-        if k not in known
+        if given.again or k not in known
     ]
     if tasks and not given.only_table:
-        judge_all(tasks, given.json, given.workers, given.hang)
+        judge_all(tasks, known, given.json, given.workers, given.hang)
     from random_statements import print_table
 
     rows = {seed: row for seed, row in rows_of(given.json).items() if seed in seeds}

@@ -14,6 +14,7 @@ import numpy as np
 
 from erls.accuracy.body_audits import body_audits
 from erls.accuracy.constrained_integration import constrained_integration_error
+from erls.accuracy.verdict import verdict
 from erls.equations.nodal.scenes.build import assemble
 from erls.equations.nodal.statics import solve_statics
 from erls.errors import Cause, SimulationError
@@ -21,7 +22,7 @@ from erls.integrate.base import hermite
 from erls.integrate.choice import body_options
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.so3 import Array
-from erls.run.accuracy import BROKEN, GOOD, LIMITED, Accuracy, Trust
+from erls.run.accuracy import Accuracy
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest
 from erls.run.bodies.run import BodyRun
@@ -32,6 +33,10 @@ _FINER = 2
 _LARGER = 2.0  # steps on the finer mesh
 _SAFETY = 1.5
 _LOOKS = 101
+_REMEDIES = {
+    "integration": "a smaller simulation.tolerance, or a smaller step",
+    "modes": "more elements per beam (this part is their mesh)",
+}
 
 
 def stated_bodies(run: BodyMotion | BodyRest) -> BodyMotion | BodyRest:
@@ -59,7 +64,10 @@ def stated_bodies(run: BodyMotion | BodyRest) -> BodyMotion | BodyRest:
     accuracy = Accuracy(
         found, mesh, 0.0, 0.0, 0.0, horizon=horizon, judged_at=run.point_names, unjudged=unjudged
     )
-    return replace(run, accuracy=accuracy, trust=_trust(run, accuracy, tolerance))
+    breaches = []
+    if isinstance(run, BodyMotion):
+        breaches = [audit.text for audit in body_audits(run, accuracy.integration) if not audit.ok]
+    return replace(run, accuracy=accuracy, trust=verdict(accuracy, breaches, tolerance, _REMEDIES))
 
 
 def mesh_error(run: BodyRun) -> tuple[float | None, str]:
@@ -142,25 +150,3 @@ def _both(run: BodyRun, scene: BodyScene) -> tuple[Array, Array]:
     y, v, a = (x[:, columns] for x in (found.y, found.v, found.a))
     there = hermite(found.t, y, v, a, looks)[0].reshape(len(looks), len(others), 3)
     return run.poses(looks, nodes)[..., :3, 3], there
-
-
-def _trust(run: BodyRun, accuracy: Accuracy, tolerance: float) -> Trust:
-    """The verdict."""
-    if isinstance(run, BodyMotion):
-        breaches = [audit.text for audit in body_audits(run, accuracy.integration) if not audit.ok]
-        if breaches:
-            return Trust(BROKEN, tuple(f"audit: {text}" for text in breaches))
-    if accuracy.total is None:
-        return Trust(BROKEN, tuple(f"the part {name} is not known: {why}" for name, why in accuracy.unjudged.items()))
-    if accuracy.total <= tolerance:
-        return Trust(GOOD)
-    coarse = (accuracy.modes or 0.0) > (accuracy.integration or 0.0)
-    remedy = "more elements per beam" if coarse else "a smaller simulation.tolerance, or a smaller step"
-    part = "the mesh of the beams (modes)" if coarse else "the integration"
-    return Trust(
-        LIMITED,
-        (
-            f"the stated error is {accuracy.total:.2g} m, the tolerance {tolerance:.2g} m; the largest part is that of "
-            f"{part}: use {remedy}",
-        ),
-    )

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from erls.accuracy.force_errors import force_differences
+from erls.accuracy.judged_places import judged_nodes, judged_places
 from erls.auto.outputs import watched_nodes
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.equations import Nodal
-from erls.equations.serial.state_series import state_series
+from erls.equations.substructures import solved
 from erls.errors import Cause
 from erls.integrate.base import Companion, Solution, hermite
 from erls.integrate.choice import body_options, integrator, options_of
@@ -24,7 +26,6 @@ from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.integrate.step_distance import STATED, Track, distance_bands, errors_over_time, samples, step_ratio
 from erls.maths.so3 import Array
 from erls.run.bodies.motion import BodyMotion
-from erls.run.chain.places import node_positions
 from erls.run.chain.run import ChainRun
 from erls.scene.bodies.analyses import Dynamics
 from erls.scene.integrators import FIXED_STEP
@@ -37,6 +38,7 @@ SMALLER = 0.5
 """The same where larger steps cannot be made."""
 
 _HALVED = 0.02  # of the steps of a companion, at most, that Newton's method may refuse
+_FORCES = 8  # instants at which they are compared
 _TOO_LIKE = 1.4  # ratio of steps below which a distance says nothing
 
 
@@ -53,12 +55,17 @@ class ConstrainedError:
         Largest of each point up to each time [m].
     evaluations : int
         Of residuals, that finding it took; 0 where the run had its companion.
+    effort, reaction : (joints,) arrays or None
+        Of a chain, relative to their peaks: the whole distance of the companion, to the safe side. NaN where they
+        cannot be evaluated; None of nodal chains and of bodies.
     """
 
     points: tuple[str, ...]
     times: Array
     errors: Array
     evaluations: int
+    effort: Array | None = None
+    reaction: Array | None = None
 
     @property
     def error(self) -> Array:
@@ -103,15 +110,17 @@ def constrained_integration_error(run: ChainRun | BodyMotion) -> ConstrainedErro
         return "Newton's method converges neither at larger nor at smaller steps"
     looks = samples(s.t)
     t, radius = s.t[looks], run.scene.record.simulation.spectral_radius  # type: ignore[union-attr]  # a motion's
+    forces: tuple[Array | None, Array | None] = None, None
     if isinstance(run, BodyMotion):
         names, places, other = _of_bodies(run, looks, companion)
     else:
         names, places, other = _of_chain(run, looks, companion)
+        forces = _forces(run, companion, STATED if ratio < _TOO_LIKE else 1.0)
     if ratio < _TOO_LIKE:
         apart = np.maximum.accumulate(np.linalg.norm(places - other, axis=2), axis=0)
-        return ConstrainedError(names, t, STATED / (1 - SMALLER**2) * apart, evaluations)
+        return ConstrainedError(names, t, STATED / (1 - SMALLER**2) * apart, evaluations, *forces)
     bands = distance_bands(t, places, other, s.work.steps, ratio, radius)
-    return ConstrainedError(names, bands.t, STATED * errors_over_time(bands), evaluations)
+    return ConstrainedError(names, bands.t, STATED * errors_over_time(bands), evaluations, *forces)
 
 
 def _ratio(s: Solution, companion: Companion) -> float:
@@ -166,13 +175,12 @@ def _of_nodes(
 
 def _of_chain(run: ChainRun, looks: IntArray, companion: Companion) -> tuple[tuple[str, ...], Array, Array]:
     """The same; points of nodal chains are taken to be their nearest nodes."""
-    formulation, s = run.formulation, run.solution
-    mechanism, watched = formulation.mechanism, watched_nodes(formulation.mechanism)
-    names = run.point_names or tuple(f"{mechanism.links[k].name}, node {n}" for k, n in watched)
+    formulation, s, watched = solved(run.formulation), run.solution, judged_nodes(run)
+    links = run.formulation.mechanism.links
+    names = run.point_names or tuple(f"{links[k].name}, node {n}" for k, n in watched_nodes(run.formulation.mechanism))
 
     def positions(t: Array, y: Array, v: Array) -> Array:
-        series = state_series(formulation, t, y, v)
-        return np.stack([node_positions(mechanism, series, k, np.array([n]))[..., 0, :] for k, n in watched], axis=1)
+        return judged_places(formulation, watched, t, y, v)
 
     t = s.t[looks]
     if isinstance(formulation, Nodal):
@@ -182,3 +190,20 @@ def _of_chain(run: ChainRun, looks: IntArray, companion: Companion) -> tuple[tup
         return names, *_of_nodes(formulation.system, s, looks, companion, nodes)
     at = hermite(companion.t, companion.y, companion.v, companion.a, np.clip(t, companion.t[0], companion.t[-1]))
     return names, positions(t, s.y[looks], s.v[looks]), positions(t, *at)
+
+
+def _forces(run: ChainRun, companion: Companion, times: float) -> tuple[Array | None, Array | None]:
+    """So many times the distances of efforts and reactions of both runs."""
+    if isinstance(run.formulation, Nodal):
+        return None, None
+    s = run.solution
+    t = s.t[np.unique(np.linspace(0, len(s.t) - 1, _FORCES).astype(int))]
+    at = np.clip(t, companion.t[0], companion.t[-1])
+    own = hermite(s.t, s.y, s.v, s.a, t)
+    known = force_differences(
+        run.formulation, t, own, hermite(companion.t, companion.y, companion.v, companion.a, at)
+    )
+    if known is None:
+        nothing = np.full(len(run.joint_names), np.nan)
+        return nothing, nothing
+    return known.relative(times * known.apart.max(axis=1, initial=0.0))

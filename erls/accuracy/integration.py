@@ -13,16 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from erls.accuracy.force_errors import force_differences
+from erls.accuracy.judged_places import judged_places
 from erls.accuracy.vibrations import FastModes, fast_modes, wrong_table
 from erls.auto.outputs import Watched
 from erls.equations.loops.tied import Tied
-from erls.equations.serial.state_series import ReactionSeries, StateSeries, reaction_series, state_series
 from erls.equations.substructures import solved
-from erls.errors import SimulationError
 from erls.integrate.choice import options_of
 from erls.integrate.global_error import ENDS, ENDS_STIFF, GlobalError, global_error
 from erls.maths.so3 import Array
-from erls.run.chain.places import node_positions
 from erls.run.chain.run import ChainRun
 
 SAFETY = 1.5
@@ -34,7 +33,6 @@ _ITERATED = 0.03  # of what the integration aims at: what Newton's iterations le
 _EXPECTED = 5.0  # times what the integration aimed at
 _PLACES, _FORCES = 40, 8  # instants at which points, and forces, are compared
 _ROUNDING = 1e-16
-_SMALL_PEAK = 1e-3  # of the largest of any joint: forces that are nothing but errors are measured by that
 _MODES_OF_FORCES = 2  # fast modes, of each instant
 
 
@@ -143,12 +141,6 @@ def _spread(found: GlobalError, count: int) -> Array:
     return np.unique([*(int(part[np.argmax(sizes[part])]) for part in parts), len(sizes) - 1])
 
 
-def _positions(run: ChainRun, watched: Watched, series: StateSeries) -> Array:
-    """(k, points, 3) in the world [m]."""
-    mechanism = run.formulation.mechanism
-    return np.stack([node_positions(mechanism, series, k, np.array([n]))[..., 0, :] for k, n in watched], axis=1)
-
-
 def _apart(
     run: ChainRun, watched: Watched, t: Array, at: tuple[Array, Array], error: tuple[Array, Array], looks: Array
 ) -> Array:
@@ -156,7 +148,7 @@ def _apart(
     times = np.concatenate([t, t])
     y = np.concatenate([at[0], at[0] + error[0][looks]])
     v = np.concatenate([at[1], at[1] + error[1][looks]])
-    here, there = np.split(_positions(run, watched, state_series(run.formulation, times, y, v)), 2)
+    here, there = np.split(judged_places(solved(run.formulation), watched, times, y, v), 2)
     return np.asarray(np.linalg.norm(there - here, axis=-1).max(axis=1))
 
 
@@ -169,8 +161,7 @@ def _of_vibrations(run: ChainRun, watched: Watched, fast: list[FastModes]) -> fl
     shapes = np.concatenate([f.shapes for f in fast])
     t, v = s.t[knots], s.v[knots]
     y, v = np.concatenate([s.y[knots], s.y[knots] + shapes]), np.concatenate([v, v])
-    series = state_series(run.formulation, np.concatenate([t, t]), y, v)
-    here, there = np.split(_positions(run, watched, series), 2)
+    here, there = np.split(judged_places(solved(run.formulation), watched, np.concatenate([t, t]), y, v), 2)
     moved = np.linalg.norm(there - here, axis=-1)
     ends = np.cumsum([0, *(len(f.shapes) for f in fast)])
     sums = [np.sqrt((moved[a:b] ** 2).sum(axis=0)).max() for a, b in itertools.pairwise(ends.tolist())]
@@ -178,39 +169,17 @@ def _of_vibrations(run: ChainRun, watched: Watched, fast: list[FastModes]) -> fl
 
 
 def _forces(run: ChainRun, found: GlobalError, fast: list[FastModes]) -> tuple[Array, Array]:
-    """Errors of efforts and reactions of all joints relative to their peaks."""
+    """Errors of efforts and reactions of all joints relative to their peaks; NaN where they cannot be evaluated."""
     s, looks = run.solution, _spread(found, _FORCES)
     few = [(f.knot, shape) for f in fast for shape in f.shapes[:_MODES_OF_FORCES]]
     knots = np.array([knot for knot, _ in few], dtype=np.int64)
     shapes = np.array([shape for _, shape in few]).reshape(-1, s.y.shape[1])
-    t = np.concatenate([found.t[looks], found.t[looks], s.t[knots], s.t[knots]])
-    y = np.concatenate(
-        [found.y[looks], found.y[looks] + found.error[looks], s.y[knots], s.y[knots] + shapes]
-    )
-    v = np.concatenate([found.v[looks], found.v[looks] + found.rate[looks], s.v[knots], s.v[knots]])
-    try:
-        with np.errstate(all="ignore"):
-            every = reaction_series(run.formulation, t, y, v)
-    except (SimulationError, np.linalg.LinAlgError):
-        joints = len(run.formulation.mechanism.joints)
-        return np.full(joints, np.nan), np.full(joints, np.nan)
-    count, modes = len(looks), len(knots)
-    slow = _difference(every, slice(0, count), slice(count, 2 * count)).max(axis=1, initial=0.0)
-    first, second = slice(2 * count, 2 * count + modes), slice(2 * count + modes, None)
-    quick = np.sqrt((_difference(every, first, second) ** 2).sum(axis=1) / max(len(fast), 1))
-    peaks = np.stack([np.abs(every.effort), *(np.linalg.norm(x, axis=-1) for x in (every.force, every.moment))])
-    peak = peaks.max(axis=1)
-    peak = np.maximum(peak, _SMALL_PEAK * peak.max(axis=1, initial=0.0)[:, None])
-    relative = np.where(peak > 0, (slow + quick) / np.where(peak > 0, peak, 1.0), 0.0)
-    return relative[0], relative[1:].max(axis=0)
-
-
-def _difference(every: ReactionSeries, first: slice, second: slice) -> Array:
-    """(3, k, joints) of effort, force and moment."""
-    return np.stack(
-        [
-            np.abs(every.effort[first] - every.effort[second]),
-            np.linalg.norm(every.force[first] - every.force[second], axis=-1),
-            np.linalg.norm(every.moment[first] - every.moment[second], axis=-1),
-        ]
-    )
+    t = np.concatenate([found.t[looks], s.t[knots]])
+    y, v = np.concatenate([found.y[looks], s.y[knots]]), np.concatenate([found.v[looks], s.v[knots]])
+    off = np.concatenate([found.error[looks], shapes]), np.concatenate([found.rate[looks], 0 * shapes])
+    known = force_differences(run.formulation, t, (y, v), (y + off[0], v + off[1]))
+    if known is None:
+        return (np.full(len(run.joint_names), np.nan),) * 2
+    slow, quick = known.apart[:, : len(looks)], known.apart[:, len(looks) :]
+    vibrating = np.sqrt((quick**2).sum(axis=1) / max(len(fast), 1))
+    return known.relative(slow.max(axis=1, initial=0.0) + vibrating)

@@ -3,10 +3,10 @@
 Beside the mechanism that was run stands one whose links hold what their reduction leaves out as further coordinates
 (`erls.accuracy.finer_links`). Three things follow from its equations along the motion that was run:
 
-- What is left out follows its loads nearly statically and moves points (`left_out_forces`). Where loads come suddenly
-  it vibrates, by as much again.
-- Links are softer than they were taken to be: vibrations run out of step (`out_of_step`), which usually counts most.
-- Under slow loads they have another shape, which makes free joints drift (`slow_drift`).
+- What is left out follows slow loads statically, and moves points (`slow_answer`); where loads come suddenly it
+  vibrates, by as much again. Other loads are those of vibrations (`left_out_vibrations`).
+- Links are softer than they were taken to be: vibrations run out of step, which usually counts most.
+- Under slow loads they have another shape, which makes free joints drift.
 
 Their sum, largest over points, is stated with a margin: all three are of first order in what is left out.
 """
@@ -15,19 +15,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.accuracy.compared_links import averaged, compared_links, sampled
+from erls.accuracy.compared_links import compared_links
+from erls.accuracy.configurations import configurations
 from erls.accuracy.finer_links import finer_links
-from erls.accuracy.left_out_forces import static_answer
+from erls.accuracy.integration import sudden
+from erls.accuracy.left_out_vibrations import left_out_vibrations
 from erls.accuracy.mesh_of_beams import mesh_error
-from erls.accuracy.out_of_step import out_of_step
-from erls.accuracy.slow_drift import slow_drift
+from erls.accuracy.slow_answer import slow_answer
+from erls.accuracy.slow_motion import parted
 from erls.equations.registry import TREES
 from erls.equations.substructures import solved
 from erls.run.chain.run import ChainRun
 from fe_import.errors import FEImportError
 
-_SUDDEN = 2.0  # of the static answer, where loads come suddenly
-_MARGIN = 2.0
+_SUDDEN = 2.0  # of what follows vibrations, where these come suddenly
+_MARGIN, _MARGIN_SUDDEN = 2.0, 2.5  # of the sum; where friction and limits of motors act, which errors set off
 
 
 def modes_error(run: ChainRun) -> tuple[float | None, str]:
@@ -54,11 +56,15 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
     except FEImportError as problem:
         return None, f"the finite-element model of a link is not at hand: {problem}"
     compared = compared_links(run, moving, finer)
-    motion = sampled(run, moving, compared)
-    if not len(motion.t):
+    motion = parted(run, moving, compared)
+    if motion is None:
         return None, "no states to judge"
-    parts = _SUDDEN * static_answer(compared, motion)
-    parts = parts + out_of_step(compared, motion, run.end - float(run.solution.t[0]))
-    parts = parts + slow_drift(compared, averaged(run, moving, compared))
-    error = float(_MARGIN * parts.max(initial=0.0))
+    duration = run.end - float(run.solution.t[0])
+    places = configurations(compared, motion)
+    start = motion.start if run.formulation.mechanism.static_start else None
+    static, drift = slow_answer(compared, motion.slow, places, duration, start)
+    off, follows = left_out_vibrations(compared, motion, places, duration)
+    parts = static + _SUDDEN * follows + off + drift
+    margin = _MARGIN_SUDDEN if sudden(run) else _MARGIN
+    error = float(margin * parts.max(initial=0.0))
     return (error, "; ".join(finer.notes)) if np.isfinite(error) else (None, "motion without bound")

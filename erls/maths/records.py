@@ -18,7 +18,7 @@ The numbers may be real or complex: a record of complex numbers is read by the s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import cache, partial
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
@@ -51,9 +51,20 @@ def _axes(kind: Any) -> int | None:
 _hints: Callable[[Any], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))
 
 
-def _fields(record: type[Any]) -> list[tuple[str, int | None, bool]]:
+@cache
+def _fields(record: Hashable) -> tuple[tuple[str, int | None, bool], ...]:
     """Name, axes, and whether it lies in the integers, of each field."""
-    return [(name, _axes(kind), kind in (Indices, Pairs)) for name, kind in _hints(record).items()]
+    return tuple((name, _axes(kind), kind in (Indices, Pairs)) for name, kind in _hints(record).items())
+
+
+@cache
+def _shapes(record: Hashable) -> tuple[tuple[str, tuple[tuple[str, ...], ...] | None], ...]:
+    """Name, and of arrays their axes as said in words, each a sum of numbers and sizes; None of whole numbers."""
+    return tuple((name, None if kind is int else _said(kind)) for name, kind in _hints(record).items())
+
+
+def _said(kind: Any) -> tuple[tuple[str, ...], ...]:
+    return tuple(tuple(axis.split("+")) for axis in kind.__metadata__[0].split())
 
 
 def room(record: type[R], **sizes: int) -> R:
@@ -62,19 +73,18 @@ def room(record: type[R], **sizes: int) -> R:
     Whole numbers are given beside the sizes, by the names of their fields.
     """
     make: Callable[..., R] = record
-    fields = _hints(record).items()
-    return make(*(sizes[name] if kind is int else _zeros(kind, sizes) for name, kind in fields))
+    return make(*(sizes[name] if axes is None else _zeros(axes, sizes) for name, axes in _shapes(record)))
 
 
-def _zeros(kind: Any, sizes: dict[str, int]) -> Array:
-    """Of the shape that an annotation tells: axes apart, each a sum of numbers and sizes."""
-    axes = [axis.split("+") for axis in kind.__metadata__[0].split()]
+def _zeros(axes: tuple[tuple[str, ...], ...], sizes: dict[str, int]) -> Array:
+    """Of the shape that axes tell."""
     return np.zeros([sum(int(part) if part.isdigit() else sizes[part] for part in axis) for axis in axes])
 
 
 def table_size(record: type[Any]) -> int:
     """Integers that say where a record lies: of records put one after the other, the distance of their tables."""
-    return sum(1 if axes is None else 1 + axes for _, axes, _ in _fields(record))
+    fields: tuple[tuple[str, int | None, bool], ...] = _fields(record)  # type: ignore[arg-type]  # classes can be hashed
+    return sum(1 if axes is None else 1 + axes for _, axes, _ in fields)
 
 
 def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
@@ -94,7 +104,7 @@ def reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
         return plain
     from erls.maths import record_code
 
-    read: Any = record_code.reader(record, tuple(_fields(record)))
+    read: Any = record_code.reader(record, _fields(record))
     read.in_python = plain
     return read  # type: ignore[no-any-return]
 

@@ -49,16 +49,27 @@ def up_to(values: Sequence[float], end: float, horizon: float | None) -> float:
 def ratio(row: Row, part: str) -> float | None:
     """Stated over actual error; None where either is missing or the reference is in doubt by too much.
 
-    Both are counted from `FLOOR` on, so that what is stated below it is enough for what is below it.
+    Both are counted from `FLOOR` on, so that what is stated below it is enough for what is below it. Up to a stated
+    horizon the error is stated to be within the tolerance: that is what counts where the reference is in doubt later
+    on, and where the motion is farther off by then.
     """
     stated, actual = row.get("stated") or {}, (row.get("actual") or {}).get(part)
     if stated.get(part) is None or not actual:
         return None
-    off = max(up_to(actual, row["end"], stated.get("horizon")), FLOOR)
-    doubt = (row.get("doubt") or {}).get("integration" if part == "integration" else "total")
-    if doubt and up_to(doubt, row["end"], stated.get("horizon")) > DOUBTFUL * off:
-        return None
-    return max(stated[part], FLOOR) / off
+    doubts, horizon = (row.get("doubt") or {}).get("integration" if part == "integration" else "total"), stated["horizon"]
+
+    def over(error: float, until: float | None) -> float | None:
+        off = max(up_to(actual, row["end"], until), FLOOR)
+        doubt = up_to(doubts, row["end"], until) if doubts else 0.0
+        return None if doubt > DOUBTFUL * off else max(error, FLOOR) / off
+
+    whole = over(stated[part], None)
+    if horizon is None:
+        return whole
+    before = over(row["tolerance"], horizon)
+    if whole is None or (before is not None and before < 1):
+        return before
+    return whole
 
 
 def print_table(rows: list[Row], subjects: Sequence[str]) -> int:
