@@ -17,7 +17,6 @@ from erls.accuracy.force_errors import force_differences
 from erls.accuracy.judged_places import judged_places
 from erls.accuracy.vibrations import FastModes, fast_modes, wrong_table
 from erls.auto.outputs import Watched
-from erls.equations.loops.tied import Tied
 from erls.equations.substructures import solved
 from erls.integrate.choice import options_of
 from erls.integrate.global_error import ENDS, ENDS_STIFF, GlobalError, global_error
@@ -68,7 +67,7 @@ class IntegrationError:
 
 
 def integration_error(run: ChainRun, watched: Watched) -> IntegrationError:
-    """Estimate it, of a run by `erls.integrate.lobatto` of which all steps were kept.
+    """Estimate it, of a run without loops by `erls.integrate.lobatto` of which all steps were kept.
 
     Parameters
     ----------
@@ -82,7 +81,6 @@ def integration_error(run: ChainRun, watched: Watched) -> IntegrationError:
         The equations cannot be evaluated beside the motion.
     """
     system, s = solved(run.formulation), run.solution
-    tied = isinstance(system, Tied)
     rigid = not any(link.elastic_modes for link in run.formulation.mechanism.links)
     found = global_error(
         system,  # type: ignore[arg-type]
@@ -91,8 +89,7 @@ def integration_error(run: ChainRun, watched: Watched) -> IntegrationError:
         run.formulation.mechanism.reach,
         _ROUNDING,
         [k - n for k, n in _vectors(run)],
-        tied,
-        ENDS if tied or rigid or s.work.steps < _MANY else ENDS_STIFF,
+        ENDS if rigid or s.work.steps < _MANY else ENDS_STIFF,
     )
     return _estimate(run, watched, system, found)
 

@@ -13,7 +13,6 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.accuracy.phase import lobatto_wrong, wrong_over_run
-from erls.equations.loops.tied import Tied
 from erls.equations.quick import quick
 from erls.equations.system import metre_scales
 from erls.integrate.base import Solution
@@ -96,15 +95,7 @@ def _around(knot: int, count: int) -> tuple[int, int]:
 
 
 def _modes(system: Any, t: float, y: Array, v: Array) -> tuple[Array, Array, Array, Array]:
-    """(m,) rising ω², (n, m) modes of unit modal mass, (n, n) mass and damping; of tied coordinates those that their
-    conditions allow.
-    """
-    if isinstance(system, Tied):
-        mass, (stiffness, damping) = system.loops.masses(t, y), system.loops.matrices(t, y, v)  # type: ignore[attr-defined]
-        rows = system.scaled_rows(system.closure(t, y, v), system.kept)  # type: ignore[attr-defined]
-        free = la.null_space(rows) / system.metres[:, None]
-        squares, modes = _of(free.T @ stiffness @ free, free.T @ mass @ free)
-        return squares, free @ modes, mass, damping
+    """(m,) rising ω², (n, m) modes of unit modal mass, (n, n) mass and damping."""
     fast = quick(system)
     mass, (stiffness, damping) = fast.mass_matrix(t, y), fast.stiffness_and_damping(t, y, v)
     return *_of(stiffness, mass), mass, damping

@@ -18,9 +18,8 @@ Vibrations that the steps of e do not resolve would enter P̈ as noise. Residual
 M Re (1 - i cot φ)(M + τ² exp(iφ) K)⁻¹, which lets the share 1/(1 + 2 cos φ (ωτ)² + (ωτ)⁴) of a mode through;
 `erls.accuracy.vibrations` adds what faster ones lose of their phase, for a known method a closed form.
 
-Where conditions tie coordinates, P between the nodes of a run violates them, and stiff links make large forces of that.
-There the driving forces are taken at the ends of steps, where P is the motion itself, and e is followed at the nodes of
-the run, or against the residuals of P between them.
+Where conditions tie coordinates, P between the nodes of a run violates them, and stiff links make large forces of that:
+the error of loops is not found so.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import SimulationError
 from erls.integrate.base import Solution
 from erls.integrate.charts import exchanged
-from erls.integrate.lobatto import NODES, coefficients
+from erls.integrate.lobatto import coefficients
 from erls.maths.jit import plain
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -98,7 +97,6 @@ def global_error(
     reach: float,
     disturbance: float = 0.0,
     rotation_vectors: Sequence[int] = (),
-    tied: bool = False,
     ends: int = 6,
 ) -> GlobalError:
     """Follow the error of a run of which all steps were kept.
@@ -116,13 +114,11 @@ def global_error(
         Error of each coordinate at the start, relative to the largest one in metres: rounding.
     rotation_vectors : sequence of int
         As of `erls.integrate.charts.exchanged`.
-    tied : bool
-        Whether conditions tie the coordinates (loops).
     ends : int
         Of steps, through which the motion is interpolated: `ENDS`, or `ENDS_STIFF` where steps leave vibrations
         unresolved, whose rates say nothing.
     """
-    follower = _Follower(system, solution, tolerance, reach, tied, ends)
+    follower = _Follower(system, solution, tolerance, reach, ends)
     n = system.size
     size = disturbance * max(float(np.abs(follower.metres * solution.y).max(initial=0.0)), 1e-3 * reach)
     signs = np.where(np.arange(n) % 2, -1.0, 1.0)
@@ -170,7 +166,7 @@ class _Follower:
     """Memory of the loop (`erls.integrate.stepping.error_steps`) over one run."""
 
     def __init__(
-        self, system: SecondOrderSystem, solution: Solution, tolerance: float, reach: float, tied: bool, ends: int
+        self, system: SecondOrderSystem, solution: Solution, tolerance: float, reach: float, ends: int
     ) -> None:
         from erls.equations.uncompiled import uncompiled  # here: they import the compiler
         from erls.integrate.stepping import error_steps as loop
@@ -182,13 +178,10 @@ class _Follower:
         self.follow = loop.follow if compiled else plain(loop.follow, within=False)
         self.functions, factoring = self.compiled.functions(), self.compiled.factoring
         steps, calls = max(solution.work.steps, 1), max(solution.work.rhs_calls, 1)
-        self.kind = loop.BETWEEN if tied else loop.UNTIED
         self.coefficients = coefficients(nodes())
         wanted = int(np.ceil(STAGES * _ITERATIONS * steps / (_COST * calls)))
-        smooth = ends == ENDS and not tied
+        smooth = ends == ENDS
         merged = _MERGED_SMOOTH if smooth else max(_MERGED_LARGE if n > _LARGE else _MERGED, wanted)
-        if tied and solution.nodes_per_step == len(NODES) - 1:
-            self.kind, self.coefficients, merged = loop.AT_NODES, coefficients(NODES), 1
         stages = self.coefficients.shape[1] - 1
         pairs = (stages + 1) // 2
         size, exchanges = (n * n, n) if factoring is None else (factoring.size, 0)
@@ -201,7 +194,7 @@ class _Follower:
         self.metres = self.vectors[at.METRES] = metre_scales(system)
         self.table = np.zeros((loop.CONDITIONS, n))
         self.counts = np.zeros(loop.COUNTS, dtype=np.int64)
-        self.counts[[loop.MERGED, loop.TIED, loop.ENDS]] = merged, self.kind, ends
+        self.counts[[loop.MERGED, loop.ENDS]] = merged, ends
         most, least = _SHARES
         self.known = np.zeros(loop.KNOWN)
         all_steps = _ALL_STEPS_SMOOTH if smooth else _ALL_STEPS
@@ -209,16 +202,12 @@ class _Follower:
         self.known[loop.LARGEST] = _ROUNDING * reach if smooth else _NEGLIGIBLE * tolerance
         self.known[loop.CUT] = _SHARP * stages if smooth else stages
         self.known[loop.BOUND], self.known[loop.RATE] = reach, loop.SLOWEST
-        self.first, self.last, self.at_nodes = loop.FIRST, loop.LAST, self.kind == loop.AT_NODES
+        self.first, self.last = loop.FIRST, loop.LAST
 
     def leg(self, at: IntArray, e: Array, rate: Array) -> tuple[IntArray, Array, bool]:
         """Which of the knots ``at`` bound steps of the error, (j, 2, n) e and ė there, whether to the end."""
         s = self.solution
         t, knots = s.t[at], np.stack([s.y[at], s.v[at], s.a[at]], axis=1)
-        inner = np.zeros((0, 3, len(e)))
-        if self.at_nodes:
-            every = slice(int(at[0]) + 1, int(at[-1]) + 1)
-            inner = np.stack([s.y[every], s.v[every], s.a[every]], axis=1)
         hair = min(_HAIR * max(1.0, abs(t[0]), abs(t[-1])), (t[-1] - t[0]) / 4)
         self.known[[self.first, self.last]] = t[0] + hair, t[-1] - hair
         ends, found = np.zeros(len(at), dtype=np.int64), np.zeros((len(at), 2, len(e)))
@@ -248,8 +237,6 @@ class _Follower:
                 self.table,
                 t,
                 knots,
-                inner,
-                np.zeros((len(t) if self.kind else 0, len(e))),
                 ends,
                 found,
             )

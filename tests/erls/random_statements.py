@@ -56,7 +56,8 @@ def ratio(row: Row, part: str) -> float | None:
     stated, actual = row.get("stated") or {}, (row.get("actual") or {}).get(part)
     if stated.get(part) is None or not actual:
         return None
-    doubts, horizon = (row.get("doubt") or {}).get("integration" if part == "integration" else "total"), stated["horizon"]
+    doubts = (row.get("doubt") or {}).get("integration" if part == "integration" else "total")
+    horizon = stated["horizon"]
 
     def over(error: float, until: float | None) -> float | None:
         off = max(up_to(actual, row["end"], until), FLOOR)

@@ -36,11 +36,10 @@ from erls.maths.jit import ENABLED, guide, helper, kernel
 # keeps (steps over τ), what is too far, and how much of a change the next iteration leaves
 FIRST, LAST, SHARE, LARGEST, CUT, BOUND, RATE = range(7)
 KNOWN = 7
-# counts: evaluations of residuals, steps of the run in one of the error, how ties of coordinates are met (`drives`),
-# ends of steps through which the motion is interpolated
-EVALUATIONS, MERGED, TIED, ENDS = range(4)
-COUNTS = 4
-UNTIED, BETWEEN, AT_NODES = range(3)  # tied coordinates, their error between nodes of the run, and at them
+# counts: evaluations of residuals, steps of the run in one of the error, ends of steps through which the motion is
+# interpolated
+EVALUATIONS, MERGED, ENDS = range(3)
+COUNTS = 3
 CONDITIONS = 12  # of interpolation, at the most: rows of a table
 MOST_ITERATIONS = 12
 FASTEST, SLOWEST = 1e-3, 0.5  # bounds on what an iteration leaves
@@ -71,8 +70,6 @@ if ENABLED:
         contract.MATRIX,
         contract.REALS,
         _CUBE,
-        _CUBE,
-        contract.MATRIX,
         contract.INTEGERS,
         _CUBE,
     )
@@ -132,80 +129,6 @@ def foretell(h: float, coefficients: Array, stages: Array, matrices: Array, vect
 
 
 @guide
-def drives(
-    system: Functions,
-    reals: Array,
-    integers: IntArray,
-    scratch: Array,
-    known: Array,
-    counts: IntArray,
-    table: Array,
-    group: int,
-    given: int,
-    t: Array,
-    knots: Array,
-    motion: Array,
-    driven: Array,
-) -> None:
-    """What P̈ leaves out of balance at the ends of the steps, where places and rates are those of the motion.
-
-    Between them P may violate the conditions that tie coordinates, by as little as vibrations that no step resolves;
-    stiff links make large forces of it, which turn up in all coordinates, past the filter.
-    """
-    last = len(t) - 1
-    for k in range(last + 1):
-        first = max(min(k - group // 2 + 1, last + 1 - group), 0)
-        differences(t, knots, first, group, given, table)
-        interpolate(t, first, group, given, table, t[k], motion[0])
-        time = min(max(t[k], known[FIRST]), known[LAST])
-        call_residual(
-            system.residual, reals, integers, scratch, time, knots[k, 0], knots[k, 1], motion[0, 2], driven[k]
-        )
-        counts[EVALUATIONS] += 1
-
-
-@guide
-def balance(
-    system: Functions,
-    scratch: Array,
-    begin: float,
-    h: float,
-    known: Array,
-    counts: IntArray,
-    coefficients: Array,
-    motion: Array,
-    matrices: Array,
-    vectors: Array,
-    way: Any,
-    t: Array,
-    driven: Array,
-) -> None:
-    """What residuals of a tied system count from: those of P (none at nodes of the run), less what drives the error."""
-    m, n = motion.shape[0] - 1, motion.shape[2]
-    drive = vectors[RESIDUALS]
-    right = 1
-    for i in range(1, m + 1):
-        time = begin + h * coefficients[ROWS, NODES, i]
-        while right < len(t) - 1 and t[right] < time:
-            right += 1
-        share = (time - t[right - 1]) / (t[right] - t[right - 1])
-        for q in range(n):
-            drive[q] = (1.0 - share) * driven[right - 1, q] + share * driven[right, q]
-        smooth(drive, matrices, vectors, way, pairs(m))
-        held = vectors[RESIDUALS + 2 * m + i]
-        if counts[TIED] == AT_NODES:
-            for q in range(n):
-                held[q] = -drive[q]
-            continue
-        time = min(max(time, known[FIRST]), known[LAST])
-        y, v, a = motion[i, 0], motion[i, 1], motion[i, 2]
-        call_residual(system.residual, way[2], way[3], scratch, time, y, v, a, held)
-        counts[EVALUATIONS] += 1
-        for q in range(n):
-            held[q] -= drive[q]
-
-
-@guide
 def settle(
     system: Functions,
     scratch: Array,
@@ -223,7 +146,7 @@ def settle(
 ) -> bool:
     """Iterate on the stages of a step; whether they settle, or ``loose``, come near to it.
 
-    What the filter holds back of the first residuals stays out of balance; of a tied system what `balance` left.
+    What the filter holds back of the first residuals stays out of balance.
     """
     m, n = stages.shape[0] - 1, stages.shape[2]
     reals, integers = way[2], way[3]
@@ -239,7 +162,7 @@ def settle(
             out, held = vectors[RESIDUALS + i - 1], vectors[RESIDUALS + 2 * m + i]
             call_residual(system.residual, reals, integers, scratch, time, y, v, a, out)
             counts[EVALUATIONS] += 1
-            if k == 0 and not counts[TIED]:
+            if k == 0:
                 for q in range(n):
                     held[q] = out[q]
                 smooth(out, matrices, vectors, way, pairs(m))
@@ -291,8 +214,6 @@ def follow(
     table: Array,
     t: Array,
     knots: Array,
-    inner: Array,
-    driven: Array,
     ends: IntArray,
     found: Array,
 ) -> int:
@@ -304,10 +225,6 @@ def follow(
         Ends of the steps of the leg.
     knots : (k, 3, n) array
         y, v, a there.
-    inner : (j, 3, n) array
-        Of a tied system, y, v, a at all nodes of all steps but the first of each, or nothing.
-    driven : (k, n) array
-        Of a tied system, memory.
     ends : (k,) array
         Gets the numbers of those that bound the steps of the error, from the second on.
     found : (k, 2, n) array
@@ -323,8 +240,6 @@ def follow(
     group = min(counts[ENDS], last + 1)
     given = max(1, min(3, CONDITIONS // group))
     tabled = -1
-    if counts[TIED]:
-        drives(system, reals, integers, scratch, known, counts, table, group, given, t, knots, motion, driven)
     while ends[made] < last:
         begin = ends[made]
         left = last - begin
@@ -354,11 +269,6 @@ def follow(
             break
         foretell(h, coefficients, stages, matrices, vectors, way)
         for i in range(1, stages.shape[0]):
-            if counts[TIED] == AT_NODES:
-                for kind in range(3):
-                    for q in range(n):
-                        motion[i, kind, q] = inner[begin * (stages.shape[0] - 1) + i - 1, kind, q]
-                continue
             time = t[begin] + h * coefficients[ROWS, NODES, i]
             here = begin
             while here < last and t[here + 1] <= time:
@@ -368,10 +278,6 @@ def follow(
                 differences(t, knots, first, group, given, table)
                 tabled = first
             interpolate(t, first, group, given, table, time, motion[i])
-        if counts[TIED]:
-            balance(
-                system, scratch, t[begin], h, known, counts, coefficients, motion, matrices, vectors, way, t, driven
-            )
         one = end == begin + 1
         if settle(
             system, scratch, t[begin], h, known, counts, coefficients, stages, motion, matrices, vectors, way, one
