@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 
 from erls.accuracy.kernels import kernels_of
@@ -49,8 +50,16 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     with announcing(tell):
         found = stated(found)
         if asked.strict:
-            return kept_to(found, lambda scene: run(scene, found.formulation.mechanism), tell)
+            return kept_to(found, lambda other: run(other, _mechanism(other, found, tell)), tell)
     return found
+
+
+def _mechanism(scene: Scene, run: ChainRun, tell: Callable[[str], None]) -> Mechanism:
+    """That of a run, or one built anew where the scene has other links or effects."""
+    now, before = scene.record, run.scene.record
+    if now.links == before.links and now.simulation.effects == before.simulation.effects:
+        return run.formulation.mechanism
+    return build_mechanism(scene, tell).mechanism
 
 
 def models_of(run: ChainRun) -> tuple[list[ModalModel], list[LinkDescription | None], list[list[ModalModel]]]:

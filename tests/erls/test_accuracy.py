@@ -176,6 +176,20 @@ def test_strict_runs_are_repeated_until_they_keep_the_tolerance(tmp_path: Path) 
                  "links.0.reduction.elastic_modes=2", "--set", "simulation.tolerance=1e-9"]) == 4  # fmt: skip
 
 
+def test_strict_runs_get_the_modes_and_effects_that_they_lack() -> None:
+    """Two modes, linear: limited by both; repeated with all, within the tolerance."""
+    lacking = ["links.0.reduction.elastic_modes=2", "simulation.effects='linear'", "simulation.duration=0.3"]
+    loose = erls.simulate(erls.load_scene(DATA / "l_shape/steel_tall.toml", lacking))
+    assert isinstance(loose, ChainRun)
+    assert loose.accuracy is not None
+    assert (loose.accuracy.modes or 0.0) > 1e-4
+    run = erls.simulate(erls.load_scene(DATA / "l_shape/steel_tall.toml", lacking), strict=True)
+    assert isinstance(run, ChainRun)
+    assert run.trust is not None
+    assert run.trust.verdict == "good"
+    assert run.formulation.mechanism.links[0].elastic_modes > 2
+
+
 def test_equilibria_state_what_their_mesh_leaves() -> None:
     """Eight chords of the 45° bend, against 64 elements on the arc; the roll-up is exact with any mesh."""
     coarse = erls.simulate(DATA / "statics/bend_45.toml")
