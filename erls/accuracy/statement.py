@@ -112,6 +112,6 @@ _REMEDIES = {
     "integration": "a smaller simulation.tolerance, or a smaller step",
     "modes": "more elastic_modes in the links' reductions, or finer meshes",
     "effects": "effects = 'all'",
-    "links": "substructures (formulation ffr), or formulation nodal",
+    "links": "effects = 'all', substructures (formulation ffr), or formulation nodal",
     "output": "a smaller simulation.output_step",
 }

@@ -79,14 +79,15 @@ def _better(run: ChainRun, wanted: float) -> tuple[Scene, list[str]]:
     what links leave out is too large by itself.
     """
     accuracy, record = run.accuracy, run.scene.record
-    if accuracy is None or accuracy.total is None or (accuracy.links or 0.0) > wanted:
-        return run.scene, []
     settings, links, changes = record.simulation, record.links, list[str]()
+    lacking = settings.effects not in ("all", "auto")
+    if accuracy is None or accuracy.total is None or ((accuracy.links or 0.0) > wanted and not lacking):
+        return run.scene, []
     large = {name for name in PARTS if (getattr(accuracy, name) or 0.0) > _FAIR * wanted}
     if "modes" in large:
         links = [_with_more_modes(run.scene, link) for link in links]
         changes += ["more modes"] if links != record.links else []
-    if "effects" in large and settings.effects not in ("all", "auto"):
+    if lacking and large & {"effects", "links"}:
         settings, changes = msgspec.structs.replace(settings, effects="all"), [*changes, "all effects"]
     if "output" in large and settings.output_step is not None:
         settings = msgspec.structs.replace(settings, output_step=settings.output_step / _MORE)
