@@ -27,8 +27,10 @@ SAFETY = 1.5
 SUDDEN = 3.0
 """Times as large an error where forces change all at once, at an instant that small vibrations decide."""
 
+ITERATED = 0.03
+"""Of what the integration aims at: what Newton's iterations leave, which is no smooth error."""
+
 _MANY = 200  # steps from which on positions alone tell a motion better than with rates, which vibrations spoil
-_ITERATED = 0.03  # of what the integration aims at: what Newton's iterations leave, which is no smooth error
 _EXPECTED = 5.0  # times what the integration aimed at
 _PLACES, _FORCES = 40, 8  # instants at which points, and forces, are compared
 _ROUNDING = 1e-16
@@ -111,7 +113,7 @@ def _estimate(run: ChainRun, watched: Watched, system: Any, found: GlobalError) 
     along = (found.t[looks] - found.t[0]) / max(float(run.end - found.t[0]), 1e-300)
     safety = SAFETY * (SUDDEN if sudden(run) else 1.0)
     aim = options_of(settings).tolerance
-    error = safety * (np.maximum.accumulate(slow) + along * vibrating) + _ITERATED * aim
+    error = safety * (np.maximum.accumulate(slow) + along * vibrating) + ITERATED * aim
     effort, reaction = _forces(run, found, fast)
     return IntegrationError(
         found.t[looks], error, safety * effort, safety * reaction, found.evaluations, found.whole

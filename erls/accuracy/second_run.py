@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from erls.accuracy.force_errors import force_differences
+from erls.accuracy.integration import ITERATED
 from erls.accuracy.judged_places import judged_places
 from erls.auto.outputs import Watched
+from erls.equations.formulation import Formulation
 from erls.equations.substructures import solved
 from erls.errors import Cause
-from erls.integrate.base import Solution, StopRun, hermite
+from erls.integrate.base import Options, Solution, StopRun, hermite
 from erls.integrate.choice import integrator, options_of
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
@@ -26,7 +28,7 @@ from erls.run.chain.run import ChainRun
 LARGER = 8.0
 """Tolerance of the second run, of that of the first; where that tells nothing, so much smaller."""
 
-_SHARE = 1.2  # of the distance
+_SHARE, _SHARE_SMALLER = 1.2, 2.0  # of the distance; of a better run, which still errs where friction decides
 _PLACES, _FORCES = 60, 8
 _LIKE = 0.95  # steps of a run at a larger tolerance, of those of the run: as many are the same ones
 _MOST = 4  # times the evaluations of the run that a second one may take
@@ -62,29 +64,27 @@ def second_run_error(run: ChainRun, watched: Watched) -> SecondRun | None:
     watched : tuple of (int, int)
         Link and node of each judged point.
     """
-    found = _second(run, LARGER)
+    found, share = _second(run, LARGER), _SHARE
     if found is None or found.work.steps > _LIKE * run.solution.work.steps:
-        found = _second(run, 1 / LARGER) or found
+        better = _second(run, 1 / LARGER)
+        found, share = (found, _SHARE) if better is None else (better, _SHARE_SMALLER)
     if found is None:
         return None
-    formulation, own = solved(run.formulation), run.solution
-    looks = run.looks(_PLACES)
-    states = [hermite(s.t, s.y, s.v, s.a, looks) for s in (own, found)]
-    here, there = (judged_places(formulation, watched, looks, *at) for at in states)
-    apart = np.linalg.norm(here - there, axis=-1).max(axis=1, initial=0.0)
-    few = np.unique(np.linspace(0, len(looks) - 1, _FORCES).astype(int))
-    (y, v), (other_y, other_v) = states
-    known = force_differences(run.formulation, looks[few], (y[few], v[few]), (other_y[few], other_v[few]))
+    own, formulation = run.solution, solved(run.formulation)
+    looks, apart = distance_from(run, watched, formulation, found)
+    few = looks[np.unique(np.linspace(0, len(looks) - 1, _FORCES).astype(int))]
+    (y, v), (other_y, other_v) = (hermite(s.t, s.y, s.v, s.a, few) for s in (own, found))
+    known = force_differences(run.formulation, few, (y, v), (other_y, other_v))
     effort = reaction = np.full(len(run.joint_names), np.nan)
     if known is not None:
-        effort, reaction = known.relative(_SHARE * known.apart.max(axis=1, initial=0.0))
-    return SecondRun(looks, _SHARE * np.maximum.accumulate(apart), effort, reaction)
+        effort, reaction = known.relative(share * known.apart.max(axis=1, initial=0.0))
+    aim = options_of(run.scene.record.simulation).tolerance
+    return SecondRun(looks, share * apart + ITERATED * aim, effort, reaction)
 
 
 def _second(run: ChainRun, times: float) -> Solution | None:
     """A run at so many times the tolerance; None where it fails."""
-    settings, formulation = run.scene.record.simulation, solved(run.formulation)
-    given = options_of(settings)
+    given = options_of(run.scene.record.simulation)
     changed = replace(
         given,
         tolerance=times * given.tolerance,
@@ -92,15 +92,38 @@ def _second(run: ChainRun, times: float) -> Solution | None:
         atol=times * given.atol,
         output_step=None,
     )
-    y, v = formulation.initial_state()
-    span = float(run.solution.t[0]), run.end
+    return other_run(run, solved(run.formulation), changed)
+
+
+def other_run(run: ChainRun, formulation: Formulation, options: Options) -> Solution | None:
+    """Integrate other equations, or with other options, over the time of a run; None where that fails, or takes much
+    longer.
+
+    Raises
+    ------
+    SimulationError
+        INTERRUPTED.
+    """
     most = _MOST * run.solution.work.rhs_calls
 
     def limit(t: float, knots: Callable[[], Solution]) -> None:
         if knots().work.rhs_calls > most:
             raise StopRun
 
-    found = integrator(formulation.mechanism, settings)(formulation, span, y, v, changed, limit)
+    integrate = integrator(formulation.mechanism, run.scene.record.simulation)
+    found = integrate(formulation, (float(run.solution.t[0]), run.end), *formulation.initial_state(), options, limit)
     if found.failure is not None and found.failure.cause == Cause.INTERRUPTED:
         raise found.failure
     return found if found.failure is None and found.t[-1] >= run.end else None
+
+
+def distance_from(
+    run: ChainRun, watched: Watched, formulation: Formulation, other: Solution
+) -> tuple[Array, Array]:
+    """Times (k,) [s], and how far any judged point of a run and of other equations were apart up to each [m]."""
+    looks, own = run.looks(_PLACES), run.solution
+    here, there = (
+        judged_places(of, watched, looks, *hermite(s.t, s.y, s.v, s.a, looks))
+        for of, s in ((solved(run.formulation), own), (formulation, other))
+    )
+    return looks, np.maximum.accumulate(np.linalg.norm(here - there, axis=-1).max(axis=1, initial=0.0))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from erls.accuracy.audits import audits
+from erls.accuracy.integration import ITERATED
 from erls.accuracy.judged_integration import Integrated, judged_integration
 from erls.accuracy.judged_places import judged_nodes
 from erls.accuracy.left_out_effects import effects_error
@@ -18,6 +19,7 @@ from erls.accuracy.modes import modes_error
 from erls.accuracy.verdict import verdict
 from erls.auto.outputs import watched_nodes
 from erls.errors import Cause, SimulationError
+from erls.integrate.choice import options_of
 from erls.run.accuracy import PARTS, Accuracy
 from erls.run.chain.run import ChainRun
 from erls.run.watches.stored_output import output_error
@@ -66,7 +68,9 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
         judged_at=_names(run),
         unjudged={name: found[name].note for name in PARTS if found[name].error is None},
     )
-    breaches = [audit.text for audit in audits(run, accuracy.integration) if not audit.ok]
+    iterated = ITERATED * options_of(run.scene.record.simulation).tolerance  # what no audit need find
+    granted = None if accuracy.integration is None else max(accuracy.integration, iterated)
+    breaches = [audit.text for audit in audits(run, granted) if not audit.ok]
     trust = verdict(accuracy, breaches, tolerance, _REMEDIES, integrated.growth())
     return replace(run, accuracy=accuracy, trust=trust)
 
