@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from erls.accuracy.error_over_time import ErrorOverTime
 from erls.accuracy.force_errors import force_differences
 from erls.accuracy.judged_places import judged_places
 from erls.accuracy.vibrations import FastModes, fast_modes, wrong_table
@@ -38,34 +39,19 @@ _MODES_OF_FORCES = 2  # fast modes, of each instant
 
 
 @dataclass(frozen=True)
-class IntegrationError:
-    """Of points and forces.
+class IntegrationError(ErrorOverTime):
+    """What the error equation says.
 
     Attributes
     ----------
-    times : (k,) array
-        [s]
-    error : (k,) array
-        Largest error of a point up to each time [m].
-    effort, reaction : (joints,) arrays
-        Relative to the peak of each over the run.
     evaluations : int
         Of residuals.
     whole : bool
         Whether it could be followed to the end of the run.
     """
 
-    times: Array
-    error: Array
-    effort: Array
-    reaction: Array
     evaluations: int
     whole: bool
-
-    @property
-    def total(self) -> float:
-        """Over the run [m]."""
-        return float(self.error[-1])
 
 
 def integration_error(run: ChainRun, watched: Watched) -> IntegrationError:

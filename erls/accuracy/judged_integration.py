@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from erls.accuracy.constrained_integration import constrained_integration_error
+from erls.accuracy.error_over_time import ErrorOverTime
 from erls.accuracy.integration import SUDDEN, IntegrationError, expected, integration_error, sudden
-from erls.accuracy.second_run import SecondRun, second_run_error
+from erls.accuracy.second_run import second_run_error
 from erls.accuracy.vibrations import wrong_table
 from erls.auto.outputs import Watched
 from erls.equations.registry import system_of
@@ -101,7 +102,7 @@ def judged_integration(run: ChainRun, watched: Watched, others: float) -> Integr
         if second is None:
             return Integrated(np.zeros(0), np.zeros(0), none, none, "second runs at other tolerances fail")
         return _with_forces(run, second)
-    if second is None or not second.error[-1] < found.total:
+    if second is None or not second.total < found.total:
         return _with_forces(run, found)
     return _with_forces(run, found)._replace(times=second.times, error=second.error)
 
@@ -115,7 +116,7 @@ def _of_companion(run: ChainRun, none: dict[str, float | None]) -> Integrated:
     return Integrated(known.times, (SUDDEN if sudden(run) else 1.0) * known.error, efforts, reactions)
 
 
-def _with_forces(run: ChainRun, found: IntegrationError | SecondRun) -> Integrated:
+def _with_forces(run: ChainRun, found: ErrorOverTime) -> Integrated:
     """With errors of efforts and reactions."""
     return Integrated(found.times, found.error, _named(run, found.effort), _named(run, found.reaction))
 

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from erls.accuracy.judged_places import judged_nodes
-from erls.accuracy.second_run import distance_from, other_run
+from erls.accuracy.other_run import distance_from, other_run
 from erls.auto.certify import certify
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved

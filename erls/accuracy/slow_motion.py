@@ -70,17 +70,31 @@ def parted(run: ChainRun, moving: Formulation, compared: Compared) -> Parted | N
         y, v, a = _with_static_modes(moving, t, hermite_knots(s.t, s.y, s.v, s.a, t))
     else:
         y, v, a = hermite_knots(s.t, s.y, s.v, s.a, t)
+    middles, means = averages(t, y, per)
+    vibration = [row - _between(t, middles, mean) for row, mean in zip((y, v, a), means, strict=True)]
+    slow, start = embedded(compared, middles, means), embedded(compared, t[:1], [y[:1], v[:1], 0 * a[:1]])
+    return Parted(slow, start, t, y, v, (vibration[0], vibration[1], vibration[2]))
+
+
+def averages(t: Array, y: Array, per: int) -> tuple[Array, list[Array]]:
+    """Middles (w,) of windows, and averages of places, rates and accelerations over them, (w, n) each.
+
+    Parameters
+    ----------
+    t : (k,) array
+        Even instants [s]; k - 1 is a multiple of ``per``.
+    y : (k, n) array
+        Places.
+    per : int
+        Instants in half a window.
+    """
     x = np.arange(-per, per + 1) / per
     weight = (1 - x**2) ** 3
     weight = np.pad(weight / weight.sum(), 1)
     step = float(t[1] - t[0])
     rate, twice = -np.gradient(weight, step)[1:-1], np.diff(weight, 2) / step**2
-    spans = per * np.arange(windows)[:, None] + np.arange(2 * per + 1)
-    means = [np.einsum("k,wkn->wn", own, y[spans]) for own in (weight[1:-1], rate, twice)]
-    middles = t[spans[:, per]]
-    vibration = [row - _between(t, middles, mean) for row, mean in zip((y, v, a), means, strict=True)]
-    slow, start = embedded(compared, middles, means), embedded(compared, t[:1], [y[:1], v[:1], 0 * a[:1]])
-    return Parted(slow, start, t, y, v, (vibration[0], vibration[1], vibration[2]))
+    spans = per * np.arange((len(t) - 1) // per - 1)[:, None] + np.arange(2 * per + 1)
+    return t[spans[:, per]], [np.einsum("k,wkn->wn", own, y[spans]) for own in (weight[1:-1], rate, twice)]
 
 
 def _windows(s: Solution, joints: int) -> int:

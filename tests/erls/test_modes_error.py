@@ -11,6 +11,7 @@ import pytest
 import scenes
 
 from erls.accuracy.modes import modes_error
+from erls.accuracy.slow_motion import averages
 from erls.run.chain.run import ChainRun
 from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
@@ -185,3 +186,14 @@ def test_a_link_that_has_changed_is_not_judged(tmp_path: Path) -> None:
     error, note = modes_error(run)
     assert error is None
     assert "not the one" in note
+
+
+def test_windows_see_the_slow_motion_through_a_quick_vibration() -> None:
+    """A parabola with a tenth of a millimetre at 40 Hz, whose accelerations are three times its own: to a hundredth."""
+    t = np.linspace(0.0, 2.0, 401)
+    quick = 1e-4 * np.sin(2 * np.pi * 40 * t)
+    middles, (place, rate, acceleration) = averages(t, (0.3 + 0.5 * t + 1.0 * t**2 + quick)[:, None], 16)
+    assert len(middles) == 24
+    assert np.allclose(rate[:, 0], 0.5 + 2.0 * middles, rtol=0, atol=0.01)
+    assert np.allclose(acceleration, 2.0, rtol=0, atol=0.02)
+    assert np.allclose(place[:, 0], 0.3 + 0.5 * middles + middles**2, rtol=0, atol=1e-3)
