@@ -60,7 +60,7 @@ _lately: dict[str, LeftOut] = {}
 
 
 def left_out_cached(
-    link: Callable[[], LinkFile], modal: ModalModel, folder: Path, loaded: Sequence[int] = (), mesh_only: bool = False
+    link: Callable[[], LinkFile], modal: ModalModel, folder: Path, loaded: Sequence[int] = ()
 ) -> LeftOut:
     """What a reduced link leaves out of its finite-element model: what this process has found lately, a file beside
     the reductions of a cache folder, or made now.
@@ -72,7 +72,7 @@ def left_out_cached(
     modal : ModalModel
         A reduction with its provenance, truncated to the modes in use.
     folder : Path
-    loaded, mesh_only
+    loaded : sequence of int
         See `fe_import.reduction.left_out.left_out_of`.
 
     Raises
@@ -82,7 +82,7 @@ def left_out_cached(
     """
     source = modal.provenance.get("sha256", "")
     frequencies = hashlib.sha256(modal.frequencies_hz.tobytes()).hexdigest()
-    content = f"{source} {modal.modes} {frequencies} {sorted(loaded)} {mesh_only} {_sources_hash()}"
+    content = f"{source} {modal.modes} {frequencies} {sorted(loaded)} {_sources_hash()}"
     key = hashlib.sha256(f"{left_out_file.SCHEMA_VERSION} {content}".encode()).hexdigest()[:32]
     if key in _lately:
         return _lately[key]
@@ -90,7 +90,7 @@ def left_out_cached(
     try:
         found = left_out_file.read_left_out_file(path, modal)
     except (OSError, FEImportError):  # none there, or not readable: made anew
-        found = _made(link(), modal, source, loaded, mesh_only)
+        found = _made(link(), modal, source, loaded)
         with contextlib.suppress(OSError, FEImportError):
             folder.mkdir(parents=True, exist_ok=True)
             left_out_file.write_left_out_file(path, found)
@@ -100,7 +100,7 @@ def left_out_cached(
     return found
 
 
-def _made(link: LinkFile, modal: ModalModel, source: str, loaded: Sequence[int], mesh_only: bool) -> LeftOut:
+def _made(link: LinkFile, modal: ModalModel, source: str, loaded: Sequence[int]) -> LeftOut:
     from fe_import.reduction.left_out import left_out_of  # as in `reduce_cached`
 
     if link.content_hash() != source:
@@ -110,4 +110,4 @@ def _made(link: LinkFile, modal: ModalModel, source: str, loaded: Sequence[int],
             where=str(link.path),
             remedy="reduce the link again",
         )
-    return left_out_of(link, modal, loaded, mesh_only)
+    return left_out_of(link, modal, loaded)

@@ -1,8 +1,7 @@
 """What a run of bodies and beams states about its error: of the integration of motions, and of the mesh of beams.
 
-Beams are geometrically exact and nothing is left out, so that ``links`` and ``effects`` are zero. Their elements err at
-second order in their length: the same with twice the elements is closer by three quarters of the error. Motions are
-repeated with larger steps on the finer mesh, which leaves the error of these in the distance, to the safe side.
+Beams are geometrically exact and nothing is left out, so that ``links`` and ``effects`` are zero. Their mesh is judged
+by a finer one, as that of chains is (`erls.accuracy.mesh_of_beams`).
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import numpy as np
 
 from erls.accuracy.body_audits import body_audits
 from erls.accuracy.constrained_integration import constrained_integration_error
+from erls.accuracy.mesh_of_beams import FINER, SHARE, larger_steps
 from erls.accuracy.verdict import verdict
 from erls.equations.nodal.scenes.build import assemble
 from erls.equations.nodal.statics import solve_statics
@@ -29,9 +29,6 @@ from erls.run.bodies.run import BodyRun
 from erls.scene.bodies.analyses import Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import BodyScene
 
-_FINER = 2
-_LARGER = 2.0  # steps on the finer mesh
-_SAFETY = 1.5
 _LOOKS = 101
 _REMEDIES = {
     "integration": "a smaller simulation.tolerance, or a smaller step",
@@ -82,18 +79,17 @@ def mesh_error(run: BodyRun) -> tuple[float | None, str]:
             raise
         return None, f"the same with twice the elements fails: {problem}"
     apart = float(np.linalg.norm(own - finer, axis=-1).max(initial=0.0))
-    share = _FINER**2 / (_FINER**2 - 1)
-    return _SAFETY * share * apart, ""
+    return SHARE * apart, ""
 
 
 def _refined(scene: BodyScene) -> BodyScene:
-    """The same with `_FINER` times the elements; inner nodes that are named keep their places."""
+    """The same with `FINER` times the elements; inner nodes that are named keep their places."""
     record = scene.record
     beams = {beam.name for beam in record.beams}
 
     def renamed(name: str) -> str:
         beam, slash, number = name.rpartition("/")
-        return f"{beam}/{_FINER * int(number)}" if slash and beam in beams and number.isdigit() else name
+        return f"{beam}/{FINER * int(number)}" if slash and beam in beams and number.isdigit() else name
 
     def moved(item: object) -> object:
         own = {key: renamed(getattr(item, key)) for key in ("node", "to") if hasattr(item, key)}
@@ -101,7 +97,7 @@ def _refined(scene: BodyScene) -> BodyScene:
 
     finer = msgspec.structs.replace(
         record,
-        beams=[msgspec.structs.replace(beam, elements=_FINER * beam.elements) for beam in record.beams],
+        beams=[msgspec.structs.replace(beam, elements=FINER * beam.elements) for beam in record.beams],
         masses=[moved(x) for x in record.masses],
         connections=[moved(x) for x in record.connections],
         springs=[moved(x) for x in record.springs],
@@ -126,7 +122,7 @@ def _both(run: BodyRun, scene: BodyScene) -> tuple[Array, Array]:
         beam, slash, number = name.rpartition("/")
         inner = bool(slash) and beam in beams and number.isdigit()
         nodes.append(run.assembly.numbers[name])
-        others.append(finer.numbers[f"{beam}/{_FINER * int(number)}" if inner else name])
+        others.append(finer.numbers[f"{beam}/{FINER * int(number)}" if inner else name])
     if isinstance(run, BodyRest):
         analysis = run.scene.record.simulation
         assert not isinstance(analysis, Dynamics)
@@ -139,10 +135,10 @@ def _both(run: BodyRun, scene: BodyScene) -> tuple[Array, Array]:
     assert isinstance(run, BodyMotion)
     settings, s = run.scene.record.simulation, run.solution
     assert isinstance(settings, Dynamics)
-    step = _LARGER * (run.end - float(s.t[0])) / max(s.work.steps, 1)
-    options = body_options(msgspec.structs.replace(settings, step=step))
-    times = float(s.t[0]), run.end
-    found = lie_generalized_alpha(finer.system, times, finer.system.start, finer.velocity, options)
+    options, times = replace(body_options(settings), follows_tolerance=False), (float(s.t[0]), run.end)
+    found = lie_generalized_alpha(
+        finer.system, times, finer.system.start, finer.velocity, options, plan=larger_steps(s)
+    )
     if found.failure is not None:
         raise found.failure
     looks = run.spread(_LOOKS)

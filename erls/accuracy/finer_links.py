@@ -93,25 +93,6 @@ def finer_links(scene: Scene, whole: Mechanism, solved: Mechanism) -> FinerLinks
     return FinerLinks(mechanism, np.concatenate(run), np.concatenate(kept), exact, tuple(notes))
 
 
-def mesh_fields(scene: Scene, mechanism: Mechanism) -> list[LeftOut | None]:
-    """What the meshes of links made of beams leave out, all modes kept; None for other links.
-
-    Raises
-    ------
-    FEImportError
-        As `finer_links`.
-    """
-    records = dict(zip(mechanism.bodies, scene.record.links, strict=True))
-    result: list[LeftOut | None] = []
-    for number, link in enumerate(mechanism.links):
-        if link.description is None or not link.elastic_modes:
-            result.append(None)
-            continue
-        source = _source(scene, records[number], replace(link, pieces=()), 0)
-        result.append(left_out_cached(source, link.model, cache_folder(), mesh_only=True))
-    return result
-
-
 def _same_inertia(first: InertiaInvariants, second: InertiaInvariants) -> bool:
     """But for rounding."""
     pairs = ((first.m, second.m), (first.X, second.X), (first.Z, second.Z))

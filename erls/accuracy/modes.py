@@ -51,7 +51,7 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
         return 0.0, ""
     try:
         if run.scene.record.simulation.formulation not in TREES:
-            return mesh_error(run), ""  # of the size of whole deflections: margin enough
+            return mesh_error(run)
         finer = finer_links(run.scene, run.formulation.mechanism, moving.mechanism)
     except FEImportError as problem:
         return None, f"the finite-element model of a link is not at hand: {problem}"

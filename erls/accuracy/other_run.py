@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +21,9 @@ _PLACES = 60
 _MOST = 4  # times the evaluations of the run that another one may take
 
 
-def other_run(run: ChainRun, formulation: Formulation, options: Options) -> Solution | None:
+def other_run(run: ChainRun, formulation: Formulation, options: Options, **more: Any) -> Solution | None:
     """Integrate other equations, or with other options, over the time of a run; None where that fails, or takes much
-    longer.
+    longer; ``more`` goes to what integrates.
 
     Raises
     ------
@@ -36,7 +37,8 @@ def other_run(run: ChainRun, formulation: Formulation, options: Options) -> Solu
             raise StopRun
 
     integrate = integrator(formulation.mechanism, run.scene.record.simulation)
-    found = integrate(formulation, (float(run.solution.t[0]), run.end), *formulation.initial_state(), options, limit)
+    times = float(run.solution.t[0]), run.end
+    found = integrate(formulation, times, *formulation.initial_state(), options, limit, **more)
     if found.failure is not None and found.failure.cause == Cause.INTERRUPTED:
         raise found.failure
     return found if found.failure is None and found.t[-1] >= run.end else None

@@ -46,16 +46,17 @@ def lie_generalized_alpha(
     v: Array,
     options: ConstrainedOptions,
     observer: Observer | None = None,
+    plan: Plan | None = None,
 ) -> ConstrainedSolution:
     """Integrate with fixed steps ``options.step`` (default: a thousandth of the run, at most 1 ms), or others.
 
     Fixed steps are equal inside a leg and end on breakpoints. Where Newton's method fails they are halved for a while.
     With ``options.error_tolerance`` they follow the local error, up to ``options.step``; where options follow the
-    tolerance, `erls.integrate.alpha_to_tolerance` chooses them.
+    tolerance, `erls.integrate.alpha_to_tolerance` chooses them. A ``plan`` says what they are instead of options.
     """
     run = partial(_run, system, times, q, v)
     if not options.follows_tolerance:
-        return run(options, observer)
+        return run(options, observer, plan)
     return to_tolerance(run, system, times[1] - times[0], options, observer)
 
 

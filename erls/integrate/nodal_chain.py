@@ -17,6 +17,7 @@ from erls.errors import SimulationError
 from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.integrate.step_plans import Plan
 from erls.maths.so3 import Array
 
 _LOOKS = 21
@@ -31,10 +32,12 @@ def nodal_generalized_alpha(
     options: Options,
     observer: Observer | None = None,
     adaptive: bool = False,
+    plan: Plan | None = None,
 ) -> Solution:
     """Integrate a `Nodal`; see `lie_generalized_alpha`.
 
-    With ``adaptive``, steps are chosen for an error of ``options.tolerance`` over the whole run.
+    With ``adaptive``, steps are chosen for an error of ``options.tolerance`` over the whole run, unless a ``plan`` says
+    what they are.
     """
     settings = ConstrainedOptions(
         options.step,
@@ -42,7 +45,7 @@ def nodal_generalized_alpha(
         newton_tolerance=_SHARE * options.newton_tolerance,
         start_from="last",
         tolerance=options.tolerance,
-        follows_tolerance=adaptive,
+        follows_tolerance=adaptive and plan is None,
         output_step=options.output_step,
     )
 
@@ -59,7 +62,7 @@ def nodal_generalized_alpha(
         return None if observer is None else observer(t, lambda: complete(knots()))
 
     start = system.configuration(y, v)
-    return closed(system, complete(lie_generalized_alpha(system.system, times, *start, settings, watch)))  # type: ignore[arg-type]
+    return closed(system, complete(lie_generalized_alpha(system.system, times, *start, settings, watch, plan)))  # type: ignore[arg-type]
 
 
 def closed(system: Nodal, found: Solution) -> Solution:

@@ -33,7 +33,9 @@ class FrameParts:
     masses: tuple[NodeMass, ...]
 
 
-def frame_parts(link: LinkDescription, frame: Frame, where: str, elements: int | None = None) -> FrameParts:
+def frame_parts(
+    link: LinkDescription, frame: Frame, where: str, elements: int | None = None, times: int = 1
+) -> FrameParts:
     """Parts of a frame link.
 
     Parameters
@@ -45,15 +47,16 @@ def frame_parts(link: LinkDescription, frame: Frame, where: str, elements: int |
         Name of the file, for messages.
     elements : int, optional
         Of each member, instead of its own number.
+    times : int
+        So many elements in place of each.
 
     Raises
     ------
     FEImportError
         A faulty member, section, node, mass or unit.
     """
-    if elements is not None:
-        members = [msgspec.structs.replace(m, elements=elements) for m in frame.members]
-        frame = msgspec.structs.replace(frame, members=members)
+    members = [msgspec.structs.replace(m, elements=times * (elements or m.elements)) for m in frame.members]
+    frame = msgspec.structs.replace(frame, members=members)
     length, mass, time = unit_factors(link, where)
     mesh = frame_mesh(link, frame, where)
     names = {**{i.name: mesh.names[i.node] for i in link.interfaces if i.node in mesh.names}, **mesh.names}

@@ -29,7 +29,6 @@ from fe_import.models.model import build_model
 from fe_import.models.refined import on_refined, refined_frame
 from fe_import.reduction.base import expanded
 from fe_import.reduction.free_body import FreeBody, free_body
-from fe_import.solver.sparse import factorize
 
 NEGLIGIBLE = 1e-2  # of the root of the strain energy of a load: 1e-4 of its flexibility
 MOST_FIELDS = 8  # of a link of many modes; one of few gets more, up to
@@ -39,7 +38,7 @@ _NO_LOAD = 1e-12  # of the largest energy of a kind of load: rounding
 _MASSLESS = 1e-12  # of the largest 1/ω²
 
 
-def left_out_of(link: LinkFile, modal: ModalModel, loaded: Sequence[int] = (), mesh_only: bool = False) -> LeftOut:
+def left_out_of(link: LinkFile, modal: ModalModel, loaded: Sequence[int] = ()) -> LeftOut:
     """What a reduction of a link leaves out, for a frame also against a finer mesh.
 
     Parameters
@@ -50,8 +49,6 @@ def left_out_of(link: LinkFile, modal: ModalModel, loaded: Sequence[int] = (), m
         Its reduction, in orthonormal form; truncated to the modes in use.
     loaded : sequence of int
         Nodes that bear loads beside the interfaces.
-    mesh_only : bool
-        Of a frame: only what the mesh leaves out, as though all its modes were kept.
 
     Raises
     ------
@@ -59,11 +56,11 @@ def left_out_of(link: LinkFile, modal: ModalModel, loaded: Sequence[int] = (), m
         As `fe_import.models.model.build_model`; MODAL_FILE: modes that are not of this model.
     """
     refined = link.description.frame is not None
-    return left_out(refined_frame(link, REFINED) if refined else build_model(link), modal, loaded, refined, mesh_only)
+    return left_out(refined_frame(link, REFINED) if refined else build_model(link), modal, loaded, refined)
 
 
 def left_out(
-    model: FEModel, modal: ModalModel, loaded: Sequence[int] = (), refined: bool = False, mesh_only: bool = False
+    model: FEModel, modal: ModalModel, loaded: Sequence[int] = (), refined: bool = False
 ) -> LeftOut:
     """The same of a finite-element model; of a ``refined`` one the nodes of ``modal`` come first."""
     shapes = on_refined(model, _nodal_fields(model, modal))
@@ -72,11 +69,10 @@ def left_out(
     loads, weights = _loads(model, body, elastic, modal, loaded)
     answers = body.static(loads)
     scale = _scale(np.einsum("fb,fb->b", body.balanced(loads), answers), weights)
-    missing = _within_elements(model, body, loads, len(modal.nodes)) if mesh_only else _less(body, elastic, answers)
+    missing = _less(body, elastic, answers)
     most = max(MOST_FIELDS, MOST_COORDINATES - elastic.shape[1])
     fields, squares = _main_fields(body, missing * scale, most)
-    if not mesh_only:
-        fields = _less(body, elastic, fields)  # once more, for what rounding left of large answers
+    fields = _less(body, elastic, fields)  # once more, for what rounding left of large answers
     extra = expanded(model, fields)
     rigid = np.vstack([modal.invariants.rigid, np.zeros((len(squares), 6))])
     nodes, turning = len(modal.nodes), modal.rotation_nodes
@@ -155,17 +151,6 @@ def _less(body: FreeBody, elastic: Array, fields: Array) -> Array:
         for _ in range(2):
             fields = fields - elastic @ la.cho_solve(factor, forces.T @ fields)
     return body.elastic(fields)
-
-
-def _within_elements(model: FEModel, body: FreeBody, loads: Array, nodes: int) -> Array:
-    """(f, b) answers of the nodes that only the finer mesh has, those of the coarse one held."""
-    inner = model.dof_map[nodes:].ravel()
-    fields = np.zeros_like(loads)
-    if len(inner):
-        matrix = body.stiffness[inner][:, inner].tocsc()
-        solve = factorize(matrix, "stiffness of the nodes within elements", model.dof_positions()[inner])
-        fields[inner] = solve(loads[inner])
-    return fields
 
 
 def _main_fields(body: FreeBody, missing: Array, most: int) -> tuple[Array, Array]:

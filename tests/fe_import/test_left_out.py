@@ -150,13 +150,6 @@ def test_coarse_matrices_are_those_of_the_fine_mesh(tmp_path: Path) -> None:
     assert np.array_equal(fine.nodes[: len(coarse.nodes)], coarse.nodes)
 
 
-def test_mesh_only_holds_the_nodes_of_the_coarse_mesh(tmp_path: Path) -> None:
-    link = frame_link(tmp_path, reduction={"method": "craig-bampton", "elastic_modes": 4})
-    left = left_out_of(link, reduce_link(link), mesh_only=True)
-    assert left.fields > 0
-    assert np.abs(left.translation_shapes).max() < 1e-12
-
-
 def test_a_solid_has_no_finer_mesh(tmp_path: Path) -> None:
     left = left_out_of(link := solid_link(tmp_path, reduction={"elastic_modes": 6}), reduce_link(link))
     assert not left.refined

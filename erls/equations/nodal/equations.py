@@ -44,6 +44,8 @@ class Nodal:
         Instead of the numbers in the descriptions of the links.
     start : ClosedStart, optional
         Of a mechanism with loops.
+    times : int
+        So many elements in place of each.
 
     Raises
     ------
@@ -52,10 +54,14 @@ class Nodal:
     """
 
     def __init__(
-        self, mechanism: Mechanism, elements_per_member: int | None = None, start: ClosedStart | None = None
+        self,
+        mechanism: Mechanism,
+        elements_per_member: int | None = None,
+        start: ClosedStart | None = None,
+        times: int = 1,
     ) -> None:
-        self.mechanism, self._start = mechanism, start
-        parts = [link_parts(link, elements_per_member) for link in mechanism.links]
+        self.mechanism, self._elements, self._start = mechanism, elements_per_member, start
+        parts = [link_parts(link, elements_per_member, times) for link in mechanism.links]
         self.chain: Chain = build_chain(mechanism, parts, start)
         self.system = self.chain.system
         self.views = [
@@ -69,6 +75,10 @@ class Nodal:
         self._kept = self._frames + len(self.system.model.actuators)
         free = [k for k, loop in enumerate(mechanism.loops) if loop.freedom is not None]
         self._moving = {k: len(mechanism.joints) + n for n, k in enumerate(free)}  # numbers of actuators of loops
+
+    def refined(self, times: int) -> Nodal:
+        """The same with so many elements in place of each."""
+        return Nodal(self.mechanism, self._elements, self._start, times)
 
     @property
     def size(self) -> int:

@@ -51,8 +51,8 @@ class LinkParts:
     fractions: Array
 
 
-def link_parts(link: Link, elements: int | None) -> LinkParts:
-    """Parts of a link, with ``elements`` in each member unless it is left to the description.
+def link_parts(link: Link, elements: int | None, times: int) -> LinkParts:
+    """Parts of a link, with ``elements`` in each member unless it is left to the description; ``times`` as many.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def link_parts(link: Link, elements: int | None) -> LinkParts:
             remedy="set damping = { ratio = 0.0 } for the link, or use another formulation",
         )
     frame = link.description.frame
-    parts = frame_parts(link.description, frame, where, elements)
+    parts = frame_parts(link.description, frame, where, elements, times)
     own = frame_parts(link.description, frame, where).mesh
     places = _places(own, parts.mesh)
     return LinkParts(parts.mesh.nodes, *_beams_and_bodies(link, parts, places), *places)
