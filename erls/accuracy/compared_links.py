@@ -12,11 +12,13 @@ import numpy as np
 from erls.accuracy.finer_links import FinerLinks
 from erls.accuracy.judged_places import judged_nodes, judged_places
 from erls.auto.outputs import Watched
+from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import Formulation, TreeFormulation
 from erls.equations.loops.tied import Tied
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import TREES
 from erls.equations.serial.state_series import state_series
+from erls.equations.series import mass_series, residual_series
 from erls.integrate.base import hermite
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
@@ -64,10 +66,27 @@ class Compared:
         """Number of joint coordinates."""
         return len(self.whole.free_joints)
 
+    def forces(self, t: Array, y: Array, v: Array, a: Array) -> Array:
+        """(k, N) out of balance in the whole mechanism, loops open."""
+        return residual_series(_compiled(self.whole), t, y, v, a)
+
+    def lesser_forces(self, t: Array, y: Array, v: Array, a: Array) -> Array:
+        """(k, n) the same in the mechanism that was run."""
+        return residual_series(_compiled(self.lesser), t, y, v, a)
+
+    def lesser_masses(self, t: Array, y: Array) -> Array:
+        """(k, n, n) mass matrices of it."""
+        return mass_series(_compiled(self.lesser), t, y)
+
     def moves(self, t: Array, y: Array, v: Array) -> Array:
         """(k, p, 3) places of the watched nodes at times (k,)."""
         linear = replace(self.whole.mechanism, effects=frozenset())  # differences of places: first order will do
         return judged_places(self.whole, self.watched, t, y, v, linear)
+
+
+def _compiled(formulation: TreeFormulation) -> CompiledSystem:
+    assert formulation.compiled is not None  # in joint angles
+    return formulation.compiled
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def integration_error(run: ChainRun, watched: Watched) -> IntegrationError:
         options_of(run.scene.record.simulation).tolerance,
         run.formulation.mechanism.reach,
         _ROUNDING,
-        [k - n for k, n in _vectors(run)],
+        solved(run.formulation).mechanism.rotation_vector_places,
         ENDS if rigid or s.work.steps < _MANY else ENDS_STIFF,
     )
     return _estimate(run, watched, system, found)
@@ -110,13 +110,6 @@ def sudden(run: ChainRun) -> bool:
     """Whether friction or motors at their limits act."""
     joints = run.formulation.mechanism.joints
     return any(joint.forces.friction or np.isfinite(joint.drive.torque_limit) for joint in joints)
-
-
-def _vectors(run: ChainRun) -> list[tuple[int, int]]:
-    """Place of each rotation vector among the joints, and how many before it are prescribed."""
-    mechanism = solved(run.formulation).mechanism
-    prescribed = np.cumsum([joint.drive.prescribed for joint in mechanism.joints])
-    return [(k, int(prescribed[k])) for k in mechanism.rotation_vectors]
 
 
 def _spread(found: GlobalError, count: int) -> Array:

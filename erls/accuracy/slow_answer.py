@@ -4,29 +4,35 @@ The equations of the whole mechanism, at the slow part of the motion that was ru
 leave forces D out of balance: on what is left out those that bend it, on the coordinates that were run what a finer
 mesh makes of the inertia. The answer is K δ = -D, with the conditions of loops, where there are any.
 
-The answer changes the forces on joints that are free to move by ΔR. Their error e grows as
+The answer changes the forces R on joints that are free to move by ΔR. Their error e grows as
 
     M ë + C ė + K e = -ΔR,
 
-with links rigid: M is the inertia of the joints, C their dampers and controllers, K = ∂R/∂θ what springs, controllers,
-weight and inertia make of e itself. It is followed by the trapezoidal rule from one stretch of time to the next.
+with links rigid: M is the inertia of the joints, C = ∂R/∂θ̇, K = ∂R/∂θ what springs, controllers, weight and inertia
+make of e itself. In loops R holds the forces Φ_θᵀ λ that close them, whose directions change with e and with the
+answer, and e is one of the ways that joints may go, Φ_θ e = 0. It is followed by N. M. Newmark's method from one
+stretch of time to the next, of loops a little damped, since what ways they may go is known at these alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
 
 from erls.accuracy.compared_links import Compared, Motion
 from erls.accuracy.configurations import Configuration
+from erls.maths.full_turns import turned_on, turns_to
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 _DIFFERENCE = 1e-6  # rad or m
 _PENALTY = 1e8  # of opened loops against stiffness
 _DEPENDENT = 1e-9  # of the largest singular value: rows of loops that follow from others
+_SAME_WAY = 1e-6  # of the largest singular value: conditions on joints, not closed by as much as links are bent
+_GAMMA_OF_LOOPS = 0.55  # of Newmark's method: 1/2 damps nothing
 
 
 def slow_answer(
@@ -48,33 +54,32 @@ def slow_answer(
     start : Motion or None
         State at the start of a run whose links are deformed as they bear it at rest; None where they start undeformed.
     """
-    forces, rows, before = _unbalanced(compared, motion)
-    free, whole = compared.free, compared.whole
+    found, free, whole = _unbalanced(compared, motion), compared.free, compared.whole
     stiffness = np.concatenate([link.stiffness for link in whole.mechanism.links])
     y, v, _ = motion.whole
     drift, answer = np.zeros_like(y), np.zeros_like(y)
     borne: Array = np.zeros((1, whole.size))
     if compared.tied is None:
-        answer[:, free:] = -forces[:, free:] / stiffness
+        answer[:, free:] = -found.forces[:, free:] / stiffness
         if start is not None:
-            borne[:, free:] = -_unbalanced(compared, start)[0][:, free:] / stiffness
+            borne[:, free:] = -_unbalanced(compared, start).forces[:, free:] / stiffness
         largest = 2 * answer - borne
         for at, place in _nearest(motion.t, places):
             block, steady = np.ix_(at, compared.rest), borne[:, compared.rest] @ _modal(place)
-            along = -(forces[block] @ place.fields) / place.squares
+            along = -(found.forces[block] @ place.fields) / place.squares
             reached = 0.5 * place.squares * duration**2  # by a steady force, as long as nothing holds it back
             answer[block] = (np.minimum(1.0, reached) * along) @ place.fields.T
             largest[block] = (steady + np.minimum(2.0, reached) * (along - steady)) @ place.fields.T
     else:
-        answer = _answer_of_loops(compared, motion, stiffness, forces, rows)
+        answer = _answer_of_loops(compared, motion, stiffness, found)
         largest = 2 * answer
     if free and len(motion.t) > 1:
-        drift[:, :free] = _drift(compared, motion, before, answer, rows)
+        drift[:, :free] = _drift(compared, motion, found, answer)
     times = np.tile(motion.t, 3)
     still, bent, drifted = np.split(
         compared.moves(times, np.concatenate([y, y + largest, y + drift]), np.tile(v, (3, 1))), 3
     )
-    moved = [np.linalg.norm(found - still, axis=2).max(axis=0) for found in (bent, drifted)]
+    moved = [np.linalg.norm(at - still, axis=2).max(axis=0) for at in (bent, drifted)]
     return np.asarray(moved[0]), np.asarray(moved[1])
 
 
@@ -89,16 +94,38 @@ def _nearest(t: Array, places: Sequence[Configuration]) -> list[tuple[IntArray, 
     return [(np.flatnonzero(own == k), place) for k, place in enumerate(places)]
 
 
-def _answer_of_loops(compared: Compared, motion: Motion, stiffness: Array, forces: Array, rows: Array) -> Array:
+@dataclass(frozen=True)
+class _Unbalanced:
+    """What the equations of the whole mechanism leave out of balance at k times of a motion.
+
+    Attributes
+    ----------
+    forces : (k, N) array
+        On all coordinates; on those that were run, what a finer mesh makes of the inertia.
+    finer : (k, f) array
+        That on free joints.
+    rows : (k, m, N) array
+        Conditions of loops.
+    multipliers : (k, m) array
+        Of these.
+    """
+
+    forces: Array
+    finer: Array
+    rows: Array
+    multipliers: Array
+
+
+def _answer_of_loops(compared: Compared, motion: Motion, stiffness: Array, found: _Unbalanced) -> Array:
     assert compared.tied is not None
     diagonal = np.concatenate([np.zeros(compared.free), stiffness])
     masses = np.array([compared.tied.masses(*at) for at in zip(motion.t.tolist(), motion.whole[0], strict=True)])
     matrices = np.diag(diagonal) + _pace(motion, compared) ** 2 * masses
     size = np.sqrt(np.einsum("kii->ki", matrices))
-    along = rows / size[:, None]
+    along = found.rows / size[:, None]
     along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), np.finfo(float).tiny)
     scaled = matrices / (size[:, :, None] * size[:, None]) + _PENALTY * along.swapaxes(1, 2) @ along
-    return np.asarray(-np.linalg.solve(scaled, (forces / size)[..., None])[..., 0] / size)
+    return np.asarray(-np.linalg.solve(scaled, (found.forces / size)[..., None])[..., 0] / size)
 
 
 def _pace(motion: Motion, compared: Compared) -> float:
@@ -107,30 +134,26 @@ def _pace(motion: Motion, compared: Compared) -> float:
     return float(max(rates, 2 * np.pi / max(float(np.ptp(motion.t)), 1e-9)))
 
 
-def _unbalanced(compared: Compared, motion: Motion) -> tuple[Array, Array, Array]:
-    """(k, N) forces out of balance on all coordinates, the conditions of loops (k, m, N), and (k, f) the forces on free
-    joints by the equations that were run.
-    """
-    forces, own = np.empty_like(motion.whole[0]), np.zeros((len(motion.t), len(compared.own)))
-    every = list(zip(motion.t.tolist(), *motion.whole, strict=True))
-    for k, state in enumerate(every):
-        forces[k] = compared.whole.residual(*state)
-    before = forces[:, : compared.free].copy()
+def _unbalanced(compared: Compared, motion: Motion) -> _Unbalanced:
+    free, run = compared.free, compared.run
+    forces = compared.forces(motion.t, *motion.whole)
+    own, finer = np.zeros((len(motion.t), len(compared.own))), np.zeros((len(motion.t), free))
     if not compared.exact:
-        lacking = [np.ascontiguousarray(row[:, compared.run]) for row in motion.whole]
-        for k, at in enumerate(zip(motion.t.tolist(), *lacking, strict=True)):
-            lesser = compared.lesser.residual(*at)
-            before[k], own[k] = lesser[: compared.free], forces[k, compared.kept] - lesser[compared.own]
-    if compared.tied is None:
-        forces[:, compared.kept] = own
-        return forces, np.zeros((len(motion.t), 0, forces.shape[1])), before
-    rows = np.array([compared.tied.closure(*state[:3]).rows[:, compared.whole.free] for state in every])
-    for k, state in enumerate(every):
-        forces[k] = compared.tied.forces(*state)
-        along, left = _loop_balance(compared, motion, k, forces[k, compared.kept] - own[k], rows[k])
-        forces[k] += rows[k].T @ np.linalg.lstsq(along.T, -left, rcond=_DEPENDENT)[0]
+        lesser = compared.lesser_forces(motion.t, *(row[:, run] for row in motion.whole))
+        own, finer = forces[:, compared.kept] - lesser[:, compared.own], forces[:, :free] - lesser[:, :free]
+    rows, multipliers = np.zeros((len(motion.t), 0, forces.shape[1])), np.zeros((len(motion.t), 0))
+    if compared.tied is not None:
+        tied = compared.tied
+        every = list(zip(motion.t.tolist(), *motion.whole, strict=True))
+        rows = np.array([tied.closure(*state[:3]).rows[:, compared.whole.free] for state in every])
+        multipliers = np.zeros(rows.shape[:2])
+        forces = tied.held(motion.t, *motion.whole, multipliers)
+        for k in range(len(every)):
+            along, left = _loop_balance(compared, motion, k, forces[k, compared.kept] - own[k], rows[k])
+            multipliers[k] = np.linalg.lstsq(along.T, -left, rcond=_DEPENDENT)[0]
+        forces += np.einsum("kmn,km->kn", rows, multipliers)
     forces[:, compared.kept] = own
-    return forces, rows, before
+    return _Unbalanced(forces, finer, rows, multipliers)
 
 
 def _loop_balance(
@@ -144,60 +167,83 @@ def _loop_balance(
     return compared.bound.closure(at, y, v).rows[:, compared.lesser.free], compared.bound.forces(at, y, v, a)
 
 
-def _drift(compared: Compared, motion: Motion, before: Array, answer: Array, rows: Array) -> Array:
-    """(k, f) e of free joints, from the forces on them (k, f) by the equations that were run, the answer (k, N), and
-    the conditions of loops (k, m, N).
-    """
-    free, lesser = compared.free, compared.lesser
+def _drift(compared: Compared, motion: Motion, found: _Unbalanced, answer: Array) -> Array:
+    """(k, f) e of free joints."""
+    free, (y, v, a) = compared.free, motion.whole
+    before, after = (_on_joints(compared, found, motion.t, place, v, a) for place in (y, y + answer))
+    forces = before - after - found.finer
+    masses = compared.lesser_masses(motion.t, y[:, compared.run])[:, :free, :free]
+    springs, dampings = _changes(compared, motion, found)
+    gamma = _GAMMA_OF_LOOPS if found.rows.shape[1] else 0.5
+    beta = (gamma + 0.5) ** 2 / 4
     drift: Array = np.zeros((len(motion.t), free))
-    moved: Array = np.zeros((2, free))
-    for k, (at, y, v, a) in enumerate(zip(motion.t.tolist(), *motion.whole, strict=True)):
-        ways, leading = _ways(rows[k][:, :free])
-        force = ways.T @ (before[k] - compared.whole.residual(at, y + answer[k], v, a)[:free])
-        mass = ways.T @ lesser.mass_matrix(at, np.ascontiguousarray(y[compared.run]))[:free, :free] @ ways
-        spring, damping = (ways.T @ change @ ways for change in _changes(compared, at, (y, v, a), before[k]))
-        h = float(motion.t[k] - motion.t[k - 1]) if k else 0.0
-        matrix = mass + h / 2 * damping + h**2 / 4 * spring
-        e, rate = moved[:, leading]
-        change = np.asarray(np.linalg.solve(matrix, force - damping @ rate - spring @ e))
-        e, rate = e + h**2 / 4 * change, rate + h / 2 * change
-        drift[k] = ways @ e
-        if k + 1 < len(motion.t):  # the first half of the next stretch
-            h = float(motion.t[k + 1] - motion.t[k])
-            moved = np.stack([ways @ (e + h * rate + h**2 / 4 * change), ways @ (rate + h / 2 * change)])
+    e, rate, change = np.zeros((3, free))
+    for k in range(len(motion.t)):
+        ways = _ways(compared, motion, k)
+        if k:
+            h = float(motion.t[k] - motion.t[k - 1])
+            ahead, rate = e + h * rate + h**2 * (0.5 - beta) * change, rate + h * (1 - gamma) * change
+            inertia = masses[k] / (beta * h**2) + gamma / (beta * h) * dampings[k]
+            load = forces[k] + inertia @ ahead - dampings[k] @ rate
+            e = ways @ np.linalg.solve(ways.T @ (inertia + springs[k]) @ ways, ways.T @ load)
+            change = (e - ahead) / (beta * h**2)
+            rate = rate + h * gamma * change
+        else:
+            change = ways @ np.linalg.solve(ways.T @ masses[k] @ ways, ways.T @ forces[k])
+        drift[k] = e
+        if k + 1 < len(motion.t):
+            e, rate = _exchanged(np.stack([e, rate]), motion, k, compared.whole.mechanism.rotation_vector_places)
     return drift
 
 
-def _ways(rows: Array) -> tuple[Array, IntArray]:
-    """(f, d) ways in which joints may move under the conditions of loops (m, f), one for each joint that leads; (d,)
-    those joints.
-    """
-    free = rows.shape[1]
-    if not len(rows):
-        return np.eye(free), np.arange(free)
-    _, triangle, order = la.qr(rows, pivoting=True)
-    size = np.abs(np.diag(triangle))
-    rank = int(np.count_nonzero(size > _DEPENDENT * size.max(initial=0.0)))
-    led, leading = np.sort(order[:rank]), np.sort(order[rank:])
-    ways = np.zeros((free, len(leading)))
-    ways[leading, np.arange(len(leading))] = 1.0
-    ways[led] = -np.linalg.lstsq(rows[:, led], rows[:, leading], rcond=_DEPENDENT)[0]
-    return ways, leading
+def _exchanged(moved: Array, motion: Motion, k: int, vectors: Sequence[int]) -> Array:
+    """(2, f) error of coordinates and rates at the next of the instants, where it holds other rotation vectors."""
+    (y, v, _), moved = motion.whole, moved.copy()
+    for at in (slice(place, place + 3) for place in vectors):
+        turns = turns_to(y[k + 1, at], y[k, at])
+        if turns:
+            old = np.stack(turned_on(y[k + 1, at], v[k + 1, at], turns))
+            back = turns_to(old[0], y[k + 1, at])
+            moved[:, at] = np.stack(turned_on(*(old + moved[:, at]), back)) - np.stack(turned_on(*old, back))
+    return moved
 
 
-def _changes(
-    compared: Compared, t: float, state: tuple[Array, Array, Array], before: Array
-) -> tuple[Array, Array]:
-    """(f, f) changes of the forces out of balance (f,) on free joints, per unit of their coordinates and rates; none
-    where loops hold them, since those of one turn of a crank cancel in the next.
-    """
+def _ways(compared: Compared, motion: Motion, k: int) -> Array:
+    """(f, d) ways in which joints may move, links rigid."""
     free = compared.free
-    changes = np.zeros((2, free, free))
     if compared.tied is None:
-        for order in range(2):
-            for j in range(free):
-                moved = [np.ascontiguousarray(row[compared.run]) for row in state]
-                step = _DIFFERENCE * max(1.0, abs(moved[order][j]))
-                moved[order][j] += step
-                changes[order, :, j] = (compared.lesser.residual(t, *moved)[:free] - before) / step
-    return changes[0], changes[1]
+        return np.eye(free)
+    rigid = np.concatenate([motion.whole[0][k, :free], np.zeros(compared.whole.size - free)])
+    rows = compared.tied.closure(float(motion.t[k]), rigid, 0 * rigid).rows[:, compared.whole.free[:free]]
+    _, values, right = la.svd(rows)
+    rank = int(np.count_nonzero(values > _SAME_WAY * values.max(initial=0.0)))
+    return np.asarray(right[rank:].T)
+
+
+def _on_joints(compared: Compared, found: _Unbalanced, t: Array, y: Array, v: Array, a: Array) -> Array:
+    """(k, f) forces out of balance on free joints, those of loops as they are."""
+    if compared.tied is None:
+        return compared.forces(t, y, v, a)[:, : compared.free]
+    return compared.tied.held(t, y, v, a, found.multipliers)[:, : compared.free]
+
+
+def _changes(compared: Compared, motion: Motion, found: _Unbalanced) -> Array:
+    """(2, k, f, f) changes of the forces on free joints per unit of their coordinates and rates."""
+    free, count, t = compared.free, len(motion.t), motion.t
+    states = motion.whole if compared.tied is not None else [row[:, compared.run] for row in motion.whole]
+    changes = np.zeros((2, count, free, free))
+    moved = np.repeat(np.stack(states)[:, None], 1 + 2 * free, axis=1)
+    steps = np.zeros((2, free, count))
+    for order in range(2):
+        for j in range(free):
+            steps[order, j] = _DIFFERENCE * np.maximum(1.0, np.abs(states[order][:, j]))
+            moved[order, 1 + order * free + j, :, j] += steps[order, j]
+    flat, times = moved.reshape(3, (1 + 2 * free) * count, -1), np.tile(t, 1 + 2 * free)
+    if compared.tied is None:
+        forces = compared.lesser_forces(times, *flat)
+    else:
+        forces = compared.tied.held(times, *flat, np.tile(found.multipliers, (1 + 2 * free, 1)))
+    forces = forces.reshape(1 + 2 * free, count, -1)[..., :free]
+    found_changes = (forces[1:] - forces[0]).reshape(2, free, count, free) / steps[..., None]
+    changes[:] = found_changes.transpose(0, 2, 3, 1)
+    return changes

@@ -6,6 +6,7 @@ window w that ends smoothly: accelerations of vibrations, which are large where 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +15,13 @@ from erls.accuracy.compared_links import Compared, Motion, embedded, in_joint_an
 from erls.equations.formulation import Formulation
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.integrate.base import Solution, hermite_knots
+from erls.maths.full_turns import nearest
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 
-_WINDOWS, _MOST_WINDOWS, _PER_WINDOW = 24, 96, 16  # windows overlap by half; instants in a half
+_WINDOWS, _MOST_WINDOWS, _PER_WINDOW = 48, 192, 8  # windows overlap by half; instants in a half
 _FEW_WINDOWS, _FEW = 12, 6  # the same where an instant costs more
-_PER_RADIAN = 4  # windows, of the way of the joint that goes farthest
+_PER_RADIAN = 8  # windows, of the way of the joint that goes farthest
 
 
 @dataclass(frozen=True)
@@ -70,14 +72,17 @@ def parted(run: ChainRun, moving: Formulation, compared: Compared) -> Parted | N
         y, v, a = _with_static_modes(moving, t, hermite_knots(s.t, s.y, s.v, s.a, t))
     else:
         y, v, a = hermite_knots(s.t, s.y, s.v, s.a, t)
-    middles, means = averages(t, y, per)
-    vibration = [row - _between(t, middles, mean) for row, mean in zip((y, v, a), means, strict=True)]
+    vectors = compared.whole.mechanism.rotation_vector_places
+    middles, means = averages(t, y, per, vectors)
+    vibration = _vibration(t, (y, v, a), middles, means, vectors)
     slow, start = embedded(compared, middles, means), embedded(compared, t[:1], [y[:1], v[:1], 0 * a[:1]])
     return Parted(slow, start, t, y, v, (vibration[0], vibration[1], vibration[2]))
 
 
-def averages(t: Array, y: Array, per: int) -> tuple[Array, list[Array]]:
+def averages(t: Array, y: Array, per: int, vectors: Sequence[int] = ()) -> tuple[Array, list[Array]]:
     """Middles (w,) of windows, and averages of places, rates and accelerations over them, (w, n) each.
+
+    Rotation vectors, which a motion may exchange for others, are in each window like that of its middle.
 
     Parameters
     ----------
@@ -87,6 +92,8 @@ def averages(t: Array, y: Array, per: int) -> tuple[Array, list[Array]]:
         Places.
     per : int
         Instants in half a window.
+    vectors : sequence of int
+        Places of the first component of each rotation vector among the coordinates.
     """
     x = np.arange(-per, per + 1) / per
     weight = (1 - x**2) ** 3
@@ -94,7 +101,13 @@ def averages(t: Array, y: Array, per: int) -> tuple[Array, list[Array]]:
     step = float(t[1] - t[0])
     rate, twice = -np.gradient(weight, step)[1:-1], np.diff(weight, 2) / step**2
     spans = per * np.arange((len(t) - 1) // per - 1)[:, None] + np.arange(2 * per + 1)
-    return t[spans[:, per]], [np.einsum("k,wkn->wn", own, y[spans]) for own in (weight[1:-1], rate, twice)]
+    values = y[spans]
+    for k in vectors:
+        own = values[..., k : k + 3]
+        for i in range(per):
+            own[:, per + i + 1] = nearest(own[:, per + i + 1], own[:, per + i])
+            own[:, per - i - 1] = nearest(own[:, per - i - 1], own[:, per - i])
+    return t[spans[:, per]], [np.einsum("k,wkn->wn", own, values) for own in (weight[1:-1], rate, twice)]
 
 
 def _windows(s: Solution, joints: int) -> int:
@@ -108,8 +121,21 @@ def _with_static_modes(moving: QuasiStatic, t: Array, states: tuple[Array, Array
     return [np.array(part).reshape(len(t), -1) for part in zip(*every, strict=True)]
 
 
-def _between(t: Array, middles: Array, means: Array) -> Array:
-    """(k, n) means, linear in between and beyond."""
+def _vibration(
+    t: Array, states: Sequence[Array], middles: Array, means: Sequence[Array], vectors: Sequence[int]
+) -> list[Array]:
+    """(k, n) each: what a motion differs by from means of windows, linear in between and beyond. Of rotation vectors
+    places alone tell it: rates of others are other ones.
+    """
     left = (np.searchsorted(middles, t) - 1).clip(0, len(middles) - 2)
-    share = (t - middles[left]) / (middles[left + 1] - middles[left])
-    return np.asarray(means[left] + share[:, None] * (means[left + 1] - means[left]))
+    share = ((t - middles[left]) / (middles[left + 1] - middles[left]))[:, None]
+    result = []
+    for order, (row, mean) in enumerate(zip(states, means, strict=True)):
+        before, after = mean[left], mean[left + 1]
+        for k in vectors if not order else ():
+            after[:, k : k + 3] = nearest(after[:, k : k + 3], before[:, k : k + 3])
+        between = before + share * (after - before)
+        for k in vectors if not order else ():
+            between[:, k : k + 3] = nearest(between[:, k : k + 3], row[:, k : k + 3])
+        result.append(np.asarray(row - between))
+    return result

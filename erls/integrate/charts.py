@@ -1,12 +1,9 @@
 """Rotation vectors that turn on for ever: a run in stretches, between which a vector is exchanged for a shorter one.
 
-A rotation vector ψ tells its rotation badly near a full turn, where T(ψ) is singular. Beyond `LONGEST` it goes on as
-
-    ψ' = (1 - 2π/|ψ|) ψ,   dψ'/dψ = 1 - 2π/|ψ| (1 - n nᵀ),   n = ψ/|ψ|,
-
-which is the same rotation with the opposite sense of turning. Nothing else changes, and no rotation has to be
-remembered beside the coordinates: equations, files and interpolation know vectors alone. At the exchange a solution
-holds two knots, one in either vector.
+A rotation vector ψ tells its rotation badly near a full turn, where T(ψ) is singular. Beyond `LONGEST` it goes on with
+a full turn less (`erls.maths.full_turns`): the same rotation with the opposite sense of turning. Nothing else changes,
+and no rotation has to be remembered beside the coordinates: equations, files and interpolation know vectors alone. At
+the exchange a solution holds two knots, one in either vector.
 """
 
 from __future__ import annotations
@@ -18,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from erls.integrate.base import Observer, Options, Solution, StopRun, Work
+from erls.maths.full_turns import turned_on
 from erls.maths.so3 import Array
 
 LONGEST = 1.25 * np.pi
@@ -35,12 +33,8 @@ def exchanged(y: Array, v: Array, places: Sequence[int]) -> tuple[Array, Array]:
     """
     y, v = y.copy(), v.copy()
     for k in places:
-        psi, rate = y[k : k + 3], v[k : k + 3]
-        length = float(np.linalg.norm(psi))
-        if length > LONGEST:
-            along = psi / length
-            v[k : k + 3] = rate - 2 * np.pi / length * (rate - along * (along @ rate))
-            y[k : k + 3] = psi - 2 * np.pi * along
+        if np.linalg.norm(y[k : k + 3]) > LONGEST:
+            y[k : k + 3], v[k : k + 3] = turned_on(y[k : k + 3], v[k : k + 3], -1)
     return y, v
 
 

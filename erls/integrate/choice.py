@@ -8,8 +8,6 @@ from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias
 
-import numpy as np
-
 from erls.equations.formulation import Formulation, Modular
 from erls.equations.registry import system_of
 from erls.equations.substructures import solved
@@ -126,8 +124,7 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Integrate:
     found = INTEGRATIONS[kind].integrator(mechanism, settings)
     if kind in ("pieces", "nodal") or not mechanism.rotation_vectors:
         return found
-    prescribed = np.cumsum([joint.drive.prescribed for joint in mechanism.joints])
-    return in_charts(found, [k - int(prescribed[k]) for k in mechanism.rotation_vectors])
+    return in_charts(found, mechanism.rotation_vector_places)
 
 
 def compiled_steps(mechanism: Mechanism, settings: Simulation) -> str | None:

@@ -88,6 +88,12 @@ class Mechanism:
         return tuple(k for k, joint in enumerate(self.joints) if joint.freedom.vector and joint.freedom.axis == 0)
 
     @property
+    def rotation_vector_places(self) -> tuple[int, ...]:
+        """Places of their first components among the free joint coordinates."""
+        prescribed = np.cumsum([joint.drive.prescribed for joint in self.joints])
+        return tuple(k - int(prescribed[k]) for k in self.rotation_vectors)
+
+    @property
     def reach(self) -> float:
         """Size of the largest link [m]."""
         return max(1e-3, *(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in self.links))

@@ -10,7 +10,7 @@ import numpy as np
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.loops import actuated, nearest, system
+from erls.equations.loops import actuated, held, nearest, system
 from erls.equations.loops import records as own
 from erls.equations.loops.closure import closure
 from erls.equations.loops.rows import Closure, Effort, LoopRows
@@ -211,6 +211,12 @@ class CompiledLoops(CompiledSystem):
         """(n,) M a - f of the tree, with what acts along closing joints."""
         out = np.empty(self.size)
         actuated.forces(*self._arrays, t, _numbers(y), _numbers(v), _numbers(a), out)
+        return out
+
+    def held(self, t: Array, y: Array, v: Array, a: Array, multipliers: Array) -> Array:
+        """(k, n) the same at many states, with forces Φ_yᵀ λ of multipliers (k, r) of the conditions in use."""
+        out = np.empty((len(t), self.size))
+        held.held(*self._arrays, *(_numbers(x) for x in (t, y, v, a, multipliers)), out)
         return out
 
     def masses(self, t: float, y: Array) -> Array:
