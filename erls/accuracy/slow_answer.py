@@ -24,6 +24,7 @@ import scipy.linalg as la
 
 from erls.accuracy.compared_links import Compared, Motion
 from erls.accuracy.configurations import Configuration
+from erls.equations.series import mass_series
 from erls.maths.full_turns import turned_on, turns_to
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -102,8 +103,10 @@ class _Unbalanced:
     ----------
     forces : (k, N) array
         On all coordinates; on those that were run, what a finer mesh makes of the inertia.
+    joints : (k, f) array
+        On free joints.
     finer : (k, f) array
-        That on free joints.
+        Of these, what a finer mesh makes of the inertia.
     rows : (k, m, N) array
         Conditions of loops.
     multipliers : (k, m) array
@@ -111,6 +114,7 @@ class _Unbalanced:
     """
 
     forces: Array
+    joints: Array
     finer: Array
     rows: Array
     multipliers: Array
@@ -119,7 +123,7 @@ class _Unbalanced:
 def _answer_of_loops(compared: Compared, motion: Motion, stiffness: Array, found: _Unbalanced) -> Array:
     assert compared.tied is not None
     diagonal = np.concatenate([np.zeros(compared.free), stiffness])
-    masses = np.array([compared.tied.masses(*at) for at in zip(motion.t.tolist(), motion.whole[0], strict=True)])
+    masses = mass_series(compared.tied, motion.t, motion.whole[0])
     matrices = np.diag(diagonal) + _pace(motion, compared) ** 2 * masses
     size = np.sqrt(np.einsum("kii->ki", matrices))
     along = found.rows / size[:, None]
@@ -144,16 +148,16 @@ def _unbalanced(compared: Compared, motion: Motion) -> _Unbalanced:
     rows, multipliers = np.zeros((len(motion.t), 0, forces.shape[1])), np.zeros((len(motion.t), 0))
     if compared.tied is not None:
         tied = compared.tied
-        every = list(zip(motion.t.tolist(), *motion.whole, strict=True))
-        rows = np.array([tied.closure(*state[:3]).rows[:, compared.whole.free] for state in every])
+        rows = tied.gradients(motion.t, motion.whole[0])
         multipliers = np.zeros(rows.shape[:2])
         forces = tied.held(motion.t, *motion.whole, multipliers)
-        for k in range(len(every)):
+        for k in range(len(motion.t)):
             along, left = _loop_balance(compared, motion, k, forces[k, compared.kept] - own[k], rows[k])
             multipliers[k] = np.linalg.lstsq(along.T, -left, rcond=_DEPENDENT)[0]
         forces += np.einsum("kmn,km->kn", rows, multipliers)
+    joints = forces[:, :free].copy()
     forces[:, compared.kept] = own
-    return _Unbalanced(forces, finer, rows, multipliers)
+    return _Unbalanced(forces, joints, finer, rows, multipliers)
 
 
 def _loop_balance(
@@ -170,8 +174,16 @@ def _loop_balance(
 def _drift(compared: Compared, motion: Motion, found: _Unbalanced, answer: Array) -> Array:
     """(k, f) e of free joints."""
     free, (y, v, a) = compared.free, motion.whole
-    before, after = (_on_joints(compared, found, motion.t, place, v, a) for place in (y, y + answer))
-    forces = before - after - found.finer
+    forces = found.joints - _on_joints(compared, found, motion.t, y + answer, v, a) - found.finer
+    vectors = compared.whole.mechanism.rotation_vector_places
+    ways = _ways(compared, motion)
+
+    def along(k: int, matrix: Array, load: Array) -> Array:
+        """What a load makes of joints that go their ways."""
+        if ways is None:
+            return np.asarray(np.linalg.solve(matrix, load))
+        return np.asarray(ways[k] @ np.linalg.solve(ways[k].T @ matrix @ ways[k], ways[k].T @ load))
+
     masses = compared.lesser_masses(motion.t, y[:, compared.run])[:, :free, :free]
     springs, dampings = _changes(compared, motion, found)
     gamma = _GAMMA_OF_LOOPS if found.rows.shape[1] else 0.5
@@ -179,45 +191,48 @@ def _drift(compared: Compared, motion: Motion, found: _Unbalanced, answer: Array
     drift: Array = np.zeros((len(motion.t), free))
     e, rate, change = np.zeros((3, free))
     for k in range(len(motion.t)):
-        ways = _ways(compared, motion, k)
         if k:
             h = float(motion.t[k] - motion.t[k - 1])
             ahead, rate = e + h * rate + h**2 * (0.5 - beta) * change, rate + h * (1 - gamma) * change
             inertia = masses[k] / (beta * h**2) + gamma / (beta * h) * dampings[k]
             load = forces[k] + inertia @ ahead - dampings[k] @ rate
-            e = ways @ np.linalg.solve(ways.T @ (inertia + springs[k]) @ ways, ways.T @ load)
+            e = along(k, inertia + springs[k], load)
             change = (e - ahead) / (beta * h**2)
             rate = rate + h * gamma * change
         else:
-            change = ways @ np.linalg.solve(ways.T @ masses[k] @ ways, ways.T @ forces[k])
+            change = along(k, masses[k], forces[k])
         drift[k] = e
         if k + 1 < len(motion.t):
-            e, rate = _exchanged(np.stack([e, rate]), motion, k, compared.whole.mechanism.rotation_vector_places)
+            e, rate = _exchanged(e, rate, motion, k, vectors)
     return drift
 
 
-def _exchanged(moved: Array, motion: Motion, k: int, vectors: Sequence[int]) -> Array:
-    """(2, f) error of coordinates and rates at the next of the instants, where it holds other rotation vectors."""
-    (y, v, _), moved = motion.whole, moved.copy()
+def _exchanged(e: Array, rate: Array, motion: Motion, k: int, vectors: Sequence[int]) -> tuple[Array, Array]:
+    """(f,) error of coordinates and rates at the next of the instants, where it holds other rotation vectors."""
+    y, v, _ = motion.whole
     for at in (slice(place, place + 3) for place in vectors):
         turns = turns_to(y[k + 1, at], y[k, at])
         if turns:
-            old = np.stack(turned_on(y[k + 1, at], v[k + 1, at], turns))
+            old = turned_on(y[k + 1, at], v[k + 1, at], turns)
             back = turns_to(old[0], y[k + 1, at])
-            moved[:, at] = np.stack(turned_on(*(old + moved[:, at]), back)) - np.stack(turned_on(*old, back))
-    return moved
+            found, there = turned_on(old[0] + e[at], old[1] + rate[at], back), turned_on(*old, back)
+            e[at], rate[at] = found[0] - there[0], found[1] - there[1]
+    return e, rate
 
 
-def _ways(compared: Compared, motion: Motion, k: int) -> Array:
-    """(f, d) ways in which joints may move, links rigid."""
+def _ways(compared: Compared, motion: Motion) -> list[Array] | None:
+    """(f, d) ways in which joints may move at each instant, links rigid; None where nothing holds them."""
     free = compared.free
     if compared.tied is None:
-        return np.eye(free)
-    rigid = np.concatenate([motion.whole[0][k, :free], np.zeros(compared.whole.size - free)])
-    rows = compared.tied.closure(float(motion.t[k]), rigid, 0 * rigid).rows[:, compared.whole.free[:free]]
-    _, values, right = la.svd(rows)
-    rank = int(np.count_nonzero(values > _SAME_WAY * values.max(initial=0.0)))
-    return np.asarray(right[rank:].T)
+        return None
+    rigid = np.zeros_like(motion.whole[0])
+    rigid[:, :free] = motion.whole[0][:, :free]
+    result = []
+    for rows in compared.tied.gradients(motion.t, rigid)[:, :, :free]:
+        _, values, right = la.svd(rows)
+        rank = int(np.count_nonzero(values > _SAME_WAY * values.max(initial=0.0)))
+        result.append(np.asarray(right[rank:].T))
+    return result
 
 
 def _on_joints(compared: Compared, found: _Unbalanced, t: Array, y: Array, v: Array, a: Array) -> Array:

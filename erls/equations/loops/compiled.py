@@ -213,6 +213,12 @@ class CompiledLoops(CompiledSystem):
         actuated.forces(*self._arrays, t, _numbers(y), _numbers(v), _numbers(a), out)
         return out
 
+    def gradients(self, t: Array, y: Array) -> Array:
+        """(k, r, n) Φ_y of the conditions in use, at many places."""
+        out = np.empty((len(t), self.kept, self.size))
+        held.gradients(*self._arrays, _numbers(t), _numbers(y), out)
+        return out
+
     def held(self, t: Array, y: Array, v: Array, a: Array, multipliers: Array) -> Array:
         """(k, n) the same at many states, with forces Φ_yᵀ λ of multipliers (k, r) of the conditions in use."""
         out = np.empty((len(t), self.size))
