@@ -184,9 +184,7 @@ def _of_chain(run: ChainRun, looks: IntArray, companion: Companion) -> tuple[tup
 
     t = s.t[looks]
     if isinstance(formulation, Nodal):
-        wanted = positions(s.t[:1], s.y[:1], s.v[:1])[0]
-        built = formulation.system.places(s.y[:1])[0]
-        nodes = [int(np.linalg.norm(built - place, axis=1).argmin()) for place in wanted]
+        nodes = [formulation.place_of(link, node) for link, node in watched]
         return names, *_of_nodes(formulation.system, s, looks, companion, nodes)
     at = hermite(companion.t, companion.y, companion.v, companion.a, np.clip(t, companion.t[0], companion.t[-1]))
     return names, positions(t, s.y[looks], s.v[looks]), positions(t, *at)

@@ -21,7 +21,7 @@ from erls.accuracy.finer_links import finer_links
 from erls.accuracy.integration import sudden
 from erls.accuracy.left_out_vibrations import left_out_vibrations
 from erls.accuracy.mesh_of_beams import mesh_error
-from erls.accuracy.slow_answer import slow_answer
+from erls.accuracy.slow_answer import slow_answer, start_of_loops
 from erls.accuracy.slow_motion import parted
 from erls.equations.registry import TREES
 from erls.equations.substructures import solved
@@ -63,6 +63,8 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
     places = configurations(compared, motion)
     start = motion.start if run.formulation.mechanism.static_start else None
     static, drift = slow_answer(compared, motion.slow, places, duration, start)
+    if compared.tied is not None and start is not None:
+        static = static + start_of_loops(compared, start)
     off, follows = left_out_vibrations(compared, motion, places, duration)
     parts = static + _SUDDEN * follows + off + drift
     margin = _MARGIN_SUDDEN if sudden(run) else _MARGIN

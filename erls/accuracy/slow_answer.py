@@ -24,6 +24,7 @@ import scipy.linalg as la
 
 from erls.accuracy.compared_links import Compared, Motion
 from erls.accuracy.configurations import Configuration
+from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.series import mass_series
 from erls.maths.full_turns import turned_on, turns_to
 from erls.maths.so3 import Array
@@ -55,12 +56,12 @@ def slow_answer(
     start : Motion or None
         State at the start of a run whose links are deformed as they bear it at rest; None where they start undeformed.
     """
-    found, free, whole = _unbalanced(compared, motion), compared.free, compared.whole
+    found, free, whole, ways = _unbalanced(compared, motion), compared.free, compared.whole, _ways(compared, motion)
     stiffness = np.concatenate([link.stiffness for link in whole.mechanism.links])
     y, v, _ = motion.whole
     drift, answer = np.zeros_like(y), np.zeros_like(y)
     borne: Array = np.zeros((1, whole.size))
-    if compared.tied is None:
+    if ways is None:
         answer[:, free:] = -found.forces[:, free:] / stiffness
         if start is not None:
             borne[:, free:] = -_unbalanced(compared, start).forces[:, free:] / stiffness
@@ -72,16 +73,35 @@ def slow_answer(
             answer[block] = (np.minimum(1.0, reached) * along) @ place.fields.T
             largest[block] = (steady + np.minimum(2.0, reached) * (along - steady)) @ place.fields.T
     else:
-        answer = _answer_of_loops(compared, motion, stiffness, found)
+        answer = _answer_of_loops(compared, motion, duration, found, ways)
         largest = 2 * answer
     if free and len(motion.t) > 1:
-        drift[:, :free] = _drift(compared, motion, found, answer)
+        drift[:, :free] = _drift(compared, motion, found, answer, ways)
     times = np.tile(motion.t, 3)
     still, bent, drifted = np.split(
         compared.moves(times, np.concatenate([y, y + largest, y + drift]), np.tile(v, (3, 1))), 3
     )
     moved = [np.linalg.norm(at - still, axis=2).max(axis=0) for at in (bent, drifted)]
     return np.asarray(moved[0]), np.asarray(moved[1])
+
+
+def start_of_loops(compared: Compared, start: Motion) -> Array:
+    """(p,) how far points begin from where they do with all that is left out, of loops in static equilibrium [m].
+
+    Parameters
+    ----------
+    compared : Compared
+    start : Motion
+        The first instant.
+
+    Raises
+    ------
+    SimulationError
+        NO_EQUILIBRIUM of the whole mechanism.
+    """
+    y, v = ClosedChain(compared.whole).initial_state()
+    here, there = compared.moves(np.repeat(start.t, 2), np.stack([start.whole[0][0], y]), np.stack([v, v]))
+    return np.asarray(np.linalg.norm(there - here, axis=-1))
 
 
 def _modal(place: Configuration) -> Array:
@@ -120,22 +140,22 @@ class _Unbalanced:
     multipliers: Array
 
 
-def _answer_of_loops(compared: Compared, motion: Motion, stiffness: Array, found: _Unbalanced) -> Array:
+def _answer_of_loops(
+    compared: Compared, motion: Motion, duration: float, found: _Unbalanced, ways: Sequence[Array]
+) -> Array:
+    """(k, N) that does not move joints along their ways, which is drift, and goes no farther than 1/2 D t^2."""
     assert compared.tied is not None
-    diagonal = np.concatenate([np.zeros(compared.free), stiffness])
     masses = mass_series(compared.tied, motion.t, motion.whole[0])
-    matrices = np.diag(diagonal) + _pace(motion, compared) ** 2 * masses
-    size = np.sqrt(np.einsum("kii->ki", matrices))
-    along = found.rows / size[:, None]
-    along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), np.finfo(float).tiny)
-    scaled = matrices / (size[:, :, None] * size[:, None]) + _PENALTY * along.swapaxes(1, 2) @ along
-    return np.asarray(-np.linalg.solve(scaled, (found.forces / size)[..., None])[..., 0] / size)
-
-
-def _pace(motion: Motion, compared: Compared) -> float:
-    """Of the rigid motion [rad/s]."""
-    rates = np.abs(motion.whole[1][:, : compared.free]).max(initial=0.0)
-    return float(max(rates, 2 * np.pi / max(float(np.ptp(motion.t)), 1e-9)))
+    free, answer = compared.free, np.empty_like(found.forces)
+    stiffness = np.concatenate([link.stiffness for link in compared.whole.mechanism.links])
+    for k, (mass, way) in enumerate(zip(masses, ways, strict=True)):
+        matrix = np.diag(np.concatenate([np.zeros(free), stiffness])) + 2 / duration**2 * mass
+        size = np.sqrt(np.diag(matrix))
+        along = np.concatenate([found.rows[k], (mass[:, :free] @ way).T]) / size
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
+        scaled = matrix / (size[:, None] * size) + _PENALTY * along.T @ along
+        answer[k] = -np.linalg.solve(scaled, found.forces[k] / size) / size
+    return answer
 
 
 def _unbalanced(compared: Compared, motion: Motion) -> _Unbalanced:
@@ -171,12 +191,13 @@ def _loop_balance(
     return compared.bound.closure(at, y, v).rows[:, compared.lesser.free], compared.bound.forces(at, y, v, a)
 
 
-def _drift(compared: Compared, motion: Motion, found: _Unbalanced, answer: Array) -> Array:
+def _drift(
+    compared: Compared, motion: Motion, found: _Unbalanced, answer: Array, ways: Sequence[Array] | None
+) -> Array:
     """(k, f) e of free joints."""
     free, (y, v, a) = compared.free, motion.whole
     forces = found.joints - _on_joints(compared, found, motion.t, y + answer, v, a) - found.finer
     vectors = compared.whole.mechanism.rotation_vector_places
-    ways = _ways(compared, motion)
 
     def along(k: int, matrix: Array, load: Array) -> Array:
         """What a load makes of joints that go their ways."""

@@ -19,7 +19,7 @@ from erls.maths.full_turns import nearest
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 
-_WINDOWS, _MOST_WINDOWS, _PER_WINDOW = 24, 192, 12  # windows overlap by half; instants in a half
+_WINDOWS, _MOST_WINDOWS, _PER_WINDOW = 24, 384, 12  # windows overlap by half; instants in a half
 _FEW_WINDOWS, _FEW = 12, 6  # the same where an instant costs more
 _PER_RADIAN = 10  # windows, of the way of the joint that goes farthest
 

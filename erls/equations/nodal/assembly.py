@@ -69,6 +69,7 @@ class NodalSystem:
     ) -> None:
         self.count, self.elements, self.group = len(poses), tuple(elements), group
         self.local = group is SE3
+        self.arms: tuple[tuple[int, Array], ...] = ()  # nodes, and places in their axes of points that go with them
         self.rows = JointRows(joints)
         self.kinds = Kinds(elements)
         pairs = self.kinds.pairs
@@ -209,8 +210,13 @@ class NodalSystem:
         return out[0], out[1], out[2]
 
     def places(self, stored: Array) -> Array:
-        """(k, nodes, 3) of the nodes."""
-        return stored[:, : 12 * self.count].reshape(len(stored), self.count, 12)[..., :3]
+        """(k, nodes + arms, 3) of the nodes, and of what they carry on `arms`."""
+        found = stored[:, : 12 * self.count].reshape(len(stored), self.count, 12)
+        if not self.arms:
+            return found[..., :3]
+        nodes, offsets = [node for node, _ in self.arms], np.array([offset for _, offset in self.arms])
+        turned = np.einsum("kpij,pj->kpi", found[:, nodes, 3:].reshape(len(stored), -1, 3, 3), offsets)
+        return np.concatenate([found[..., :3], found[:, nodes, :3] + turned], axis=1)
 
     def energies(self, q: Nodes, v: Array) -> Array:
         """(5,) kinetic, elastic of beams, gravity, springs, springs in joints [J]."""

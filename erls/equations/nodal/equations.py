@@ -62,6 +62,7 @@ class Nodal:
     ) -> None:
         self.mechanism, self._elements, self._start = mechanism, elements_per_member, start
         parts = [link_parts(link, elements_per_member, times) for link in mechanism.links]
+        self._built = [part.nodes for part in parts]  # in the mesh frames
         self.chain: Chain = build_chain(mechanism, parts, start)
         self.system = self.chain.system
         self.views = [
@@ -70,6 +71,7 @@ class Nodal:
                 mechanism.links, parts, self.chain.nodes, self.chain.elements, strict=True
             )
         ]
+        self.system.arms = tuple((self.chain.nodes[link].start, offset) for link, _, offset in self._arms)
         self._frames = 12 * self.system.count  # entries of y that hold them
         self._joints = slice(self._frames, self._frames + len(mechanism.joints))
         self._kept = self._frames + len(self.system.model.actuators)
@@ -79,6 +81,25 @@ class Nodal:
     def refined(self, times: int) -> Nodal:
         """The same with so many elements in place of each."""
         return Nodal(self.mechanism, self._elements, self._start, times)
+
+    @cached_property
+    def _arms(self) -> list[tuple[int, int, Array]]:
+        """Link, node and place from its inboard interface of each point that errors are judged at on rigid links."""
+        result = []
+        for number, link in enumerate(self.mechanism.links):
+            wanted = {i.node for i in link.model.interface_nodes}
+            wanted |= {point.node for point in self.mechanism.points if point.link == number}
+            for node in sorted(wanted - {link.inboard.node}) if not link.elastic_modes else ():
+                result.append((number, node, link.model.nodes[node] - link.inboard.position))
+        return result
+
+    def place_of(self, link: int, node: int) -> int:
+        """Number, among the places of ``system``, of a node of a link's model: the nearest one on that link."""
+        model, own = self.mechanism.links[link].model, self.chain.nodes[link]
+        arms = [(self.system.count + k, arm) for k, (number, arm, _) in enumerate(self._arms) if number == link]
+        built = np.concatenate([self._built[link], model.nodes[[arm for _, arm in arms]].reshape(-1, 3)])
+        numbers = [*range(own.start, own.stop), *(number for number, _ in arms)]
+        return numbers[int(np.linalg.norm(built - model.nodes[node], axis=1).argmin())]
 
     @property
     def size(self) -> int:
