@@ -82,6 +82,9 @@ def finer_links(scene: Scene, whole: Mechanism, solved: Mechanism) -> FinerLinks
             exact &= _same_inertia(link.model.invariants, left.invariants.truncated(np.arange(link.model.modes)))
             if not left.refined:
                 notes[f"the mesh of link {_name(link)!r} is not judged"] = None
+        elif lumped(link) and source is not None:
+            finer = _weighed(link, source)
+            exact &= _same_inertia(link.invariants, finer.invariants)
         elif own:
             lesser = int(np.ceil(_KEPT_OF_FILE * own))
             notes[f"link {_name(link)!r} is a modal file: judged by the highest third of its modes"] = None
@@ -91,6 +94,12 @@ def finer_links(scene: Scene, whole: Mechanism, solved: Mechanism) -> FinerLinks
         links.append(finer)
     mechanism = replace(solved, links=tuple(links), bandwidth=None)
     return FinerLinks(mechanism, np.concatenate(run), np.concatenate(kept), exact, tuple(notes))
+
+
+def lumped(link: Link) -> bool:
+    """Whether the inertia of a link hangs on its mesh, rigid as it may be: that of beams with lumped masses does."""
+    frame = None if link.description is None else link.description.frame
+    return frame is not None and frame.mass == "lumped"
 
 
 def _same_inertia(first: InertiaInvariants, second: InertiaInvariants) -> bool:
@@ -151,6 +160,13 @@ def _finer(link: Link, source: Callable[[], LinkFile], points: Sequence[int]) ->
         while len(_lately) > _KEPT:
             del _lately[next(iter(_lately))]
     return _lately[key][1], left
+
+
+def _weighed(link: Link, source: Callable[[], LinkFile]) -> Link:
+    """A rigid link with the inertia of the finer mesh."""
+    left = left_out_cached(source, link.model, cache_folder())
+    difference = left.invariants.truncated(np.arange(link.model.modes)) - link.model.invariants
+    return replace(link, invariants=link.invariants + difference)
 
 
 def _extended(link: Link, left: LeftOut, nodes: Sequence[int]) -> Link:

@@ -17,7 +17,7 @@ import numpy as np
 
 from erls.accuracy.compared_links import compared_links
 from erls.accuracy.configurations import configurations
-from erls.accuracy.finer_links import finer_links
+from erls.accuracy.finer_links import finer_links, lumped
 from erls.accuracy.integration import sudden
 from erls.accuracy.left_out_vibrations import left_out_vibrations
 from erls.accuracy.mesh_of_beams import mesh_error
@@ -47,7 +47,7 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
         Why, or what is not in it; may be empty.
     """
     moving = solved(run.formulation)
-    if not any(link.elastic_modes for link in moving.mechanism.links):
+    if not any(link.elastic_modes or lumped(link) for link in moving.mechanism.links):
         return 0.0, ""
     try:
         if run.scene.record.simulation.formulation not in TREES:

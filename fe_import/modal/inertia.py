@@ -50,6 +50,10 @@ class InertiaInvariants:
         """Inertia of the link with a payload on it (same modes)."""
         return InertiaInvariants(self.m + other.m, self.X + other.X, self.Z + other.Z, self.rigid)
 
+    def __sub__(self, other: InertiaInvariants) -> InertiaInvariants:
+        """Those of a link without some of its masses."""
+        return InertiaInvariants(self.m - other.m, self.X - other.X, self.Z - other.Z, self.rigid)
+
     def truncated(self, modes: NDArray[np.int64]) -> InertiaInvariants:
         """The invariants of some of the modes, in the given order."""
         ix = np.ix_(modes, modes)
