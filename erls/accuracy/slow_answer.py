@@ -278,7 +278,8 @@ def _changes(compared: Compared, motion: Motion, found: _Unbalanced) -> Array:
     if compared.tied is None:
         forces = compared.lesser_forces(times, *flat)
     else:
-        forces = compared.tied.held(times, *flat, np.tile(found.multipliers, (1 + 2 * free, 1)))
+        y, v, a = flat
+        forces = compared.tied.held(times, y, v, a, np.tile(found.multipliers, (1 + 2 * free, 1)))
     forces = forces.reshape(1 + 2 * free, count, -1)[..., :free]
     found_changes = (forces[1:] - forces[0]).reshape(2, free, count, free) / steps[..., None]
     changes[:] = found_changes.transpose(0, 2, 3, 1)

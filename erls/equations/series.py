@@ -70,8 +70,8 @@ def residual_series(system: CompiledSystem, t: Array, y: Array, v: Array, a: Arr
     """
     out = np.empty((len(t), system.size))
     address = handed(function or system.residual, RESIDUAL)
-    states = (np.ascontiguousarray(x, dtype=float) for x in (t, y, v, a))
-    residuals(address, system.reals, system.integers, system.scratch, *states, out)
+    t, y, v, a = (np.ascontiguousarray(x, dtype=float) for x in (t, y, v, a))
+    residuals(address, system.reals, system.integers, system.scratch, t, y, v, a, out)
     return out
 
 
@@ -79,6 +79,6 @@ def mass_series(system: CompiledSystem, t: Array, y: Array) -> Array:
     """(k, n, n) mass matrices at places (k, n) and times (k,) [s]."""
     out = np.empty((len(t), system.size, system.size))
     address = handed(system.mass_matrix, MASS_MATRIX)
-    states = (np.ascontiguousarray(x, dtype=float) for x in (t, y))
-    masses(address, system.reals, system.integers, system.scratch, *states, out)
+    t, y = (np.ascontiguousarray(x, dtype=float) for x in (t, y))
+    masses(address, system.reals, system.integers, system.scratch, t, y, out)
     return out

@@ -330,3 +330,17 @@ def test_an_observer_that_fails_ends_the_run() -> None:
     assert found.failure is not None
     assert found.failure.cause is Cause.RUNAWAY
     assert found.t[-1] < 0.5
+
+
+def test_points_on_rigid_nodal_links_tell_their_error() -> None:
+    """The one node of a rigid link sits in its joint, and rests; the errors of its turning are those of its points."""
+    path = DATA / "l_shape/steel_tall.toml"
+    rigid = ("links.l.flexible=false", "simulation.formulation=nodal", "simulation.duration=0.5")
+    times = np.linspace(0, 0.5, 301)
+    exact = _extrapolated(path, rigid, 1e-3, times)
+    run = _run(path, *rigid, "simulation.step=8e-3")
+    actual, found = _apart(run, exact, times), _stated(run)
+    assert actual > 1e-6
+    assert actual <= found.total <= TOO_LARGE * actual
+    adaptive = _run(path, *rigid)
+    assert _apart(adaptive, exact, times) <= _stated(adaptive).total

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import scenes
 
+import erls.accuracy.slow_answer as slow_answer_module
+from erls.accuracy.compared_links import Motion
 from erls.accuracy.modes import modes_error
 from erls.accuracy.slow_motion import averages
 from erls.run.chain.run import ChainRun
@@ -118,6 +121,60 @@ def test_loops_state_what_their_links_leave_out(tmp_path: Path) -> None:
     assert actual <= stated(run) <= 20 * actual
 
 
+def undriven_four_bar(folder: Path, **changes: Any) -> Path:
+    """The flexible four-bar, its crank free."""
+    source = scenes.ROOT / "data" / "four_bar" / "flexible.toml"
+    data = scenes.merged(scenes.read_toml(source), changes)
+    crank = {key: value for key, value in data["joints"][0].items() if key != "drive"}
+    joints = [{**crank, "initial": {"position_deg": 60.0}}, *data["joints"][1:]]
+    links = [{**link, "model": str(source.parent / link["model"])} for link in data["links"]]
+    return scenes.write_toml(folder / "undriven.toml", {**data, "joints": joints, "links": links})
+
+
+def test_loops_in_static_equilibrium_begin_where_their_links_let_them(tmp_path: Path) -> None:
+    """With one mode each, links of the loop bear their weight in another shape, and joints follow."""
+    scene = undriven_four_bar(tmp_path, simulation={"duration": 0.02}, initial={"deformation": "static"})
+    run = run_of(scene, *(f"links.{name}.elastic_modes=1" for name in ("crank", "coupler", "rocker")))
+    better = run_of(scene, *finer(tmp_path, scene, 2))
+    begin = max(float(np.linalg.norm(run.position(n, 0.0) - better.position(n, 0.0))) for n in run.point_names)
+    assert begin > FLOOR
+    actual = distance(run, better)
+    assert actual <= stated(run) <= 20 * actual
+
+
+def test_loops_that_swing_drift(tmp_path: Path) -> None:
+    """A four-bar that nothing drives: what its links leave out makes it swing otherwise."""
+    scene = undriven_four_bar(tmp_path, simulation={"duration": 0.5})
+    run = run_of(scene, *(f"links.{name}.elastic_modes=6" for name in ("crank", "coupler", "rocker")))
+    actual = distance(run, run_of(scene, *finer(tmp_path, scene, 2)))
+    assert actual <= stated(run) + FLOOR
+    assert stated(run) <= 20 * max(actual, FLOOR)
+
+
+def test_rotation_vectors_that_are_exchanged_make_no_error(tmp_path: Path) -> None:
+    """A link that turns more than once in a spherical joint: coordinates jump by full turns, the motion does not."""
+    scenes.l_link(tmp_path, 2, reduction={"method": "craig-bampton", "elastic_modes": 4})
+    turning = {"turn_z": {"initial": {"rate": 9.0}}, "turn_x": {"initial": {"rate": 1.0}}}
+    joint = {"name": "shoulder", "type": "spherical", "dh": {"convention": "standard"}, "coordinates": turning}
+    scene = scenes.l_scene(tmp_path, joints=[joint], simulation={"duration": 1.0})
+    run = run_of(scene)
+    jumps = np.abs(np.diff(run.solution.y[:, :3], axis=0)).max()
+    assert jumps > np.pi
+    actual = distance(run, run_of(scene, *finer(tmp_path, scene, 4)))
+    assert actual <= stated(run) <= 20 * actual
+
+
+def test_rigid_links_of_lumped_masses_have_a_mesh_too(tmp_path: Path) -> None:
+    """Lumped masses of two elements a leg are not those of four: a pendulum swings otherwise, rigid as it is."""
+    scenes.l_link(tmp_path, 2, frame={"mass": "lumped"})
+    scene = scenes.l_scene(tmp_path, simulation={"duration": 0.4})
+    rigid = "links.l.flexible=false"
+    run = run_of(scene, rigid)
+    actual = distance(run, run_of(scene, rigid, *finer(tmp_path, scene, 6)))
+    assert actual > 1e-5
+    assert actual <= stated(run) <= 20 * actual
+
+
 @pytest.mark.parametrize(
     "overrides",
     [
@@ -197,3 +254,42 @@ def test_windows_see_the_slow_motion_through_a_quick_vibration() -> None:
     assert np.allclose(rate[:, 0], 0.5 + 2.0 * middles, rtol=0, atol=0.01)
     assert np.allclose(acceleration, 2.0, rtol=0, atol=0.02)
     assert np.allclose(place[:, 0], 0.3 + 0.5 * middles + middles**2, rtol=0, atol=1e-3)
+
+
+def one_way(stiffness: float, damping: float, push: float, ways: list[Any] | None) -> Any:
+    """Equations of joints of unit mass that an answer of 1 on a last coordinate pushes, as `slow_answer` asks them."""
+
+    def forces(t: Any, y: Any, v: Any, a: Any, *_: Any) -> Any:
+        return stiffness * y + damping * v + a + push * y[:, -1:]
+
+    free = 1 if ways is None else 2
+    link = SimpleNamespace(mechanism=SimpleNamespace(rotation_vector_places=()))
+    tied = None if ways is None else SimpleNamespace(held=forces)
+    masses = np.broadcast_to(np.eye(free + 1), (601, free + 1, free + 1))
+    return SimpleNamespace(
+        free=free, tied=tied, whole=link, run=np.arange(free + 1), forces=forces,
+        lesser_forces=forces, lesser_masses=lambda t, y: masses,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(400.0, 0.0), (400.0, 6.0), (-9.0, 0.0)])
+@pytest.mark.parametrize("loop", [False, True])
+def test_drift_is_that_of_an_oscillator(stiffness: float, damping: float, loop: bool) -> None:
+    """ë + c ė + k e = -ΔR, constant, from rest: closed forms, to 2 % of the largest in 600 steps of 5 periods; of two
+    joints that a loop lets move only together, too, with the little damping of its method.
+    """
+    t = np.linspace(0.0, 1.5, 601)
+    way = np.array([[1.0], [1.0]]) / np.sqrt(2)
+    compared = one_way(stiffness, damping, 3.0, [way] * len(t) if loop else None)
+    n = compared.free + 1
+    still, answer = np.zeros((len(t), n)), np.zeros((len(t), n))
+    answer[:, -1] = 1.0
+    motion = Motion(t, (still, still, still), (still, still, still))
+    joints = np.zeros((len(t), compared.free))
+    rows = np.zeros((len(t), 1, n) if loop else (len(t), 0, n))
+    found = slow_answer_module._Unbalanced(still, joints, joints, rows, np.zeros(rows.shape[:2]))
+    drift = slow_answer_module._drift(compared, motion, found, answer, [way] * len(t) if loop else None)
+    roots = np.roots([1.0, damping, stiffness]).astype(complex)
+    c = np.linalg.solve(np.array([[1.0, 1.0], roots]), [1.0, 0.0])
+    exact = -3.0 / stiffness * (1 - (c[0] * np.exp(roots[0] * t) + c[1] * np.exp(roots[1] * t)).real)
+    assert np.abs(drift - exact[:, None]).max() < (0.06 if loop else 0.02) * np.abs(exact).max()

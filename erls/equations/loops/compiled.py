@@ -222,7 +222,8 @@ class CompiledLoops(CompiledSystem):
     def held(self, t: Array, y: Array, v: Array, a: Array, multipliers: Array) -> Array:
         """(k, n) the same at many states, with forces Φ_yᵀ λ of multipliers (k, r) of the conditions in use."""
         out = np.empty((len(t), self.size))
-        held.held(*self._arrays, *(_numbers(x) for x in (t, y, v, a, multipliers)), out)
+        t, y, v, a = (_numbers(x) for x in (t, y, v, a))
+        held.held(*self._arrays, t, y, v, a, _numbers(multipliers), out)
         return out
 
     def masses(self, t: float, y: Array) -> Array:

@@ -99,7 +99,8 @@ class Nodal:
         arms = [(self.system.count + k, arm) for k, (number, arm, _) in enumerate(self._arms) if number == link]
         built = np.concatenate([self._built[link], model.nodes[[arm for _, arm in arms]].reshape(-1, 3)])
         numbers = [*range(own.start, own.stop), *(number for number, _ in arms)]
-        return numbers[int(np.linalg.norm(built - model.nodes[node], axis=1).argmin())]
+        nearest: int = numbers[int(np.linalg.norm(built - model.nodes[node], axis=1).argmin())]
+        return nearest
 
     @property
     def size(self) -> int:
