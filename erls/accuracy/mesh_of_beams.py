@@ -20,7 +20,7 @@ from erls.run.chain.run import ChainRun
 FINER = 2
 """Elements in place of each."""
 
-SHARE = 1.5 * FINER**2 / (FINER**2 - 1)
+SHARE = 1.8 * FINER**2 / (FINER**2 - 1)
 """Of the distance from a run on the finer mesh: the error by its order, and a margin."""
 
 _LARGER = 2.0  # steps

@@ -14,7 +14,7 @@ import numpy as np
 
 from erls.accuracy.error_over_time import ErrorOverTime
 from erls.accuracy.force_errors import force_differences
-from erls.accuracy.integration import ITERATED
+from erls.accuracy.integration import ITERATED, sudden
 from erls.accuracy.other_run import distance_from, other_run
 from erls.auto.outputs import Watched
 from erls.equations.substructures import solved
@@ -25,7 +25,7 @@ from erls.run.chain.run import ChainRun
 LARGER = 8.0
 """Tolerance of the second run, of that of the first; where that tells nothing, so much smaller."""
 
-_SHARE, _SHARE_SMALLER = 1.2, 2.0  # of the distance; of a better run, which still errs where friction decides
+_SHARE, _SHARE_SUDDEN = 1.5, 2.0  # of the distance; where friction and limits decide, or of a better run, which errs
 _FORCES = 8  # instants at which they are compared
 _LIKE = 0.95  # steps of a run at a larger tolerance, of those of the run: as many are the same ones
 
@@ -40,10 +40,10 @@ def second_run_error(run: ChainRun, watched: Watched) -> ErrorOverTime | None:
     watched : tuple of (int, int)
         Link and node of each judged point.
     """
-    found, share = _second(run, LARGER), _SHARE
+    found, share = _second(run, LARGER), _SHARE_SUDDEN if sudden(run) else _SHARE
     if found is None or found.work.steps > _LIKE * run.solution.work.steps:
         better = _second(run, 1 / LARGER)
-        found, share = (found, _SHARE) if better is None else (better, _SHARE_SMALLER)
+        found, share = (found, _SHARE) if better is None else (better, _SHARE_SUDDEN)
     if found is None:
         return None
     own, formulation = run.solution, solved(run.formulation)

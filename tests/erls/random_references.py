@@ -76,19 +76,19 @@ class Limited(Asked):
         return [*super().watches(), WorkLimit(self.calls, self.steps)]
 
 
-def limited_run(scene: Scene, more: int = 1, verdict: bool = False) -> ChainRun:
+def limited_run(scene: Scene, more: float = 1.0, verdict: bool = False) -> ChainRun:
     """A run of a scene whose work is limited.
 
     Parameters
     ----------
     scene : Scene
-    more : int
+    more : float
         How many times as much work it may take as a scene itself.
     verdict : bool
         Whether it states its accuracy.
     """
     calls = MOST_NODAL_CALLS if scene.record.simulation.formulation == "nodal" else MOST_CALLS
-    asked = Limited(None, lambda text: None, None, False, None, verdict, more * calls, more * MOST_STEPS)
+    asked = Limited(None, lambda text: None, None, False, None, verdict, round(more * calls), round(more * MOST_STEPS))
     return run_chain(scene, asked)
 
 
@@ -136,7 +136,7 @@ class Judge:
         return self.places(run, end)
 
 
-def judge(seed: int, parts: str = "all", nodal_s: float = 0.0) -> dict[str, Any]:
+def judge(seed: int, parts: str = "all", nodal_s: float = 0.0, work: float = 1.0) -> dict[str, Any]:
     """Run a random scene and its references.
 
     Parameters
@@ -146,6 +146,8 @@ def judge(seed: int, parts: str = "all", nodal_s: float = 0.0) -> dict[str, Any]
         ``all``; ``integration`` alone; ``statement``: no references; ``none``: nor the cost of the statement.
     nodal_s : float
         Time that a reference of beam elements may take [s]; none is made unless given.
+    work : float
+        Of the limits of work, what the run itself may take.
 
     Returns
     -------
@@ -156,7 +158,7 @@ def judge(seed: int, parts: str = "all", nodal_s: float = 0.0) -> dict[str, Any]
     row: dict[str, Any] = {"seed": seed, "labels": scene.labels, "outcome": "ran"}
     try:
         with tempfile.TemporaryDirectory() as folder:
-            _judged(Judge(scene, Path(folder)), row, parts, nodal_s)
+            _judged(Judge(scene, Path(folder)), row, parts, nodal_s, work)
     except (SceneError, SimulationError, ReportedError) as problem:
         kind = "failed" if isinstance(problem, SimulationError) else "refused"
         row |= {"outcome": f"{kind}: {problem.cause}", "message": str(problem).replace(folder, "")[:400]}
@@ -165,9 +167,9 @@ def judge(seed: int, parts: str = "all", nodal_s: float = 0.0) -> dict[str, Any]
     return {**row, "judged_s": round(time.perf_counter() - begun, 2)}
 
 
-def _judged(judge: Judge, row: dict[str, Any], parts: str, nodal_s: float) -> None:
+def _judged(judge: Judge, row: dict[str, Any], parts: str, nodal_s: float, work: float) -> None:
     scene, loaded = judge.scene, load_chain(judge.path)
-    run = limited_run(loaded, verdict=True)
+    run = limited_run(loaded, work, verdict=True)
     own = judge.places(run, run.end)
     row |= {"steps": run.solution.work.steps, "evaluations": run.solution.work.rhs_calls, "wall_s": run.wall_s}
     row |= {"tolerance": loaded.record.simulation.tolerance, "end": run.end, "warnings": len(run.warnings)}

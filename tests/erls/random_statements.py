@@ -46,6 +46,12 @@ def up_to(values: Sequence[float], end: float, horizon: float | None) -> float:
     return values[passed - 1] if passed else 0.0
 
 
+def judged(stated: dict[str, Any], part: str = "total") -> float | None:
+    """What is stated of what references judge [m]: of the total all but ``links``, whose model they share."""
+    error: float | None = stated.get(part)
+    return error if error is None or part != "total" else error - (stated.get("links") or 0.0)
+
+
 def ratio(row: Row, part: str) -> float | None:
     """Stated over actual error; None where either is missing or the reference is in doubt by too much.
 
@@ -54,7 +60,8 @@ def ratio(row: Row, part: str) -> float | None:
     on, and where the motion is farther off by then.
     """
     stated, actual = row.get("stated") or {}, (row.get("actual") or {}).get(part)
-    if stated.get(part) is None or not actual:
+    error = judged(stated, part)
+    if error is None or not actual:
         return None
     doubts = (row.get("doubt") or {}).get("integration" if part == "integration" else "total")
     horizon = stated["horizon"]
@@ -64,7 +71,7 @@ def ratio(row: Row, part: str) -> float | None:
         doubt = up_to(doubts, row["end"], until) if doubts else 0.0
         return None if doubt > DOUBTFUL * off else max(error, FLOOR) / off
 
-    whole = over(stated[part], None)
+    whole = over(error, None)
     if horizon is None:
         return whole
     before = over(row["tolerance"], horizon)
