@@ -95,7 +95,8 @@ def judged_integration(run: ChainRun, watched: Watched, others: float) -> Integr
     followed = settings.output_step is None and wrong_table(s, settings.integrator) is not None
     if followed and not mechanism.loops and not (elastic and sudden(run)):  # sudden forces lead it astray there
         found = integration_error(run, watched)
-    if found is not None and found.whole and found.total <= max(expected(run), others):
+    smooth = not elastic and not sudden(run)  # then nothing is unresolved, and the equation right
+    if found is not None and found.whole and (smooth or found.total <= max(expected(run), others)):
         return _with_forces(run, found)
     second = second_run_error(run, watched)
     if found is None or not found.whole:
