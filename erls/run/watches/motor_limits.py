@@ -47,9 +47,10 @@ def limit_warnings(formulation: Formulation, solution: Solution, tolerance: floa
     tolerance : float
         That the integrator was given [m].
     """
+    formulation = solved(formulation)  # links in pieces are held by more joints
     mechanism = formulation.mechanism
     result = []
-    for place, k in enumerate(getattr(solved(formulation), "free_joints", ())):
+    for place, k in enumerate(getattr(formulation, "free_joints", ())):
         joint = mechanism.joints[k]
         if not math.isfinite(joint.drive.torque_limit):
             continue

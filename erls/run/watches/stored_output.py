@@ -57,7 +57,7 @@ def output_error(run: ChainRun) -> float:
     twice, fourfold = (float(np.linalg.norm(x - stored, axis=-1).max(initial=0.0)) for x in (near, far))
     if not 0 < twice < np.inf:
         return 0.0
-    return twice * float(np.clip(twice / fourfold, 1 / _ORDER, 1.0)) if fourfold < np.inf else twice
+    return twice * float(np.clip(twice / fourfold, 1 / _ORDER, 1.0)) if 0 < fourfold < np.inf else twice
 
 
 def output_warnings(run: ChainRun) -> list[str]:
