@@ -29,7 +29,7 @@ from erls.run.chain.run import ChainRun
 from fe_import.errors import FEImportError
 
 _SUDDEN = 2.0  # of what follows vibrations, where these come suddenly
-_MARGIN, _MARGIN_SUDDEN = 2.4, 3.0  # of the sum; where friction and limits of motors act, which errors set off
+_MARGIN, _MARGIN_SUDDEN = 2.0, 2.5  # of the sum; where friction and limits of motors act, which errors set off
 
 
 def modes_error(run: ChainRun) -> tuple[float | None, str]:

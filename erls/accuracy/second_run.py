@@ -25,7 +25,7 @@ from erls.run.chain.run import ChainRun
 LARGER = 8.0
 """Tolerance of the second run, of that of the first; where that tells nothing, so much smaller."""
 
-_SHARE, _SHARE_SUDDEN = 1.5, 2.0  # of the distance; where friction and limits decide, or of a better run, which errs
+_SHARE, _SHARE_SUDDEN = 1.2, 2.0  # of the distance; where friction and limits decide, or of a better run, which errs
 _FORCES = 8  # instants at which they are compared
 _LIKE = 0.95  # steps of a run at a larger tolerance, of those of the run: as many are the same ones
 

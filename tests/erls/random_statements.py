@@ -46,10 +46,15 @@ def up_to(values: Sequence[float], end: float, horizon: float | None) -> float:
     return values[passed - 1] if passed else 0.0
 
 
-def judged(stated: dict[str, Any], part: str = "total") -> float | None:
-    """What is stated of what references judge [m]: of the total all but ``links``, whose model they share."""
+def judged(row: Row, part: str = "total") -> float | None:
+    """What is stated of what references judge [m]: of the total all but ``links`` where they share the links' model, as
+    they do with runs of all effects.
+    """
+    stated = row.get("stated") or {}
     error: float | None = stated.get(part)
-    return error if error is None or part != "total" else error - (stated.get("links") or 0.0)
+    if error is None or part != "total" or row["labels"]["effects"] != "all":
+        return error
+    return error - (stated.get("links") or 0.0)
 
 
 def ratio(row: Row, part: str) -> float | None:
@@ -60,7 +65,7 @@ def ratio(row: Row, part: str) -> float | None:
     on, and where the motion is farther off by then.
     """
     stated, actual = row.get("stated") or {}, (row.get("actual") or {}).get(part)
-    error = judged(stated, part)
+    error = judged(row, part)
     if error is None or not actual:
         return None
     doubts = (row.get("doubt") or {}).get("integration" if part == "integration" else "total")

@@ -58,8 +58,8 @@ def test_scene_ends_typed_and_stated_error_holds(seed: int) -> None:
 def _check_statement(row: dict[str, Any]) -> None:
     """The stated total is at least the stored actual one, up to the stated horizon."""
     stated, stored = row.get("stated"), REFERENCES.get(row["seed"])
-    error = judged(stated) if stated else None
-    if error is None or stored is None or not stored["total"] or row["seed"] in UNCOVERED:
+    error = judged(row)
+    if not stated or error is None or stored is None or not stored["total"] or row["seed"] in UNCOVERED:
         return
     actual = up_to([float(value) for value in stored["total"].split()], float(stored["end"]), stated["horizon"])
     if float(stored["doubt"]) > DOUBTFUL * max(actual, FLOOR):  # NaN of no second reference: judged all the same
