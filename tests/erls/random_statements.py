@@ -48,11 +48,11 @@ def up_to(values: Sequence[float], end: float, horizon: float | None) -> float:
 
 def judged(row: Row, part: str = "total") -> float | None:
     """What is stated of what references judge [m]: of the total all but ``links`` where they share the links' model, as
-    they do with runs of all effects.
+    they do with runs of all effects that have no gauge or body frame of their own.
     """
-    stated = row.get("stated") or {}
+    stated, labels = row.get("stated") or {}, row["labels"]
     error: float | None = stated.get(part)
-    if error is None or part != "total" or row["labels"]["effects"] != "all":
+    if error is None or part != "total" or labels["effects"] != "all" or "," in labels["formulation"]:
         return error
     return error - (stated.get("links") or 0.0)
 
