@@ -9,9 +9,11 @@ from erls.scene.settings import Simulation
 
 
 def kernels_of(mechanism: Mechanism, settings: Simulation) -> tuple[str, ...]:
-    """Modules by name: powers in joints, and where `lobatto` may integrate, the steps of the error equation."""
+    """Modules by name: powers in joints, forces at many states; where `lobatto` may integrate, the steps of the error
+    equation.
+    """
     if settings.formulation not in TREES or system_of(mechanism, settings) == "absolute":
         return ()
     followed = settings.integrator != FIXED_STEP and INTEGRATORS[settings.integrator].kernels is not None
     steps = ("erls.integrate.stepping.error_steps",) if followed and settings.output_step is None else ()
-    return (*steps, "erls.equations.serial.joint_powers")
+    return (*steps, "erls.equations.serial.joint_powers", "erls.equations.series")

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 import scenes
 
-import erls.accuracy.slow_answer as slow_answer_module
 from erls.accuracy.compared_links import Motion
+from erls.accuracy.joint_drift import joint_drift
 from erls.accuracy.modes import modes_error
 from erls.accuracy.slow_motion import averages
+from erls.accuracy.unbalanced_forces import Unbalanced
 from erls.run.chain.run import ChainRun
 from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
@@ -257,7 +258,7 @@ def test_windows_see_the_slow_motion_through_a_quick_vibration() -> None:
 
 
 def one_way(stiffness: float, damping: float, push: float, ways: list[Any] | None) -> Any:
-    """Equations of joints of unit mass that an answer of 1 on a last coordinate pushes, as `slow_answer` asks them."""
+    """Equations of joints of unit mass that an answer of 1 on a last coordinate pushes, as `joint_drift` asks them."""
 
     def forces(t: Any, y: Any, v: Any, a: Any, *_: Any) -> Any:
         return stiffness * y + damping * v + a + push * y[:, -1:]
@@ -287,8 +288,8 @@ def test_drift_is_that_of_an_oscillator(stiffness: float, damping: float, loop: 
     motion = Motion(t, (still, still, still), (still, still, still))
     joints = np.zeros((len(t), compared.free))
     rows = np.zeros((len(t), 1, n) if loop else (len(t), 0, n))
-    found = slow_answer_module._Unbalanced(still, joints, joints, rows, np.zeros(rows.shape[:2]))
-    drift = slow_answer_module._drift(compared, motion, found, answer, [way] * len(t) if loop else None)
+    found = Unbalanced(still, joints, joints, rows, np.zeros(rows.shape[:2]))
+    drift = joint_drift(compared, motion, found, answer, [way] * len(t) if loop else None)
     roots = np.roots([1.0, damping, stiffness]).astype(complex)
     c = np.linalg.solve(np.array([[1.0, 1.0], roots]), [1.0, 0.0])
     exact = -3.0 / stiffness * (1 - (c[0] * np.exp(roots[0] * t) + c[1] * np.exp(roots[1] * t)).real)

@@ -17,6 +17,7 @@ from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.serial.equilibrium import held_equilibrium
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
+from erls.equations.series import mass_series, residual_series
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, cross_all
 from erls.mechanism.chain import Mechanism
@@ -109,9 +110,8 @@ class SerialFormulation(TreeFormulation):
         SimulationError
             As `acceleration`.
         """
-        forces, masses = np.empty(y.shape), np.empty((*y.shape, y.shape[1]))
-        for i, at in enumerate(t.tolist()):
-            forces[i], masses[i] = self.residual(at, y[i], v[i], np.zeros(0)), self.mass_matrix(at, y[i])
+        forces = residual_series(self.compiled, t, y, v, np.zeros((len(t), 0)))
+        masses = mass_series(self.compiled, t, y)
         try:
             lower = np.linalg.cholesky(masses)
         except np.linalg.LinAlgError:  # one of them: the method for one names what is wrong with it
