@@ -47,7 +47,7 @@ STAGES = 6
 ENDS, ENDS_STIFF = 6, 10
 """Ends of steps through which P goes, with rates or without."""
 
-_MERGED_SMOOTH = 4  # steps of the run in one of the error, of motions without noise, which steps just resolve
+_MERGED_SMOOTH = 3  # steps of the run in one of the error, of motions without noise, which steps just resolve
 _MERGED, _MERGED_LARGE = 6, 8  # the same of others, at the least: of systems up to, and above
 _SHARP = 4  # times the frequency of the filter, of motions without noise
 _LARGE = 15  # coordinates, whose factors cost more than evaluations

@@ -15,8 +15,11 @@ from scipy.special import ellipj, ellipk
 import erls
 from erls.accuracy import statement
 from erls.accuracy.audits import Audit
+from erls.accuracy.judged_integration import Integrated
 from erls.accuracy.statement import stated
+from erls.accuracy.vibrations import swing_between_knots
 from erls.cli.main import main
+from erls.integrate.base import Solution, Work, hermite
 from erls.maths.so3 import Array
 from erls.run.accuracy import PARTS
 from erls.run.bodies.rest import BodyRest
@@ -121,6 +124,36 @@ def test_shipped_scenes_are_good_and_cover_their_distance_from_exact_beams(scene
     assert run.accuracy.total is not None
     assert beams - 1e-5 <= run.accuracy.total <= 10 * beams
     assert run.trust.verdict == ("good" if run.accuracy.total <= 1e-4 else "limited")
+
+
+def test_what_is_interpolated_swings_no_farther_than_is_found() -> None:
+    """q = A cos ωt between knots 20 rad apart: by J. Hermite's polynomial farther than its places tell."""
+    amplitude, omega = 1e-6, 1.5e4
+    t = np.cumsum(np.tile([0.0011, 0.0017, 0.0014], 40))
+    y, v, a = (x[:, None] for x in (np.cos(omega * t), -omega * np.sin(omega * t), -(omega**2) * np.cos(omega * t)))
+    run = Solution(t, amplitude * y, amplitude * v, amplitude * a, Work())
+    middle = (t[1:-2] + t[2:-1]) / 2
+    actual = np.abs(hermite(run.t, run.y, run.v, run.a, middle)[0]).max()
+    found = swing_between_knots(run, np.arange(len(t)), np.ones((1, 1)))
+    assert actual > 10 * amplitude
+    assert actual - 3 * amplitude <= found[0] <= actual + 3 * amplitude
+    slow = Solution(t, np.sin(40 * t)[:, None], 40 * np.cos(40 * t)[:, None], -1600 * np.sin(40 * t)[:, None], Work())
+    assert swing_between_knots(slow, np.arange(len(t)), np.ones((1, 1)))[0] < 1e-6  # (40 h)^4 / 24, h = 1.4 ms
+
+
+def test_disturbances_that_grow_are_told_from_those_that_add_up() -> None:
+    t = np.linspace(0.0, 2.0, 101)
+    for error, amplified in ((t, 1.0), (t**2, 4 / 3), (np.exp(4 * t), np.exp(4.0) / 3)):
+        assert Integrated(t, 1e-6 * error, {}, {}).amplified() == pytest.approx(amplified, rel=1e-3)
+
+
+def test_a_horizon_is_given_up_to_where_half_of_the_rest_is_left() -> None:
+    """Of an error that is t, 0.2 of other parts and a tolerance of 1: until 2 t = 0.8."""
+    t = np.linspace(0.0, 2.0, 201)
+    found = Integrated(t, t, {}, {})
+    assert found.horizon(1.0, 0.2) == pytest.approx(0.4, abs=0.011)  # an instant of the curve
+    assert found.horizon(2.5, 0.2) is None
+    assert found.horizon(0.1, 0.2) is None
 
 
 def test_files_and_json_hold_the_statement(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
