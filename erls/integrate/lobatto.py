@@ -41,7 +41,7 @@ from erls.maths.so3 import Array
 
 NODES = (0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0)
 WEIGHT = 0.08  # κ
-_ITERATED = 0.01  # of the tolerance: where iterations stop
+_ITERATED = 3e-4  # of the tolerance: where iterations stop; what they leave of a smooth motion adds up over its steps
 _FIRST_STEP = 1e-4  # s, at most
 _MAX_ITERATIONS = 10
 _REFRESH_COST = 2  # of fresh factors, in iterations

@@ -59,7 +59,7 @@ def rod_angle(run: ChainRun, t: Array) -> Array:
 
 @pytest.mark.parametrize("duration", [6.0, 60.0, 600.0])
 def test_a_pendulum_states_how_far_it_drifts(tmp_path: Path, duration: float) -> None:
-    """Against the closed form: at least the actual error, and no more than ten times; 1e-2 m after ten minutes."""
+    """Against the closed form: at least the actual error, and no more than ten times; 3e-4 m after ten minutes."""
     run = erls.simulate(rods(tmp_path, 1, duration))
     assert isinstance(run, ChainRun)
     assert run.accuracy is not None
@@ -78,13 +78,15 @@ def test_a_pendulum_states_how_far_it_drifts(tmp_path: Path, duration: float) ->
         assert np.linalg.norm(run.position("tip", times[within]) - exact[within], axis=1).max() <= 1e-4
 
 
-@pytest.mark.parametrize("changes", [(), ("simulation.integrator=generalized_alpha", "simulation.step=1e-3")])
-def test_a_tumbling_triple_pendulum_is_told(tmp_path: Path, changes: tuple[str, ...]) -> None:
-    """It was 0.05 m off with `lobatto`, 0.9 m with generalized-α at 1 ms, and nothing was said."""
-    path = rods(tmp_path, 3, 5.0)
+@pytest.mark.parametrize(
+    ("duration", "changes"), [(10.0, ()), (5.0, ("simulation.integrator=generalized_alpha", "simulation.step=1e-3"))]
+)
+def test_a_tumbling_triple_pendulum_is_told(tmp_path: Path, duration: float, changes: tuple[str, ...]) -> None:
+    """It was 0.05 m off after 5 s with `lobatto`, 0.9 m with generalized-α at 1 ms, and nothing was said."""
+    path = rods(tmp_path, 3, duration)
     run = erls.simulate(erls.load_scene(path, changes))
     tight = erls.simulate(erls.load_scene(path, ["simulation.tolerance=1e-8"]), verdict=False)
-    times = np.linspace(0.0, 5.0, 1001)
+    times = np.linspace(0.0, duration, 1001)
     apart = np.linalg.norm(run.position("tip", times) - tight.position("tip", times), axis=1)
     assert run.accuracy is not None
     assert run.trust is not None
@@ -194,8 +196,8 @@ def test_an_unknown_part_or_a_breach_is_broken(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_strict_runs_are_repeated_until_they_keep_the_tolerance(tmp_path: Path) -> None:
-    """A minute of a pendulum; where other parts are too large, exit code 4 and the run kept."""
-    path = rods(tmp_path, 1, 60.0)
+    """Ten minutes of a pendulum; where other parts are too large, exit code 4 and the run kept."""
+    path = rods(tmp_path, 1, 600.0)
     assert isinstance(loose := erls.simulate(path), ChainRun)
     run = erls.simulate(path, strict=True)
     assert isinstance(run, ChainRun)
