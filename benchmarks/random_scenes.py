@@ -199,7 +199,7 @@ def print_command_costs(seeds: range) -> None:
         print(f"  seed {seed}: " + ("does not run to its end" if cost is None else f"{cost:.0%}"), flush=True)
         found += [] if cost is None else [cost]
     middle, high = np.percentile(found, (50, 90))
-    print(f"cost of the statement over the command: {len(found)} scenes, median {middle:.0%}, 90th percentile {high:.0%}")
+    print(f"cost over the command of {len(found)} scenes: median {middle:.0%}, 90th percentile {high:.0%}")
 
 
 def main() -> int:
