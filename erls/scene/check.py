@@ -6,9 +6,9 @@ from erls.errors import SceneError
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.build_joints import GROUND, joint_coordinates
-from erls.scene.chain import Event, SceneRecord
+from erls.scene.chain import Event, Load, SceneRecord
 from erls.scene.check_settings import check_settings
-from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
+from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, check_wrench, directed, not_negative
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping, check_temperature
@@ -18,6 +18,7 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
+AXES = ("world", "link")  # of loads
 # on one coordinate
 _ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
 
@@ -63,6 +64,8 @@ def check_scene(scene: SceneRecord, file: str) -> None:
             raise bad(f"{file}: points[{k}]", "give exactly one of 'node' and 'position'", point.name, remedy)
     for k, payload in enumerate(scene.payloads):
         choose(payload.point, [p.name for p in scene.points], f"{file}: payloads[{k}].point", SceneError)
+    for k, load in enumerate(scene.loads):
+        _check_load(load, scene, f"{file}: loads[{k}]")
     for k, loop in enumerate(scene.loops):
         _check_loop(loop, scene, f"{file}: loops[{k}]")
     for k, event in enumerate(scene.events):
@@ -80,6 +83,14 @@ def check_scene(scene: SceneRecord, file: str) -> None:
                 _check_feed_forward(coordinate, f"{file}: joints[{k}].coordinates.{name}")
         for k, loop in enumerate(scene.loops):
             _check_feed_forward(loop, f"{file}: loops[{k}]")
+
+
+def _check_load(load: Load, scene: SceneRecord, place: str) -> None:
+    choose(load.point, [point.name for point in scene.points], f"{place}.point", SceneError)
+    choose(load.axes, AXES, f"{place}.axes", SceneError)
+    check_wrench(place, load.force, load.moment)
+    if load.follower and load.axes != "world":
+        raise bad(f"{place}.axes", "a follower has the axes of its node", load.axes, "remove 'axes' or 'follower'")
 
 
 def _check_feed_forward(acting: Acting, place: str) -> None:

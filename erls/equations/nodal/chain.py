@@ -16,6 +16,7 @@ from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.beam import Beams
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import GROUND, Joint, Motion
+from erls.equations.nodal.loads import NodalLoad, NodalLoads
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.redundant import without_redundant
@@ -28,6 +29,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.chain import poses as link_poses
 from erls.mechanism.joint_types import Freedom, Z, single
 from erls.mechanism.joints import Joint as MechanismJoint
+from erls.mechanism.loads import PointLoad
 from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
@@ -162,6 +164,8 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
         passive.append(elastic)
     if bodies:
         passive.append(RigidBodies(bodies, mechanism.gravity))
+    if mechanism.loads:
+        passive.append(NodalLoads([_load(mechanism, links, ends, load) for load in mechanism.loads]))
     seats = _seats(mechanism, links, ends)
     closing = tuple(_closing(mechanism, links, ends, loop) for loop in mechanism.loops)
     acting = _actuators(mechanism, seats, positions)
@@ -175,6 +179,22 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
         system = ChainSystem(poses, passive, actuators, joints) if left_out else full
     firsts = np.cumsum([0, *(len(part.beams) for part in links)])[:-1].tolist()
     return Chain(system, full, left_out, elastic, nodes, tuple(firsts), seats, closing)
+
+
+def _load(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int], load: PointLoad) -> NodalLoad:
+    """A load on the node that carries its node."""
+
+    def at(link: int, node: int) -> tuple[int, Array]:
+        number = node_at(links[link], node, f"link {mechanism.links[link].name!r}")
+        return firsts[link] + number, mechanism.links[link].model.nodes[node] - links[link].nodes[number]
+
+    node, position = at(load.link, load.node)
+    axes = GROUND if load.axes is None else at(*load.axes)[0]
+    factor: Callable[[float], float] = (lambda t: 1.0) if load.factor is None else load.factor.value
+    own = axes == node
+    return NodalLoad(
+        node, load.wrench[:3], load.wrench[3:], own, position, GROUND if own else axes, factor, load.breakpoints
+    )
 
 
 def _seats(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int]) -> tuple[Seat, ...]:
