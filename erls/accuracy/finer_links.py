@@ -149,8 +149,8 @@ _lately: dict[tuple[Any, ...], tuple[LeftOut, Link]] = {}
 def _finer(
     link: Link, source: Callable[[], LinkFile], points: Sequence[int], loaded: Set[int]
 ) -> tuple[Link, LeftOut]:
-    """A link with what it leaves out as further coordinates, forces on its nodes ``loaded`` among what loads it; one made
-    lately where nothing tells them apart.
+    """A link with what it leaves out under forces on its nodes ``loaded`` too as further coordinates; one made lately
+    where nothing tells them apart.
     """
     interfaces = {i.node for i in link.model.interface_nodes}
     carrying = sorted(({p.node for p in link.payloads} | loaded) - interfaces)

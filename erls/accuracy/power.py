@@ -34,7 +34,7 @@ def in_angles(formulation: Formulation) -> SerialFormulation | None:
 
 
 def known_power(tree: SerialFormulation, t: Array, y: Array, v: Array) -> Array:
-    """(k,) power of drives, dampers and friction in the joints of a tree, of the damping of its modes, and of loads [W].
+    """(k,) power of drives, dampers and friction in the joints of a tree, of the damping of its modes and of loads [W].
 
     Motors that prescribe motions are left out.
     """
@@ -85,7 +85,7 @@ def _along(tree: SerialFormulation, t: Array, y: Array, v: Array, a: Array) -> t
 
 
 def reported_power(formulation: Formulation, t: Array, y: Array, v: Array, a: Array) -> Array:
-    """(k,) power of drives, dampers and friction in all joints, from the efforts that a run reports, and of loads [W]."""
+    """(k,) power of drives, dampers and friction in all joints, from the efforts that a run reports; of loads [W]."""
     mechanism, found = formulation.mechanism, reaction_series(formulation, t, y, v, a)
     states, result = state_series(formulation, t, y, v), formulation.load_power(t, y, v)
     for k, joint in enumerate(mechanism.joints):

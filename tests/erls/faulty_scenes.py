@@ -23,6 +23,7 @@ def torque(*profiles: dict[str, Any]) -> tuple[str, Any]:
 SLIDER = ("joints.0", {"name": "s", "type": "prismatic", "dh": {"convention": "standard"}})
 SECOND_JOINT = ("joints.1", {"name": "j", "dh": {"convention": "standard"}})
 SECOND_LINK = ("links.1", {"name": "m", "model": "link.toml"})
+LOAD = ("loads", [{"point": "tip", "force": [0.0, 0.0, 1.0]}])
 PAYLOAD = ("payloads", [{"point": "tip", "mass": 1.0}])
 
 # edits of the sound scene, place of the error, words in it
@@ -263,6 +264,44 @@ FAULTS: dict[str, tuple[list[tuple[str, Any]], str, str]] = {
             ("payloads.0.inertia", [1, 1, 1]),
         ],
         "payloads[0]",
+        "no rotation",
+    ),
+    # loads
+    "load on an unknown point": ([LOAD, ("loads.0.point", "hand")], "loads[0].point", "elbow, tip"),
+    "load of nothing": ([LOAD, ("loads.0.force", [0, 0, 0])], "loads[0]", "neither a force nor a moment"),
+    "load in unknown axes": ([LOAD, ("loads.0.axes", "body")], "loads[0].axes", "world, link"),
+    "follower in axes of the link": (
+        [LOAD, ("loads.0.axes", "link"), ("loads.0.follower", True)],
+        "loads[0].axes",
+        "axes of its node",
+    ),
+    "load inf": ([LOAD, ("loads.0.force", [0, INF, 0])], "loads[0].force[1]", "finite"),
+    "load moment NaN": ([LOAD, ("loads.0.moment", [0, 0, NAN])], "loads[0].moment[2]", "finite"),
+    "load of two numbers": ([LOAD, ("loads.0.force", [0, 1])], "loads[0].force", "3"),
+    "load on a node": ([LOAD, ("loads.0.node", "tip")], "loads[0].node", "node"),
+    "load of unknown shape": ([LOAD, ("loads.0.factor", [{"shape": "sine"}])], "loads[0].factor[0]", "sine_burst"),
+    "load that ends before it starts": (
+        [LOAD, ("loads.0.factor", [{"shape": "step", "start": 0.0, "value": 1.0, "end": -1.0}])],
+        "loads[0].factor[0].end",
+        "not after the start",
+    ),
+    "load from a faulty table": ([LOAD, ("loads.0.factor", [TABLE])], "load.csv", "number"),
+    "moment on a node without rotation": (
+        [
+            ("links.0", {"name": "l", "modal_file": "solid.modal.h5"}),
+            LOAD,
+            ("loads.0", {"point": "elbow", "moment": [0, 0, 1]}),
+        ],
+        "loads[0].moment",
+        "no rotation",
+    ),
+    "follower on a node without rotation": (
+        [
+            ("links.0", {"name": "l", "modal_file": "solid.modal.h5"}),
+            LOAD,
+            ("loads.0", {"point": "elbow", "force": [0, 0, 1], "follower": True}),
+        ],
+        "loads[0].follower",
         "no rotation",
     ),
     "unknown deformation": ([("initial.deformation", "relaxed")], "initial.deformation", "zero, static"),

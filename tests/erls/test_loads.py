@@ -1,0 +1,295 @@
+"""Forces and moments on points: virtual power, closed forms of beams, work against potential, formulations agree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import loop_scenes
+import numpy as np
+import pytest
+import scenes
+from scipy.integrate import solve_ivp
+
+import erls
+from benchmarks.follower_flutter import BECK, BENDING, CASES, SCENE, flutters, growth, linearized
+from erls.accuracy.energy_balance import States, energy_of, power_taken
+from erls.equations.erls.formulation import Erls
+from erls.equations.erls.paper.dense_chain import DenseChain
+from erls.equations.ffr.formulation import Ffr
+from erls.equations.nodal.equations import Nodal
+from erls.equations.registry import formulate
+from erls.equations.serial.state_series import energy_series, state_series
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.run.chain.places import point_position
+from erls.scene.build import build_mechanism
+from erls.scene.read import load_scene
+
+FORCE, MOMENT = [3.0, -2.0, 5.0], [0.4, 0.2, -0.7]
+WAVE = [{"shape": "sine_burst", "start": 0.0, "amplitude": 1.0, "frequency_hz": 20.0, "cycles": 50}]
+KINDS: dict[str, dict[str, Any]] = {
+    "world": {"force": FORCE, "moment": MOMENT},
+    "link": {"force": FORCE, "moment": MOMENT, "axes": "link", "factor": WAVE},
+    "follower": {"force": FORCE, "moment": MOMENT, "follower": True, "factor": WAVE},
+}
+TREES: dict[str, Callable[[Mechanism], Any]] = {
+    "erls": Erls,
+    "minimum-norm": DenseChain,
+    "ffr": Ffr,
+    "mean-axis": lambda mechanism: Ffr(mechanism, "mean-axis"),
+}
+AT = 0.013  # s, within the wave
+STILL = "loads.1.force=[0.0, 0.0, 1e-9]"  # no push from the side
+
+
+def _three(folder: Path, loads: list[dict[str, Any]], effects: str = "all", kind: str = "revolute") -> Mechanism:
+    points = [{"name": "end", "link": "c", "node": "tip"}, {"name": "middle", "link": "b", "node": "tip"}]
+    path = scenes.three_links(folder, kind, points=points, loads=loads, simulation={"effects": effects})
+    return build_mechanism(load_scene(path)).mechanism
+
+
+def _state(equations: Any) -> tuple[Array, Array, Array]:
+    """Joints anywhere, links bent by some millimetres."""
+    rng = np.random.default_rng(7)
+    y, v, a = rng.standard_normal((3, equations.size))
+    free = len(equations.free_joints)
+    y[free:] *= 2e-3
+    v[free:] *= 0.1
+    return y, v, a
+
+
+@pytest.mark.parametrize("effects", ["linear", "all"])
+@pytest.mark.parametrize("name", TREES)
+def test_generalized_forces_are_those_of_virtual_power(tmp_path: Path, name: str, effects: str) -> None:
+    """What loads take from the residual is F · ∂x/∂y of the point that is reported (differences: 1e-8), and its
+    power that of the load, to rounding, in all axes.
+    """
+    bare = TREES[name](_three(tmp_path, [], effects))
+    y, v, a = _state(bare)
+    without = bare.residual(AT, y, v, a)
+    pulled = TREES[name](_three(tmp_path, [{"point": "end", "force": FORCE}], effects))
+    gradient = np.empty(bare.size)
+    for k in range(bare.size):
+        both, step = np.array([y, y]), 1e-7
+        both[:, k] += step, -step
+        series = state_series(pulled, np.full(2, AT), both, np.zeros_like(both))
+        ahead, behind = point_position(pulled.mechanism, series, 0)
+        gradient[k] = FORCE @ (ahead - behind) / (2 * step)
+    np.testing.assert_allclose(without - pulled.residual(AT, y, v, a), gradient, atol=1e-8 * np.abs(gradient).max())
+    for load in KINDS.values():
+        loads = [{"point": "end", **load}, {"point": "middle", **load}]
+        equations = TREES[name](_three(tmp_path, loads, effects))
+        taken = v @ (without - equations.residual(AT, y, v, a))
+        assert equations.load_power(np.array([AT]), y[None], v[None])[0] == pytest.approx(taken, rel=1e-10)
+
+
+def test_dense_form_of_the_paper_agrees(tmp_path: Path) -> None:
+    """Residuals of ERLS by recursion and in the paper's matrices, links linear, to rounding; a prescribed joint too."""
+    loads = [{"point": point, **load} for point in ("end", "middle") for load in KINDS.values()]
+    mechanism = _three(tmp_path, loads, "linear", "prescribed")
+    one, other = Erls(mechanism), DenseChain(mechanism, "joint-angle")
+    at = _state(one)
+    expected = other.residual(AT, *at)
+    np.testing.assert_allclose(one.residual(AT, *at), expected, atol=1e-11 * np.abs(expected).max())
+
+
+def _equations(*changes: str) -> Any:
+    scene = load_scene(SCENE, changes)
+    return formulate(build_mechanism(scene).mechanism, scene.record.simulation)
+
+
+@pytest.mark.parametrize("more", [*CASES.values(), ("simulation.gauge=minimum-norm",), ("simulation.bandwidth=3",)])
+def test_cantilever_against_closed_forms(more: tuple[str, ...]) -> None:
+    """F L³/(3 E I) and M L²/(2 E I) at the tip; what the clamp gives is in balance.
+
+    Second order in a slope of 1e-3 is 1e-6 of them; the equilibrium of nodes is found to as much of the load. Elements
+    of constant strain bend the less under a force by 1/(4 n²): the moment between the ends of each is its mean.
+    """
+    load, elements = BENDING / 1000, 24
+    for what, deflection, moment in (("force", load / (3 * BENDING), load), ("moment", -load / (2 * BENDING), -load)):
+        along = [0.0, 0.0, load] if what == "force" else [0.0, load, 0.0]
+        dead = ["loads.0.follower=false", "loads.0.force=[0.0, 0.0, 0.0]", f"loads.0.{what}={along}", STILL]
+        equations = _equations(*dead, *more)
+        y, v = equations.initial_state()
+        tip = point_position(equations.mechanism, equations.state(0.0, y, v), 0)
+        softer = 1 - (what == "force" and isinstance(equations, Nodal)) / (4 * elements**2)
+        assert tip[2] == pytest.approx(deflection * softer, rel=2e-6)
+        held = equations.reactions(0.0, y, v)[0]
+        assert held.force == pytest.approx([0.0, 0.0, -load * (what == "force")], abs=2e-6 * load)
+        assert held.moment == pytest.approx([0.0, moment, 0.0], abs=2e-6 * load)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_follower_force_flutters_a_cantilever_at_becks_load(name: str) -> None:
+    """Roots are imaginary 1 % below 20.05 E I / L² and no longer so 1 % above: the load of the nodal mesh is 0.5 %
+    high, that of eight modes 0.01 % (``benchmarks/follower_flutter.py``, which confirms it in time for all three).
+    """
+    assert not flutters(linearized(0.99 * BECK, *CASES[name]))
+    assert flutters(linearized(1.01 * BECK, *CASES[name]))
+
+
+def test_flutter_in_time() -> None:
+    """A push of 10 µN dies no more than it grows below Beck's load, and grows a thousandfold above it in a quarter of a
+    second, as its roots 45.5 ± 159.6i say: exp(45.5 · 0.15) = 900 between fifths of the run.
+    """
+    below, above = (growth(share * BECK) for share in (0.9, 1.1))
+    assert 0.5 < below < 2
+    assert above == pytest.approx(np.exp(45.5 * 0.15), rel=0.5)
+
+
+@pytest.mark.parametrize("name", ["erls", "ffr"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_work_of_loads_closes_the_balance_of_energy(tmp_path: Path, name: str, kind: str) -> None:
+    """Energy changes by the integral of the power, within 1e-9 of what is exchanged, along motions integrated to 1e-12;
+    a constant force in the world takes it from its potential -F · x.
+    """
+    load = {"force": FORCE} if kind == "world" else KINDS[kind]
+    path = scenes.three_links(
+        tmp_path,
+        points=[{"name": "end", "link": "c", "node": "tip"}],
+        loads=[{"point": "end", **load}],
+        links=[{"name": n, **scenes.ARM, "mesh_pose": {"frame": "joint"}, "elastic_modes": 2} for n in "abc"],
+    )
+    equations = TREES[name](build_mechanism(load_scene(path)).mechanism)
+    n, end = equations.size, 0.05
+
+    def motion(t: float, x: Array) -> Array:
+        y, v = x[:n], x[n : 2 * n]
+        power = equations.load_power(np.array([t]), y[None], v[None])
+        return np.concatenate([v, equations.acceleration(t, y, v), power])
+
+    y, v = equations.initial_state()
+    x = solve_ivp(motion, (0.0, end), [*y, *v, 0.0], "DOP853", rtol=1e-12, atol=1e-14).y.T
+    times = np.array([0.0, end])
+    ends = x[[0, -1], :n], x[[0, -1], n : 2 * n]
+    energies = energy_series(equations, times, *ends)
+    exchanged = np.abs(np.diff(energies, axis=0)).max()
+    assert exchanged > 0.05
+    gained = float(np.diff(energies.sum(axis=1))[0])
+    assert gained == pytest.approx(x[-1, -1], abs=1e-9 * exchanged)
+    if kind == "world":
+        places = point_position(equations.mechanism, state_series(equations, times, *ends), 0)
+        assert gained == pytest.approx(FORCE @ (places[1] - places[0]), abs=1e-9 * exchanged)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_power_of_loads_on_nodes(tmp_path: Path, kind: str) -> None:
+    """Of the nodal formulation: what loads take from the residual, to rounding, on a rigid link besides; its tangent
+    is that of the residual (differences: 1e-6).
+    """
+    rigid = {"mass": 1.0, "points": {"root": [0, 0, 0], "tip": [0.3, 0.1, 0.0], "side": [0.1, 0.3, 0.2]}}
+    points = [{"name": "end", "link": "l", "node": "tip"}, {"name": "side", "link": "r", "node": "side"}]
+    second = {"name": "wrist", "dh": {"convention": "standard", "alpha_deg": 30.0}}
+    scenes.l_link(tmp_path)
+
+    def system(*loads: dict[str, Any]) -> Any:
+        path = scenes.l_scene(
+            tmp_path,
+            joints=[*scenes.L_SCENE["joints"], second],
+            links=[*scenes.L_SCENE["links"], {"name": "r", "rigid": rigid}],
+            points=points,
+            loads=list(loads),
+            simulation={"formulation": "nodal"},
+        )
+        return Nodal(build_mechanism(load_scene(path)).mechanism).system
+
+    bare, loaded = system(), system(*({"point": p["name"], **KINDS[kind]} for p in points))
+    rng = np.random.default_rng(3)
+    q = bare.compose(bare.start, 0.3 * rng.standard_normal(bare.size))
+    v, zero = rng.standard_normal(bare.size), np.zeros(bare.size)
+    without = bare.residual(AT, q, v, zero)
+    rounding = 1e-15 * np.abs(without).max()
+    taken = v @ (without - loaded.residual(AT, q, v, zero))
+    assert loaded.kinds.loads.power(AT, q.poses, v.reshape(-1, 6)) == pytest.approx(taken, abs=10 * rounding)
+
+    def of_loads(system: Any) -> Array:
+        lines = zero[: system.constraints] if system.constraints <= len(zero) else np.zeros(system.constraints)
+        found = system.stiffness_and_damping(AT, q, zero, zero, lines)[0]
+        return np.asarray(found.todense() if hasattr(found, "todense") else found)
+
+    tangent = of_loads(loaded) - of_loads(bare)
+    for direction in rng.standard_normal((3, bare.size)):
+        both = [bare.compose(q, step * direction) for step in (1e-5, -1e-5)]
+        forces = [loaded.residual(AT, x, zero, zero) - bare.residual(AT, x, zero, zero) for x in both]
+        expected = (forces[0] - forces[1]) / 2e-5
+        atol = 1e-6 * np.abs(expected).max() + rounding / 1e-5
+        np.testing.assert_allclose(tangent @ direction, expected, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_formulations_agree(tmp_path: Path, kind: str) -> None:
+    """The L under a wave at its tip: ERLS and FFR within 1e-6 m, exact beams within 2e-5 m, over 0.1 s."""
+    scenes.l_link(tmp_path)
+    load = {"point": "tip", **KINDS[kind], "factor": WAVE}
+    path = scenes.l_scene(tmp_path, loads=[load], simulation={"duration": 0.1, "step": 5e-4})
+    runs = [erls.simulate(load_scene(path, changes)) for changes in CASES.values()]
+    places = [run.position("tip", np.linspace(0.02, 0.1, 9)) for run in runs]
+    still = scenes.l_scene(tmp_path, simulation={"duration": 0.1, "step": 5e-4})
+    moved = erls.simulate(load_scene(still)).position("tip", np.linspace(0.02, 0.1, 9)) - places[0]
+    assert np.abs(moved).max() > 1e-3  # the load matters
+    assert np.abs(places[1] - places[0]).max() < 1e-6
+    assert np.abs(places[2] - places[0]).max() < 2e-5
+
+
+def test_absolute_coordinates_agree(tmp_path: Path) -> None:
+    """Loads on links that float freely, tied by joints: the motion of independent coordinates within 1e-8 m."""
+    scenes.l_link(tmp_path)
+    loads = [{"point": point, **load} for point in ("tip", "elbow") for load in KINDS.values()]
+    path = scenes.l_scene(tmp_path, loads=loads, simulation={"duration": 0.02, "step": 5e-4, "formulation": "ffr"})
+    one, other = (erls.simulate(load_scene(path, [f"simulation.coordinates={x}"])) for x in ("independent", "absolute"))
+    times = np.linspace(0.0, 0.02, 5)
+    np.testing.assert_allclose(other.position("tip", times), one.position("tip", times), atol=1e-8)
+    np.testing.assert_allclose(other.joint_effort("shoulder", times), one.joint_effort("shoulder", times), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_loads_on_links_in_pieces(tmp_path: Path, kind: str) -> None:
+    """A static deflection of 1e-5 of the length is that of the whole link to as much; axes of the link are those of its
+    first piece.
+    """
+    scenes.l_link(tmp_path, elements=3)
+    load = {k: [x / 100 for x in v] if k in ("force", "moment") else v for k, v in KINDS[kind].items() if k != "factor"}
+    tips = []
+    for pieces in (1, 3):
+        path = scenes.l_scene(
+            tmp_path,
+            joints=[{**scenes.L_SCENE["joints"][0], "type": "fixed"}],
+            links=[{**scenes.L_SCENE["links"][0], "substructures": pieces}],
+            loads=[{"point": "tip", **load}],
+            gravity=[0.0, 0.0, 0.0],
+            initial={"deformation": "static"},
+            simulation={"formulation": "ffr"},
+        )
+        scene = load_scene(path)
+        equations = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
+        state = equations.state(0.0, *equations.initial_state())
+        tips.append(point_position(equations.mechanism, state, 1) - [0.5, 0.5, 0.0])
+        power = equations.load_power(np.zeros(1), *(x[None] for x in equations.initial_state()))
+        assert power == pytest.approx(0.0, abs=1e-12)
+    assert 1e-6 < np.linalg.norm(tips[0]) < 1e-4
+    assert tips[1] == pytest.approx(tips[0], abs=1e-4 * float(np.linalg.norm(tips[0])))
+
+
+def test_loads_on_a_closed_chain(tmp_path: Path) -> None:
+    """A load on the coupler of a four-bar: ERLS and FFR within 1e-9 m, and the balance of energy of their knots as the
+    accuracy of runs takes it: power of loads against differences of energy over a step (Gauss-Lobatto: 1e-6).
+    """
+    data = loop_scenes.four_bar(loads=[{"point": "coupler middle", **KINDS["follower"]}])
+    runs = [
+        loop_scenes.run(tmp_path, data, name, integrator="lobatto", duration=0.1, tolerance=1e-10)
+        for name in ("erls", "ffr")
+    ]
+    times = np.linspace(0.0, 0.1, 11)
+    one, other = (run.position("coupler tip", times) for run in runs)
+    np.testing.assert_allclose(one, other, atol=1e-8)
+    run, (nodes, weights) = runs[0], np.polynomial.legendre.leggauss(6)
+    edges = np.linspace(0.0, 0.1, 41)
+    inside = (edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2).ravel()
+    _, t, y, v = run._interpolated(inside)
+    power, _ = power_taken(States(run.formulation, t, y, v, np.zeros_like(v)))
+    work = (power.reshape(40, 6) @ weights / 2 * np.diff(edges)).sum()
+    stored = energy_series(energy_of(run.formulation), *run._interpolated(edges[[0, -1]])[1:])
+    assert np.diff(stored.sum(axis=1))[0] == pytest.approx(work, rel=1e-6)
+    assert not run.conservative
