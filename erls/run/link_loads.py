@@ -1,4 +1,6 @@
-"""Loads on one link during a run, in the axes of its mesh frame: joints, what it carries, how fast it turns."""
+"""Loads on one link during a run, in the axes of its mesh frame: joints, loads of the scene, what it carries, how fast
+it turns.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.equations.formulation import State
+from erls.maths.rotation_maps import exp
 from erls.maths.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
 from erls.mechanism.loops import LoopEnd
@@ -44,8 +47,8 @@ class _Carried:
 
 
 def link_loads(run: ChainRun, number: int, times: Array) -> LinkLoads:
-    """Loads on link ``number`` at times (k,): joint reactions, weight and inertia of payloads and motors on its
-    interfaces. A payload elsewhere on the link is left to the modes.
+    """Loads on link ``number`` at times (k,): joint reactions, loads of the scene, weight and inertia of payloads and
+    motors on its interfaces. A payload or a load elsewhere on the link is left to the modes.
 
     Parameters
     ----------
@@ -58,7 +61,7 @@ def link_loads(run: ChainRun, number: int, times: Array) -> LinkLoads:
     step = min(_STEP, (run.end - float(run.solution.t[0])) / 4)
     middle = np.clip(times, run.solution.t[0] + step, run.end - step)
     before, at, after = (run.states(middle + shift) for shift in (-step, 0.0, step))
-    loads = _joint_loads(run, number, times, states)
+    loads = _joint_loads(run, number, times, states) + _given_loads(run, number, states)
     omega = np.empty((len(times), 3))
     for k, three in enumerate(zip(before, at, after, strict=True)):
         omega[k] = _omega(three, number, step)
@@ -100,6 +103,28 @@ def _joint_loads(run: ChainRun, number: int, times: Array, states: list[State]) 
                 about = moment[k] + cross(arm, force[k])
                 result[k, nodes.index(end.node)] += sign * np.concatenate([turn @ force[k], turn @ about])
     return result
+
+
+def _given_loads(run: ChainRun, number: int, states: list[State]) -> Array:
+    """(k, i, 6) what the loads of the scene do to the interfaces of a link."""
+    mechanism = run.formulation.mechanism
+    nodes = [i.node for i in mechanism.links[number].model.interface_nodes]
+    result = np.zeros((len(states), len(nodes), 6))
+    for load in mechanism.loads:
+        if load.link != number or load.node not in nodes:
+            continue
+        for k, state in enumerate(states):
+            turn = state.poses[number][:3, :3].T
+            if load.axes is not None:
+                turn = turn @ _turn(run, state, *load.axes)
+            result[k, nodes.index(load.node)] += (load.at(state.time).reshape(2, 3) @ turn.T).ravel()
+    return result
+
+
+def _turn(run: ChainRun, state: State, number: int, node: int) -> Array:
+    """(3, 3) turn of a node in the world, from mesh axes."""
+    _, rotation = node_shape6(run.formulation.mechanism.links[number].model, node)
+    return np.asarray(state.poses[number][:3, :3] @ exp(rotation @ state.modal[number]))
 
 
 def _end(run: ChainRun, state: State, end: LoopEnd) -> Array:

@@ -149,6 +149,31 @@ def test_a_payload_at_rest_loads_the_tip(tmp_path: Path) -> None:
     np.testing.assert_allclose(found, np.tile(expected, (2, 1)), atol=1.1 * 5.3 / 80)
 
 
+@pytest.mark.parametrize("given", [{}, {"axes": "link"}, {"follower": True}])
+def test_a_load_at_rest_loads_the_tip(tmp_path: Path, given: dict[str, object]) -> None:
+    """Force and moment at the tip of a cantilever, from two modes: what the load is there, and at the clamp its
+    reaction, to what the turn of the tip makes of it (0.5 mrad).
+    """
+    scenes.l_link(tmp_path, 4, **ENDS)
+    force, moment = [1.0, -2.0, 3.0], [0.4, 0.3, -0.2]
+    joint = {**scenes.L_SCENE["joints"][0], "type": "fixed"}
+    path = scenes.l_scene(
+        tmp_path,
+        joints=[joint],
+        links=[{"name": "l", "model": "link.toml", "elastic_modes": 2}],
+        loads=[{"point": "tip", "force": force, "moment": moment, **given}],
+        gravity=[0.0, 0.0, 0.0],
+        initial={"deformation": "static"},
+        simulation={"duration": 1e-3, "step": 1e-3},
+    )
+    run = erls.simulate(path)
+    t = np.zeros(1)
+    expected = np.array([[-2.0, -1.0, 3.0, 0.3, -0.4, -0.2]])  # the last leg lies along y
+    assert max(relative(at_node(run, "l", t, "tip"), expected)) < 2e-3
+    reaction = -in_link_axes(run, 0, "shoulder", t)
+    assert max(relative(at_node(run, "l", t, "root"), reaction)) < 2e-3
+
+
 def test_a_turning_payload_pulls(tmp_path: Path) -> None:
     """N at the tip is m ω² r, at the root that and the arm's own; the six lowest modes alone have no axial force."""
     rate, mass = 6.0, 1.0
