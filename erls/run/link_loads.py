@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.equations.formulation import State
-from erls.maths.rotation_maps import exp
+from erls.equations.serial.state_series import StateSeries
 from erls.maths.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
 from erls.mechanism.loops import LoopEnd
+from erls.run.chain.loads import wrenches
 from erls.run.chain.run import ChainRun
 
 _STEP = 1e-5  # s, of central differences: 1e-6 m/s² of rounding, and below 1 kHz 3e-4 of the acceleration
@@ -57,11 +58,12 @@ def link_loads(run: ChainRun, number: int, times: Array) -> LinkLoads:
     times : (k,) array
         Within the run [s].
     """
-    states = run.states(times)
+    series = run.series(times)
+    states = series.states()
     step = min(_STEP, (run.end - float(run.solution.t[0])) / 4)
     middle = np.clip(times, run.solution.t[0] + step, run.end - step)
     before, at, after = (run.states(middle + shift) for shift in (-step, 0.0, step))
-    loads = _joint_loads(run, number, times, states) + _given_loads(run, number, states)
+    loads = _joint_loads(run, number, times, states) + _given_loads(run, number, series)
     omega = np.empty((len(times), 3))
     for k, three in enumerate(zip(before, at, after, strict=True)):
         omega[k] = _omega(three, number, step)
@@ -105,26 +107,16 @@ def _joint_loads(run: ChainRun, number: int, times: Array, states: list[State]) 
     return result
 
 
-def _given_loads(run: ChainRun, number: int, states: list[State]) -> Array:
+def _given_loads(run: ChainRun, number: int, series: StateSeries) -> Array:
     """(k, i, 6) what the loads of the scene do to the interfaces of a link."""
     mechanism = run.formulation.mechanism
     nodes = [i.node for i in mechanism.links[number].model.interface_nodes]
-    result = np.zeros((len(states), len(nodes), 6))
+    result = np.zeros((len(series.times), len(nodes), 6))
     for load in mechanism.loads:
-        if load.link != number or load.node not in nodes:
-            continue
-        for k, state in enumerate(states):
-            turn = state.poses[number][:3, :3].T
-            if load.axes is not None:
-                turn = turn @ _turn(run, state, *load.axes)
-            result[k, nodes.index(load.node)] += (load.at(state.time).reshape(2, 3) @ turn.T).ravel()
+        if load.link == number and load.node in nodes:
+            found = wrenches(mechanism, load, series) @ series.poses[number][:, :3, :3]
+            result[:, nodes.index(load.node)] += found.reshape(-1, 6)
     return result
-
-
-def _turn(run: ChainRun, state: State, number: int, node: int) -> Array:
-    """(3, 3) turn of a node in the world, from mesh axes."""
-    _, rotation = node_shape6(run.formulation.mechanism.links[number].model, node)
-    return np.asarray(state.poses[number][:3, :3] @ exp(rotation @ state.modal[number]))
 
 
 def _end(run: ChainRun, state: State, end: LoopEnd) -> Array:

@@ -1,12 +1,18 @@
-"""Loads of a scene as those of a mechanism."""
+"""Loads of a scene as those of a mechanism.
+
+A force per length acts on the nodes of the beams by the consistent loads of a cubic element: half of it, and ± ℓ²/12 of
+its moment, at each end, which bend elements of uniform section as the force itself does (J. Przemieniecki, Theory of
+Matrix Structural Analysis, 1968, sec. 7).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from erls.errors import Cause, SceneError
+from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Point
 from erls.mechanism.links import Link
 from erls.mechanism.loads import PointLoad
@@ -32,19 +38,32 @@ def build_loads(scene: Scene, links: Sequence[Link], points: Sequence[Point], nu
     Raises
     ------
     SceneError
-        BAD_FIELD: a profile, or a node that does not turn under a moment or as the node of a follower.
+        BAD_FIELD: a profile, a node that does not turn under a moment or as the node of a follower, a force per length
+        on a link that is not made of beams.
     """
-    known = {point.name: point for point in points}
-    found = []
+    names, known = [link.name for link in links], {point.name: point for point in points}
+    found: list[PointLoad] = []
     for k, load in enumerate(scene.record.loads):
         place = Place(scene.folder, f"{scene.path}: loads[{k}]")
-        found.append(_load(load, known[load.point], links[known[load.point].link], numbers, place))
+        at = known[load.point].link if load.point else names.index(load.link)
+        link, number = links[at], int(numbers[at])
+        if load.point:
+            node = known[load.point].node
+            _check_turning(load, node, link, place)
+            wrenches = iter([(node, np.array([*load.force, *load.moment]))])
+        else:
+            wrenches = _along(np.array(load.force_per_length), link, place)
+        factor = build_profiles(load.factor, place, "factor") if load.factor else None
+        for node, wrench in wrenches:
+            turner = node if load.follower else link.inboard.node if load.axes == "link" else None
+            axes = None if turner is None else (number, turner)
+            found.append(PointLoad(number, node, wrench, axes, factor))
     return found
 
 
-def _load(load: Load, point: Point, link: Link, numbers: IntArray, place: Place) -> PointLoad:
-    number = int(numbers[point.link])
-    if (load.follower or any(load.moment)) and point.node not in link.model.rotation_nodes:
+def _check_turning(load: Load, node: int, link: Link, place: Place) -> None:
+    """A node turns where a load needs it to."""
+    if (load.follower or any(load.moment)) and node not in link.model.rotation_nodes:
         field, what = ("follower", "turn a load") if load.follower else ("moment", "take a moment")
         raise SceneError(
             Cause.BAD_FIELD,
@@ -53,8 +72,25 @@ def _load(load: Load, point: Point, link: Link, numbers: IntArray, place: Place)
             value=load.point,
             remedy="put the load on an interface, or give a force in axes of the world or of the link",
         )
-    axes = None
-    if load.follower or load.axes == "link":
-        axes = number, point.node if load.follower else link.inboard.node
-    factor = build_profiles(load.factor, place, "factor") if load.factor else None
-    return PointLoad(number, point.node, np.array([*load.force, *load.moment]), axes, factor)
+
+
+def _along(force: Array, link: Link, place: Place) -> Iterator[tuple[int, Array]]:
+    """Nodes of a link made of beams, and the wrench (6,) that a force per length leaves on each."""
+    if link.description is None:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "a force per length needs a link made of beams",
+            where=place.field("link"),
+            value=link.name,
+            remedy="give 'model' with a table [frame], or forces on points",
+        )
+    model = link.model
+    wrenches = np.zeros((len(model.nodes), 6))
+    for first, second in model.lines.tolist():
+        along = model.nodes[second] - model.nodes[first]
+        length = float(np.linalg.norm(along))
+        ends = np.concatenate([force * length / 2, length / 12 * cross(along, force)])
+        wrenches[first] += ends
+        wrenches[second] += ends * [1, 1, 1, -1, -1, -1]
+    for node in np.flatnonzero(wrenches.any(axis=1)).tolist():
+        yield node, wrenches[node]

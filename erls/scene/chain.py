@@ -59,28 +59,34 @@ class Payload(Record, frozen=True):
 
 
 class Load(Record, frozen=True):
-    """A force and a moment on a named point.
+    """A force and a moment on a named point, or a force all along a link.
 
     Attributes
     ----------
     point : str
-        A name from ``[[points]]``.
+        A name from ``[[points]]``; give this or ``link``.
+    link : str
+        A link made of beams, all of which bear the force.
     force : (3,) floats
-        [N]
+        On the point [N].
     moment : (3,) floats
-        [N m]; on an interface, or another node that turns.
+        On the point [N m]: an interface, or another node that turns.
+    force_per_length : (3,) floats
+        Along the link [N/m].
     axes : str
         Of force and moment: those of the ``world``, or the mesh axes of the ``link``, which turn with its inboard
         interface.
     follower : bool
-        Force and moment turn with the displaced node of the point: they are given in the link's mesh axes as built.
+        They turn with the displaced node that they act on: they are given in the link's mesh axes as built.
     factor : list of Load
-        Profiles over time, which add up and multiply both; they act in full at all times unless given.
+        Profiles over time, which add up and multiply all; they act in full at all times unless given.
     """
 
-    point: str
+    point: str = ""
+    link: str = ""
     force: Vector = (0.0, 0.0, 0.0)
     moment: Vector = (0.0, 0.0, 0.0)
+    force_per_length: Vector = (0.0, 0.0, 0.0)
     axes: str = "world"
     follower: bool = False
     factor: tuple[Profile, ...] = ()
@@ -151,7 +157,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     payloads : list of Payload
         Rigid bodies on points, ``[[payloads]]``.
     loads : list of Load
-        Forces and moments on points, ``[[loads]]``.
+        Forces and moments on points and links, ``[[loads]]``.
     initial : Initial
         How links start.
     loops : list of Loop

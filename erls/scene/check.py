@@ -86,9 +86,21 @@ def check_scene(scene: SceneRecord, file: str) -> None:
 
 
 def _check_load(load: Load, scene: SceneRecord, place: str) -> None:
-    choose(load.point, [point.name for point in scene.points], f"{place}.point", SceneError)
+    if bool(load.point) == bool(load.link):
+        remedy = "name a point for force and moment, or a link for force_per_length"
+        raise bad(place, "give exactly one of 'point' and 'link'", load.point or None, remedy)
     choose(load.axes, AXES, f"{place}.axes", SceneError)
-    check_wrench(place, load.force, load.moment)
+    for field in ("force_per_length",) if load.point else ("force", "moment"):
+        if any(getattr(load, field)):
+            here, there = ("point", "link") if load.point else ("link", "point")
+            raise bad(f"{place}.{field}", f"a {here} bears none", getattr(load, field), f"name a {there}, or remove it")
+    if load.point:
+        choose(load.point, [point.name for point in scene.points], f"{place}.point", SceneError)
+        check_wrench(place, load.force, load.moment)
+    else:
+        choose(load.link, [link.name for link in scene.links], f"{place}.link", SceneError)
+        if not any(load.force_per_length):
+            raise bad(f"{place}.force_per_length", "no force", load.force_per_length, "give one, or remove the load")
     if load.follower and load.axes != "world":
         raise bad(f"{place}.axes", "a follower has the axes of its node", load.axes, "remove 'axes' or 'follower'")
 

@@ -269,6 +269,24 @@ FAULTS: dict[str, tuple[list[tuple[str, Any]], str, str]] = {
     # loads
     "load on an unknown point": ([LOAD, ("loads.0.point", "hand")], "loads[0].point", "elbow, tip"),
     "load of nothing": ([LOAD, ("loads.0.force", [0, 0, 0])], "loads[0]", "neither a force nor a moment"),
+    "load nowhere": ([LOAD, ("loads.0", {"force": [0, 0, 1]})], "loads[0]", "exactly one of"),
+    "load on a point and a link": ([LOAD, ("loads.0.link", "l")], "loads[0]", "exactly one of"),
+    "load per length on a point": ([LOAD, ("loads.0.force_per_length", [0, 0, 1])], "force_per_length", "point"),
+    "force on a link": ([("loads", [{"link": "l", "force": [0, 0, 1]}])], "loads[0].force", "a link bears none"),
+    "load along an unknown link": (
+        [("loads", [{"link": "m", "force_per_length": [0, 0, 1]}])],
+        "loads[0].link",
+        "loads[0].link",
+    ),
+    "no load along a link": ([("loads", [{"link": "l"}])], "loads[0].force_per_length", "no force"),
+    "load along a solid link": (
+        [
+            ("links.0", {"name": "l", "modal_file": "solid.modal.h5"}),
+            ("loads", [{"link": "l", "force_per_length": [0, 0, 1]}]),
+        ],
+        "loads[0].link",
+        "made of beams",
+    ),
     "load in unknown axes": ([LOAD, ("loads.0.axes", "body")], "loads[0].axes", "world, link"),
     "follower in axes of the link": (
         [LOAD, ("loads.0.axes", "link"), ("loads.0.follower", True)],

@@ -15,6 +15,7 @@ from erls.integrate.base import hermite
 from erls.maths.so3 import Array, cross_all
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link, link_mass_properties, node_shape6
+from erls.run.chain.loads import wrenches
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.lines import Lines, lines
 
@@ -50,7 +51,7 @@ class Bending:
     dragged : (k, s, 3) array
         What the turning of the axes adds to accelerations of the stations because they are displaced [m/s²].
     forces, moments : (k, s, 3) arrays
-        Of joints, weight and inertia [N, N m].
+        Of joints, loads, weight and inertia [N, N m].
     masses : (s,) array
         [kg]
     strain : (k,) array
@@ -124,7 +125,7 @@ class _Seat(NamedTuple):
 
 
 class _Given(NamedTuple):
-    """Force (k, 3) and moment (k, 3) about the origin of a closing joint on a node of a link, in the world."""
+    """Force (k, 3) of a closing joint or a load on a node of a link, and its moment (k, 3) about the origin; world."""
 
     link: int
     node: int
@@ -147,7 +148,7 @@ def bending(run: ChainRun, nodes: Sequence[tuple[int, int]]) -> BendingRun:
     times = run.looks(_SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES, step)
     seen = replace(run, formulation=formulation).series(np.concatenate([times - step, times, times + step]))
     differences = _Differences(step, mechanism.gravity)
-    loops = _loop_loads(run, mechanism, times)
+    loads = _loop_loads(run, mechanism, times) + _given_loads(mechanism, seen, len(times))
     ends = {end.link for loop in mechanism.loops for end in (loop.inner, loop.outer)}
     sums: list[_Sums | None] = [None] * len(mechanism.links)
     found: dict[int, Bending] = {}
@@ -155,7 +156,7 @@ def bending(run: ChainRun, nodes: Sequence[tuple[int, int]]) -> BendingRun:
         link = mechanism.links[number]
         beyond = [(mechanism.joints[k].seat, sums[k], not freed(mechanism, k)) for k in mechanism.standing_on(number)]
         seats = [_Seat(seat.node, part, turns) for seat, part, turns in beyond if seat is not None and part is not None]
-        given = [load for load in loops if load.link == number]
+        given = [load for load in loads if load.link == number]
         if link.elastic_modes:
             asked = [node for at, node in nodes if at == number] + [seat.node for seat in seats]
             asked += [load.node for load in given] + [payload.node for payload in link.payloads]
@@ -325,4 +326,16 @@ def _loop_loads(run: ChainRun, mechanism: Mechanism, times: Array) -> list[_Give
         for end, sign in ((loop.outer, 1.0), (loop.inner, -1.0)):
             if end.link is not None:
                 result.append(_Given(end.link, end.node, sign * force, sign * moment))
+    return result
+
+
+def _given_loads(mechanism: Mechanism, seen: StateSeries, k: int) -> list[_Given]:
+    """Loads of the scene, at the k times in the middle of three rounds."""
+    middle, result = slice(k, 2 * k), []
+    for load in mechanism.loads:
+        found = wrenches(mechanism, load, seen)[middle]
+        model = mechanism.links[load.link].model
+        local = model.nodes[load.node] + seen.modal[load.link] @ model.translation_shapes[load.node].T
+        at = _world(seen.poses[load.link], local[:, None])[middle, 0]
+        result.append(_Given(load.link, load.node, found[:, 0], found[:, 1] + cross_all(at, found[:, 0])))
     return result
