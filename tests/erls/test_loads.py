@@ -321,7 +321,7 @@ def test_loads_on_a_closed_chain(tmp_path: Path) -> None:
 
 
 def test_audits_hold_where_a_load_acts_along_a_free_joint(tmp_path: Path) -> None:
-    """No momentum is expected to stay: it is the impulse of 2 N half a metre beside the axis, but for how far that lever
+    """No momentum is expected to stay: it is the impulse of 2 N half a metre beside the axis, but for how that lever
     bends; steps end where the load jumps.
     """
     scenes.l_link(tmp_path)
