@@ -20,6 +20,7 @@ from erls.run.chain.run import ChainRun
 from erls.run.deflection.lines import Lines, lines
 
 _SAMPLES, _SAMPLES_OF_LOOPS = 61, 31  # forces of loops are found time by time
+_TURNING = 1e-8  # of the most that a unit of energy turns stations: rounding
 _STEP = 1e-5  # s, of central differences, as in `erls.run.link_loads`
 
 
@@ -55,7 +56,7 @@ class Bending:
     masses : (s,) array
         [kg]
     strain : (k,) array
-        Twice the elastic energy [J].
+        Twice the elastic energy that the turns of its stations take [J].
     axes : (k, 3, 3) array
         To the world.
     places : (k, s, 3) array
@@ -245,13 +246,24 @@ def _bent(
         pull @ axes,
         moments @ axes,
         masses,
-        elastic[here] ** 2 @ link.stiffness,
+        _bending_energy(link, line.rotation @ held, elastic[here]),
         axes,
         at,
         carried,
         floating,
     )
     return bent, _Sums(force, moment, mass, centre)
+
+
+def _bending_energy(link: Link, rotation: Array, elastic: Array) -> Array:
+    """(k,) twice the least elastic energy with the turns of the stations that elastic coordinates (k, e) make by their
+    rotations (s, 3, e): that of a stretch, which no second order of displacements softens, is not in it.
+    """
+    roots = np.sqrt(link.stiffness)
+    turning = rotation.reshape(-1, link.elastic_modes) / roots
+    _, sizes, rows = np.linalg.svd(turning, full_matrices=False)
+    known = rows[sizes > _TURNING * sizes.max(initial=0.0)]
+    return np.asarray(((elastic * roots @ known.T) ** 2).sum(axis=1))
 
 
 def _rigid(link: Link, frames: Array, differences: _Differences, seats: list[_Seat], given: list[_Given]) -> _Sums:
