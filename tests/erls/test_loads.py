@@ -351,3 +351,20 @@ def test_links_without_stiffening_say_what_a_load_along_them_does() -> None:
     assert off > 1e-3
     assert off < lesser.accuracy.total < 10 * off
     assert lesser.trust.verdict == "limited"
+
+
+@pytest.mark.parametrize("name", ["erls", "ffr", "nodal"])
+def test_a_motor_holds_a_load(tmp_path: Path, name: str) -> None:
+    """At rest under 2 N half a metre beside a joint that is held: 1 N m, but for the square of a slope of 1e-3."""
+    scenes.l_link(tmp_path)
+    held = {"type": "motion", "motion": {"shape": "waypoints", "times": [0.0, 1.0], "values": [0.0, 0.0]}}
+    path = scenes.l_scene(
+        tmp_path,
+        gravity=[0.0, 0.0, 0.0],
+        initial={"deformation": "static"},
+        joints=[{**scenes.L_SCENE["joints"][0], "drive": held}],
+        loads=[{"point": "tip", "force": [0.0, 0.0, 2.0]}],
+        simulation={"duration": 1e-3, "formulation": name},
+    )
+    run = erls.simulate(path)
+    assert run.joint_effort("shoulder", [0.0, 1e-3]) == pytest.approx(1.0, rel=1e-5)
