@@ -15,6 +15,7 @@ import numpy as np
 
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link, payload_invariants
+from erls.mechanism.loads import CENTRE
 from erls.scene.build import cache_folder, link_description
 from erls.scene.chain import Scene
 from erls.scene.links import Link as LinkRecord
@@ -82,7 +83,7 @@ def finer_links(scene: Scene, whole: Mechanism, solved: Mechanism) -> FinerLinks
                 link,
                 source,
                 [p.node for p in solved.points if p.link == number],
-                {load.node for load in solved.loads if load.link == number},
+                {load.node for load in solved.loads if load.link == number and load.node != CENTRE},
             )
             exact &= _same_inertia(link.model.invariants, left.invariants.truncated(np.arange(link.model.modes)))
             if not left.refined:

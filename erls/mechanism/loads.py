@@ -1,4 +1,4 @@
-"""Forces and moments on nodes of links, which change with time."""
+"""Forces and moments on nodes of links, and forces on all of their mass, which change with time."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ import numpy as np
 from erls.maths.so3 import Array
 from erls.mechanism.curves import Curve
 
+CENTRE = -1
+"""In place of a node: the centre of mass of a link with what it carries, on which a force per mass acts as a whole."""
+
 
 @dataclass(frozen=True)
 class PointLoad:
-    """A force and a moment on a node of a link.
+    """A force and a moment on a node of a link, or a force on all of its mass.
 
     Attributes
     ----------
     link, node : int
-        Where they act: number of the link, and of the node in its model.
+        Where they act: number of the link, and of the node in its model, or `CENTRE`.
     wrench : (6,) array
-        Force [N] and moment [N m].
+        Force [N] and moment [N m]; on the centre force per mass [N/kg].
     axes : (link, node) or None
         Node whose axes the wrench is given in: it turns with them. As built these are the mesh axes of that link. The
         load's own node makes it a follower; None stands for the world.

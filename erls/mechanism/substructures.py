@@ -19,7 +19,7 @@ from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.compound_joints import fixed_joint
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, payload_invariants
-from erls.mechanism.loads import PointLoad
+from erls.mechanism.loads import CENTRE, PointLoad
 from erls.mechanism.loops import LoopEnd
 from fe_import.model import IntArray
 
@@ -87,7 +87,7 @@ def split(mechanism: Mechanism) -> Split:
         links=tuple(links),
         points=tuple(Point(p.name, *places[p.link][p.node].tolist()) for p in mechanism.points),
         loops=tuple(replace(loop, inner=moved(loop.inner), outer=moved(loop.outer)) for loop in mechanism.loops),
-        loads=tuple(_moved_load(load, places) for load in mechanism.loads),
+        loads=tuple(moved for load in mechanism.loads for moved in _moved_loads(load, ranges, places)),
     )
     return Split(mechanism, pieces, ranges, places)
 
@@ -117,13 +117,16 @@ def _seat(mechanism: Mechanism, joint: Joint, ranges: Sequence[range], places: S
     return {"parent": piece, "seat": whole.pieces[piece - ranges[joint.parent].start].model.interface(joint.seat.name)}
 
 
-def _moved_load(load: PointLoad, places: Sequence[IntArray]) -> PointLoad:
-    """A load on the piece that carries its node, with the axes of the node of a piece."""
-    piece, node = places[load.link][load.node].tolist()
-    if load.axes is None:
-        return replace(load, link=piece, node=node)
-    of_piece, of_node = places[load.axes[0]][load.axes[1]].tolist()
-    return replace(load, link=piece, node=node, axes=(of_piece, of_node))
+def _moved_loads(load: PointLoad, ranges: Sequence[range], places: Sequence[IntArray]) -> list[PointLoad]:
+    """A load on the piece that carries its node, or on the mass of all pieces, with the axes of the node of a piece."""
+    at = [(piece, CENTRE) for piece in ranges[load.link]]
+    if load.node != CENTRE:
+        at = [tuple(places[load.link][load.node].tolist())]
+    axes = load.axes
+    if axes is not None:
+        of_piece, of_node = places[axes[0]][axes[1]].tolist()
+        axes = of_piece, of_node
+    return [replace(load, link=piece, node=node, axes=axes) for piece, node in at]
 
 
 def _weld(link: Link, number: int, parent: int) -> Joint:

@@ -7,7 +7,7 @@ Matrix Structural Analysis, 1968, sec. 7).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Point
 from erls.mechanism.links import Link
-from erls.mechanism.loads import PointLoad
+from erls.mechanism.loads import CENTRE, PointLoad
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import build_loads as build_profiles
 from erls.scene.chain import Load, Scene
@@ -41,24 +41,33 @@ def build_loads(scene: Scene, links: Sequence[Link], points: Sequence[Point], nu
         BAD_FIELD: a profile, a node that does not turn under a moment or as the node of a follower, a force per length
         on a link that is not made of beams.
     """
-    names, known = [link.name for link in links], {point.name: point for point in points}
+    known = {point.name: point for point in points}
     found: list[PointLoad] = []
     for k, load in enumerate(scene.record.loads):
         place = Place(scene.folder, f"{scene.path}: loads[{k}]")
-        at = known[load.point].link if load.point else names.index(load.link)
-        link, number = links[at], int(numbers[at])
-        if load.point:
-            node = known[load.point].node
-            _check_turning(load, node, link, place)
-            wrenches = iter([(node, np.array([*load.force, *load.moment]))])
-        else:
-            wrenches = _along(np.array(load.force_per_length), link, place)
         factor = build_profiles(load.factor, place, "factor") if load.factor else None
-        for node, wrench in wrenches:
-            turner = node if load.follower else link.inboard.node if load.axes == "link" else None
-            axes = None if turner is None else (number, turner)
-            found.append(PointLoad(number, node, wrench, axes, factor))
+        for at, link in enumerate(links):
+            if at != known[load.point].link if load.point else load.link not in ("", link.name):
+                continue
+            number = int(numbers[at])
+            for node, wrench in _wrenches(load, known, link, place):
+                turner = node if load.follower else link.inboard.node if load.axes == "link" else None
+                axes = None if turner is None else (number, turner)
+                found.append(PointLoad(number, node, wrench, axes, factor))
     return found
+
+
+def _wrenches(
+    load: Load, points: Mapping[str, Point], link: Link, place: Place
+) -> Iterable[tuple[int, Array]]:
+    """Nodes of a link and what a load does to each, (6,)."""
+    if load.point:
+        node = points[load.point].node
+        _check_turning(load, node, link, place)
+        return [(node, np.array([*load.force, *load.moment]))]
+    if any(load.force_per_mass):
+        return [(CENTRE, np.array([*load.force_per_mass, 0.0, 0.0, 0.0]))]
+    return _along(np.array(load.force_per_length), link, place)
 
 
 def _check_turning(load: Load, node: int, link: Link, place: Place) -> None:

@@ -59,20 +59,22 @@ class Payload(Record, frozen=True):
 
 
 class Load(Record, frozen=True):
-    """A force and a moment on a named point, or a force all along a link.
+    """A force and a moment on a named point, a force all along a link, or one on all mass.
 
     Attributes
     ----------
     point : str
         A name from ``[[points]]``; give this or ``link``.
     link : str
-        A link made of beams, all of which bear the force.
+        All of which bears the force; for ``force_per_length`` one made of beams.
     force : (3,) floats
         On the point [N].
     moment : (3,) floats
         On the point [N m]: an interface, or another node that turns.
     force_per_length : (3,) floats
         Along the link [N/m].
+    force_per_mass : (3,) floats
+        On all mass of the link, payloads and motors included, or of all links unless one is named [N/kg].
     axes : str
         Of force and moment: those of the ``world``, or the mesh axes of the ``link``, which turn with its inboard
         interface.
@@ -87,6 +89,7 @@ class Load(Record, frozen=True):
     force: Vector = (0.0, 0.0, 0.0)
     moment: Vector = (0.0, 0.0, 0.0)
     force_per_length: Vector = (0.0, 0.0, 0.0)
+    force_per_mass: Vector = (0.0, 0.0, 0.0)
     axes: str = "world"
     follower: bool = False
     factor: tuple[Profile, ...] = ()

@@ -8,7 +8,7 @@ from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, 
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, Load, SceneRecord
 from erls.scene.check_settings import check_settings
-from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, check_wrench, directed, not_negative
+from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping, check_temperature
@@ -85,24 +85,34 @@ def check_scene(scene: SceneRecord, file: str) -> None:
             _check_feed_forward(loop, f"{file}: loops[{k}]")
 
 
+_BORNE = {"point": ("force", "moment"), "link": ("force_per_length", "force_per_mass"), "mass": ("force_per_mass",)}
+
+
 def _check_load(load: Load, scene: SceneRecord, place: str) -> None:
-    if bool(load.point) == bool(load.link):
-        remedy = "name a point for force and moment, or a link for force_per_length"
-        raise bad(place, "give exactly one of 'point' and 'link'", load.point or None, remedy)
+    if load.point and load.link:
+        raise bad(place, "give one of 'point' and 'link'", load.point, "remove the other")
     choose(load.axes, AXES, f"{place}.axes", SceneError)
-    for field in ("force_per_length",) if load.point else ("force", "moment"):
-        if any(getattr(load, field)):
-            here, there = ("point", "link") if load.point else ("link", "point")
-            raise bad(f"{place}.{field}", f"a {here} bears none", getattr(load, field), f"name a {there}, or remove it")
     if load.point:
         choose(load.point, [point.name for point in scene.points], f"{place}.point", SceneError)
-        check_wrench(place, load.force, load.moment)
-    else:
+    if load.link:
         choose(load.link, [link.name for link in scene.links], f"{place}.link", SceneError)
-        if not any(load.force_per_length):
-            raise bad(f"{place}.force_per_length", "no force", load.force_per_length, "give one, or remove the load")
-    if load.follower and load.axes != "world":
-        raise bad(f"{place}.axes", "a follower has the axes of its node", load.axes, "remove 'axes' or 'follower'")
+    where = "point" if load.point else "link" if load.link else "mass"
+    given = [field for field in (*_BORNE["point"], *_BORNE["link"]) if any(getattr(load, field))]
+    if not given:
+        wanted = " or ".join(_BORNE[where])
+        raise bad(place, "no force" if where != "point" else "neither a force nor a moment", None, f"give {wanted}")
+    for field in given:
+        if field not in _BORNE[where]:
+            missing = "point" if field in _BORNE["point"] else "link"
+            here = f"a {where} bears none" if where != "mass" else f"'{missing}' is missing"
+            raise bad(f"{place}.{field}", here, getattr(load, field), f"name a {missing} for it, or remove it")
+    if where != "point" and len(given) > 1:
+        raise bad(f"{place}.{given[1]}", "one force for one load", getattr(load, given[1]), "make two loads of them")
+    if load.follower and (load.axes != "world" or "force_per_mass" in given):
+        field, message = ("axes", "a follower has the axes of its node")
+        if "force_per_mass" in given:
+            field, message = "follower", "mass turns with no node"
+        raise bad(f"{place}.{field}", message, getattr(load, field), "remove 'axes' or 'follower'")
 
 
 def _check_feed_forward(acting: Acting, place: str) -> None:

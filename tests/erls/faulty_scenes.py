@@ -269,8 +269,16 @@ FAULTS: dict[str, tuple[list[tuple[str, Any]], str, str]] = {
     # loads
     "load on an unknown point": ([LOAD, ("loads.0.point", "hand")], "loads[0].point", "elbow, tip"),
     "load of nothing": ([LOAD, ("loads.0.force", [0, 0, 0])], "loads[0]", "neither a force nor a moment"),
-    "load nowhere": ([LOAD, ("loads.0", {"force": [0, 0, 1]})], "loads[0]", "exactly one of"),
-    "load on a point and a link": ([LOAD, ("loads.0.link", "l")], "loads[0]", "exactly one of"),
+    "load of nothing on nothing": ([("loads", [{"axes": "world"}])], "loads[0]", "force_per_mass"),
+    "load nowhere": ([LOAD, ("loads.0", {"force": [0, 0, 1]})], "loads[0].force", "'point' is missing"),
+    "load along nothing": ([("loads", [{"force_per_length": [0, 0, 1]}])], "force_per_length", "'link' is missing"),
+    "load on a point and a link": ([LOAD, ("loads.0.link", "l")], "loads[0]", "one of 'point' and 'link'"),
+    "two forces along a link": (
+        [("loads", [{"link": "l", "force_per_length": [0, 0, 1], "force_per_mass": [0, 0, 1]}])],
+        "loads[0].force_per_mass",
+        "two loads",
+    ),
+    "mass that follows": ([("loads", [{"force_per_mass": [0, 0, 1], "follower": True}])], "loads[0].follower", "mass"),
     "load per length on a point": ([LOAD, ("loads.0.force_per_length", [0, 0, 1])], "force_per_length", "point"),
     "force on a link": ([("loads", [{"link": "l", "force": [0, 0, 1]}])], "loads[0].force", "a link bears none"),
     "load along an unknown link": (
@@ -278,7 +286,7 @@ FAULTS: dict[str, tuple[list[tuple[str, Any]], str, str]] = {
         "loads[0].link",
         "loads[0].link",
     ),
-    "no load along a link": ([("loads", [{"link": "l"}])], "loads[0].force_per_length", "no force"),
+    "no load along a link": ([("loads", [{"link": "l"}])], "loads[0]", "give force_per_length or force_per_mass"),
     "load along a solid link": (
         [
             ("links.0", {"name": "l", "modal_file": "solid.modal.h5"}),

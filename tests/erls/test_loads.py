@@ -368,3 +368,40 @@ def test_a_motor_holds_a_load(tmp_path: Path, name: str) -> None:
     )
     run = erls.simulate(path)
     assert run.joint_effort("shoulder", [0.0, 1e-3]) == pytest.approx(1.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("effects", ["linear", "all"])
+@pytest.mark.parametrize("name", TREES)
+def test_a_force_on_all_mass_is_gravity(tmp_path: Path, name: str, effects: str) -> None:
+    """Residuals, in the place of gravity, on links with a payload, to rounding; so is the power against its energy."""
+    pull, more = [1.0, -2.0, -9.0], {"payloads": [{"point": "end", "mass": 0.5, "offset": [0.0, 0.1, 0.0]}]}
+    points = [{"name": "end", "link": "c", "node": "tip"}]
+    both = []
+    for given in ({"gravity": pull}, {"gravity": [0.0, 0.0, 0.0], "loads": [{"force_per_mass": pull}]}):
+        path = scenes.three_links(tmp_path, points=points, simulation={"effects": effects}, **more, **given)
+        both.append(TREES[name](build_mechanism(load_scene(path)).mechanism))
+    y, v, a = _state(both[0])
+    expected = both[0].residual(AT, y, v, a)
+    np.testing.assert_allclose(both[1].residual(AT, y, v, a), expected, atol=1e-11 * np.abs(expected).max())
+    places = np.array([y - 1e-7 * v, y + 1e-7 * v])
+    stored = energy_series(both[0], np.full(2, AT), places, np.zeros_like(places))[:, 2]
+    power = both[1].load_power(np.array([AT]), y[None], v[None])[0]
+    assert power == pytest.approx((stored[0] - stored[1]) / 2e-7, rel=1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["nodal", "pieces", "absolute"])
+def test_a_force_on_all_mass_moves_as_gravity_does(tmp_path: Path, formulation: str) -> None:
+    """The L under it instead, to 1e-8 m; of nodal elements, whose halves of mass bear it, to their square: 2e-5 m."""
+    scenes.l_link(tmp_path, 6)
+    settings: dict[str, dict[str, Any]] = {
+        "nodal": {"simulation": {"formulation": "nodal"}},
+        "pieces": {"links": [{**scenes.L_SCENE["links"][0], "substructures": 2}]},
+        "absolute": {"simulation": {"coordinates": "absolute"}},
+    }
+    tips = []
+    for given in ({}, {"gravity": [0.0, 0.0, 0.0], "loads": [{"link": "l", "force_per_mass": [0.0, 0.0, -9.81]}]}):
+        short = {"simulation": {"duration": 0.05, "step": 5e-4, "formulation": "ffr"}}
+        path = scenes.l_scene(tmp_path, **scenes.merged(short, settings[formulation]), **given)
+        tips.append(erls.simulate(load_scene(path)).position("tip", np.linspace(0.0, 0.05, 6)))
+    assert np.abs(tips[0][-1] - tips[0][0]).max() > 5e-3
+    np.testing.assert_allclose(tips[1], tips[0], atol=2e-5 if formulation == "nodal" else 1e-8)

@@ -14,12 +14,15 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
+
 from erls.equations import compiled_system as contract
 from erls.equations.serial.nodes import (
     NODE,
     NODE_STATE,
     Node,
     NodeState,
+    centre_record,
     from_node_axes,
     move_node,
     node_record,
@@ -36,6 +39,8 @@ from erls.maths.records import Memory, Vector, python_reader, reader, room, tabl
 from erls.maths.so3 import Array
 from erls.maths.spatial import dot6, rotate, rotate_back, transform_force_back, transform_motion
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import Link
+from erls.mechanism.loads import CENTRE
 from fe_import.model import IntArray
 
 LOADS: Any = None
@@ -119,8 +124,9 @@ def put_loads(
     """
     own = mechanism.loads
 
-    def at(link: int, node: int) -> Node:
-        return node_record(link, mechanism.links[link], bases[link], node, bent[link])
+    def at(k: int, node: int) -> Node:
+        given = k, mechanism.links[k], bases[k]
+        return centre_record(*given, bent[k]) if node == CENTRE else node_record(*given, node, bent[k])
 
     nodes = [node for load in own for node in (at(load.link, load.node), at(*(load.axes or (load.link, load.node))))]
     records = [
@@ -129,7 +135,7 @@ def put_loads(
             reference=load.axes[0] if load.axes else -1,
             follower=int(load.follower),
             factor=put_curve(constants, load.factor),
-            wrench=load.wrench,
+            wrench=load.wrench * (_mass(mechanism.links[load.link]) if load.node == CENTRE else 1.0),
         )
         for load in own
     ]
@@ -141,6 +147,11 @@ def put_loads(
     }
     places = {name: [memory.put(record) for record in every] for name, (memory, every) in tables.items()}
     return {"load_count": len(own), **{name: every[0] if every else -1 for name, every in places.items()}}
+
+
+def _mass(link: Link) -> float:
+    """Of a link with what it carries [kg]."""
+    return float(np.trace(link.invariants.rigid_mass_matrix[:3, :3])) / 3
 
 
 def load_powers(system: contract.CompiledSystem, serial: Serial) -> list[Array]:

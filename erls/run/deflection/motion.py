@@ -15,7 +15,8 @@ from erls.integrate.base import hermite
 from erls.maths.so3 import Array, cross_all
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link, link_mass_properties, node_shape6
-from erls.run.chain.loads import wrenches
+from erls.mechanism.loads import CENTRE
+from erls.run.chain.loads import pull, wrenches
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.lines import Lines, lines
 
@@ -102,7 +103,7 @@ class BendingRun:
 
 
 class _Differences(NamedTuple):
-    """What accelerations are found with: step of differences [s], acceleration of gravity (3,)."""
+    """What accelerations are found with: step of differences [s], gravity and other forces per mass (k, 3)."""
 
     step: float
     gravity: Array
@@ -148,13 +149,13 @@ def bending(run: ChainRun, nodes: Sequence[tuple[int, int]]) -> BendingRun:
     step = min(_STEP, (run.end - float(run.solution.t[0])) / 4)
     times = run.looks(_SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES, step)
     seen = replace(run, formulation=formulation).series(np.concatenate([times - step, times, times + step]))
-    differences = _Differences(step, mechanism.gravity)
     loads = _loop_loads(run, mechanism, times) + _given_loads(mechanism, seen, len(times))
     ends = {end.link for loop in mechanism.loops for end in (loop.inner, loop.outer)}
     sums: list[_Sums | None] = [None] * len(mechanism.links)
     found: dict[int, Bending] = {}
     for number in reversed(range(len(mechanism.links))):
         link = mechanism.links[number]
+        differences = _Differences(step, pull(mechanism, number, seen)[len(times) : 2 * len(times)])
         beyond = [(mechanism.joints[k].seat, sums[k], not freed(mechanism, k)) for k in mechanism.standing_on(number)]
         seats = [_Seat(seat.node, part, turns) for seat, part, turns in beyond if seat is not None and part is not None]
         given = [load for load in loads if load.link == number]
@@ -213,15 +214,15 @@ def _bent(
     masses = line.shares * link.model.full_mass_properties.mass
     for payload in link.payloads:
         masses[line.nodes[payload.node]] += payload.mass
-    pull = masses[:, None] * (gravity - _acceleration(places, step))
+    pulled = masses[:, None] * (gravity[:, None] - _acceleration(places, step))
     at = places[here]
-    moments = np.zeros_like(pull)
-    force, moment = pull.sum(axis=1), cross_all(at, pull).sum(axis=1)
+    moments = np.zeros_like(pulled)
+    force, moment = pulled.sum(axis=1), cross_all(at, pulled).sum(axis=1)
     mass, centre = float(masses.sum()), np.einsum("s,ksi->ki", masses, at)
     carried = []
     for node, part, turns in seats:
         station = line.nodes[node]
-        pull[:, station] += part.force
+        pulled[:, station] += part.force
         moments[:, station] += part.moment - cross_all(at[:, station], part.force)
         force, moment = force + part.force, moment + part.moment
         if part.mass > 0:
@@ -230,7 +231,7 @@ def _bent(
             mass, centre = mass + part.mass, centre + part.place
     for load in given:
         station = line.nodes[load.node]
-        pull[:, station] += load.force
+        pulled[:, station] += load.force
         moments[:, station] += load.moment - cross_all(at[:, station], load.force)
         force, moment = force + load.force, moment + load.moment
     omega = spin[:, None]
@@ -243,7 +244,7 @@ def _bent(
         rates,
         local(line.rotation, rate),
         2 * cross_all(omega, rates) + cross_all(alpha[:, None], moved) + cross_all(omega, cross_all(omega, moved)),
-        pull @ axes,
+        pulled @ axes,
         moments @ axes,
         masses,
         _bending_energy(link, line.rotation @ held, elastic[here]),
@@ -345,6 +346,8 @@ def _given_loads(mechanism: Mechanism, seen: StateSeries, k: int) -> list[_Given
     """Loads of the scene, at the k times in the middle of three rounds."""
     middle, result = slice(k, 2 * k), []
     for load in mechanism.loads:
+        if load.node == CENTRE:
+            continue
         found = wrenches(mechanism, load, seen)[middle]
         model = mechanism.links[load.link].model
         local = model.nodes[load.node] + seen.modal[load.link] @ model.translation_shapes[load.node].T
