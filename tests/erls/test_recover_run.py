@@ -111,7 +111,7 @@ def test_the_outer_joint_loads_the_inner_link(tmp_path: Path) -> None:
     assert moment < 2e-3
 
 
-def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any]) -> ChainRun:
+def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any], **more: Any) -> ChainRun:
     """A straight arm of 40 elements along x, turned about z at a constant rate, with a payload on its tip.
 
     Strongly damped: what the sudden centrifugal force stirs up is gone after 10 ms.
@@ -136,13 +136,22 @@ def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any]) 
         "links": [{"name": "a", "model": "arm.toml", "mesh_pose": {"frame": "joint"}, "damping": {"ratio": 0.7}}],
         "points": [{"name": "end", "link": "a", "node": "tip"}],
         "payloads": [{"point": "end", **payload}],
+        **more,
     }
     return erls.simulate(scenes.write_toml(folder / "turning.toml", data))
 
 
-def test_a_payload_at_rest_loads_the_tip(tmp_path: Path) -> None:
-    """Shear is its weight, bending and torsion follow from its offset; 1/80 of the arm's own 5.3 N is the element's."""
-    run = turning(tmp_path, 0.0, 9.81, {"mass": 2.0, "offset": [0.03, 0.02, 0.0], "inertia": [1e-3, 1e-3, 1e-3]})
+@pytest.mark.parametrize("given", ["gravity", "load"])
+def test_a_payload_at_rest_loads_the_tip(tmp_path: Path, given: str) -> None:
+    """Shear is its weight, bending and torsion follow from its offset; 1/80 of the arm's own 5.3 N is the element's.
+
+    A load on all mass in place of gravity does the same.
+    """
+    payload = {"mass": 2.0, "offset": [0.03, 0.02, 0.0], "inertia": [1e-3, 1e-3, 1e-3]}
+    if given == "gravity":
+        run = turning(tmp_path, 0.0, 9.81, payload)
+    else:
+        run = turning(tmp_path, 0.0, 0.0, payload, loads=[{"force_per_mass": [0.0, 0.0, -9.81]}])
     weight = 2.0 * 9.81
     found = at_node(run, "a", np.array([0.0, 0.01]), "tip")
     expected = np.array([0.0, 0.0, -weight, -0.02 * weight, 0.03 * weight, 0.0])

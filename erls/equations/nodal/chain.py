@@ -13,7 +13,7 @@ import numpy as np
 from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.nodal.actuators import Actuator, Actuators
 from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.beam import Beams, lumped
+from erls.equations.nodal.beam import Beams, halves
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import GROUND, Joint, Motion
 from erls.equations.nodal.loads import NodalLoad, NodalLoads
@@ -206,8 +206,9 @@ def _loads(
 def _masses(parts: LinkParts, first: int) -> list[tuple[int, Array, float]]:
     """Node, place in its axes [m] and mass [kg] of all that a link consists of, half of each beam at its ends."""
     poses = np.array([pose(position=x) for x in parts.nodes])
-    bodies = [*lumped(parts.beams, poses), *parts.bodies]
-    return [(first + body.node, body.centre, body.mass) for body in bodies if body.mass]
+    found = [(first + node, local[:3, 3], float(half[0, 0])) for node, local, half in halves(parts.beams, poses)]
+    found += [(first + body.node, body.centre, body.mass) for body in parts.bodies]
+    return [(node, place, mass) for node, place, mass in found if mass]
 
 
 def _seats(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int]) -> tuple[Seat, ...]:
