@@ -230,6 +230,10 @@ class ClosedChain(Tied):
                 result[i, 3] += 0.5 * found.forces.stiffness * (efforts[k].coordinate - found.forces.rest) ** 2
         return result
 
+    def load_power(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) that of the tree."""
+        return self.bare.load_power(t, y, v)
+
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """The same at one time."""
         return single_energy(self.energy_series(np.array([t]), np.array([y]), np.array([v])))
