@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -160,7 +161,8 @@ class Recorder:
         t, rows = self._t[:knots], self._rows[:knots]
         more = self._waiting()
         if len(more[0]):
-            t, rows = np.concatenate([t, more[0]]), np.concatenate([rows, more[1]])
+            with suppress(MemoryError):  # of a run that ended for it: without its last knots
+                t, rows = np.concatenate([t, more[0]]), np.concatenate([rows, more[1]])
         return t, rows
 
 
@@ -263,6 +265,12 @@ def run_to_end(
                 Cause.INTERRUPTED,
                 "the run was interrupted",
                 remedy="the motion up to this time was kept",
+            )
+        except MemoryError:
+            failure = SimulationError(
+                Cause.OUT_OF_MEMORY,
+                "out of memory",
+                remedy="the motion up to this time was kept; give a larger simulation.output_step, or free memory",
             )
         except SimulationError as error:
             failure = error
