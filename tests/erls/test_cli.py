@@ -246,6 +246,7 @@ def test_compare_writes_what_it_prints(folder: Path, capsys: pytest.CaptureFixtu
     stored = json.loads((folder / "c.json").read_text(encoding="utf-8"))
     walls = [o["formulations"][n].pop("wall_s") for o in (found, stored) for n in ("erls", "erls-minimum-norm")]
     assert min(walls) > 0
+    assert stored.pop("written_by") == "erls"
     assert found == {**stored, "output": "c.json"}
     (pair,) = found["pairs"]
     assert (pair["a"], pair["b"], pair["as_expected"]) == ("erls", "erls-minimum-norm", True)
