@@ -119,6 +119,8 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
             return super().load_overload(sig, target_context)
         except MemoryError:
             raise
+        except OSError:  # no folder, or no permission: who writes is told
+            return None
         except Exception:  # damage may make anything of a pickle, and of the code in it
             self._tell("damaged", f"compiled code in {self._folder} is damaged: compiled anew")
             with contextlib.suppress(OSError):

@@ -38,7 +38,7 @@ def assembled_warning(start: Start, limit: float) -> tuple[str, ...]:
     if not start.where:
         return ()
     return (
-        f"{start.where}: rigid links leave {start.gap:.3g} m open, which the assembly tolerance of {limit:.3g} m allows",
+        f"{start.where}: rigid links leave {start.gap:.3g} m open, within the assembly tolerance of {limit:.3g} m",
     )
 
 
