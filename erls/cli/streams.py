@@ -41,7 +41,10 @@ def prepare_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
+    _of_any_letter("stderr", 2)
     stdout = _of_any_letter("stdout", 1)
+    if sys.platform == "win32" and stdout.isatty():  # no file there
+        return
     sys.stdout = io.TextIOWrapper(
         io.BufferedWriter(_Stdout(stdout.fileno(), "w", closefd=False)),
         encoding=stdout.encoding,
@@ -49,7 +52,6 @@ def prepare_streams() -> None:
         line_buffering=stdout.line_buffering,
         write_through=stdout.write_through,
     )
-    _of_any_letter("stderr", 2)
 
 
 def _of_any_letter(name: str, number: int) -> io.TextIOWrapper:
