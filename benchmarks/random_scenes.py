@@ -66,7 +66,7 @@ class Worker:
         if self._process is None:
             command = [sys.executable, __file__, "--serve"]
             pipe = subprocess.PIPE
-            new = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, start_new_session=True)
+            new = subprocess.Popen(command, stdin=pipe, stdout=pipe, encoding="utf-8", start_new_session=True)
             self._process, self._lines = new, SimpleQueue()  # type: ignore[assignment]
             threading.Thread(target=self._read, args=(new, self._lines), daemon=True).start()
         return self._process  # type: ignore[return-value]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from erls.cli.terminal import Json, Output, Progress, print_json, refuse_unwritable, remove, report_times, tell
+from erls.cli.terminal import Force, Json, Output, Progress, print_json, remove, report_times, tell
 
 if TYPE_CHECKING:
     from erls.scene.records import Record
@@ -23,6 +23,7 @@ def simulate(
     at: str = "",
     strict: Annotated[bool, Parameter(negative="")] = False,
     verdict: bool = True,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Simulate a scene; links are reduced on the fly and cached by content.
@@ -45,12 +46,16 @@ def simulate(
     verdict
         State the error of the run, part by part, and whether it can be relied on; --no-verdict does without, at no
         cost.
+    force
+        Replace an existing file that is no run file.
     json
         Print one JSON object.
     """
     from erls.errors import Cause, SimulationError
+    from erls.files.results import RUN, claim
     from erls.report.runs import run_report
     from erls.run.file import write_run
+    from erls.scene.inputs import files_of
     from erls.scene.read import load_scene
     from erls.simulation.simulate import simulate as run_simulation
 
@@ -59,9 +64,10 @@ def simulate(
         changes.append(f'simulation.formulation="{formulation}"')
     loaded = load_scene(scene, changes)
     times = _asked(at, loaded.record.simulation)
-    if output is not None:
-        refuse_unwritable(output, scene)
     partial = output.with_name(f"{output.name}.partial") if output is not None else None
+    for path in (output, partial):
+        if path is not None:
+            claim(path, RUN, files_of(loaded), force)
     try:
         with Progress("simulating") as advance:
             asked: dict[str, Any] = {"checkpoint": partial, "strict": strict, "verdict": verdict}

@@ -13,7 +13,7 @@ Rules for adding an integrator:
 4. Knots lie densely enough that quintic Hermite interpolation through (y, v, a) is as accurate as the method.
 5. It never raises for a numerical failure: it returns what was computed, at least one knot, with
    ``Solution.failure`` set, whose message says when, why and what to try. ``KeyboardInterrupt`` likewise ends
-   in a failure with cause INTERRUPTED.
+   in a failure with cause INTERRUPTED, ``MemoryError`` in one with cause OUT_OF_MEMORY.
 6. It counts its work honestly in `Work`; tests assert budgets on it.
 7. It calls ``observer(t, knots)`` after each accepted step (a compiled one after the last of some steps that took
    about 50 ms, once a run has made its first steps), where ``knots()`` returns the `Solution` so far, with every step

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
 AT = 1e-3  # of the same: adaptive steps would shrink for ever
-_ITS_OWN = (Cause.INTERRUPTED, Cause.SINGULAR_MASS, Cause.RUNAWAY)
+_ITS_OWN = (Cause.INTERRUPTED, Cause.OUT_OF_MEMORY, Cause.SINGULAR_MASS, Cause.RUNAWAY)
 
 
 class TiedCoordinates:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from erls.maths.so3 import Array
 _PAUSE = 0.05  # s between looks at the observer and at interrupts
 _SINGLE = 32  # first steps of an observed run, each looked at: a short run is seen step by step
 _FIRST, LARGEST_CHUNK = 32, 4096  # steps in one go
+_RESERVE = 12_000_000  # numbers: what writing a run file takes beside its knots
 
 
 class Recorder:
@@ -46,9 +48,14 @@ class Recorder:
         self._size, self._observer, self._apart, self.beside = size, observer, apart, beside
         self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
         self._begun = 0.0
+        self._reserve: Array | None = np.empty(_RESERVE)  # address space only, as nobody writes to it
         # how many knots are kept, accepted steps, and, where knots are dropped, the last one that was looked at and
         # those after it: one object, so that an interrupt finds all or nothing
         self._kept: tuple[int, int, tuple[Array, Array]] = 0, 0, (self._t[:0], self._rows[:0])
+
+    def release(self) -> None:
+        """Give back what was set aside for whoever keeps a run that ended for lack of memory."""
+        self._reserve = None
 
     def begin(self, t: float, *parts: Array) -> None:
         """Add a copy of the knot y, v, a (and what is kept beside it) at which a leg begins; the last leg ends."""
@@ -160,7 +167,8 @@ class Recorder:
         t, rows = self._t[:knots], self._rows[:knots]
         more = self._waiting()
         if len(more[0]):
-            t, rows = np.concatenate([t, more[0]]), np.concatenate([rows, more[1]])
+            with suppress(MemoryError):  # of a run that ended for it: without its last knots
+                t, rows = np.concatenate([t, more[0]]), np.concatenate([rows, more[1]])
         return t, rows
 
 
@@ -263,6 +271,13 @@ def run_to_end(
                 Cause.INTERRUPTED,
                 "the run was interrupted",
                 remedy="the motion up to this time was kept",
+            )
+        except MemoryError:
+            recorder.release()
+            failure = SimulationError(
+                Cause.OUT_OF_MEMORY,
+                "out of memory",
+                remedy="the motion up to this time was kept; give a larger simulation.output_step, or free memory",
             )
         except SimulationError as error:
             failure = error

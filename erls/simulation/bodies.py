@@ -21,6 +21,7 @@ from erls.run.watches.watching import Warnings, Watching
 from erls.scene.bodies.analyses import TANGENTS, AtRest, Buckling, Dynamics, Frequencies, StaticSteps
 from erls.scene.bodies.schema import BodyScene
 from erls.simulation.asked import Asked
+from erls.simulation.statements import with_statement
 
 
 def run_bodies(scene: BodyScene, asked: Asked) -> BodyMotion | BodyRest:
@@ -53,7 +54,7 @@ def _stated(run: BodyMotion | BodyRest, asked: Asked) -> BodyMotion | BodyRest:
         return run
     from erls.accuracy.bodies import stated_bodies  # here: runs without a verdict need none of it
 
-    return stated_bodies(run)
+    return with_statement(run, stated_bodies)
 
 
 def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, asked: Asked) -> BodyMotion:

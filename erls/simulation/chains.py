@@ -22,6 +22,7 @@ from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.simulation.asked import Asked
 from erls.simulation.kept import kept_to
+from erls.simulation.statements import with_statement
 from fe_import.description.records import LinkDescription
 from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
@@ -48,7 +49,7 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     from erls.accuracy.statement import stated  # here: runs without a verdict need none of it
 
     with announcing(tell):
-        found = stated(found)
+        found = with_statement(found, stated)
         if asked.strict:
             return kept_to(found, lambda other: run(other, _mechanism(other, found, tell)), tell)
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -153,3 +154,18 @@ def test_a_stopped_reduction_on_the_fly_leaves_nothing(folder: Path, monkeypatch
     assert (process.returncode, out) == (130, "")
     assert err.splitlines()[-1].startswith("error: ")
     assert not [p for p in folder.rglob("*") if p.suffix in (".h5", ".tmp", ".partial")]
+
+
+@pytest.mark.skipif(os.environ.get("ERLS_JIT") == "0", reason="nothing is compiled")
+def test_a_kill_while_kernels_are_compiled(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exit code 130; neither a run nor half a file of compiled code."""
+    monkeypatch.setenv("ERLS_KERNELS", str(folder / "kernels"))
+    process = start(folder, "simulate", "scene.toml", "-o", "r.h5")
+    until(lambda: any((folder / "kernels").rglob("*.nbc")))
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert err.splitlines()[-1] == "error: interrupted; start again"
+    assert "Traceback" not in err
+    assert sorted(p.name for p in folder.iterdir()) == ["kernels", "link.toml", "scene.toml"]
+    assert {p.suffix for p in (folder / "kernels").rglob("*") if p.is_file()} <= {".nbc", ".nbi"}

@@ -17,9 +17,9 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
-from erls.equations.loops.failures import comes_apart, locks, warnings_of
+from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.rows import Closure, applied
-from erls.equations.loops.start import Start, find_start, start_velocity
+from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
 from erls.equations.loops.static import closed_equilibrium
 from erls.equations.loops.tied import OPEN, Tied
 from erls.equations.serial.state_series import (
@@ -98,7 +98,7 @@ class ClosedChain(Tied):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know about the loops."""
-        return warnings_of(self.redundant)
+        return (*warnings_of(self.redundant), *assembled_warning(self.start, ASSEMBLED * self.reach))
 
     def refuse_open(self, t: float, found: Closure) -> None:
         """Raise when a loop has come apart.
@@ -190,6 +190,8 @@ class ClosedChain(Tied):
     def initial_state(self) -> tuple[Array, Array]:
         """(y, v) at time 0: loops closed on the undeformed chain, or in static equilibrium; rates that keep to them."""
         y = self.start.y
+        if self.start.where:  # the gap is all in conditions that others leave to it, or links bend by as much
+            y = self.closed(0.0, y, np.zeros(self.size))[0]
         if self.mechanism.static_start:
             y = closed_equilibrium(self, y, self.start.held, self.kept)
         return y, self.start_velocity(y)
