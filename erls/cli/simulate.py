@@ -23,6 +23,7 @@ def simulate(
     at: str = "",
     strict: Annotated[bool, Parameter(negative="")] = False,
     verdict: bool = True,
+    resume: Path | None = None,
     json: Json = False,
 ) -> None:
     """Simulate a scene; links are reduced on the fly and cached by content.
@@ -45,11 +46,16 @@ def simulate(
     verdict
         State the error of the run, part by part, and whether it can be relied on; --no-verdict does without, at no
         cost.
+    resume
+        Run file of a run that was stopped, killed or ran out of memory: go on from the last checkpoint beside it
+        (RUN.h5.partial), with what --set gave then, and write it; as though nothing had happened, bit for bit.
     json
         Print one JSON object.
     """
+    from erls.cli.resuming import checkpoint_of, left_by
     from erls.errors import Cause, SimulationError
     from erls.report.runs import run_report
+    from erls.run.checkpoints import Checkpoints
     from erls.run.file import write_run
     from erls.scene.read import load_scene
     from erls.simulation.simulate import simulate as run_simulation
@@ -57,14 +63,19 @@ def simulate(
     changes = list(set_ or [])
     if formulation is not None:
         changes.append(f'simulation.formulation="{formulation}"')
+    output = output or resume
+    saved = None if resume is None else left_by(resume)
+    if saved is not None and not changes:
+        changes = list(saved.changes)
     loaded = load_scene(scene, changes)
     times = _asked(at, loaded.record.simulation)
     if output is not None:
         refuse_unwritable(output, scene)
-    partial = output.with_name(f"{output.name}.partial") if output is not None else None
+    partial = None if output is None else checkpoint_of(output)
+    saving = None if partial is None else Checkpoints(partial, tuple(changes), saved)
     try:
         with Progress("simulating") as advance:
-            asked: dict[str, Any] = {"checkpoint": partial, "strict": strict, "verdict": verdict}
+            asked: dict[str, Any] = {"checkpoint": saving, "strict": strict, "verdict": verdict}
             run = run_simulation(loaded, progress=advance, tell=tell, **asked)
     except SimulationError as problem:
         if output is None and problem.run is not None:
@@ -74,7 +85,10 @@ def simulate(
             write_run(output, problem.run)
             axis = problem.run.axis
             tell(f"what was computed, up to {axis.symbol} = {axis.text(f'{problem.run.end:.6g}')}, is in {output}")
-            remove(partial)
+            if problem.cause == Cause.INTERRUPTED and partial is not None and partial.exists():
+                tell(f"erls simulate {scene} --resume {output} goes on from the last checkpoint")
+            else:
+                remove(partial)
         raise
     if output is not None:
         write_run(output, run)

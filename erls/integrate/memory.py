@@ -32,9 +32,10 @@ _LEG = "leg"
 
 
 class Keeper(Protocol):
-    """Who keeps the memory of an integration, and what it goes on from: None from the start."""
+    """Who keeps the memory of an integration."""
 
     memory: Memory | None
+    """What the integration goes on from; None from the start."""
 
     def offer(self, memory: Callable[[], Memory]) -> None:
         """A memory to keep, for who asks now."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from erls.accuracy.kernels import kernels_of
@@ -34,6 +35,9 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     like, tell = asked.like, asked.tell
     built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
+    if asked.checkpoints is not None:
+        links = built.mechanism.links
+        asked.checkpoints.identify(scene, [part.model for link in links for part in (link, *link.pieces)])
     warnings = Warnings(tell)
     warnings(built.warnings)
     run = partial(_run, asked=asked, warnings=warnings)
@@ -73,7 +77,8 @@ def models_of(run: ChainRun) -> tuple[list[ModalModel], list[LinkDescription | N
 def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -> ChainRun:
     """Run a mechanism as the scene says."""
     settings, plan, told = scene.record.simulation, Plan(scene, mechanism), warnings.beside()
-    watching = Watching(plan, told, asked.watches())
+    checkpoint = asked.checkpoint(scene)
+    watching = Watching(plan, told, asked.watches(checkpoint))
     watching.before()
     later = kernels_of(mechanism, settings) if asked.verdict else ()
     steps = compiled_steps(mechanism, settings)
@@ -81,13 +86,14 @@ def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -
         formulation = formulate(mechanism, settings)
         compile_kernels(formulation, settings)
     y, v = formulation.initial_state()
-    begun = time.perf_counter()
+    begun = time.perf_counter() - (0.0 if checkpoint is None else checkpoint.spent)
 
     def run_of(solution: Solution) -> ChainRun:
         return ChainRun(scene, formulation, solution, time.perf_counter() - begun, tuple(told.texts))
 
-    watching.begins(Begun(settings.duration, run_of, plan, formulation))
+    since = 0.0 if checkpoint is None else checkpoint.since
+    watching.begins(Begun(settings.duration, run_of, plan, formulation, since=since))
     integrate = integrator(mechanism, settings)
-    times, options = (0.0, settings.duration), options_of(settings)
+    times, options = (0.0, settings.duration), replace(options_of(settings), keeper=checkpoint)
     solution = integrate(formulation, times, y, v, options, watching.observe)
     return watching.judged(run_of(watching.ended(solution)))
