@@ -14,7 +14,7 @@ from erls.run.watches.base import NOTHING, Finding, Knots, Started, Watch
 FIRST_S, LEAST_S = 0.5, 1.0
 """Work before the first checkpoint, and between two of them at the least [s]."""
 
-_SHARE = 0.02  # of the time that a run takes: what checkpoints may cost
+_SHARE, _WAITING = 0.02, 0.1  # of the time of a run: what checkpoints may cost, and wait for disks and other processes
 
 
 class Checkpoint(Watch):
@@ -80,7 +80,7 @@ class Checkpoint(Watch):
         return Part(memory(), self.spent + time.perf_counter() - self._begun)
 
     def _write(self, memory: Callable[[], Memory] | None) -> None:
-        begun = time.perf_counter()
+        begun, worked = time.perf_counter(), time.thread_time()
         assert self._knots is not None
         part = None if memory is None else self._part(memory)
         try:
@@ -88,5 +88,5 @@ class Checkpoint(Watch):
                 self._checkpoints.write(self._run_of(self._knots()), self._key, part)
         except (SceneError, MemoryError) as problem:
             self._problem = f"warning: no checkpoint: {problem}"
-        now = time.perf_counter()
-        self._due = now + max(LEAST_S, (now - begun) / _SHARE)
+        now, work = time.perf_counter(), time.thread_time() - worked
+        self._due = now + max(LEAST_S, work / _SHARE, (now - begun) / _WAITING)
