@@ -1,8 +1,10 @@
 """Runs that are killed (SIGKILL) at random moments and resumed: is the result that of the run that nothing stopped?
 
-``python benchmarks/resume.py [KILLS] [SEED]`` prints a line for each kill: when it came, after the start of the process;
-up to which time of the motion the checkpoint went that it left; and whether times, positions, velocities, accelerations
-and all counts of work of the resumed run are those of the uninterrupted one, bit for bit.
+    python benchmarks/resume.py [KILLS] [SEED]
+
+50 kills unless given. Prints a line for each kill: when it came, after the start of the process; up to which time of
+the motion the checkpoint went that it left; and whether times, positions, velocities, accelerations and all counts of
+work of the resumed run are those of the uninterrupted one, bit for bit.
 """
 
 from __future__ import annotations

@@ -34,6 +34,7 @@ from fe_import.modal.model import ModalModel
 UNFINISHED = "unfinished"
 
 _GROUP = "checkpoint"
+_BITS = ".bits"  # after the name of float64 values of which some are not finite: stored as int64
 _ANEW = "run the scene again without --resume"
 
 
@@ -136,7 +137,9 @@ class Checkpoints:
             own = runs.create_group(key)
             write_attribute(own, "wall_s", part.wall_s)
             for name, values in part.memory.items():
-                write_array(own, name, values, "SI", "of the integrator")
+                known = bool(np.isfinite(values).all())
+                stored = values if known else np.ascontiguousarray(values).view(np.int64)  # readers refuse the others
+                write_array(own, name if known else name + _BITS, stored, "SI", "of the integrator")
 
 
 def read_checkpoint(path: Path | str) -> Saved:
@@ -162,7 +165,12 @@ def read_checkpoint(path: Path | str) -> Saved:
 
 
 def _part(group: Reader) -> Part:
-    return Part({name: group.numbers(name) for name in group.names_inside()}, group.attribute("wall_s", float))
+    found = {name: group.numbers(name) for name in group.names_inside()}
+    memory = {
+        name.removesuffix(_BITS): values.view(np.float64) if name.endswith(_BITS) else values
+        for name, values in found.items()
+    }
+    return Part(memory, group.attribute("wall_s", float))
 
 
 def _digests(group: Reader) -> dict[str, str]:
@@ -175,11 +183,6 @@ def _digests(group: Reader) -> dict[str, str]:
 def key_of(scene: SceneFile) -> str:
     """Digest of a scene that is integrated: its settings, effects and links as they were chosen."""
     return _digest(msgspec.json.encode(scene.record))
-
-
-def finite(memory: Memory) -> bool:
-    """Whether a file can hold it."""
-    return all(bool(np.isfinite(values).all()) for values in memory.values())
 
 
 def made_with() -> str:

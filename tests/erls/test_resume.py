@@ -70,9 +70,10 @@ class Kept:
         self.all.append({name: values.copy() for name, values in memory().items()})
 
 
-def equal(one: Solution, other: Solution) -> bool:
+def equal(one: Solution, other: Solution, work: bool = True) -> bool:
     """Whether all knots are equal bit for bit, and so is the work."""
-    return one.work == other.work and all(np.array_equal(getattr(one, k), getattr(other, k)) for k in "tyva")
+    same = [np.array_equal(getattr(one, name), getattr(other, name)) for name in "tyva"]
+    return all(same) and (one.work == other.work or not work)
 
 
 def chunks_of(numbers: random.Random, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,12 +107,13 @@ def test_integrators_go_on(name: str, tmp_path: Path, monkeypatch: pytest.Monkey
     kept = Kept()
     whole = run(kept)
     assert whole.failure is None
-    assert equal(run(None), whole)
+    counted = name != "rotation vectors"  # steps beyond an exchange are made again, as many as were made at once
+    assert equal(run(None), whole, counted)
     assert len(kept.all) > 5
     for k in sorted({*np.linspace(0, len(kept.all) - 1, 8).astype(int).tolist()}):
         resumed = Kept(kept.all[k])
-        assert equal(run(resumed), whole), f"from {kept.all[k]['time']}"
-        assert len(resumed.all) < len(kept.all) or k == 0
+        assert equal(run(resumed), whole, counted), f"from {kept.all[k]['time']}"
+        assert all(offered["time"] > kept.all[k]["time"] for offered in resumed.all)
 
 
 def l_scene(folder: Path, **changes: Any) -> Path:
@@ -138,12 +140,11 @@ def stopped(scene: Path, checkpoint: Path, looks: int, changes: tuple[str, ...] 
 
 
 def test_runs_go_on_through_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With what runs state of themselves, and with events of which the run keeps the steps; nothing is computed twice."""
+    """With what runs state of themselves, and events whose steps the run keeps; nothing is computed twice."""
     at_every_look(monkeypatch)
     chunks_of(random.Random(2), monkeypatch)
     crossing = {"name": "down", "coordinate": "angle", "joint": "shoulder", "value_deg": 3.0}
-    ends = {"name": "end", "coordinate": "angle", "joint": "shoulder", "value_deg": 10.0, "stop": True}
-    scene = l_scene(tmp_path, events=[crossing, ends], simulation={"output_step": 1e-3})
+    scene = l_scene(tmp_path, events=[crossing], simulation={"output_step": 1e-3})
     whole, path = erls.simulate(scene), tmp_path / "r.partial"
     for looks in (2, 5, 9):
         saved, seen = stopped(scene, path, looks), list[float]()
@@ -249,28 +250,31 @@ def test_damage_is_refused(
     chunks_of(random.Random(6), monkeypatch)
     scene, path = l_scene(tmp_path), tmp_path / "r.h5.partial"
     stopped(scene, path, 6)
-    whole, draw = path.read_bytes(), random.Random(7)
+    whole, draw, saved, causes = path.read_bytes(), random.Random(7), read_checkpoint(path), set()
     for _ in range(12):
         damaged = bytearray(whole)
         damaged[draw.randrange(len(damaged))] ^= 1 << draw.randrange(8)
         path.write_bytes(damaged)
         try:
-            read_checkpoint(path)
+            found = read_checkpoint(path)
         except SceneError as problem:
-            assert problem.cause in (Cause.RUN_FILE, Cause.NOT_READABLE)
+            causes.add(problem.cause)
         else:  # a byte between what is stored
-            assert equal(load_run(path).solution, load_run(path).solution)
+            assert found.made_from == saved.made_from
+            for key, part in found.parts.items():
+                assert all(np.array_equal(v, saved.parts[key].memory[k]) for k, v in part.memory.items())
+    assert causes
+    assert causes <= {Cause.RUN_FILE, Cause.NOT_READABLE}
     for damaged in (whole[: len(whole) // 2], b"", b"not HDF5"):
         path.write_bytes(damaged)
         assert str(path) in refused(capsys, str(scene), "--resume", str(tmp_path / "r.h5"))
-    path.write_bytes(whole)
-    saved = read_checkpoint(path)
     ((key, part),) = saved.parts.items()
     for name, values in (("steps.known", np.zeros(3)), ("leg", np.array([-1])), ("recorder.t", np.zeros(0))):
         other = replace(saved, parts={key: part._replace(memory={**part.memory, name: values})})
         with pytest.raises(SceneError) as caught:
             erls.simulate(scene, checkpoint=Checkpoints(path, saved=other))
         assert caught.value.cause == Cause.RUN_FILE
+    path.unlink()
     erls.save_run(path, erls.simulate(scene, verdict=False))
     assert "no checkpoint" in refused(capsys, str(scene), "--resume", str(tmp_path / "r.h5"))
 
@@ -281,7 +285,8 @@ def test_integrators_that_cannot_go_on_are_refused(
     """Their checkpoints can be read, and are no more than that."""
     at_every_look(monkeypatch)
     path = tmp_path / "r.h5.partial"
-    scene = scenes.write_toml(tmp_path / "scene.toml", scenes.merged(TOP, {"simulation": {"integrator": "radau"}}))
+    changed = scenes.merged(TOP, {"simulation": {"integrator": "radau", "duration": 0.005}})
+    scene = scenes.write_toml(tmp_path / "scene.toml", changed)
     erls.simulate(scene, checkpoint=path, verdict=False)
     assert load_run(path).end > 0
     assert "cannot go on from a checkpoint" in refused(capsys, str(scene), "--resume", str(tmp_path / "r.h5"))
@@ -316,7 +321,8 @@ def test_killed_processes_go_on(tmp_path: Path) -> None:
                 break
             time.sleep(0.01)
         process.kill()
-        process.communicate()
+        _, told = process.communicate()
+        assert partial.exists(), told
         (part,) = read_checkpoint(partial).parts.values()
         reached.append(float(part.memory["time"][0]))
     assert 0.0 < reached[1] < reached[2] < 60.0

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from erls.errors import SceneError
 from erls.integrate.base import Solution
 from erls.integrate.memory import Memory, time_of
-from erls.run.checkpoints import Checkpoints, Part, finite
+from erls.run.checkpoints import Checkpoints, Part
 from erls.run.watches.base import NOTHING, Finding, Knots, Started, Watch
 
 FIRST_S, LEAST_S = 0.5, 1.0
@@ -84,8 +84,7 @@ class Checkpoint(Watch):
         assert self._knots is not None
         part = None if memory is None else self._part(memory)
         try:
-            if part is None or finite(part.memory):
-                self._checkpoints.write(self._run_of(self._knots()), self._key, part)
+            self._checkpoints.write(self._run_of(self._knots()), self._key, part)
         except (SceneError, MemoryError) as problem:
             self._problem = f"warning: no checkpoint: {problem}"
         now, work = time.perf_counter(), time.thread_time() - worked
