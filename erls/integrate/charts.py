@@ -67,7 +67,7 @@ def in_charts(integrate: Callable[..., Solution], places: Sequence[int]) -> Call
             found = integrate(system, (start, end), *state, options, watch)
             long = _first_long(found, places)
             last = len(found.t) - 1 if long is None else long
-            whole = _joined(before, _up_to(found, last))
+            whole = joined(before, _up_to(found, last))
             if long is None or watch.stopped or not found.t[long] < end:
                 return whole if long is None else replace(whole, failure=found.failure)
             start, before = float(found.t[long]), replace(whole, failure=None)
@@ -103,7 +103,7 @@ class _Watch:
         kept: Sequence[float] | None = None
         if self._observer is not None:
             try:
-                kept = self._observer(t, lambda: _joined(self._before, knots()))
+                kept = self._observer(t, lambda: joined(self._before, knots()))
             except StopRun:
                 self.stopped = True
                 raise
@@ -130,8 +130,8 @@ def _up_to(solution: Solution, last: int) -> Solution:
     return replace(solution, **parts)
 
 
-def _joined(before: Solution | None, after: Solution) -> Solution:
-    """One solution of two stretches."""
+def joined(before: Solution | None, after: Solution) -> Solution:
+    """One solution of two stretches, the first of which may be none."""
     if before is None:
         return after
     parts: dict[str, Any] = {}

@@ -32,6 +32,8 @@ from fe_import.modal.file import write_modal_group
 from fe_import.modal.model import ModalModel
 
 UNFINISHED = "unfinished"
+EXTENDED = "run that is extended"
+"""Among what runs are made from: a finished one, which is in a file of its own."""
 
 _GROUP = "checkpoint"
 _BITS = ".bits"  # after the name of float64 values of which some are not finite: stored as int64
@@ -89,15 +91,18 @@ class Checkpoints:
     made_from: Mapping[str, str] = field(default_factory=dict)
     finished: dict[str, Part] = field(default_factory=dict)
 
-    def identify(self, scene: SceneFile, models: Iterable[ModalModel] = ()) -> None:
-        """Learn what the runs are made from: the scene with its tables in it, and the modal models of its links.
+    def identify(
+        self, scene: SceneFile, models: Iterable[ModalModel] = (), beside: Mapping[str, str] | None = None
+    ) -> None:
+        """Learn what the runs are made from: the scene with its tables in it, the modal models of its links, and what
+        else there is, as digests.
 
         Raises
         ------
         SceneError
             CHANGED: what was saved is of something else.
         """
-        self.made_from = {**_tables(scene), **_models(models)}
+        self.made_from = {**_tables(scene), **_models(models), **(beside or {})}
         if self.saved is None:
             return
         before, now = ({**known, "program": made} for known, made in self._made())

@@ -23,6 +23,7 @@ class Asked:
     strict: bool
     like: ChainRun | None
     verdict: bool = True
+    until: float | None = None
 
     def checkpoint(self, scene: SceneFile) -> Checkpoint | None:
         """Of the integration of a scene."""

@@ -10,6 +10,7 @@ from erls.equations.nodal.redundant import refuse_open
 from erls.equations.nodal.scenes.build import Assembly, assemble
 from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
 from erls.equations.nodal.statics import Statics, solve_statics
+from erls.errors import Cause, SceneError
 from erls.integrate.choice import TIED_STEPS, body_options, compiling_steps
 from erls.integrate.constrained import ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
@@ -35,6 +36,9 @@ def run_bodies(scene: BodyScene, asked: Asked) -> BodyMotion | BodyRest:
         A failure or an interrupt; what was computed is in its attribute ``run``.
     """
     analysis = scene.record.simulation
+    if asked.until is not None:
+        message, remedy = "a run of bodies and beams cannot be extended", "simulate with a longer simulation.duration"
+        raise SceneError(Cause.BAD_FIELD, message, where="--until", value=asked.until, remedy=remedy)
     with announcing(asked.tell), compiling_steps(TIED_STEPS if isinstance(analysis, Dynamics) else None):
         assembly = assemble(scene)
     if isinstance(analysis, Dynamics):

@@ -40,6 +40,7 @@ def simulate(
     strict: bool = ...,
     like: ChainRun | None = ...,
     verdict: bool = ...,
+    until: float | None = ...,
 ) -> ChainRun: ...
 
 
@@ -53,6 +54,7 @@ def simulate(
     strict: bool = ...,
     like: ChainRun | None = ...,
     verdict: bool = ...,
+    until: float | None = ...,
 ) -> Run: ...
 
 
@@ -65,6 +67,7 @@ def simulate(
     strict: bool = False,
     like: ChainRun | None = None,
     verdict: bool = True,
+    until: float | None = None,
 ) -> Run:
     """Simulate a scene.
 
@@ -88,6 +91,9 @@ def simulate(
     verdict : bool
         Whether the run states its error, ``accuracy``, and whether it can be relied on, ``trust``; nothing is computed
         for it otherwise.
+    until : float, optional
+        Go on up to this time [s] once the run has come to its end, with what was settled for it
+        (`erls.simulation.extension`).
 
     Returns
     -------
@@ -115,4 +121,4 @@ def simulate(
     """
     loaded = load_scene(scene) if isinstance(scene, (Path, str)) else scene
     saving = Checkpoints(checkpoint) if isinstance(checkpoint, Path) else checkpoint
-    return RUNS[type(loaded)](loaded, Asked(progress, tell, saving, strict, like, verdict))
+    return RUNS[type(loaded)](loaded, Asked(progress, tell, saving, strict, like, verdict, until))
