@@ -23,8 +23,8 @@ from erls.run.file import load_run
 
 DATA = Path(__file__).parents[1] / "data"
 SCENES = (
-    (DATA / "slider_crank/flexible.toml", ["simulation.duration=40"]),
-    (DATA / "l_shape/steel_tall.toml", ["simulation.duration=60", "simulation.output_step=0.01"]),
+    (DATA / "slider_crank/flexible.toml", ["simulation.duration=500"]),
+    (DATA / "l_shape/steel_tall.toml", ["simulation.duration=100", "simulation.output_step=0.01"]),
     (DATA / "slider_crank/flexible.toml", ["simulation.duration=20", "simulation.step=2e-4"]),
 )
 COMMAND = "import sys; from erls.cli.main import main; sys.exit(main())"
@@ -55,7 +55,6 @@ def same(one: Path, other: Path) -> bool:
 def main(kills: int = 50, seed: int = 1) -> None:
     """Kill and resume."""
     draw = random.Random(seed)
-    print(f"{'scene':30}{'killed at':>10}{'checkpoint':>12}{'equal':>8}")
     equal = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -64,6 +63,8 @@ def main(kills: int = 50, seed: int = 1) -> None:
             output = folder / f"whole{number}.h5"
             finished(process(scene, changes, output))  # compiles
             whole.append((output, finished(process(scene, changes, output))))
+            print(f"{scene.parent.name}/{scene.stem}, {', '.join(changes)}: {whole[-1][1]:.1f} s", flush=True)
+        print(f"{'scene':30}{'killed at':>10}{'checkpoint':>12}{'equal':>8}")
         kill = 0
         while kill < kills:
             number = kill % len(SCENES)
