@@ -162,6 +162,19 @@ def test_runs_go_on_through_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyP
         )
 
 
+def test_an_event_ends_a_resumed_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last checkpoint lies before it."""
+    at_every_look(monkeypatch)
+    chunks_of(random.Random(9), monkeypatch)
+    ends = {"name": "end", "coordinate": "angle", "joint": "shoulder", "value_deg": 3.0, "stop": True}
+    scene, path = l_scene(tmp_path, events=[ends]), tmp_path / "r.partial"
+    whole = erls.simulate(scene, checkpoint=path, verdict=False)
+    assert 0 < whole.end < 0.2
+    run = erls.simulate(scene, checkpoint=Checkpoints(path, saved=read_checkpoint(path)), verdict=False)
+    assert equal(run.solution, whole.solution, work=False)  # steps beyond the event count
+    assert run.events == whole.events
+
+
 def test_motions_of_bodies_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With multipliers."""
     at_every_look(monkeypatch)

@@ -38,6 +38,7 @@ class Checkpoint(Watch):
         self.spent: float = 0.0 if found is None else found.wall_s
         """Work that was saved [s]."""
         self._knots: Knots | None = None
+        self._seen = 0.0
         self._offered: Callable[[], Memory] | None = None
         self._problem = ""
 
@@ -55,7 +56,7 @@ class Checkpoint(Watch):
     def during(self, t: float, knots: Knots) -> Finding:
         """That a file could not be written: a full disk may have room again at the end."""
         silent = self._knots is not None and self._offered is None
-        self._knots = knots
+        self._knots, self._seen = knots, t
         if silent and time.perf_counter() >= self._due:
             self._write(None)
         problem, self._problem = self._problem, ""
@@ -69,8 +70,10 @@ class Checkpoint(Watch):
 
     def ends(self, solution: Solution) -> Finding:
         """Nothing; an integration that came to its end is not made again, whatever comes after it."""
-        if solution.failure is None and self._offered is not None:
-            part = self._part(self._offered)
+        if solution.failure is not None or self._offered is None:
+            return NOTHING
+        part = self._part(self._offered)
+        if part.memory["time"] == self._seen:  # otherwise a watch ended it, and has to do so again
             self._checkpoints.finished[self._key] = part
             if time.perf_counter() >= self._due:
                 self._write(self._offered)
