@@ -33,6 +33,10 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     """Build the mechanism of a scene and run it, with all effects that it names or those that ``auto`` chooses."""
     settings = scene.record.simulation
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
+    if asked.until is not None:
+        from erls.simulation.extension import extended, refuse_time, refuse_unextendable  # here: it runs mechanisms
+
+        refuse_time(settings, asked.until)
     like, tell = asked.like, asked.tell
     built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
@@ -49,8 +53,6 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     else:
         found = run(scene, built.mechanism)
     if asked.until is not None:
-        from erls.simulation.extension import extended, refuse_unextendable  # here: it runs mechanisms, too
-
         return extended(refuse_unextendable(found, asked.until), asked.until, asked)
     if not asked.verdict:
         return found

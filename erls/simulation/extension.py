@@ -24,9 +24,11 @@ from erls.run.record import Run
 from erls.run.watches.watching import Warnings
 from erls.scene.chain import Scene, SceneRecord
 from erls.scene.records import SceneFile
+from erls.scene.settings import Simulation
 from erls.simulation.asked import Asked
 from erls.simulation.chains import run_mechanism
 
+_LONGER = "simulate with a longer simulation.duration"
 _RESOLVED = ("duration", "effects", "bandwidth", "output_step")  # what a run may have settled itself
 
 
@@ -43,19 +45,30 @@ def refuse_unextendable(run: Run, until: float) -> ChainRun:
         problem = "a run of bodies and beams cannot be extended"
     elif run.failure is not None:
         problem = "a run that failed or was stopped cannot be extended"
-    elif run.scene.record.simulation.bandwidth is not None:
-        problem = "a run whose fast modes follow statically (simulation.bandwidth) cannot be extended"
     elif run.end < run.scene.record.simulation.duration:
         problem = "a run that one of its events ended cannot be extended"
     if problem:
-        remedy = "simulate with a longer simulation.duration"
-        raise SceneError(Cause.BAD_FIELD, problem, where="--until", value=until, remedy=remedy)
-    if not run.end < until < np.inf:
-        message, remedy = "not beyond the end of the run", "give a later time"
-        limit = f"beyond {run.end:.6g} s"
-        raise SceneError(Cause.TIME_OUT_OF_RANGE, message, where="--until", value=until, limit=limit, remedy=remedy)
+        raise SceneError(Cause.BAD_FIELD, problem, where="--until", value=until, remedy=_LONGER)
     assert isinstance(run, ChainRun)
+    refuse_time(run.scene.record.simulation, until)
     return run
+
+
+def refuse_time(settings: Simulation, until: float) -> None:
+    """Raise before any work where a run with these settings cannot go on up to that time.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD, TIME_OUT_OF_RANGE.
+    """
+    if settings.bandwidth is not None:
+        problem = "a run whose fast modes follow statically (simulation.bandwidth) cannot be extended"
+        raise SceneError(Cause.BAD_FIELD, problem, where="--until", value=until, remedy=_LONGER)
+    if not settings.duration < until < np.inf:
+        message, limit = "not beyond the end of the run", f"beyond {settings.duration:.6g} s"
+        where, remedy = "--until", "give a later time"
+        raise SceneError(Cause.TIME_OUT_OF_RANGE, message, where=where, value=until, limit=limit, remedy=remedy)
 
 
 def refuse_other(scene: SceneFile, run: Run) -> None:

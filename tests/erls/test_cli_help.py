@@ -14,7 +14,8 @@ from erls.cli.main import main
 
 OPTIONS = {
     "reduce": ["--output", "-o", "--method", "--modes", "--json"],
-    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict", "--json"],
+    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict",
+                 "--resume", "--until", "--json"],
     "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--json"],
     "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
                     "--beside", "--set", "--workers", "--json"],
