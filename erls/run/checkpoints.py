@@ -35,7 +35,7 @@ UNFINISHED = "unfinished"
 EXTENDED = "run that is extended"
 """Among what runs are made from: a finished one, which is in a file of its own."""
 
-_GROUP = "checkpoint"
+_GROUP, _PROGRAM = "checkpoint", "program"
 _BITS = ".bits"  # after the name of float64 values of which some are not finite: stored as int64
 _ANEW = "run the scene again without --resume"
 
@@ -105,18 +105,13 @@ class Checkpoints:
         self.made_from = {**_tables(scene), **_models(models), **(beside or {})}
         if self.saved is None:
             return
-        before, now = ({**known, "program": made} for known, made in self._made())
+        now = {**self.made_from, _PROGRAM: made_with()}
+        before = {**self.saved.made_from, _PROGRAM: self.saved.made_with}
         for name in (name for name in {**before, **now} if before.get(name) != now.get(name)):
             message = f"{name} is not what the run that shall be resumed began with"
-            remedy = f"take back the change, or {_ANEW}"
-            value = now[name] if name == "program" else None
-            limit = before[name] if name == "program" else None
-            where = f"{self.saved.path}: {name}"
+            where, remedy = f"{self.saved.path}: {name}", f"take back the change, or {_ANEW}"
+            value, limit = (now[name], before[name]) if name == _PROGRAM else (None, None)  # digests tell nothing
             raise SceneError(Cause.CHANGED, message, where=where, value=value, limit=limit, remedy=remedy)
-
-    def _made(self) -> tuple[tuple[Mapping[str, str], str], tuple[Mapping[str, str], str]]:
-        assert self.saved is not None
-        return (self.saved.made_from, self.saved.made_with), (self.made_from, made_with())
 
     def part(self, key: str) -> Part | None:
         """What an integration goes on from."""

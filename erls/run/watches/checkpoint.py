@@ -33,7 +33,7 @@ class Checkpoint(Watch):
 
     def __init__(self, checkpoints: Checkpoints, key: str) -> None:
         self._checkpoints, self._key = checkpoints, key
-        found = checkpoints.part(key)
+        self._found = found = checkpoints.part(key)
         self.memory: Memory | None = None if found is None else found.memory
         self.spent: float = 0.0 if found is None else found.wall_s
         """Work that was saved [s]."""
@@ -70,6 +70,8 @@ class Checkpoint(Watch):
 
     def ends(self, solution: Solution) -> Finding:
         """Nothing; an integration that came to its end is not made again, whatever comes after it."""
+        if solution.failure is None and self._offered is None and self._found is not None:
+            self._checkpoints.finished[self._key] = self._found  # it had come to its end before
         if solution.failure is not None or self._offered is None:
             return NOTHING
         part = self._part(self._offered)
