@@ -14,8 +14,8 @@ from erls.cli.main import main
 
 OPTIONS = {
     "reduce": ["--output", "-o", "--method", "--modes", "--force", "--json"],
-    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict", "--force",
-                 "--json"],
+    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict",
+                 "--resume", "--until", "--force", "--json"],
     "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--force", "--json"],
     "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
                     "--beside", "--set", "--workers", "--force", "--json"],

@@ -100,6 +100,13 @@ class Reader:
             self._refuse_first(name, values >= high, values, "too large", f"below {high}")
         return values
 
+    def numbers(self, name: str) -> Array | IntArray:
+        """A float64 dataset, all values finite, or an int64 dataset, of any shape."""
+        with translated(self.place(name), self.error, self.cause):
+            dataset = self._item(name, h5py.Dataset)
+            whole, shape = dataset.dtype.kind == "i", (None,) * dataset.ndim
+        return self.integers(name, shape) if whole else self.array(name, shape)
+
     def scalar(self, name: str) -> float:
         """A float64 dataset of one finite value."""
         return float(self.array(name, ()))
