@@ -257,7 +257,7 @@ def integrate_legs(
     Parameters
     ----------
     method : Method or None
-        None where there is nothing to integrate.
+        Not asked where there is nothing to integrate.
     keeper : Keeper or None
         Of what the run needs to go on, and what it goes on from.
     """
@@ -282,6 +282,7 @@ def integrate_legs(
             if method is not None and leg.end > leg.start:
                 y, v = method.finish(leg)
 
+    method = method if system.size else None
     start = np.array(y, dtype=float), np.array(v, dtype=float)
     return run_to_end(system, times, recorder, go, lambda: recorder.append(times[0], *start, np.zeros_like(start[0])))
 

@@ -34,6 +34,7 @@ from erls.maths.so3 import Array
 from erls.mechanism.effects import in_order
 from erls.run.chain.run import ChainRun
 from erls.run.watches.base import NOTHING, Finding, Knots, Watch
+from erls.run.watches.checkpoint import Checkpoint
 from erls.scene.chain import Scene, Simulation
 from erls.scene.read import load_chain
 from erls.simulation.asked import Asked
@@ -71,9 +72,9 @@ class Limited(Asked):
     calls: int = MOST_CALLS
     steps: int = MOST_STEPS
 
-    def watches(self) -> list[Any]:
+    def watches(self, checkpoint: Checkpoint | None) -> list[Any]:
         """Those asked for and the limit."""
-        return [*super().watches(), WorkLimit(self.calls, self.steps)]
+        return [*super().watches(checkpoint), WorkLimit(self.calls, self.steps)]
 
 
 def limited_run(scene: Scene, more: float = 1.0, verdict: bool = False) -> ChainRun:
@@ -88,7 +89,8 @@ def limited_run(scene: Scene, more: float = 1.0, verdict: bool = False) -> Chain
         Whether it states its accuracy.
     """
     calls = MOST_NODAL_CALLS if scene.record.simulation.formulation == "nodal" else MOST_CALLS
-    asked = Limited(None, lambda text: None, None, False, None, verdict, round(more * calls), round(more * MOST_STEPS))
+    limits = {"calls": round(more * calls), "steps": round(more * MOST_STEPS)}
+    asked = Limited(None, lambda text: None, None, False, None, verdict, **limits)
     return run_chain(scene, asked)
 
 

@@ -194,7 +194,7 @@ def test_a_parallelogram_at_its_change_point(tmp_path: Path) -> None:
     """
     run = _ended(scenes.write_toml(tmp_path / "scene.toml", PARALLELOGRAM))
     energy = run.energy(run.times)
-    wrong = np.ptp(np.asarray(energy.total)) > 0.01 * np.ptp(np.asarray(energy.gravity))
+    wrong = np.ptp(np.asarray(energy.total)) > 1e-3 * np.ptp(np.asarray(energy.gravity))
     assert ("energy" in breaches(run)) == wrong
     s = run.solution
     share = np.where(np.arange(len(s.t)) < len(s.t) // 2, 1.0, np.sqrt(0.5))[:, None]

@@ -18,6 +18,7 @@ from erls.run.watches.base import NOTHING, Ended, Finding, Plan, Watch
 IntArray = NDArray[np.int64]
 
 _PLACES = 40
+_MARGIN = 2.0  # times what is found at some places: the largest over all times lies above
 _ORDER = 64  # halving the distance of knots divides the error of quintic interpolation by as much, once it resolves
 
 
@@ -57,7 +58,8 @@ def output_error(run: ChainRun) -> float:
     twice, fourfold = (float(np.linalg.norm(x - stored, axis=-1).max(initial=0.0)) for x in (near, far))
     if not 0 < twice < np.inf:
         return 0.0
-    return twice * float(np.clip(twice / fourfold, 1 / _ORDER, 1.0)) if 0 < fourfold < np.inf else twice
+    shrinks = float(np.clip(twice / fourfold, 1 / _ORDER, 1.0)) if 0 < fourfold < np.inf else 1.0
+    return _MARGIN * twice * shrinks
 
 
 def output_warnings(run: ChainRun) -> list[str]:
