@@ -45,6 +45,7 @@ MOST_STEPS, MOST_CALLS, MOST_NODAL_CALLS = 25_000, 150_000, 40_000
 MORE = 3  # times as much may references take
 TIGHTER, TIGHT = 100.0, 30.0
 _TIMES, _EVERY = 201, 20
+_UNTIL = 0.9  # of runs that an event ends, at the end of the step in which it happens: better runs take other steps
 
 
 class WorkLimit(Watch):
@@ -124,8 +125,8 @@ class Judge:
         self.problems: dict[str, str] = {}
 
     def places(self, run: ChainRun, end: float) -> Array:
-        """(times, points, 3) up to a time that the run covers or almost does [m]."""
-        times = np.linspace(0.0, min(end, run.end), _TIMES)
+        """(times, points, 3) up to a time that the run covers [m]."""
+        times = np.linspace(0.0, end, _TIMES)
         return np.stack([run.position(name, times) for name in self.names], axis=1)
 
     def reference(self, name: str, scene: RandomScene, end: float) -> Array | None:
@@ -134,6 +135,9 @@ class Judge:
             run = limited_run(load_chain(scene.write(self.folder / name)), MORE)
         except ReportedError as problem:
             self.problems[name] = f"{type(problem).__name__}: {problem.cause}"
+            return None
+        if run.end < end:
+            self.problems[name] = f"an event ends it at {run.end:.6g} s"
             return None
         return self.places(run, end)
 
@@ -172,9 +176,10 @@ def judge(seed: int, parts: str = "all", nodal_s: float = 0.0, work: float = 1.0
 def _judged(judge: Judge, row: dict[str, Any], parts: str, nodal_s: float, work: float) -> None:
     scene, loaded = judge.scene, load_chain(judge.path)
     run = limited_run(loaded, work, verdict=True)
-    own = judge.places(run, run.end)
+    end = run.end if run.end >= loaded.record.simulation.duration else _UNTIL * run.end
+    own = judge.places(run, end)
     row |= {"steps": run.solution.work.steps, "evaluations": run.solution.work.rhs_calls, "wall_s": run.wall_s}
-    row |= {"tolerance": loaded.record.simulation.tolerance, "end": run.end, "warnings": len(run.warnings)}
+    row |= {"tolerance": loaded.record.simulation.tolerance, "end": end, "warnings": len(run.warnings)}
     if not np.isfinite(own).all():
         row |= {"outcome": "BUG: not finite"}
         return
@@ -188,18 +193,18 @@ def _judged(judge: Judge, row: dict[str, Any], parts: str, nodal_s: float, work:
     formulation = scene.tables["simulation"]["formulation"]
     if scene.tables["simulation"]["effects"] == "auto":  # those that it chose
         scene = judge.scene = scene.changed({"effects": in_order(run.formulation.mechanism.effects)})
-    tight = judge.reference("tight", tightened(scene, formulation, TIGHT), run.end)
-    best = judge.reference("tighter", tightened(scene, formulation, TIGHTER), run.end)
+    tight = judge.reference("tight", tightened(scene, formulation, TIGHT), end)
+    best = judge.reference("tighter", tightened(scene, formulation, TIGHTER), end)
     row["actual"] = {"integration": _growing(own, best)}
     row["doubt"] = {"integration": _growing(tight, best)}
     row["problems"] = judge.problems
     if parts == "integration":
         return
-    modes, every, other = _of_model(judge, run.end, best)
+    modes, every, other = _of_model(judge, end, best)
     row["actual"] |= {"modes": _growing(best, modes), "effects": _growing(modes, every), "total": _growing(own, every)}
     row["doubt"] |= {"total": _growing(every, other)}
     if nodal_s and every is not None and formulation != "nodal" and scene.links:
-        row["links"] = _from_beams(judge, every, run.end, row["actual"]["total"][-1], nodal_s)
+        row["links"] = _from_beams(judge, every, end, row["actual"]["total"][-1], nodal_s)
 
 
 def _of_model(judge: Judge, end: float, best: Array | None) -> tuple[Array | None, Array | None, Array | None]:
