@@ -71,9 +71,9 @@ class Limited(Asked):
     calls: int = MOST_CALLS
     steps: int = MOST_STEPS
 
-    def watches(self) -> list[Any]:
+    def watches(self, checkpoint: Any) -> list[Any]:
         """Those asked for and the limit."""
-        return [*super().watches(), WorkLimit(self.calls, self.steps)]
+        return [*super().watches(checkpoint), WorkLimit(self.calls, self.steps)]
 
 
 def limited_run(scene: Scene, more: float = 1.0, verdict: bool = False) -> ChainRun:
