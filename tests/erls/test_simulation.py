@@ -322,3 +322,13 @@ def test_halved_steps_are_told_once(name: str, tmp_path: Path) -> None:
 def test_halved_steps_of_bodies_are_told(tmp_path: Path) -> None:
     """A pendulum of 2 s with steps of a quarter of that."""
     told_of_halved(erls.simulate(body_scene(tmp_path, PENDULUM, simulation={"step": 0.5, "duration": 2.0})), 2.0, 0.5)
+
+
+@pytest.mark.parametrize("name", ["erls", "nodal"])
+def test_friction_that_turns_over_within_a_step_is_named(name: str, tmp_path: Path) -> None:
+    """Newton's method goes to and fro between both signs of 20 N m, at all steps that are tried."""
+    settings = {**HALVED[name], "step": 1e-3, "duration": 0.02}
+    sticks = {"initial": {"rate": 0.5}, "friction": {"force": 20.0, "transition_rate": 1e-3}}
+    with pytest.raises(SimulationError, match="friction has too small a transition_rate") as caught:
+        erls.simulate(scene(tmp_path, sticks, simulation=settings))
+    assert caught.value.cause == Cause.NEWTON_FAILED
