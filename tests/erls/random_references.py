@@ -88,7 +88,8 @@ def limited_run(scene: Scene, more: float = 1.0, verdict: bool = False) -> Chain
         Whether it states its accuracy.
     """
     calls = MOST_NODAL_CALLS if scene.record.simulation.formulation == "nodal" else MOST_CALLS
-    asked = Limited(None, lambda text: None, None, False, None, verdict, round(more * calls), round(more * MOST_STEPS))
+    limits = {"calls": round(more * calls), "steps": round(more * MOST_STEPS)}
+    asked = Limited(None, lambda text: None, None, False, None, verdict, **limits)
     return run_chain(scene, asked)
 
 
