@@ -53,7 +53,8 @@ def absolute_generalized_alpha(
         y, v, a = (np.ascontiguousarray(x[:, kept]) for x in (found.y, found.v, found.a))
         other = found.companion
         companion = other and Companion(other.t, other.y[:, kept], other.v[:, kept], other.a[:, kept])
-        return Solution(found.t, y, v, a, found.work, found.failure, found.warnings, companion=companion)
+        known = found.work, found.failure, found.warnings
+        return Solution(found.t, y, v, a, *known, companion=companion, halved=found.halved)
 
     def watch(t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:
         return None if observer is None else observer(t, lambda: independent(knots()))

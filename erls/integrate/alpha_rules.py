@@ -19,6 +19,8 @@ ROUNDING = 16 * np.finfo(float).eps
 SLOWEST_KNOWN, FASTEST_TRUSTED = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
 GROWTH = 1.7  # ratio of steps that is worth new factors
 SINGULAR = "the iteration matrix is singular"
+_ALIKE = 0.01  # corrections that go to and fro between two states, and do not converge slowly
+_TURNING = ", as where a force turns over within one step: friction has too small a transition_rate, say"
 GUESSES = (*STARTS, "extrapolated")
 
 
@@ -155,4 +157,5 @@ def newton_failure(
 
 def too_slow(before: float, size: float, goal: float) -> str:
     """Reason of a failure: corrections [m]."""
-    return f"corrections of {before:.3g} m and {size:.3g} m do not shrink to {goal:.3g} m"
+    told = f"corrections of {before:.3g} m and {size:.3g} m do not shrink to {goal:.3g} m"
+    return told + (_TURNING if abs(size - before) < _ALIKE * before else "")

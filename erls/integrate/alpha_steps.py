@@ -28,7 +28,7 @@ from erls.integrate.alpha_rules import (
     newton_failure,
     too_slow,
 )
-from erls.integrate.base import Leg
+from erls.integrate.base import Halved, Leg
 from erls.integrate.driver import Pace, Recorder
 from erls.integrate.memory import Memory, recall, taken
 from erls.integrate.stepping import alpha_memory as alpha
@@ -237,10 +237,13 @@ class Steps:
         return int(counts[alpha.STEPS])
 
 
-def equal_steps(steps: Steps, leg: Leg, step: float, halve: bool, recorder: Recorder) -> None:
+def equal_steps(
+    steps: Steps, leg: Leg, step: float, halve: bool, recorder: Recorder, given: bool = True
+) -> None:
     """Equal steps over a leg, each of 2^MAX_HALVINGS units of time, so that halved steps meet its end.
 
-    Where Newton's method fails they are halved for a while, or the run fails unless ``halve``.
+    Where Newton's method fails they are halved for a while, which is told of ``given`` ones, or the run fails unless
+    ``halve``.
     """
     unit = 1 << MAX_HALVINGS
     count = max(1, math.ceil((leg.end - leg.start) / step * (1 - 1e-9)))
@@ -259,8 +262,14 @@ def equal_steps(steps: Steps, leg: Leg, step: float, halve: bool, recorder: Reco
         times = np.where(ends == total, leg.end, leg.start + span * (ends / total))
         made, status = steps.stretch(times, leg.last, Limit())
         at, served = at + made * width, served + made
+        whole = made if not halvings else int(made and at % unit == 0)
+        if given and whole:
+            recorder.halved = recorder.halved.and_then(Halved(whole if halvings else 0, whole))
         if status == alpha.FAILED:
             recorder.work.rejected_steps += 1
+            if given:
+                began = leg.start + span * (at // unit * unit / total)
+                recorder.halved = recorder.halved.and_then(Halved(first=began))
             halvings, served = halvings + 1, 0
             if halvings > MAX_HALVINGS or not halve:
                 raise steps.failure(float(times[made]))

@@ -29,6 +29,7 @@ Rules for adding an integrator:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -133,12 +134,42 @@ class Companion(NamedTuple):
     a: Array
 
 
+class Halved(NamedTuple):
+    """Steps of a given size that were made in parts, since Newton's method did not converge.
+
+    Attributes
+    ----------
+    steps, given : int
+        How many, and of how many.
+    first : float
+        Time of the first one [s]; infinite where there is none.
+    """
+
+    steps: int = 0
+    given: int = 0
+    first: float = math.inf
+
+    def and_then(self, more: Halved) -> Halved:
+        """Those of two stretches."""
+        return Halved(self.steps + more.steps, self.given + more.given, min(self.first, more.first))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to tell; nothing where none was halved."""
+        if not self.steps:
+            return ()
+        were = "step was" if self.given == 1 else "steps were"
+        why = "since Newton's method did not converge: use a smaller simulation.step"
+        return (f"{self.steps} of {self.given} {were} halved, first at t = {self.first:.6g} s, {why}",)
+
+
 @dataclass(frozen=True)
 class Solution:
     """Knots of the motion: times (k,) in rising order (twice at a jump), y, v, a (k, n).
 
     ``choice`` names the method that ``auto`` chose, and why; ``nodes_per_step``: how many knots a step adds, the last
-    of them its end; ``companion`` is known where steps were chosen by it.
+    of them its end; ``companion`` is known where steps were chosen by it. ``halved`` stands apart from
+    ``warnings``: what it says is known at the end, of all stretches of a run together.
     """
 
     t: Array
@@ -151,6 +182,7 @@ class Solution:
     choice: str = ""
     nodes_per_step: int = 1
     companion: Companion | None = None
+    halved: Halved = field(default_factory=Halved)
 
 
 Observer = Callable[[float, Callable[[], Solution]], Sequence[float] | None]

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from erls.integrate.base import Observer, Options, Solution, StopRun, Work
+from erls.integrate.base import Halved, Observer, Options, Solution, StopRun, Work
 from erls.integrate.memory import Memory, Within, taken
 from erls.maths.full_turns import turned_on
 from erls.maths.so3 import Array
@@ -80,6 +80,7 @@ def _memory(start: float, state: tuple[Array, Array], before: Solution) -> Memor
     """Of a stretch: how it began, and what was before."""
     work = [getattr(before.work, f.name) for f in fields(Work)]
     known = {_CHART: np.array([start]), "chart.work": np.array(work), "chart.start": np.array(state)}
+    known["chart.halved"] = np.array(before.halved, dtype=float)
     return {**known, **{f"chart.{name}": getattr(before, name) for name in ("t", "y", "v", "a")}}
 
 
@@ -89,7 +90,9 @@ def _restored(memory: Memory, size: int) -> tuple[float, tuple[Array, Array], So
     work = Work(*taken(memory, "chart.work", np.zeros(len(fields(Work)), dtype=np.int64)).tolist())
     state, t = taken(memory, "chart.start", np.zeros((2, size))), taken(memory, "chart.t", np.zeros(1), axis=0)
     y, v, a = (taken(memory, f"chart.{name}", np.zeros((len(t), size))) for name in ("y", "v", "a"))
-    return start, (state[0], state[1]), Solution(t, y, v, a, work)
+    halved, given, first = taken(memory, "chart.halved", np.zeros(3)).tolist()
+    whole = Solution(t, y, v, a, work, halved=Halved(int(halved), int(given), first))
+    return start, (state[0], state[1]), whole
 
 
 class _Watch:
@@ -142,4 +145,5 @@ def joined(before: Solution | None, after: Solution) -> Solution:
     work = Work(**{f.name: getattr(before.work, f.name) + getattr(after.work, f.name) for f in fields(Work)})
     warnings = tuple(dict.fromkeys((*before.warnings, *after.warnings)))
     choice = before.choice or after.choice
-    return replace(after, **parts, work=work, warnings=warnings, choice=choice, companion=None)
+    halved = before.halved.and_then(after.halved)
+    return replace(after, **parts, work=work, warnings=warnings, choice=choice, companion=None, halved=halved)

@@ -12,7 +12,7 @@ import numpy as np
 
 from erls.equations.system import MovingSystem, SecondOrderSystem
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Leg, Observer, Solution, StopRun, Work, legs
+from erls.integrate.base import Halved, Leg, Observer, Solution, StopRun, Work, legs
 from erls.integrate.memory import Keeper, Keeping, Memory, Method, taken, unfit
 from erls.integrate.thinning import thinned
 from erls.maths.so3 import Array
@@ -46,6 +46,7 @@ class Recorder:
     ) -> None:
         self.work = Work()
         self.warnings: list[str] = []
+        self.halved = Halved()
         self._size, self._observer, self._apart, self.beside = size, observer, apart, beside
         self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
         self._begun = 0.0
@@ -151,6 +152,7 @@ class Recorder:
             "time": np.array([self.time]),
             "recorder.begun": np.array([self._begun]),
             "recorder.work": np.array([getattr(self.work, f.name) for f in fields(Work)] + [steps]),
+            "recorder.halved": np.array(self.halved, dtype=float),
             "recorder.t": self._t[:knots],
             "recorder.rows": self._rows[:knots],
             "recorder.waiting.t": times,
@@ -162,6 +164,8 @@ class Recorder:
         *work, steps = taken(memory, "recorder.work", np.zeros(len(fields(Work)) + 1, dtype=np.int64)).tolist()
         for field, number in zip(fields(Work), work, strict=True):
             setattr(self.work, field.name, number)
+        halved, given, first = taken(memory, "recorder.halved", np.zeros(3)).tolist()
+        self.halved = Halved(int(halved), int(given), first)
         self._begun = float(taken(memory, "recorder.begun", np.zeros(1))[0])
         t, waiting = (taken(memory, f"recorder.{name}", self._t, axis=0) for name in ("t", "waiting.t"))
         rows, more = (taken(memory, f"recorder.{name}", self._rows, axis=0) for name in ("rows", "waiting.rows"))
@@ -192,7 +196,8 @@ class Recorder:
         """The run so far; later knots leave its arrays unchanged."""
         t, rows = self._so_far()
         y, v, a = (rows[:, i * self._size : (i + 1) * self._size] for i in range(3))
-        return Solution(t, y, v, a, replace(self.work, steps=self.steps), failure, tuple(self.warnings))
+        work = replace(self.work, steps=self.steps)
+        return Solution(t, y, v, a, work, failure, tuple(self.warnings), halved=self.halved)
 
     def _so_far(self) -> tuple[Array, Array]:
         """Times and rows."""

@@ -83,7 +83,7 @@ def _run(
             return
         parts = [(leg, step)] if plan is None else planned(plan, leg)
         for part, width in parts[steps.part :]:
-            equal_steps(steps, part, width, options.iteration_matrix != "frozen", recorder)
+            equal_steps(steps, part, width, options.iteration_matrix != "frozen", recorder, given=plan is None)
             steps.part += 1
 
     def go(walk: list[Leg]) -> None:

@@ -55,9 +55,8 @@ def nodal_generalized_alpha(
         for _ in range(2):
             more.append(_slopes(found.t, more[-1]))
         full = [np.concatenate(pair, axis=1) for pair in zip((found.y, found.v, found.a), more, strict=True)]
-        return Solution(
-            found.t, full[0], full[1], full[2], found.work, found.failure, found.warnings, companion=found.companion
-        )
+        known = found.work, found.failure, found.warnings
+        return Solution(found.t, full[0], full[1], full[2], *known, companion=found.companion, halved=found.halved)
 
     def watch(t: float, knots: Callable[[], ConstrainedSolution]) -> Sequence[float] | None:
         return None if observer is None else observer(t, lambda: complete(knots()))

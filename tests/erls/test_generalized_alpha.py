@@ -141,6 +141,18 @@ def test_halved_steps_recover() -> None:
     np.testing.assert_allclose(
         np.min(np.abs(found.t[:, None] - np.linspace(0, 4, 81)), axis=0), 0, atol=1e-12
     )
+    # and it is told which of them were made in parts: those with knots inside
+    inside = np.histogram(found.t, np.linspace(0, 4, 81) + 1e-9)[0] - 1
+    parts = np.flatnonzero(inside > 0)
+    assert found.halved == (len(parts), 80, pytest.approx(0.05 * parts[0], abs=1e-12))
+    (text,) = found.halved.warnings
+    assert text.startswith(f"{len(parts)} of 80 steps were halved, first at t = {0.05 * parts[0]:.6g} s, since")
+    assert "use a smaller simulation.step" in text
+
+
+def test_nothing_is_told_where_no_step_was_halved() -> None:
+    found = generalized_alpha(Modes([1.0]), (0, 0.5), ONE, ZERO, Options(step=0.01))
+    assert (found.halved.steps, found.halved.given, found.halved.warnings) == (0, 50, ())
 
 
 def test_a_system_without_solution_is_reported() -> None:

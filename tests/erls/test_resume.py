@@ -46,11 +46,18 @@ TOP: dict[str, Any] = {
     ],
     "links": [{"name": "top", "rigid": {"mass": 2.0, "inertia": [0.03, 0.03, 0.05], "points": {"centre": [0, 0, 0]}}}],
 }
+PIN = {"name": "pin", "dh": {"convention": "modified"}, "initial": {"rate": 3.0}}
+HALVED: dict[str, Any] = {
+    "simulation": {"duration": 0.5, "step": 0.01, "integrator": "generalized_alpha"},
+    "joints": [{**PIN, "friction": {"force": 0.5, "transition_rate": 0.01}}],
+    "links": TOP["links"],
+}
 CASES: dict[str, tuple[Path | dict[str, Any], list[str]]] = {
     "lobatto": (L, ["duration=0.3"]),
     "stored output": (L, ["duration=0.3", "output_step=0.004"]),
     "static modes": (L, ["duration=0.3", "bandwidth=200.0"]),
     "equal steps": (L, ["duration=0.05", "step=1e-3"]),
+    "halved steps": (HALVED, []),
     "loop": (CRANK, ["duration=0.05"]),
     "loop, equal steps": (CRANK, ["duration=0.02", "step=2e-4"]),
     "rotation vectors": (TOP, []),
@@ -108,12 +115,15 @@ def test_integrators_go_on(name: str, tmp_path: Path, monkeypatch: pytest.Monkey
     kept = Kept()
     whole = run(kept)
     assert whole.failure is None
+    assert bool(whole.halved.steps) == (name == "halved steps")
     counted = name != "rotation vectors"  # steps beyond an exchange are made again, as many as were made at once
     assert equal(run(None), whole, counted)
     assert len(kept.all) > 5
     for k in sorted({*np.linspace(0, len(kept.all) - 1, 5).astype(int).tolist()}):
         resumed = Kept(kept.all[k])
-        assert equal(run(resumed), whole, counted), f"from {kept.all[k]['time']}"
+        found = run(resumed)
+        assert equal(found, whole, counted), f"from {kept.all[k]['time']}"
+        assert found.halved == whole.halved
         assert all(offered["time"] > kept.all[k]["time"] for offered in resumed.all)
 
 

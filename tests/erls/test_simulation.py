@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from body_scenes_data import PENDULUM, body_scene
 from checkpoint_times import at_every_look
 
 import erls
@@ -288,3 +289,46 @@ def test_formulation_is_checked_before_work(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="known: erls") as caught:
         erls.simulate(scene(tmp_path, simulation={"formulation": "x"}), tell=tell)
     assert caught.value.cause == Cause.BAD_REFERENCE
+
+
+HALVED: dict[str, dict[str, Any]] = {
+    "erls": {"integrator": "generalized_alpha"},
+    "ffr": {"integrator": "generalized_alpha", "formulation": "ffr"},
+    "nodal": {"formulation": "nodal"},
+    "absolute": {"integrator": "generalized_alpha", "formulation": "ffr", "coordinates": "absolute"},
+}
+
+
+def told_of_halved(run: Any, end: float, step: float) -> None:
+    """One warning, that says which of the given steps have knots inside."""
+    grid = np.linspace(0.0, end, round(end / step) + 1)
+    parts = np.flatnonzero(np.histogram(run.solution.t, grid + 1e-9)[0] > 1)
+    told = [text for text in run.warnings if "halved" in text]
+    assert len(told) == 1
+    count, first = f"{len(parts)} of {len(grid) - 1} steps were halved", f"first at t = {grid[parts[0]]:.6g} s"
+    assert told[0].startswith(f"{count}, {first}, since Newton's method did not converge: use a smaller")
+
+
+@pytest.mark.parametrize("name", HALVED)
+def test_halved_steps_are_told_once(name: str, tmp_path: Path) -> None:
+    """Of a joint whose friction turns over within a step; nothing without friction."""
+    settings = {**HALVED[name], "step": 1e-3, "duration": 0.02}
+    sticks = {"initial": {"rate": 0.5}, "friction": {"force": 20.0, "transition_rate": 0.05}}
+    told_of_halved(erls.simulate(scene(tmp_path, sticks, simulation=settings)), 0.02, 1e-3)
+    free = erls.simulate(scene(tmp_path, {"initial": {"rate": 0.5}}, simulation=settings))
+    assert not any("halved" in text for text in free.warnings)
+
+
+def test_halved_steps_of_bodies_are_told(tmp_path: Path) -> None:
+    """A pendulum of 2 s with steps of a quarter of that."""
+    told_of_halved(erls.simulate(body_scene(tmp_path, PENDULUM, simulation={"step": 0.5, "duration": 2.0})), 2.0, 0.5)
+
+
+@pytest.mark.parametrize("name", ["erls", "nodal"])
+def test_friction_that_turns_over_within_a_step_is_named(name: str, tmp_path: Path) -> None:
+    """Newton's method goes to and fro between both signs of 20 N m, at all steps that are tried."""
+    settings = {**HALVED[name], "step": 1e-3, "duration": 0.02}
+    sticks = {"initial": {"rate": 0.5}, "friction": {"force": 20.0, "transition_rate": 1e-3}}
+    with pytest.raises(SimulationError, match="friction has too small a transition_rate") as caught:
+        erls.simulate(scene(tmp_path, sticks, simulation=settings))
+    assert caught.value.cause == Cause.NEWTON_FAILED

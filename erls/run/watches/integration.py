@@ -27,4 +27,5 @@ class Integration(Watch):
 
     def after(self, ended: Ended) -> Finding:
         """All warnings."""
-        return Finding(ended.run.solution.warnings)
+        solution = ended.run.solution
+        return Finding((*solution.warnings, *solution.halved.warnings))

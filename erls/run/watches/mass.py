@@ -64,14 +64,16 @@ def indefinite_mass(formulation: Formulation, solution: Solution) -> SimulationE
         scale = 1 / np.sqrt(np.abs(np.diag(mass)))
         lowest = float(np.linalg.eigvalsh(scale[:, None] * mass * scale)[0])
         first = first or lowest
-        if lowest < (share * first if share and k == len(solution.t) - 1 else -_ROUNDING):
+        ends = bool(share) and k == len(solution.t) - 1
+        if lowest < (share * first if ends else -_ROUNDING):
+            is_now = "is indefinite" if lowest <= 0 else "is about to turn indefinite"
             return SimulationError(
                 Cause.SINGULAR_MASS,
-                "the mass matrix is indefinite: with 'inertia_first_order' but not 'inertia_second_order' the kinetic "
+                f"the mass matrix {is_now}: with 'inertia_first_order' but not 'inertia_second_order' the kinetic "
                 "energy lacks the square of the deformation",
                 where=f"t = {solution.t[k]:.6g} s",
-                value=lowest,
-                limit="above 0",
+                value=f"least eigenvalue {lowest:.3g}, scaled to a unit diagonal",
+                limit="above 0" if lowest <= 0 else f"above {share * first:.3g}, as it was {first:.3g} at the start",
                 remedy="keep 'inertia_second_order', or leave out both",
             )
     return None
