@@ -113,6 +113,7 @@ def build_mechanism(
         points=tuple(replace(point, link=int(whole.numbers[point.link])) for point in points),
         gravity=np.array(record.gravity),
         static_start=record.initial.deformation == "static",
+        allow_unstable=record.initial.allow_unstable,
         bandwidth=record.simulation.bandwidth,
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
