@@ -121,7 +121,8 @@ def against_beams(quick: bool) -> None:
     cases += [("robot/two_link", "two_link", "end2", "end2")]
     for scene, table, point, prefix in cases:
         path = ROOT / "tests" / "data" / f"{table}_nonlinear_beam.csv"
-        columns = [line for line in path.read_text().splitlines() if line.startswith("#")][-1].lstrip("# ").split(",")
+        text = path.read_text(encoding="utf-8")
+        columns = [line for line in text.splitlines() if line.startswith("#")][-1].lstrip("# ").split(",")
         values = np.loadtxt(path, delimiter=",")
         distances = []
         for changes in VARIANTS.values():

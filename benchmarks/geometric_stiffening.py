@@ -38,7 +38,8 @@ LARGEST_LAG, STRETCH = -0.57384, 5.145e-4  # of the exact spin-up beam [m]
 def table(name: str) -> dict[str, np.ndarray]:
     """Columns of a reference trajectory by name."""
     path = ROOT / f"tests/data/{name}.csv"
-    columns = [line for line in path.read_text().splitlines() if line.startswith("#")][-1].lstrip("# ").split(",")
+    text = path.read_text(encoding="utf-8")
+    columns = [line for line in text.splitlines() if line.startswith("#")][-1].lstrip("# ").split(",")
     return dict(zip(columns, np.loadtxt(path, delimiter=",").T, strict=True))
 
 

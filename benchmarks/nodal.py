@@ -111,7 +111,8 @@ def pendulums(elements: list[int], repeat: int, exudyn: Any) -> None:
 
 
 def _tip_distance(rows: np.ndarray) -> float:
-    names = [x for x in l_shape.DATA.read_text().splitlines() if x.startswith("#")][-1].lstrip("# ").split(",")
+    text = l_shape.DATA.read_text(encoding="utf-8")
+    names = [x for x in text.splitlines() if x.startswith("#")][-1].lstrip("# ").split(",")
     table = dict(zip(names, np.loadtxt(l_shape.DATA, delimiter=",").T, strict=True))
     exact = np.stack([table[f"steel_tall_{axis}"] for axis in "xyz"], axis=1)
     v = np.gradient(rows[:, 1:4], rows[:, 0], axis=0)

@@ -1,7 +1,7 @@
 """Random scenes: what their runs state of their accuracy against what they are off.
 
     python benchmarks/random_scenes.py [--seeds 0:2000] [--json rows.jsonl] [--workers 2] [--again]
-        [--parts all|integration|statement] [--nodal-every 0] [--write-references] [--only-table]
+        [--parts all|integration|statement] [--nodal-every 0] [--write-references] [--only-table] [--commands]
 
 Scenes, references and what parts of an error are: tests/erls/random_scenes.py and random_references.py. Rows go to the
 file as they come, one JSON object a line; seeds that stand there are not run again, so that Ctrl-C loses nothing. A
@@ -14,6 +14,10 @@ class of scene; of each integrator the actual error of integration over the tole
 the actual errors to tests/data/random_scenes.csv, by which tests judge the first seeds; ``--nodal-every 10`` judges
 each tenth scene by beam elements too, in up to ``--nodal-budget`` seconds. References take nearly all of the time:
 ``--again --parts statement`` runs the scenes again, and holds what is stated now against those that stand in the file.
+
+What the statement costs is printed against the run within one process, which knows its links and has its kernels; with
+``--commands``, which does nothing else, against what a user waits for: `erls simulate SCENE` as a process of its own,
+with and without ``--no-verdict`` in turns, the least of three each.
 """
 
 from __future__ import annotations
@@ -23,6 +27,7 @@ import csv
 import json
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections import Counter
@@ -36,6 +41,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), *(str(ROOT / "tests" / part) for part in ("", "erls"))]  # before this file's own folder
 
 STORED = ROOT / "tests/data/random_scenes.csv"
+_ERLS = "import sys; from erls.cli.main import main; sys.exit(main())"
+_LONGEST = 30.0  # s: longer commands tell nothing of most
 SUBJECTS = ("kind", "mechanism", "links", "formulation", "integrator", "effects", "sag", "size", "friction", "limit")
 
 
@@ -59,7 +66,7 @@ class Worker:
         if self._process is None:
             command = [sys.executable, __file__, "--serve"]
             pipe = subprocess.PIPE
-            new = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, start_new_session=True)
+            new = subprocess.Popen(command, stdin=pipe, stdout=pipe, encoding="utf-8", start_new_session=True)
             self._process, self._lines = new, SimpleQueue()  # type: ignore[assignment]
             threading.Thread(target=self._read, args=(new, self._lines), daemon=True).start()
         return self._process  # type: ignore[return-value]
@@ -162,6 +169,39 @@ def write_references(rows: dict[int, dict[str, Any]]) -> None:
         table.writerows(reference_row(rows[seed]) for seed in sorted(rows))
 
 
+def command_cost(seed: int) -> float | None:
+    """Time of `erls simulate` over that of `erls simulate --no-verdict`, less one; None of scenes that do not run."""
+    from random_scenes import random_scene
+
+    spent: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        scene = str(random_scene(seed).write(Path(folder)))
+        for turn in range(4):  # the first one makes modal files and kernels
+            for option in ("--verdict", "--no-verdict"):
+                command = [sys.executable, "-c", _ERLS, "simulate", scene, option, "--json"]
+                begun = time.perf_counter()
+                try:
+                    made = subprocess.run(command, capture_output=True, timeout=_LONGEST, check=False)
+                except subprocess.TimeoutExpired:
+                    return None
+                if made.returncode:
+                    return None
+                if turn:
+                    spent[option] = min(spent.get(option, np.inf), time.perf_counter() - begun)
+    return spent["--verdict"] / spent["--no-verdict"] - 1
+
+
+def print_command_costs(seeds: range) -> None:
+    """One line a scene, and their percentiles."""
+    found = []
+    for seed in seeds:
+        cost = command_cost(seed)
+        print(f"  seed {seed}: " + ("does not run to its end" if cost is None else f"{cost:.0%}"), flush=True)
+        found += [] if cost is None else [cost]
+    middle, high = np.percentile(found, (50, 90))
+    print(f"cost over the command of {len(found)} scenes: median {middle:.0%}, 90th percentile {high:.0%}")
+
+
 def main() -> int:
     """Judge what is not judged yet, print the table; 1 where a run ended as none may."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -175,6 +215,7 @@ def main() -> int:
     parser.add_argument("--hang", type=float, default=900.0, help="seconds without an answer")
     parser.add_argument("--write-references", action="store_true", help="write tests/data/random_scenes.csv")
     parser.add_argument("--only-table", action="store_true", help="of the rows that there are")
+    parser.add_argument("--commands", action="store_true", help="what the statement costs of erls simulate")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.serve:
@@ -182,6 +223,9 @@ def main() -> int:
         return 0
     first, _, last = given.seeds.partition(":")
     seeds = range(int(first), int(last))
+    if given.commands:
+        print_command_costs(seeds)
+        return 0
     known = rows_of(given.json)
     by_beams = set(seeds[:: given.nodal_every]) if given.nodal_every else set()
     tasks = [

@@ -252,7 +252,7 @@ CASES: dict[str, Callable[[int, int], dict[str, Any]]] = {"reduce": reduce_case,
 def in_own_process(case: str, dofs: int, modes: int) -> dict[str, Any]:
     """The result of a case that runs in a process of its own."""
     command = [sys.executable, __file__, "--case", case, "--dofs", str(dofs), "--modes", str(modes)]
-    lines = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
+    lines = subprocess.run(command, stdout=subprocess.PIPE, encoding="utf-8", check=True).stdout.splitlines()
     return dict(json.loads(lines[-1]))
 
 

@@ -20,6 +20,7 @@ class Cause(enum.StrEnum):
     BAD_REFERENCE = "reference to something that does not exist"
     TABLE = "faulty table"
     RUN_FILE = "faulty run file"
+    CHANGED = "changed since the run began"
     TIME_OUT_OF_RANGE = "time outside the run"
     SINGULAR_MASS = "mass matrix not positive definite"
     REDUNDANT_CONSTRAINTS = "redundant constraints"

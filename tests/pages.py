@@ -40,7 +40,7 @@ def run(command: str, folder: Path) -> None:
             code = main(words)
     else:
         settings = {**os.environ, "PYTHONPATH": str(ROOT)}
-        done = subprocess.run([sys.executable, *words], cwd=folder, env=settings, capture_output=True, text=True)
+        done = subprocess.run([sys.executable, *words], cwd=folder, env=settings, capture_output=True, encoding="utf-8")
         code, told = done.returncode, io.StringIO(done.stderr)
     assert code == 0, told.getvalue()
     assert "error" not in told.getvalue()

@@ -34,5 +34,5 @@ def test_module(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_examples_of_the_api_are_among_them() -> None:
     """The doors of both packages teach by example."""
     doors = ("erls/simulation/simulate.py", "erls/simulation/batch.py", "fe_import/reduce.py")
-    text = "".join((ROOT / p).read_text() for p in doors)
+    text = "".join((ROOT / p).read_text(encoding="utf-8") for p in doors)
     assert text.count(">>> ") > 10

@@ -8,6 +8,7 @@ work; where Newton's method does not bear that, one with half as large ones, at 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import msgspec
@@ -20,7 +21,7 @@ from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.equations import Nodal
 from erls.equations.substructures import solved
 from erls.errors import Cause
-from erls.integrate.base import Companion, Solution, hermite
+from erls.integrate.base import Companion, Solution, StopRun, hermite
 from erls.integrate.choice import body_options, integrator, options_of
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.integrate.step_distance import STATED, Track, distance_bands, errors_over_time, samples, step_ratio
@@ -100,7 +101,7 @@ def constrained_integration_error(run: ChainRun | BodyMotion) -> ConstrainedErro
     if len(s.t) < 2 or not s.work.steps:
         return "the run has no steps"
     companion, evaluations = s.companion, 0
-    if companion is None:
+    if companion is None and s.work.rejected_steps <= _HALVED * s.work.steps:  # else larger ones are refused, too
         companion, evaluations = _companion(run, LARGER)
     ratio = 0.0 if companion is None else _ratio(s, companion)
     if ratio < _TOO_LIKE:
@@ -132,29 +133,33 @@ def _ratio(s: Solution, companion: Companion) -> float:
 
 def _companion(run: ChainRun | BodyMotion, larger: float) -> tuple[Companion | None, int]:
     """The same with steps so many times as large, None where it fails; and its evaluations."""
-    made = _with_steps(run, larger)
-    if made.failure is not None and made.t[-1] < run.solution.t[-1]:
-        if made.failure.cause == Cause.INTERRUPTED:
-            raise made.failure
-        return None, made.work.rhs_calls
-    if larger > 1 and made.work.rejected_steps > _HALVED * made.work.steps:  # no proportion of steps any more
+    most = _HALVED * run.solution.work.steps / larger if larger > 1 else np.inf  # else no proportion of steps any more
+    made = _with_steps(run, larger, most)
+    if made.failure is not None and made.failure.cause == Cause.INTERRUPTED:
+        raise made.failure
+    if made.t[-1] < run.solution.t[-1] or made.work.rejected_steps > most:
         return None, made.work.rhs_calls
     return Companion(made.t, made.y, made.v, made.a), made.work.rhs_calls
 
 
-def _with_steps(run: ChainRun | BodyMotion, larger: float) -> Solution:
-    """The same with steps so many times as large, up to where the run ended."""
+def _with_steps(run: ChainRun | BodyMotion, larger: float, most: float) -> Solution:
+    """The same with steps so many times as large, up to where the run ended, or more than so many are refused."""
     s = run.solution
+
+    def limit(t: float, knots: Callable[[], Solution]) -> None:
+        if knots().work.rejected_steps > most:
+            raise StopRun
+
     times = float(s.t[0]), float(s.t[-1])
     step = larger * (times[1] - times[0]) / s.work.steps
     if isinstance(run, BodyMotion):
         system, analysis = run.assembly.system, run.scene.record.simulation
         assert isinstance(analysis, Dynamics)
         own = body_options(msgspec.structs.replace(analysis, step=step))
-        return lie_generalized_alpha(system, times, system.start, run.assembly.velocity, own)
+        return lie_generalized_alpha(system, times, system.start, run.assembly.velocity, own, limit)
     settings = msgspec.structs.replace(run.scene.record.simulation, integrator=FIXED_STEP, step=step, output_step=None)
     integrate = integrator(run.formulation.mechanism, settings)
-    return integrate(run.formulation, times, *run.formulation.initial_state(), options_of(settings), None)
+    return integrate(run.formulation, times, *run.formulation.initial_state(), options_of(settings), limit)
 
 
 def _of_bodies(run: BodyMotion, looks: IntArray, companion: Companion) -> tuple[tuple[str, ...], Array, Array]:

@@ -1,6 +1,6 @@
-"""The balance of energy: what a run holds against what drives, dampers and friction gave and took.
+"""The balance of energy: what a run holds against what drives, loads, dampers and friction gave and took.
 
-    E(t) - E(0) = ∫ (power of drives - dissipation) dt
+    E(t) - E(0) = ∫ (power of drives and loads - dissipation) dt
 
 Where all powers follow from angles and rates it is looked at over the whole run, at the ends of some panels, with
 powers at every knot. Motors that prescribe motions give what the equations of motion say, which costs as much as a
@@ -151,7 +151,7 @@ def energy_of(formulation: Formulation) -> Formulation:
 
 
 def power_taken(states: States) -> tuple[Array, Array]:
-    """(k,) power of all drives and dissipation at some states [W], and (k,) largest force of a condition [N]."""
+    """(k,) power of all drives, loads and dissipation at some states [W], and (k,) largest force of a condition [N]."""
     formulation, *at = states
     tree = in_angles(formulation)
     if tree is None:

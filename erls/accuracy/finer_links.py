@@ -7,7 +7,7 @@ these are then the coordinates that the lesser model lacks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link, payload_invariants
+from erls.mechanism.loads import CENTRE
 from erls.scene.build import cache_folder, link_description
 from erls.scene.chain import Scene
 from erls.scene.links import Link as LinkRecord
@@ -78,7 +79,12 @@ def finer_links(scene: Scene, whole: Mechanism, solved: Mechanism) -> FinerLinks
     for number, (link, source) in enumerate(zip(solved.links, sources, strict=True)):
         own, lesser, finer = link.elastic_modes, link.elastic_modes, link
         if own and source is not None:
-            finer, left = _finer(link, source, [p.node for p in solved.points if p.link == number])
+            finer, left = _finer(
+                link,
+                source,
+                [p.node for p in solved.points if p.link == number],
+                {load.node for load in solved.loads if load.link == number and load.node != CENTRE},
+            )
             exact &= _same_inertia(link.model.invariants, left.invariants.truncated(np.arange(link.model.modes)))
             if not left.refined:
                 notes[f"the mesh of link {_name(link)!r} is not judged"] = None
@@ -141,10 +147,14 @@ _KEPT = 32
 _lately: dict[tuple[Any, ...], tuple[LeftOut, Link]] = {}
 
 
-def _finer(link: Link, source: Callable[[], LinkFile], points: Sequence[int]) -> tuple[Link, LeftOut]:
-    """A link with what it leaves out as further coordinates; one made lately where nothing tells them apart."""
+def _finer(
+    link: Link, source: Callable[[], LinkFile], points: Sequence[int], loaded: Set[int]
+) -> tuple[Link, LeftOut]:
+    """A link with what it leaves out under forces on its nodes ``loaded`` too as further coordinates; one made lately
+    where nothing tells them apart.
+    """
     interfaces = {i.node for i in link.model.interface_nodes}
-    carrying = sorted({p.node for p in link.payloads} - interfaces)
+    carrying = sorted(({p.node for p in link.payloads} | loaded) - interfaces)
     left = left_out_cached(source, link.model, cache_folder(), carrying)
     thermal = link.model.thermal
     key = (
@@ -153,6 +163,7 @@ def _finer(link: Link, source: Callable[[], LinkFile], points: Sequence[int]) ->
         link.damping.tobytes(),
         None if thermal is None else thermal.change,
         tuple(points),
+        tuple(carrying),
         *((p.node, p.mass, p.motor, p.offset.tobytes(), p.inertia.tobytes()) for p in link.payloads),
     )
     if key not in _lately or _lately[key][0] is not left:

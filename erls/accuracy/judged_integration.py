@@ -29,6 +29,8 @@ CONSTRAINED = ("nodal", "absolute")
 """Kinds of systems whose integration is generalized-α with conditions."""
 
 _CHAOTIC = 3.0  # e-folds of the error over the second half of a run: more than drift makes
+_ADDED_UP = 3.0  # growth over the second half of errors that add up: by 2 what runs out of step, by 4 what drifts
+_EARLY = 2.0  # times the error up to which a horizon is given: when an error passes a bound is less sure than its size
 
 
 class Integrated(NamedTuple):
@@ -52,10 +54,20 @@ class Integrated(NamedTuple):
 
     def horizon(self, tolerance: float, others: float) -> float | None:
         """Last time up to which all parts together stay within the tolerance, where the integration passes it."""
-        beyond = np.flatnonzero(~(self.error + others <= tolerance))
-        if not len(beyond) or others > tolerance:
+        if not len(self.error) or self.error[-1] + others <= tolerance or others > tolerance:
             return None
+        beyond = np.flatnonzero(~(_EARLY * self.error + others <= tolerance))
         return float(self.times[max(int(beyond[0]) - 1, 0)])
+
+    def amplified(self) -> float:
+        """By how much disturbances of the motion grow beyond what errors that add up do: at least 1.
+
+        Errors of other parts are found where they arise; the motion takes them on as it does those of the integration.
+        """
+        if not len(self.error):
+            return 1.0
+        half = float(np.interp((self.times[0] + self.times[-1]) / 2, self.times, self.error))
+        return max(1.0, float(self.error[-1]) / max(_ADDED_UP * half, 1e-300)) if half > 0 else 1.0
 
     def growth(self) -> float:
         """Rate at which errors grow exponentially over the second half of a run [1/s]; 0 where they only add up.

@@ -34,14 +34,14 @@ def in_angles(formulation: Formulation) -> SerialFormulation | None:
 
 
 def known_power(tree: SerialFormulation, t: Array, y: Array, v: Array) -> Array:
-    """(k,) power of drives, dampers and friction in the joints of a tree, and of the damping of its modes [W].
+    """(k,) power of drives, dampers and friction in the joints of a tree, of the damping of its modes and of loads [W].
 
     Motors that prescribe motions are left out.
     """
     system, out = tree.compiled, np.empty((len(t), 2))
     powers = function_in("erls.equations.serial.joint_powers", "joint_powers")()
     powers(system.reals, system.integers, system.scratch, contiguous(t), contiguous(y), contiguous(v), out)
-    return np.asarray(out.sum(axis=1))
+    return np.asarray(out.sum(axis=1)) + tree.load_power(t, y, v)
 
 
 def motor_power(tree: SerialFormulation, t: Array, y: Array, v: Array, a: Array) -> Array:
@@ -85,9 +85,9 @@ def _along(tree: SerialFormulation, t: Array, y: Array, v: Array, a: Array) -> t
 
 
 def reported_power(formulation: Formulation, t: Array, y: Array, v: Array, a: Array) -> Array:
-    """(k,) power of drives, dampers and friction in all joints, from the efforts that a run reports [W]."""
+    """(k,) power of drives, dampers and friction in all joints, from the efforts that a run reports; of loads [W]."""
     mechanism, found = formulation.mechanism, reaction_series(formulation, t, y, v, a)
-    states, result = state_series(formulation, t, y, v), np.zeros(len(t))
+    states, result = state_series(formulation, t, y, v), formulation.load_power(t, y, v)
     for k, joint in enumerate(mechanism.joints):
         if not joint.fixed:
             result += _power(joint, found.effort[:, k], states.angles[:, k], states.rates[:, k])

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from erls.accuracy.audits import audits
-from erls.accuracy.integration import ITERATED
+from erls.accuracy.integration import ITERATED, SUDDEN, sudden
 from erls.accuracy.judged_integration import Integrated, judged_integration
 from erls.accuracy.judged_places import judged_nodes
 from erls.accuracy.left_out_effects import effects_error
@@ -55,10 +55,10 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
         "links": _judged(lambda: links_error(run)),
         "output": _judged(lambda: (output_error(run), "")),
     }
-    for name in ("modes", "links"):
-        found[name] = found[name]._replace(error=_within(found[name].error, reach))
-    others = math.fsum(part.error or 0.0 for part in found.values())
-    integrated = judged_integration(run, judged_nodes(run), others)
+    integrated = judged_integration(run, judged_nodes(run), _sum(found))
+    for name, times in (("modes", integrated.amplified()), ("links", SUDDEN if sudden(run) else 1.0)):
+        found[name] = found[name]._replace(error=_within(found[name].error, times, reach))
+    others = _sum(found)
     found["integration"] = _capped(integrated, reach)
     accuracy = Accuracy(
         **{name: found[name].error for name in PARTS},
@@ -75,9 +75,14 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
     return replace(run, accuracy=accuracy, trust=trust)
 
 
-def _within(error: float | None, reach: float) -> float | None:
-    """No point is farther off than that."""
-    return None if error is None else min(error, reach)
+def _sum(found: Mapping[str, Judged]) -> float:
+    """Of the parts that are known [m]."""
+    return math.fsum(part.error or 0.0 for part in found.values())
+
+
+def _within(error: float | None, times: float, reach: float) -> float | None:
+    """So many times an error, but no point is farther off than the mechanism reaches."""
+    return None if error is None else min(times * error, reach)
 
 
 def _judged(find: Callable[[], tuple[float | None, str]]) -> Judged:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from erls.cli.reports import Set, Workers, check_output, dumped, exit_code, tell_written, write
-from erls.cli.terminal import Json, Output, Progress, print_json
+from erls.cli.terminal import Force, Json, Output, Progress, print_json
 
 
 def compare(
@@ -16,6 +16,7 @@ def compare(
     output: Output = None,
     set_: Set = None,
     workers: Workers = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """Simulate a scene in several formulations and report distances, cost and whether they are as expected.
@@ -39,6 +40,8 @@ def compare(
         Change a field of the scene, KEY=VALUE; may be repeated.
     workers
         Runs at a time; as many as cores unless given.
+    force
+        Replace an existing file that is no such report.
     json
         Print one JSON object.
     """
@@ -46,8 +49,7 @@ def compare(
     from erls.studies.compare import compare as run_comparison
     from erls.studies.compare_result import comparison_summary
 
-    for path in (scene, *more):
-        check_output(output, path, (".html", ".csv", ".json"))
+    check_output(output, [scene, *more], set_ or [], (".html", ".csv", ".json"), force)
     names = [name.strip() for name in formulations.split(",") if name.strip()]
     if more:
         return _compare_scenes([scene, *more], names or ["erls", "ffr"], output, set_ or [], workers, json)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from erls.cli.terminal import Json, Output, Progress, print_json, refuse_unwritable, report_times
+from erls.cli.terminal import Force, Json, Output, Progress, print_json, report_times
 
 
 def info(file: Path, /, *, json: Json = False) -> None:
@@ -39,6 +39,7 @@ def view(
     magnify: float = 1.0,
     fps: int = 30,
     speed: float = 1.0,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Make a picture, film or export of a run; without -o, open a window.
@@ -62,12 +63,15 @@ def view(
         Frames per second of a film.
     speed
         Film time over real time; 0.5 is slow motion.
+    force
+        Replace an existing file that is no such picture, film, export or table of this program.
     json
         Print one JSON object.
     """
+    from erls.files.results import claim
     from erls.run.bodies.mode import mode_of
     from erls.run.file import load_run
-    from erls.view import show, write_view
+    from erls.view import show, view_kind, write_view
 
     loaded = load_run(run)
     if mode is not None:
@@ -75,7 +79,7 @@ def view(
     if output is None:
         show(loaded)
         return
-    refuse_unwritable(output, run)
+    claim(output, view_kind(output), [run], force)
     begun = time.perf_counter()
     times = report_times(at, loaded.end, loaded.axis.unit) or None
     with Progress("drawing") as advance:

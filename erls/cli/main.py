@@ -7,18 +7,21 @@ help answers at once.
 
 from __future__ import annotations
 
-import os
+import errno
+import re
 import signal
 import sys
 from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError, Parameter
 
+from erls.cli.address_space import address_space, require_address_space
 from erls.cli.compare import compare
 from erls.cli.effects import effects
 from erls.cli.files import info, view
 from erls.cli.reduce import reduce
 from erls.cli.simulate import simulate
+from erls.cli.streams import StdoutLost, prepare_streams
 from erls.cli.studies import study
 from erls.cli.terminal import print_json, tell
 from fe_import.errors import ReportedError
@@ -36,19 +39,19 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 
+_UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
 for command in (reduce, simulate, info, view, compare, effects):
     app.command(command)
 app.command(study)
 
 
-def _report(error: ReportedError, as_json: bool) -> int:
-    """Print an error; returns the exit code."""
+def _report(error: ReportedError, as_json: bool) -> None:
+    """Print an error."""
     if as_json:
         print_json({"error": error.as_dict()})
     else:
         tell("error: " + str(error).replace("\n", "\\n"))
-    return error.exit_code
 
 
 def _usage_error(problem: CycloptsError) -> ReportedError:
@@ -73,26 +76,57 @@ def main(arguments: Sequence[str] | None = None) -> int:
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     as_json = not {"--json", "--json=true", "--json=yes", "--json=1"}.isdisjoint(tokens)
     if arguments is None:
+        prepare_streams()
         signal.signal(signal.SIGTERM, _interrupt)  # like Ctrl-C: finished work is kept
+    code, failure = 0, None
     try:
-        code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        require_address_space(tokens)
+        found = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
-        return code if isinstance(code, int) else 0
+        code = found if isinstance(found, int) else 0
     except CycloptsError as problem:
-        return _report(_usage_error(problem), as_json)
+        failure = _usage_error(problem)
     except ReportedError as problem:
-        return _report(problem, as_json)
+        failure = problem
     except KeyboardInterrupt:
-        return _report(_stopped("INTERRUPTED", "interrupted", "start again"), as_json)
-    except MemoryError:
-        remedy = "reduce the model further, shorten the run, or free memory"
-        return _report(_stopped("OUT_OF_MEMORY", "out of memory", remedy), as_json)
-    except BrokenPipeError:  # whoever reads stdout has enough, as in: erls info FILE | head
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0
+        failure = _stopped("INTERRUPTED", "interrupted", "start again")
+    except StdoutLost as problem:
+        failure, as_json = _of_stdout(problem), False
+    except (MemoryError, ImportError, OSError) as problem:
+        failure = _of_memory(problem)
+        if failure is None:
+            raise
+    if failure is not None:
+        try:
+            _report(failure, as_json)
+            sys.stdout.flush()
+        except StdoutLost:
+            _report(failure, as_json=False)
+        code = failure.exit_code
+    return code
 
 
 def _stopped(cause: str, message: str, remedy: str) -> ReportedError:
     from erls.errors import Cause, SimulationError
 
     return SimulationError(Cause[cause], message, remedy=remedy)
+
+
+def _of_stdout(problem: StdoutLost) -> ReportedError | None:
+    """None where nobody reads it."""
+    if problem.reader_left:
+        return None
+    from erls.files.output import not_writable
+
+    return not_writable("stdout", problem.strerror, "free disk space, or send it elsewhere")
+
+
+def _of_memory(problem: Exception) -> ReportedError | None:
+    """The error where memory is missing, or address space even for a library; None where it is something else."""
+    limit = address_space()
+    unloaded = limit is not None and isinstance(problem, (ImportError, OSError)) and _UNLOADED.search(str(problem))
+    if not (isinstance(problem, MemoryError) or getattr(problem, "errno", None) == errno.ENOMEM or unloaded):
+        return None
+    what = "" if limit is None else f": address space is limited to {limit // 2**20} MB"
+    more = "free memory" if limit is None else "raise ulimit -v"
+    return _stopped("OUT_OF_MEMORY", f"out of memory{what}", f"reduce the model further, shorten the run, or {more}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from erls.cli.terminal import Json, Output, peak_memory_mb, print_json, refuse_unwritable, tell
+from erls.cli.terminal import Force, Json, Output, peak_memory_mb, print_json, tell
 
 
 def reduce(
@@ -15,6 +15,7 @@ def reduce(
     output: Output = None,
     method: str | None = None,
     modes: int | None = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Reduce the finite-element model of a link to a modal file.
@@ -32,9 +33,13 @@ def reduce(
         mode-displacement or none.
     modes
         Number of elastic modes instead of that in the description.
+    force
+        Replace an existing file that is no modal file.
     json
         Print one JSON object.
     """
+    from erls.files.results import MODAL, claim
+    from erls.scene.inputs import files_of_link
     from fe_import.description.link import load_link
     from fe_import.modal.file import write_modal_file
     from fe_import.reduce import reduce_link, reduction_summary
@@ -42,7 +47,7 @@ def reduce(
     changes = {k: v for k, v in (("method", method), ("elastic_modes", modes)) if v is not None}
     description = load_link(link, changes)
     target = output or Path(f"{description.description.name}.modal.h5")
-    refuse_unwritable(target, link)
+    claim(target, MODAL, files_of_link(description), force)
     begun = time.perf_counter()
     tell(f"reducing {link}")
     model = reduce_link(description, tell)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from erls.cli.terminal import refuse_unwritable, tell
+from erls.cli.terminal import tell
 
 if TYPE_CHECKING:
     from erls.errors import SceneError
@@ -21,14 +23,39 @@ def exit_code(complete: bool, failed: list[int]) -> int:
     return 130 if not complete else max(failed, default=0)
 
 
-def check_output(output: Path | None, scene: Path, suffixes: tuple[str, ...]) -> None:
-    """Refuse a report that cannot be written, or whose ending says no form."""
+def check_output(
+    output: Path | None,
+    scenes: Sequence[Path],
+    changes: Sequence[str],
+    suffixes: tuple[str, ...],
+    force: bool,
+    more: Sequence[Path] = (),
+) -> None:
+    """Refuse a report that must not be written (`erls.files.results.claim`), or whose ending says no form.
+
+    ``more`` is read beside the scenes with their changes.
+    """
     if output is None:
         return
+    from erls.files.results import claim
+
     if output.suffix not in suffixes:
         remedy = "end in " + ", ".join(suffixes)
         raise bad("the ending of the report decides its form", "--output", output.name, remedy)
-    refuse_unwritable(output, scene)
+    claim(output, output.suffix, [*read_by(scenes, changes), *more], force)
+
+
+def read_by(scenes: Sequence[Path], changes: Sequence[str]) -> list[Path]:
+    """Files that commands read for scenes; of one that cannot be read itself."""
+    from erls.scene.inputs import files_of
+    from erls.scene.read import load_scene
+    from fe_import.errors import ReportedError
+
+    found = list(scenes)
+    for scene in scenes:
+        with contextlib.suppress(ReportedError):  # reported, or stated, by who runs it
+            found += files_of(load_scene(scene, changes))
+    return found
 
 
 def bad(message: str, where: str, value: object, remedy: str) -> SceneError:
@@ -47,10 +74,10 @@ def write(path: Path, text: str) -> None:
 
 
 def dumped(summary: dict[str, object]) -> str:
-    """JSON as a file."""
+    """JSON as a file, with the mark of a result (`erls.files.results`)."""
     from erls.cli.terminal import json_text
 
-    return json_text(summary) + "\n"
+    return json_text({"written_by": "erls", **summary}) + "\n"
 
 
 def tell_written(output: Path | None) -> None:

@@ -7,8 +7,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from erls.cli.reports import Set, Workers, bad, check_output, dumped, exit_code, tell_written, write
-from erls.cli.terminal import Json, Output, Progress, print_json, tell
+from erls.cli.reports import Set, Workers, bad, check_output, dumped, exit_code, read_by, tell_written, write
+from erls.cli.terminal import Force, Json, Output, Progress, print_json, tell
 
 study = App(name="study", help="Run a scene many times and report what changes.", help_format="plaintext")
 
@@ -27,6 +27,7 @@ def modes(
     beside: Path | None = None,
     set_: Set = None,
     workers: Workers = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """How many elastic modes are enough: raise their number until points, angles, loads and spectra stop changing.
@@ -55,6 +56,8 @@ def modes(
         Change a field of the scene, KEY=VALUE; may be repeated.
     workers
         Runs at a time; as many as cores unless given.
+    force
+        Replace an existing file that is no such report.
     json
         Print one JSON object.
     """
@@ -62,7 +65,7 @@ def modes(
     from erls.studies.mode_count import study_modes
     from erls.studies.mode_result import Tolerances, study_summary
 
-    check_output(output, scene, (".html", ".json"))
+    check_output(output, [scene], set_ or [], (".html", ".json"), force, [] if beside is None else [beside])
     printed = None if beside is None else read_printed(beside)
     with Progress("mode study") as advance:
         result = study_modes(
@@ -106,6 +109,7 @@ def cost(
     apply: Path | None = None,
     set_: Set = None,
     workers: Workers = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """What accuracy costs in time: error against time over many settings, and the cheapest that is good enough.
@@ -147,18 +151,22 @@ def cost(
         Change a field of the scene, KEY=VALUE; may be repeated.
     workers
         Runs at a time; as many as cores unless given.
+    force
+        Replace an existing file that is no such report.
     json
         Print one JSON object.
     """
+    from erls.files.results import MARK, claim
     from erls.report.cost_page import cost_csv, cost_page, cost_text
     from erls.studies.apply import check_copy, write_copy
     from erls.studies.cost import study_cost
     from erls.studies.cost_result import cost_summary
     from erls.studies.grid import Grid
 
-    check_output(output, scene, (".html", ".csv", ".json"))
+    check_output(output, [scene], set_ or [], (".html", ".csv", ".json"), force)
     if apply is not None:
         check_copy(apply, scene)
+        claim(apply, ".toml", read_by([scene], set_ or []), force)
     grid = Grid(_names(formulations), _names(integrators), tuple(effects or ()), tuple(_counts(modes, "--modes") or ()))
     with Progress("cost study") as advance:
         result = study_cost(
@@ -178,7 +186,7 @@ def cost(
         makers = {".html": cost_page, ".csv": cost_csv}
         write(output, makers[output.suffix](result) if output.suffix in makers else dumped(summary))
     if apply is not None and result.chosen is not None:
-        write_copy(apply, scene, result.chosen_overrides, "\n".join([summary["recommendation"], *_kept(set_)]))
+        write_copy(apply, scene, result.chosen_overrides, "\n".join([summary["recommendation"], *_kept(set_), MARK]))
     if json:
         print_json({**summary, "output": None if output is None else str(output)})
     else:

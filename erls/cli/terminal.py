@@ -15,6 +15,7 @@ from cyclopts import Parameter
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Output = Annotated[Path | None, Parameter(name=["--output", "-o"])]
+Force = Annotated[bool, Parameter(name="--force", negative="")]
 
 
 def report_times(text: str, end: float, unit: str = "s") -> list[float]:
@@ -38,14 +39,6 @@ def report_times(text: str, end: float, unit: str = "s") -> list[float]:
             )
         result.append(value)
     return result
-
-
-def refuse_unwritable(path: Path, source: Path) -> None:
-    """Refuse an output that cannot be written, or that is what was read, before any work is done."""
-    from erls.files.output import check_writable, not_writable
-
-    if check_writable(path) == source.resolve():
-        raise not_writable(path, "it is the file that is read", "give the output another name")
 
 
 def remove(path: Path | None) -> None:

@@ -129,6 +129,9 @@ class Formulation(Protocol):
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies."""
 
+    def load_power(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) power of loads on nodes at times (k,), with coordinates and rates (k, n) [W]."""
+
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions, with the acceleration from the equations of motion."""
 

@@ -86,7 +86,9 @@ class Started(Protocol):
         """Of its static start."""
 
 
-def stability_of(bearing: Bearing, motions: Linearization, acceleration: Array, metres: Array, size: float) -> Stability:
+def stability_of(
+    bearing: Bearing, motions: Linearization, acceleration: Array, metres: Array, size: float
+) -> Stability:
     """Of a static start with the joints released.
 
     Parameters

@@ -52,6 +52,10 @@ class Substructured:
         """(k, 4) that of all pieces at times (k,)."""
         return energy_series(self.inner, t, y, v)
 
+    def load_power(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) that of the pieces."""
+        return self.inner.load_power(t, y, v)
+
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """That of all pieces."""
         return self.inner.energy(t, y, v)

@@ -42,6 +42,7 @@ def absolute_generalized_alpha(
         options.newton_tolerance,
         tolerance=options.tolerance,
         output_step=options.output_step,
+        keeper=options.keeper,
         follows_tolerance=adaptive,
     )
     frames = 12 * absolute.links  # entries of what is stored before the elastic coordinates and the joint angles

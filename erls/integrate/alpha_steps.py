@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from erls.equations.stepped import Stepped
 from erls.errors import Cause, SimulationError
@@ -29,9 +30,11 @@ from erls.integrate.alpha_rules import (
 )
 from erls.integrate.base import Leg
 from erls.integrate.driver import Pace, Recorder
+from erls.integrate.memory import Memory, recall, taken
 from erls.integrate.stepping import alpha_memory as alpha
 from erls.maths.jit import plain
-from erls.maths.records import Memory, overwrite, python_reader
+from erls.maths.records import Memory as FlatMemory
+from erls.maths.records import overwrite, python_reader
 from erls.maths.so3 import Array
 from erls.scene.integrators import MATRICES
 
@@ -69,20 +72,58 @@ class Steps:
         self._memory: Any = None
         self.h, self.error = 0.0, 0.0
         """Step [s], and local error of the last one [m]."""
+        self.part = 0
+        """Which of the parts of a leg with steps of their own is walked over."""
+        self._walk = self._stood = np.zeros(0)  # where a walk stands, and stood when it was resumed
+        self._reached = 0, alpha.DONE  # steps of the present stretch, and what ended them
+        self.resumable = system.compiled
 
     def begin(self, q: Any, v: Array, a: Array) -> None:
         """Start a leg with consistent accelerations and multipliers (n + m,), which the algorithmic ones equal."""
         start = self._system.pack(q)
         if self._memory is None:
-            self._make_room()
-            self._start, self._tried = start.copy(), start.copy()
+            self._make_room(start)
         memory = self._memory
         self._start[:], memory.v[:], memory.a[:], memory.alg[:] = start, v, a, a[: len(v)]
+        self.part = 0
 
-    def _make_room(self) -> None:
-        """Records of a run in flat memory."""
+    def stand(self, *at: float) -> None:
+        """Where a walk stands, in numbers of its own, as it asks for its next steps."""
+        self._walk = np.array(at, dtype=float)
+
+    def stood(self) -> list[float]:
+        """Where a walk that was resumed stood, its step set; nothing of one that begins."""
+        found, self._stood = self._stood.tolist(), np.zeros(0)
+        return found
+
+    def memory(self) -> Memory:
+        """Between two steps, see `erls.integrate.memory`."""
+        return {
+            **{f"steps.{name}": array for name, array in self._arrays()},
+            "steps.size": np.array([self.h, self.error]),
+            "steps.walk": self._walk,
+            "steps.reached": np.array([self.part, *self._reached]),
+        }
+
+    def restore(self, memory: Memory) -> None:
+        """As another run left it."""
+        self._make_room(taken(memory, "steps.start", np.zeros(1), axis=0))
+        for name, array in self._arrays():
+            recall(memory, f"steps.{name}", array)
+        self.h, self.error = taken(memory, "steps.size", np.zeros(2)).tolist()
+        self._walk = self._stood = taken(memory, "steps.walk", np.zeros(1), axis=0)
+        self.part, *reached = taken(memory, "steps.reached", np.zeros(3, dtype=np.int64)).tolist()
+        self._reached = reached[0], reached[1]
+
+    def _arrays(self) -> list[tuple[str, NDArray[Any]]]:
+        own = ("own", self._own), ("places", self._places), ("start", self._start), ("tried", self._tried)
+        return [*own, ("scratch", self._system.scratch)]
+
+    def _make_room(self, start: Any) -> None:
+        """Records of a run in flat memory; ``start`` is like every configuration."""
+        self._start, self._tried = start.copy(), start.copy()
         places = [0, 0, 0]
-        flat = Memory(places)
+        flat = FlatMemory(places)
         blank = alpha.Settings(*[0] * len(alpha.Settings._fields))
         course = alpha.Course(np.zeros(6), np.zeros(7, dtype=np.int64))
         course.rates[alpha.RATE], course.counts[alpha.USUAL] = SLOWEST_KNOWN, MAX_ITERATIONS
@@ -129,7 +170,7 @@ class Steps:
         """Steps to ``times``, with forces up to ``last``, in chunks; how many were recorded, and what ended them."""
         overwrite(self._settings(last, limit), self._own, self._places, int(self._places[0]))
         own = self._own, self._places, self._start, self._tried
-        done, status = 0, alpha.DONE
+        done, status = self._reached
         while done < len(times) and status == alpha.DONE:
             part = times[done : done + self._pace.size()]
             knots = np.empty((len(part), 3, self._system.kept))
@@ -140,8 +181,10 @@ class Steps:
                     status = self._advance(*self._arguments, *own, part, samples, knots, beside)
             finally:
                 made = self._count()
-            self._recorder.extend(part[:made], knots[:made], beside=beside[:made])
             done += made
+            self._reached = done, int(status)
+            self._recorder.extend(part[:made], knots[:made], beside=beside[:made])
+        self._reached = 0, alpha.DONE
         if status == alpha.REFUSED:
             self._system.refuse(float(times[done]), self._system.unpack(self._tried), self._memory.v1)
             status = alpha.FAILED  # it does not insist
@@ -203,8 +246,13 @@ def equal_steps(steps: Steps, leg: Leg, step: float, halve: bool, recorder: Reco
     count = max(1, math.ceil((leg.end - leg.start) / step * (1 - 1e-9)))
     total, at, halvings, served = count * unit, 0, 0, 0
     span = leg.end - leg.start
-    steps.set_step(span / count)
+    stood = steps.stood()
+    if stood:
+        at, halvings, served = map(int, stood)
+    else:
+        steps.set_step(span / count)
     while at < total:
+        steps.stand(at, halvings, served)
         width = unit >> halvings
         ahead = 1 if halvings else min(_AT_ONCE, (total - at) // width)
         ends = at + width * np.arange(1, ahead + 1)
@@ -229,9 +277,15 @@ def adaptive_steps(steps: Steps, leg: Leg, largest: float, tolerance: float, rec
     The error of a step is of third order (M. Géradin, A. Cardona, Flexible Multibody Dynamics, 2001, ch. 14).
     """
     t, h, held = leg.start, min(max(steps.h, _FIRST * largest), largest), False
+    stood = steps.stood()
+    if stood:
+        t, h, held = stood[0], stood[1], bool(stood[2])
     while t < leg.end:
+        steps.stand(t, h, held)
         count = max(1, math.ceil((leg.end - t) / h * (1 - 1e-9)))
-        steps.set_step((leg.end - t) / count)
+        if not stood:
+            steps.set_step((leg.end - t) / count)
+        stood = []
         ahead = min(count, _HELD if held else _AT_ONCE)
         times = t + (leg.end - t) * np.arange(1, ahead + 1) / count
         if ahead == count:

@@ -75,10 +75,10 @@ def to_tolerance(
         Length of the run [s].
     options : ConstrainedOptions
     observer : callable or None
-        Of the last run alone.
+        Of the last run alone, and so is the keeper of ``options``: who resumes makes the forerunners again.
     """
     plain = replace(options, follows_tolerance=False)
-    cheap = replace(plain, output_step=None, step=options.step or _LARGEST * span)
+    cheap = replace(plain, keeper=None, output_step=None, step=options.step or _LARGEST * span)
     first = attempt(replace(cheap, error_tolerance=_LOOSE * options.tolerance, rough=True))
     plan, made, rungs, factor = plan_like(first.t), [first], list[_Rung](), FINER
     density, parted = 1.0, np.inf

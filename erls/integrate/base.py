@@ -13,7 +13,7 @@ Rules for adding an integrator:
 4. Knots lie densely enough that quintic Hermite interpolation through (y, v, a) is as accurate as the method.
 5. It never raises for a numerical failure: it returns what was computed, at least one knot, with
    ``Solution.failure`` set, whose message says when, why and what to try. ``KeyboardInterrupt`` likewise ends
-   in a failure with cause INTERRUPTED.
+   in a failure with cause INTERRUPTED, ``MemoryError`` in one with cause OUT_OF_MEMORY.
 6. It counts its work honestly in `Work`; tests assert budgets on it.
 7. It calls ``observer(t, knots)`` after each accepted step (a compiled one after the last of some steps that took
    about 50 ms, once a run has made its first steps), where ``knots()`` returns the `Solution` so far, with every step
@@ -21,8 +21,10 @@ Rules for adding an integrator:
    whose knots on either side are kept.
    A `SimulationError` that the observer or the system raises ends the run and becomes its failure; a `StopRun` of
    the observer ends it without failure.
+8. After each look it offers ``options.keeper`` what it needs to go on, if it can (`erls.integrate.memory`); with a
+   memory it goes on from there, bit for bit as though it had never ended.
 
-`erls.integrate.driver.integrate_legs` keeps rules 3, 5 and 7 for a method that can advance over one leg.
+`erls.integrate.driver.integrate_legs` keeps rules 3, 5, 7 and 8 for a method that can advance over one leg.
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ import numpy as np
 
 from erls.equations.system import MovingSystem, SecondOrderSystem
 from erls.errors import Cause, SceneError, SimulationError
+from erls.integrate.memory import Keeper
 from erls.maths.so3 import Array
 
 _HAIR = 1e-12  # of the largest time, or of 1 s: breakpoints this close are one
@@ -80,6 +83,9 @@ class Options:
     output_step : float or None
         Of the knots only the states at these distances in time [s] are kept (`erls.integrate.thinning`) beside the
         ends of legs; None keeps all.
+    keeper : Keeper or None
+        Of what the integration needs to go on, and what it goes on from (`erls.integrate.memory`); it says nothing of
+        the motion.
 
     Raises
     ------
@@ -94,6 +100,7 @@ class Options:
     newton_tolerance: float = 1e-11
     tolerance: float = 1e-5
     output_step: float | None = None
+    keeper: Keeper | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         apart = self.output_step

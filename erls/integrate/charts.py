@@ -10,13 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from erls.integrate.base import Observer, Options, Solution, StopRun, Work
+from erls.integrate.memory import Memory, Within, taken
 from erls.maths.full_turns import turned_on
 from erls.maths.so3 import Array
+
+_CHART = "chart.begun"
 
 LONGEST = 1.25 * np.pi
 """Length of a rotation vector beyond which it is exchanged; a step may go on by the rest of a full turn [rad]."""
@@ -51,19 +55,41 @@ def in_charts(integrate: Callable[..., Solution], places: Sequence[int]) -> Call
     ) -> Solution:
         before: Solution | None = None
         state = exchanged(np.asarray(y), np.asarray(v), places)
-        start, end = times
+        (start, end), keeper = times, options.keeper
+        inner = None if keeper is None else keeper.memory
+        if inner is not None and _CHART in inner:
+            start, state, before = _restored(inner, len(y))
         while True:
             watch = _Watch(observer, places, before)
+            if keeper is not None:
+                own = partial(_memory, start, state, before) if before is not None else dict
+                options = replace(options, keeper=Within(keeper, own, inner))
             found = integrate(system, (start, end), *state, options, watch)
             long = _first_long(found, places)
             last = len(found.t) - 1 if long is None else long
-            whole = _joined(before, _up_to(found, last))
+            whole = joined(before, _up_to(found, last))
             if long is None or watch.stopped or not found.t[long] < end:
                 return whole if long is None else replace(whole, failure=found.failure)
             start, before = float(found.t[long]), replace(whole, failure=None)
-            state = exchanged(found.y[long], found.v[long], places)
+            state, inner = exchanged(found.y[long], found.v[long], places), None
 
     return integrated
+
+
+def _memory(start: float, state: tuple[Array, Array], before: Solution) -> Memory:
+    """Of a stretch: how it began, and what was before."""
+    work = [getattr(before.work, f.name) for f in fields(Work)]
+    known = {_CHART: np.array([start]), "chart.work": np.array(work), "chart.start": np.array(state)}
+    return {**known, **{f"chart.{name}": getattr(before, name) for name in ("t", "y", "v", "a")}}
+
+
+def _restored(memory: Memory, size: int) -> tuple[float, tuple[Array, Array], Solution]:
+    """The same again."""
+    start = float(taken(memory, _CHART, np.zeros(1))[0])
+    work = Work(*taken(memory, "chart.work", np.zeros(len(fields(Work)), dtype=np.int64)).tolist())
+    state, t = taken(memory, "chart.start", np.zeros((2, size))), taken(memory, "chart.t", np.zeros(1), axis=0)
+    y, v, a = (taken(memory, f"chart.{name}", np.zeros((len(t), size))) for name in ("y", "v", "a"))
+    return start, (state[0], state[1]), Solution(t, y, v, a, work)
 
 
 class _Watch:
@@ -77,7 +103,7 @@ class _Watch:
         kept: Sequence[float] | None = None
         if self._observer is not None:
             try:
-                kept = self._observer(t, lambda: _joined(self._before, knots()))
+                kept = self._observer(t, lambda: joined(self._before, knots()))
             except StopRun:
                 self.stopped = True
                 raise
@@ -104,8 +130,8 @@ def _up_to(solution: Solution, last: int) -> Solution:
     return replace(solution, **parts)
 
 
-def _joined(before: Solution | None, after: Solution) -> Solution:
-    """One solution of two stretches."""
+def joined(before: Solution | None, after: Solution) -> Solution:
+    """One solution of two stretches, the first of which may be none."""
     if before is None:
         return after
     parts: dict[str, Any] = {}

@@ -15,6 +15,7 @@ from erls.errors import Cause, SimulationError
 from erls.integrate.base import Integrator, Observer, Options, Solution
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.integrate.memory import time_of
 from erls.integrate.registry import integrator_named
 from erls.maths.so3 import Array
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
 AT = 1e-3  # of the same: adaptive steps would shrink for ever
-_ITS_OWN = (Cause.INTERRUPTED, Cause.SINGULAR_MASS, Cause.RUNAWAY)
+_ITS_OWN = (Cause.INTERRUPTED, Cause.OUT_OF_MEMORY, Cause.SINGULAR_MASS, Cause.RUNAWAY)
 
 
 class TiedCoordinates:
@@ -119,10 +120,11 @@ def loop_integrator(name: str) -> Integrator:
                 options.spectral_radius,
                 options.newton_tolerance,
                 output_step=options.output_step,
+                keeper=options.keeper,
             )
             solution = lie_generalized_alpha(TiedCoordinates(system), times, y, v, settings, observer)
         else:
-            watch = Watch(system, observer)
+            watch = Watch(system, observer, time_of(options.keeper))
             solution = integrator_named(name)(system, times, y, v, options, watch)
             if solution.failure is not None and solution.failure.cause == Cause.LOOP_OPEN:
                 solution = _first(solution, watch.good)
@@ -142,11 +144,13 @@ class Watch:
     chain : ClosedChain
     observer : callable or None
         Told of what is not refused.
+    since : float or None
+        Time up to which a run that goes on was looked at.
     """
 
-    def __init__(self, chain: ClosedChain, observer: Observer | None) -> None:
+    def __init__(self, chain: ClosedChain, observer: Observer | None, since: float | None = None) -> None:
         self.chain, self.observer = chain, observer
-        self.good = -np.inf
+        self.good = -np.inf if since is None else since
         """Time of the first knot that was refused, or of the last one that was looked at."""
 
     def __call__(self, t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:

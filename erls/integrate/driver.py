@@ -5,19 +5,22 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import fields, replace
 
 import numpy as np
 
 from erls.equations.system import MovingSystem, SecondOrderSystem
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, Observer, Solution, StopRun, Work, legs
+from erls.integrate.memory import Keeper, Keeping, Memory, Method, taken, unfit
 from erls.integrate.thinning import thinned
 from erls.maths.so3 import Array
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts
 _SINGLE = 32  # first steps of an observed run, each looked at: a short run is seen step by step
 _FIRST, LARGEST_CHUNK = 32, 4096  # steps in one go
+_RESERVE = 12_000_000  # numbers: what writing a run file takes beside its knots
 
 
 class Recorder:
@@ -46,9 +49,15 @@ class Recorder:
         self._size, self._observer, self._apart, self.beside = size, observer, apart, beside
         self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
         self._begun = 0.0
+        self._reserve: Array | None = np.empty(_RESERVE)  # address space only, as nobody writes to it
+        self._offer: Callable[[], None] = lambda: None
         # how many knots are kept, accepted steps, and, where knots are dropped, the last one that was looked at and
         # those after it: one object, so that an interrupt finds all or nothing
         self._kept: tuple[int, int, tuple[Array, Array]] = 0, 0, (self._t[:0], self._rows[:0])
+
+    def release(self) -> None:
+        """Give back what was set aside for whoever keeps a run that ended for lack of memory."""
+        self._reserve = None
 
     def begin(self, t: float, *parts: Array) -> None:
         """Add a copy of the knot y, v, a (and what is kept beside it) at which a leg begins; the last leg ends."""
@@ -101,6 +110,7 @@ class Recorder:
             raise
         finally:
             self._thin(whole or ())
+        self._offer()
 
     def _thin(self, whole: Sequence[float]) -> None:
         """Drop what need not be kept, once the observer has seen it."""
@@ -129,6 +139,36 @@ class Recorder:
             self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
         self._t[start:end], self._rows[start:end] = t, rows
         self._kept = end, before + steps, rest
+
+    def kept_by(self, offer: Callable[[], None]) -> None:
+        """Call ``offer`` after each look of the observer."""
+        self._offer = offer
+
+    def memory(self) -> Memory:
+        """Knots and work so far (`erls.integrate.memory`)."""
+        knots, steps, (times, rows) = self._kept
+        return {
+            "time": np.array([self.time]),
+            "recorder.begun": np.array([self._begun]),
+            "recorder.work": np.array([getattr(self.work, f.name) for f in fields(Work)] + [steps]),
+            "recorder.t": self._t[:knots],
+            "recorder.rows": self._rows[:knots],
+            "recorder.waiting.t": times,
+            "recorder.waiting.rows": rows,
+        }
+
+    def restore(self, memory: Memory) -> None:
+        """Knots and work of such a memory, instead of none."""
+        *work, steps = taken(memory, "recorder.work", np.zeros(len(fields(Work)) + 1, dtype=np.int64)).tolist()
+        for field, number in zip(fields(Work), work, strict=True):
+            setattr(self.work, field.name, number)
+        self._begun = float(taken(memory, "recorder.begun", np.zeros(1))[0])
+        t, waiting = (taken(memory, f"recorder.{name}", self._t, axis=0) for name in ("t", "waiting.t"))
+        rows, more = (taken(memory, f"recorder.{name}", self._rows, axis=0) for name in ("rows", "waiting.rows"))
+        if len(t) != len(rows) or len(waiting) != len(more) or not len(t):
+            raise unfit("recorder.rows", (len(t), len(rows)))
+        self._kept = 0, 0, (t[:0], rows[:0])
+        self._store(t, rows, steps, (waiting, more))
 
     @property
     def steps(self) -> int:
@@ -160,7 +200,8 @@ class Recorder:
         t, rows = self._t[:knots], self._rows[:knots]
         more = self._waiting()
         if len(more[0]):
-            t, rows = np.concatenate([t, more[0]]), np.concatenate([rows, more[1]])
+            with suppress(MemoryError):  # of a run that ended for it: without its last knots
+                t, rows = np.concatenate([t, more[0]]), np.concatenate([rows, more[1]])
         return t, rows
 
 
@@ -190,9 +231,6 @@ class Pace:
         self._steps = max(1, min(4 * self._asked, math.ceil(_PAUSE * self._asked / spent)))
 
 
-Advance = Callable[[Leg, Array, Array, Array, Recorder], tuple[Array, Array]]
-
-
 def not_finite(t: float, values: Array) -> SimulationError:
     """Failure because ``values`` (n,) holds an infinity or NaN at time ``t``."""
     bad = int(np.argmin(np.isfinite(values)))
@@ -211,30 +249,38 @@ def integrate_legs(
     y: Array,
     v: Array,
     recorder: Recorder,
-    advance: Advance,
+    method: Method | None,
+    keeper: Keeper | None = None,
 ) -> Solution:
     """Walk over all legs and turn whatever ends the run early into the failure of its solution.
 
     Parameters
     ----------
-    advance : callable
-        ``advance(leg, y, v, a, recorder) -> (y, v)`` adds the knots after the first one of a leg and returns
-        the state at its end; raises `SimulationError` when it cannot.
+    method : Method or None
+        None where there is nothing to integrate.
+    keeper : Keeper or None
+        Of what the run needs to go on, and what it goes on from.
     """
 
     def go(walk: list[Leg]) -> None:
         y, v = start
-        for leg in walk:
-            recorder.work.rhs_calls += 1
-            a = system.acceleration(leg.first, y, v)
-            if not np.isfinite(a).all():
-                raise not_finite(leg.start, a)
-            recorder.begin(leg.start, y, v, a)
-            if system.size == 0:  # every motion is prescribed and no link deforms: nothing to integrate
-                recorder.append(leg.end, y, v, a)
-                recorder.accept(leg.end)
-            elif leg.end > leg.start:
-                y, v = advance(leg, y, v, a, recorder)
+        keeping = None if method is None else Keeping(keeper, recorder, method)
+        for number, leg in enumerate(walk):
+            if keeping is not None and keeping.passed(number):
+                continue
+            if keeping is None or not keeping.resumes(number):
+                recorder.work.rhs_calls += 1
+                a = system.acceleration(leg.first, y, v)
+                if not np.isfinite(a).all():
+                    raise not_finite(leg.start, a)
+                recorder.begin(leg.start, y, v, a)
+                if method is None:  # every motion is prescribed and no link deforms
+                    recorder.append(leg.end, y, v, a)
+                    recorder.accept(leg.end)
+                elif leg.end > leg.start:
+                    method.begin(leg, y, v, a)
+            if method is not None and leg.end > leg.start:
+                y, v = method.finish(leg)
 
     start = np.array(y, dtype=float), np.array(v, dtype=float)
     return run_to_end(system, times, recorder, go, lambda: recorder.append(times[0], *start, np.zeros_like(start[0])))
@@ -263,6 +309,13 @@ def run_to_end(
                 Cause.INTERRUPTED,
                 "the run was interrupted",
                 remedy="the motion up to this time was kept",
+            )
+        except MemoryError:
+            recorder.release()
+            failure = SimulationError(
+                Cause.OUT_OF_MEMORY,
+                "out of memory",
+                remedy="the motion up to this time was kept; give a larger simulation.output_step, or free memory",
             )
         except SimulationError as error:
             failure = error

@@ -47,15 +47,33 @@ def generalized_alpha(
     capacity = int(min((times[1] - times[0]) / step, 1e6)) + 2 if times[1] > times[0] else 2
     capacity = 1024 if options.output_step else capacity + 2 * len(system.breakpoints)
     recorder = Recorder(system.size, observer, capacity, options.output_step)
-    steps = _steps(system, options, recorder) if system.size else None
+    method = _Equal(_steps(system, options, recorder), step, recorder) if system.size else None
+    return integrate_legs(system, times, y, v, recorder, method, options.keeper)
 
-    def advance(leg: Leg, y: Array, v: Array, a: Array, recorder: Recorder) -> tuple[Array, Array]:
-        assert steps is not None
-        steps.begin(y, v, a)
-        equal_steps(steps, leg, step, True, recorder)
-        return steps.end()
 
-    return integrate_legs(system, times, y, v, recorder, advance)
+class _Equal:
+    """A `Method` of equal steps.
+
+    Parameters
+    ----------
+    steps : Steps
+    step : float
+        [s]
+    recorder : Recorder
+    """
+
+    def __init__(self, steps: Steps, step: float, recorder: Recorder) -> None:
+        self._steps, self._step, self._recorder = steps, step, recorder
+        self.resumable, self.memory, self.restore = steps.resumable, steps.memory, steps.restore
+
+    def begin(self, leg: Leg, y: Array, v: Array, a: Array) -> None:
+        """Stand at the start of a leg."""
+        self._steps.begin(y, v, a)
+
+    def finish(self, leg: Leg) -> tuple[Array, Array]:
+        """Equal steps over the rest of a leg."""
+        equal_steps(self._steps, leg, self._step, True, self._recorder)
+        return self._steps.end()
 
 
 def _steps(system: SecondOrderSystem, options: Options, recorder: Recorder) -> Steps:

@@ -47,14 +47,15 @@ STAGES = 6
 ENDS, ENDS_STIFF = 6, 10
 """Ends of steps through which P goes, with rates or without."""
 
-_MERGED_SMOOTH = 4  # steps of the run in one of the error, of motions without noise, which steps just resolve
+_MERGED_SMOOTH = 3  # steps of the run in one of the error, of motions without noise: those in the middle of six ends,
+# where P is best; two or four lie askew, and are off by ten times as much
 _MERGED, _MERGED_LARGE = 6, 8  # the same of others, at the least: of systems up to, and above
 _SHARP = 4  # times the frequency of the filter, of motions without noise
 _LARGE = 15  # coordinates, whose factors cost more than evaluations
 _COST = 0.2  # of the run's evaluations: what more steps are merged for
 _ITERATIONS = 1.3  # per step, about
 _SHARES = 0.1, 1e-6  # of the error so far: where the iterations of a step stop, at most and at least
-_ALL_STEPS, _ALL_STEPS_SMOOTH = 0.5, 0.02  # the same over all steps of a run, of motions without noise
+_ALL_STEPS, _ALL_STEPS_SMOOTH = 0.5, 0.005  # the same over all steps of a run, of motions without noise
 _NEGLIGIBLE = 0.02  # of the tolerance of integration: errors that need no iteration
 _ROUNDING = 1e-15  # of the reach: the same of motions without noise, where disturbances of this size may grow
 _HAIR = 2e-12  # of the run: forces jump at the ends of a leg

@@ -31,6 +31,7 @@ from erls.integrate.base import Leg, Observer
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.constrained_run import ConstrainedRecorder, tell_again
 from erls.integrate.driver import not_finite, run_to_end
+from erls.integrate.memory import Keeping
 from erls.integrate.step_plans import Plan, planned
 from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
@@ -80,8 +81,10 @@ def _run(
             follow = rough_steps if options.rough else adaptive_steps
             follow(steps, leg, step, options.error_tolerance, recorder)
             return
-        for part, width in [(leg, step)] if plan is None else planned(plan, leg):
+        parts = [(leg, step)] if plan is None else planned(plan, leg)
+        for part, width in parts[steps.part :]:
             equal_steps(steps, part, width, options.iteration_matrix != "frozen", recorder)
+            steps.part += 1
 
     def go(walk: list[Leg]) -> None:
         if known is not None:
@@ -90,9 +93,13 @@ def _run(
         refuse_redundant(system, walk[0].first, q)
         place, rate = consistent_start(system, walk[0].first, q, given.v, recorder.warnings)
         steps = _steps(system, options, recorder)
-        for leg in walk:
-            start = _start_of_leg(system, leg, place, rate, recorder)
-            steps.begin(place, rate, np.concatenate([start.a, start.multipliers]))
+        keeping = Keeping(options.keeper, recorder, steps)
+        for number, leg in enumerate(walk):
+            if keeping.passed(number):
+                continue
+            if not keeping.resumes(number):
+                start = _start_of_leg(system, leg, place, rate, recorder)
+                steps.begin(place, rate, np.concatenate([start.a, start.multipliers]))
             if leg.end > leg.start:
                 before = recorder.steps
                 advance(steps, leg)

@@ -29,19 +29,22 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, Observer, Options, Solution
 from erls.integrate.driver import Pace, Recorder, integrate_legs, not_finite
+from erls.integrate.memory import Memory, flat, recall
 from erls.maths.jit import plain
 from erls.maths.so3 import Array
 
 NODES = (0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0)
 WEIGHT = 0.08  # κ
-_ITERATED = 0.01  # of the tolerance: where iterations stop
+_ITERATED = 3e-4  # of the tolerance: where iterations stop; what they leave of a smooth motion adds up over its steps
 _FIRST_STEP = 1e-4  # s, at most
 _MAX_ITERATIONS = 10
 _REFRESH_COST = 2  # of fresh factors, in iterations
@@ -62,8 +65,9 @@ def lobatto(
     """
     recorder = Recorder(system.size, observer, apart=options.output_step)
     if system.size == 0:  # nothing to integrate
-        return integrate_legs(system, times, y, v, recorder, lambda leg, y, v, a, recorder: (y, v))
-    found = integrate_legs(system, times, y, v, recorder, _Run(system, times, options, recorder).advance)
+        return integrate_legs(system, times, y, v, recorder, None)
+    run = _Run(system, times, options, recorder)
+    found = integrate_legs(system, times, y, v, recorder, run, options.keeper)
     return replace(found, nodes_per_step=len(NODES) - 1)
 
 
@@ -77,7 +81,9 @@ def tableau(nodes: tuple[float, ...] = NODES) -> tuple[Array, Array]:
 
 
 class _Run:
-    """Memory of the loop (`erls.integrate.stepping.lobatto`) over one run."""
+    """A `Method`: memory of the loop (`erls.integrate.stepping.lobatto`) over one run."""
+
+    resumable = True
 
     def __init__(
         self, system: SecondOrderSystem, times: tuple[float, float], options: Options, recorder: Recorder
@@ -109,8 +115,8 @@ class _Run:
         self.known[[at.TOLERANCE, at.GOAL]] = options.tolerance, _ITERATED * options.tolerance
         self.known[[at.ROUNDING, at.RATE]] = _ROUNDING, at.SLOWEST
 
-    def advance(self, leg: Leg, y: Array, v: Array, a: Array, recorder: Recorder) -> tuple[Array, Array]:
-        """Adaptive steps over a leg."""
+    def begin(self, leg: Leg, y: Array, v: Array, a: Array) -> None:
+        """Stand at the start of a leg."""
         at, known = self.at, self.known
         known[[at.END, at.FIRST, at.LAST]] = leg.end, leg.first, leg.last
         known[at.T], known[at.BEFORE] = leg.start, leg.end - leg.start
@@ -118,10 +124,27 @@ class _Run:
         self.counts[[at.FACTORED, at.HISTORY]] = 0
         self.stages[0] = y, v, a
         self.last[:] = self.stages[0]
-        while known[at.T] < leg.end:
+
+    def finish(self, leg: Leg) -> tuple[Array, Array]:
+        """Adaptive steps over the rest of a leg."""
+        while self.known[self.at.T] < leg.end:
             if not self.make_steps():
                 raise self.failure()
         return self.stages[0, 0].copy(), self.stages[0, 1].copy()
+
+    def memory(self) -> Memory:
+        """All that one call of the loop leaves to the next."""
+        return {name: flat(array) for name, array in self._arrays()}
+
+    def restore(self, memory: Memory) -> None:
+        """As another run left it."""
+        for name, array in self._arrays():
+            recall(memory, name, array)
+
+    def _arrays(self) -> list[tuple[str, NDArray[Any]]]:
+        names = ("known", "counts", "mixed", "stages", "last", "matrices", "vectors")
+        own = [(f"factors.{k}", array) for k, array in enumerate(self.own)]
+        return [*((f"steps.{name}", getattr(self, name)) for name in names), *own, ("scratch", self.system.scratch)]
 
     def make_steps(self) -> bool:
         """A chunk of steps; False when no step is small enough to go on."""

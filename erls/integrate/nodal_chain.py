@@ -47,6 +47,7 @@ def nodal_generalized_alpha(
         tolerance=options.tolerance,
         follows_tolerance=adaptive and plan is None,
         output_step=options.output_step,
+        keeper=options.keeper,
     )
 
     def complete(found: ConstrainedSolution) -> Solution:

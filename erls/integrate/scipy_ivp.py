@@ -29,6 +29,7 @@ from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Integrator, Leg, Observer, Options, Solution, hermite
 from erls.integrate.driver import Recorder, integrate_legs, not_finite
+from erls.integrate.memory import Memory, taken
 from erls.maths.so3 import Array
 
 VELOCITY_PER_METRE = 10.0  # 1/s, of the absolute tolerance
@@ -128,7 +129,7 @@ def scipy_method(name: str) -> Integrator:
         run = _Run(method, system, options, recorder)
         if math.isfinite(method.stable_to):
             recorder.warnings.extend(_warn_of_stiffness(name, system, times, np.asarray(y), np.asarray(v)))
-        return integrate_legs(system, times, y, v, recorder, run.advance)
+        return integrate_legs(system, times, y, v, recorder, run, options.keeper)
 
     integrate.__name__ = name
     integrate.__doc__ = f"Integrate with SciPy's {method.name}; ``options.step`` is its largest step."
@@ -152,13 +153,18 @@ def _acceleration_of(system: SecondOrderSystem) -> Callable[[float, Array, Array
 
 
 class _Run:
-    """One run with one of SciPy's solvers."""
+    """A `Method`: one run with one of SciPy's solvers. Explicit ones can be resumed: their state is numbers and arrays.
+    """
 
     def __init__(
         self, method: _Method, system: SecondOrderSystem, options: Options, recorder: Recorder
     ) -> None:
-        self.method, self.system, self.work = method, system, recorder.work
+        self.method, self.system, self.recorder, self.work = method, system, recorder, recorder.work
         self.n, self.explicit = system.size, math.isfinite(method.stable_to)
+        self.resumable = self.explicit
+        self.solver: Any = None
+        self.old: Knot
+        self.resumable = self.explicit
         per_metre = 1 / metre_scales(system)
         self.settings: dict[str, Any] = {
             "rtol": options.rtol,
@@ -191,13 +197,34 @@ class _Run:
         result[n:] = -np.linalg.solve(self.system.mass_matrix(t, x[:n]), np.hstack([stiffness, damping]))
         return result
 
-    def advance(self, leg: Leg, y: Array, v: Array, a: Array, recorder: Recorder) -> tuple[Array, Array]:
-        """Adaptive steps over a leg."""
-        self.leg = leg
+    def begin(self, leg: Leg, y: Array, v: Array, a: Array) -> None:
+        """Stand at the start of a leg."""
+        self.leg, self.old = leg, (leg.start, y, v, a)
         x = np.concatenate([y, v])
-        solver = self.guarded(self.method.solver, self.derivative, leg.start, x, leg.end, **self.settings)
-        old = (leg.start, y, v, a)
+        self.solver = self.guarded(self.method.solver, self.derivative, leg.start, x, leg.end, **self.settings)
+
+    def memory(self) -> Memory:
+        """What an explicit solver knows between two steps."""
+        solver = self.solver
+        known = np.array([solver.t, solver.h_abs])
+        return {"solver.leg": np.array(self.leg), "solver.known": known, "solver.y": solver.y, "solver.f": solver.f}
+
+    def restore(self, memory: Memory) -> None:
+        """As another run left it."""
+        self.leg = leg = Leg(*taken(memory, "solver.leg", np.zeros(4)).tolist())
+        y, f = (taken(memory, f"solver.{name}", np.zeros(2 * self.n)) for name in ("y", "f"))
+        with_step = {**self.settings, "first_step": leg.end - leg.start}  # any: it asks for no trial
+        self.solver = self.guarded(self.method.solver, self.derivative, leg.start, y, leg.end, **with_step)
+        solver = self.solver
+        (solver.t, solver.h_abs), solver.f = taken(memory, "solver.known", np.zeros(2)).tolist(), f
+        solver.status = "running" if solver.t < leg.end else "finished"
+        self.old = self.knot(solver)
+
+    def finish(self, leg: Leg) -> tuple[Array, Array]:
+        """Adaptive steps over the rest of a leg."""
+        solver, recorder = self.solver, self.recorder
         while solver.status == "running":
+            old = self.old
             calls, factored = self.work.rhs_calls, solver.nlu
             message = self.guarded(solver.step)
             self.work.factorizations += int(solver.nlu - factored)  # LSODA counts in its own type
@@ -211,9 +238,9 @@ class _Run:
             if self.method.refine:
                 self.add_knots(solver.dense_output(), old, new, recorder)
             recorder.append(*new)
+            self.old = new
             recorder.accept(new[0])
-            old = new
-        return old[1], old[2]
+        return self.old[1], self.old[2]
 
     def knot(self, solver: Any) -> Knot:
         """The end of the last step."""

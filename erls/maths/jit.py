@@ -31,7 +31,7 @@ _SUBJECTS = {"auto": "the certificate of what auto leaves out", "integrate": "th
 _ROOT = Path(__file__).parents[1]
 _IMPORT = re.compile(r"^\s*from (erls[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
 _listeners: list[Callable[[str], None]] = []
-_told: set[str] = set()  # subjects
+_told: set[str] = set()  # subjects, and kinds of faults of what is kept
 _fixed: set[Any] = set()  # kernels, whose signatures are fixed
 _guiding: set[Any] = set()  # helpers that call functions of a system
 ENABLED = os.environ.get("ERLS_JIT", "1") != "0"
@@ -42,7 +42,9 @@ def folder(module: str) -> Path:
     """Folder for the compiled code of this very source: Numba does not notice changes in what a function calls."""
     import numba
 
-    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
+    from erls.maths.kernel_cache import FORMAT
+
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__} {FORMAT}".encode())
     for name in _reads(module):
         digest.update(_source(name)[0])
     given = os.environ.get("ERLS_KERNELS") or os.environ.get("ERLS_CACHE")
@@ -99,22 +101,26 @@ def announcing(tell: Callable[[str], None]) -> Iterator[None]:
 
 def compiled_before(module: str) -> bool:
     """Whether code for this source lies on disk; otherwise the first use compiles for some seconds."""
-    return not ENABLED or folder(module).is_dir()
+    return not ENABLED or os.path.isdir(folder(module))
 
 
 def tell_of(module: str) -> None:
     """Say that kernels of a module are about to be compiled, once for each subject."""
     subject = next((words for part, words in _SUBJECTS.items() if f".{part}." in f"{module}."), _EQUATIONS)
+    _tell_once(subject, f"compiling {subject} (once on this machine)")
+
+
+def _tell_once(subject: str, text: str) -> None:
     if subject in _told or not _listeners:
         return
     _told.add(subject)
     for tell in _listeners:
-        tell(f"compiling {subject} (once on this machine)")
+        tell(text)
 
 
 def _on_disk(function: Any) -> bool:
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-{function.__code__.co_firstlineno}"
-    return any(folder(function.__module__).glob(f"*/{name}.*"))
+    return compiled_before(function.__module__) and any(folder(function.__module__).glob(f"*/{name}.*"))
 
 
 def helper(function: F) -> F:
@@ -276,23 +282,27 @@ def kernel(signature: Any, counted: bool = True) -> Callable[[F], F]:
     return compiled
 
 
-def _njit(function: Any, *signature: Any, **options: Any) -> Any:
+def _njit(function: Any, *signature: Any, cache: bool = True, **options: Any) -> Any:
     import numba
+    from numba.core.typeinfer import register_dispatcher
 
     from erls.maths.compilers import CompilerOfKernels, CompilerOfParts
+    from erls.maths.kernel_cache import KernelCache
 
     _prepare_numba()
-    before = numba.config.CACHE_DIR
     if signature and not _on_disk(function):
         tell_of(function.__module__)
-    numba.config.CACHE_DIR = str(folder(function.__module__))
-    try:
-        settings = {"cache": True, "error_model": "numpy", "nogil": True, **options}
-        compiler = CompilerOfParts if "no_cpython_wrapper" in options else CompilerOfKernels
-        with _no_collection():
-            return numba.njit(*signature, **settings, pipeline_class=compiler)(function)
-    finally:
-        numba.config.CACHE_DIR = before
+    settings = {"error_model": "numpy", "nogil": True, **options}
+    compiler = CompilerOfParts if "no_cpython_wrapper" in options else CompilerOfKernels
+    with _no_collection():
+        made = numba.njit(**settings, pipeline_class=compiler)(function)
+        if cache:
+            made._cache = KernelCache(function, folder(function.__module__), _tell_once)
+        for fixed in signature:  # as Numba does, which has no place for a cache of another kind
+            with register_dispatcher(made):
+                made.compile(fixed)
+            made.disable_compile()
+    return made
 
 
 @contextmanager

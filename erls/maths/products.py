@@ -26,6 +26,13 @@ def copy(x: Array, out: Array) -> None:
 
 
 @part
+def subtract(x: Array, out: Array) -> None:
+    """Subtract x from ``out``, of vectors."""
+    for i in range(len(x)):
+        out[i] -= x[i]
+
+
+@part
 def copy_matrix(a: Array, out: Array) -> None:
     """``out`` = A."""
     for i in range(a.shape[0]):

@@ -47,6 +47,14 @@ def rotate_back(pose: Array, x: Array, out: Array) -> None:
 
 
 @part
+def rotate(pose: Array, x: Array, out: Array) -> None:
+    """R x of a vector (3,)."""
+    x0, x1, x2 = x[0], x[1], x[2]
+    for i in range(3):
+        out[i] = pose[3 * i] * x0 + pose[3 * i + 1] * x1 + pose[3 * i + 2] * x2
+
+
+@part
 def invert_pose(pose: Array, out: Array) -> None:
     """The inverse pose, into another array."""
     p0, p1, p2 = pose[9], pose[10], pose[11]
@@ -54,6 +62,21 @@ def invert_pose(pose: Array, out: Array) -> None:
         for j in range(3):
             out[3 * i + j] = pose[3 * j + i]
         out[9 + i] = -(pose[i] * p0 + pose[3 + i] * p1 + pose[6 + i] * p2)
+
+
+@part
+def step_back(step: Array, pose: Array, spare: Array) -> None:
+    """A pose (12,) in one frame becomes that in the frame before, in which the former stands at ``step``."""
+    for i in range(12):
+        spare[i] = pose[i]
+    compose_poses(step, spare, pose)
+
+
+@part
+def set_identity(pose: Array) -> None:
+    """The pose of a frame in itself."""
+    for i in range(12):
+        pose[i] = 1.0 if i in (0, 4, 8) else 0.0
 
 
 @part

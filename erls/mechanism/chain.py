@@ -16,6 +16,7 @@ from erls.maths.so3 import Array
 from erls.mechanism.effects import ALL
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
+from erls.mechanism.loads import PointLoad
 from erls.mechanism.loops import Loop
 
 
@@ -46,6 +47,8 @@ class Mechanism:
         Whether that equilibrium may be unstable.
     loops : tuple of Loop
         Joints that close it.
+    loads : tuple of PointLoad
+        Forces and moments on nodes.
     effects : frozenset of str
         Names from `erls.mechanism.effects` that the equations of motion take into account.
     bandwidth : float or None
@@ -60,6 +63,7 @@ class Mechanism:
     static_start: bool = False
     allow_unstable: bool = False
     loops: tuple[Loop, ...] = ()
+    loads: tuple[PointLoad, ...] = ()
     effects: frozenset[str] = ALL
     bandwidth: float | None = None
 
@@ -67,6 +71,12 @@ class Mechanism:
     def parents(self) -> tuple[int, ...]:
         """Of every link the one that its joint stands on, -1 for the ground."""
         return tuple(joint.parent for joint in self.joints)
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times at which drives of the tree or loads jump, in rising order [s]."""
+        own = [joint.drive.breakpoints for joint in self.joints] + [load.breakpoints for load in self.loads]
+        return tuple(sorted({t for times in own for t in times}))
 
     def carried(self, number: int) -> list[int]:
         """A link and all that it bears, by their numbers."""

@@ -19,6 +19,7 @@ from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.compound_joints import fixed_joint
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, payload_invariants
+from erls.mechanism.loads import CENTRE, PointLoad
 from erls.mechanism.loops import LoopEnd
 from fe_import.model import IntArray
 
@@ -59,7 +60,7 @@ def is_split(mechanism: Mechanism) -> bool:
 
 
 def split(mechanism: Mechanism) -> Split:
-    """The mechanism of pieces; payloads, points and loops sit on the piece that carries their node."""
+    """The mechanism of pieces; payloads, points, loads and loops sit on the piece that carries their node."""
     ends = np.cumsum([0, *(max(1, len(link.pieces)) for link in mechanism.links)]).tolist()
     ranges = tuple(range(a, b) for a, b in itertools.pairwise(ends))
     places = tuple(_places(link, own) for link, own in zip(mechanism.links, ranges, strict=True))
@@ -86,6 +87,7 @@ def split(mechanism: Mechanism) -> Split:
         links=tuple(links),
         points=tuple(Point(p.name, *places[p.link][p.node].tolist()) for p in mechanism.points),
         loops=tuple(replace(loop, inner=moved(loop.inner), outer=moved(loop.outer)) for loop in mechanism.loops),
+        loads=tuple(moved for load in mechanism.loads for moved in _moved_loads(load, ranges, places)),
     )
     return Split(mechanism, pieces, ranges, places)
 
@@ -113,6 +115,18 @@ def _seat(mechanism: Mechanism, joint: Joint, ranges: Sequence[range], places: S
         return {"parent": ranges[joint.parent].start}
     piece = int(places[joint.parent][joint.seat.node, 0])
     return {"parent": piece, "seat": whole.pieces[piece - ranges[joint.parent].start].model.interface(joint.seat.name)}
+
+
+def _moved_loads(load: PointLoad, ranges: Sequence[range], places: Sequence[IntArray]) -> list[PointLoad]:
+    """A load on the piece that carries its node, or on the mass of all pieces, with the axes of the node of a piece."""
+    at = [(piece, CENTRE) for piece in ranges[load.link]]
+    if load.node != CENTRE:
+        at = [tuple(places[load.link][load.node].tolist())]
+    axes = load.axes
+    if axes is not None:
+        of_piece, of_node = places[axes[0]][axes[1]].tolist()
+        axes = of_piece, of_node
+    return [replace(load, link=piece, node=node, axes=axes) for piece, node in at]
 
 
 def _weld(link: Link, number: int, parent: int) -> Joint:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import io
 
 import numpy as np
 
+from erls.files.csv_table import write_table
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
 from erls.report.tables import table
@@ -69,9 +69,8 @@ def comparison_csv(comparison: Comparison) -> str:
                 columns += [(f"{name}: {label} {item}{a} [{unit}]", c) for a, c in zip(axes, components, strict=True)]
         columns.append((f"{name}: energy [J]", o.energy))
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([name for name, _ in columns])
-    writer.writerows(zip(*(map(repr, values.tolist()) for _, values in columns), strict=True))
+    rows = zip(*(map(repr, values.tolist()) for _, values in columns), strict=True)
+    write_table(out, [name for name, _ in columns], rows)
     return out.getvalue()
 
 

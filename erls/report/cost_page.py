@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import io
 
 import numpy as np
 
+from erls.files.csv_table import write_table
 from erls.maths.so3 import Array
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
@@ -38,19 +38,20 @@ def cost_csv(study: CostStudy) -> str:
     """Every run as one row."""
     front = set(map(id, study.front))
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(
-        ("formulation", "elastic_modes", "integrator", "effects", "knob", "value", "wall_s", "error_m", "steps",
-         "rhs_calls", "factorizations", "on_front", "failure", "warned_error_m")
-    )  # fmt: skip
+    head = (
+        *("formulation", "elastic_modes", "integrator", "effects", "knob", "value", "wall_s", "error_m", "steps"),
+        *("rhs_calls", "factorizations", "on_front", "failure", "warned_error_m"),
+    )
+    rows: list[tuple[object, ...]] = []
     for r in study.runs:
         s = r.setting
         modes = "all" if s.modes is None else s.modes
         figures = ("", "") if r.failure else (f"{r.wall_s:.6g}", f"{r.error:.6g}")
         work = (r.steps, r.rhs_calls, r.factorizations)
         cause = "" if r.failure is None else str(r.failure.cause)
-        writer.writerow((s.formulation, modes, s.integrator, s.effects, s.knob, f"{s.value:.6g}", *figures, *work,
-                         int(id(r) in front), cause, "" if r.failure else f"{r.foretold:.6g}"))  # fmt: skip
+        rows.append((s.formulation, modes, s.integrator, s.effects, s.knob, f"{s.value:.6g}", *figures, *work,
+                     int(id(r) in front), cause, "" if r.failure else f"{r.foretold:.6g}"))  # fmt: skip
+    write_table(out, head, rows)
     return out.getvalue()
 
 

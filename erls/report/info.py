@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -35,6 +37,7 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
     SceneError, FEImportError
         Not a file of this program, or a faulty one.
     """
+    _refuse_pipe(path)
     try:
         with path.open("rb") as file:
             start = file.read(len(_HDF5))
@@ -61,6 +64,15 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
         scene = load_scene(path)
         return _body_scene_info(scene) if isinstance(scene, BodyScene) else _scene_info(scene)
     return _link_info(load_link(path))
+
+
+def _refuse_pipe(path: Path) -> None:
+    """What is no file on a disk cannot be read twice, and a pipe that nobody writes to never ends."""
+    with contextlib.suppress(OSError, ValueError):  # reported by the readers
+        mode = path.stat().st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            message, remedy = "not a file but a pipe or device", "write it to a file, and give the path of that"
+            raise SceneError(Cause.NOT_READABLE, message, where=str(path), remedy=remedy)
 
 
 def _modal_info(model: ModalModel) -> tuple[dict[str, Any], str]:
@@ -106,6 +118,8 @@ def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
         ("joint", "type", "drive", "on", "link", "source"), rows
     )
     text += "\n\npoints: " + (", ".join(p.name for p in record.points) or "none")
+    if record.loads:
+        text += "\nloads: " + ", ".join(f"on {load.point or load.link}" for load in record.loads)
     if record.loops:
         kinds = [msgspec.to_builtins(x.drive)["type"] for x in record.loops]
         driven = ["" if kind == "free" else f", {kind}" for kind in kinds]

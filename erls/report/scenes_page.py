@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from pathlib import Path
 
 import numpy as np
 
+from erls.files.csv_table import write_table
 from erls.report.compare_page import distance_rows
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
@@ -47,12 +47,9 @@ def scenes_page(comparison: SceneComparison) -> str:
 def scenes_csv(comparison: SceneComparison) -> str:
     """One row for each formulation on each scene."""
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(
-        ["scene", "formulation", "deflection [m]", "size [m]", "departure [m]", "departure L / deflection^2"]
-    )
-    for d in comparison.departures:
-        writer.writerow([d.scene, d.formulation, *(repr(x) for x in (d.deflection, d.size, d.largest, d.share))])
+    head = ["scene", "formulation", "deflection [m]", "size [m]", "departure [m]", "departure L / deflection^2"]
+    figures = ((d, (d.deflection, d.size, d.largest, d.share)) for d in comparison.departures)
+    write_table(out, head, ([d.scene, d.formulation, *map(repr, found)] for d, found in figures))
     return out.getvalue()
 
 

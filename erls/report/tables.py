@@ -120,7 +120,7 @@ def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
         f"{s['integrator']}: {s['duration']:.6g} s in {s['steps']} steps, {s['rhs_calls']} evaluations, "
         f"{s['newton_iterations']} iterations, {s['factorizations']} factorizations, {s['wall_s']:.2f} s",
         f"energy: {s['energy']['initial']:.6g} J at the start, {s['energy']['final']:.6g} J at the end"
-        + (f", drift at most {drift:.2g} J" if drift is not None else " (driven or damped: not conserved)"),
+        + (f", drift at most {drift:.2g} J" if drift is not None else " (driven, loaded or damped: not conserved)"),
     ]
     lines += statement_lines(run)
     if run.failure is not None:

@@ -7,6 +7,7 @@ energies at even times.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,7 +36,9 @@ _OUTPUT_TIMES = 1001
 S = TypeVar("S", bound=SceneFile)
 
 
-def write_run(path: Path | str, run: Run, status: str = "") -> None:
+def write_run(
+    path: Path | str, run: Run, status: str = "", beside: Callable[[h5py.Group], None] | None = None
+) -> None:
     """Write a run, completely or not at all.
 
     Parameters
@@ -44,6 +47,8 @@ def write_run(path: Path | str, run: Run, status: str = "") -> None:
     run : Run
     status : str
         ``complete`` or the cause of the failure, unless given.
+    beside : callable, optional
+        Writes what else the file is to hold, instead of the curves for other programs.
 
     Raises
     ------
@@ -52,7 +57,15 @@ def write_run(path: Path | str, run: Run, status: str = "") -> None:
     """
     if not status:
         status = "complete" if run.failure is None else str(run.failure.cause)
-    write_atomically(path, lambda group: _fill(group, run, status), SceneError, Cause.NOT_WRITABLE)
+
+    def fill(group: h5py.Group) -> None:
+        _fill(group, run, status)
+        if beside is None:
+            _fill_output(group, run)
+        else:
+            beside(group)
+
+    write_atomically(path, fill, SceneError, Cause.NOT_WRITABLE)
 
 
 def _fill(group: h5py.Group, run: Run, status: str) -> None:
@@ -76,7 +89,6 @@ def _fill(group: h5py.Group, run: Run, status: str) -> None:
 
         assert isinstance(run, (BodyMotion, BodyRest))
         write_bodies(group, run)
-    _fill_output(group, run)
 
 
 def _fill_output(group: h5py.Group, run: Run) -> None:

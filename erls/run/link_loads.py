@@ -1,4 +1,6 @@
-"""Loads on one link during a run, in the axes of its mesh frame: joints, what it carries, how fast it turns."""
+"""Loads on one link during a run, in the axes of its mesh frame: joints, loads of the scene, what it carries, how fast
+it turns.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.equations.formulation import State
+from erls.equations.serial.state_series import StateSeries
 from erls.maths.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
 from erls.mechanism.loops import LoopEnd
+from erls.run.chain.loads import pull, wrenches
 from erls.run.chain.run import ChainRun
 
 _STEP = 1e-5  # s, of central differences: 1e-6 m/s² of rounding, and below 1 kHz 3e-4 of the acceleration
@@ -44,8 +48,8 @@ class _Carried:
 
 
 def link_loads(run: ChainRun, number: int, times: Array) -> LinkLoads:
-    """Loads on link ``number`` at times (k,): joint reactions, weight and inertia of payloads and motors on its
-    interfaces. A payload elsewhere on the link is left to the modes.
+    """Loads on link ``number`` at times (k,): joint reactions, loads of the scene, weight and inertia of payloads and
+    motors on its interfaces. A payload or a load elsewhere on the link is left to the modes.
 
     Parameters
     ----------
@@ -54,16 +58,17 @@ def link_loads(run: ChainRun, number: int, times: Array) -> LinkLoads:
     times : (k,) array
         Within the run [s].
     """
-    states = run.states(times)
+    series = run.series(times)
+    states = series.states()
     step = min(_STEP, (run.end - float(run.solution.t[0])) / 4)
     middle = np.clip(times, run.solution.t[0] + step, run.end - step)
     before, at, after = (run.states(middle + shift) for shift in (-step, 0.0, step))
-    loads = _joint_loads(run, number, times, states)
-    omega = np.empty((len(times), 3))
+    loads = _joint_loads(run, number, times, states) + _given_loads(run, number, series)
+    omega, pulls = np.empty((len(times), 3)), pull(run.formulation.mechanism, number, series)
     for k, three in enumerate(zip(before, at, after, strict=True)):
         omega[k] = _omega(three, number, step)
         for body in _carried(run, number):
-            loads[k, body.interface] += _weight_and_inertia(run, number, body, three, omega[k], step)
+            loads[k, body.interface] += _weight_and_inertia(run, number, body, three, omega[k], pulls[k], step)
     modal = np.array([s.modal[number] for s in states]).reshape(len(times), -1)
     return LinkLoads(modal, loads.reshape(len(times), -1), omega)
 
@@ -102,6 +107,18 @@ def _joint_loads(run: ChainRun, number: int, times: Array, states: list[State]) 
     return result
 
 
+def _given_loads(run: ChainRun, number: int, series: StateSeries) -> Array:
+    """(k, i, 6) what the loads of the scene do to the interfaces of a link."""
+    mechanism = run.formulation.mechanism
+    nodes = [i.node for i in mechanism.links[number].model.interface_nodes]
+    result = np.zeros((len(series.times), len(nodes), 6))
+    for load in mechanism.loads:
+        if load.link == number and load.node in nodes:
+            found = wrenches(mechanism, load, series) @ series.poses[number][:, :3, :3]
+            result[:, nodes.index(load.node)] += found.reshape(-1, 6)
+    return result
+
+
 def _end(run: ChainRun, state: State, end: LoopEnd) -> Array:
     """(3,) world position of the frame of a closing joint, which sits on its node."""
     return end.frame[:3, 3] if end.link is None else _place(run, state, end.link, end.node)
@@ -129,8 +146,9 @@ def _omega(three: tuple[State, State, State], number: int, step: float) -> Array
 
 
 def _weight_and_inertia(
-    run: ChainRun, number: int, body: _Carried, three: tuple[State, State, State], omega: Array, step: float
-) -> Array:
+    run: ChainRun, number: int, body: _Carried, three: tuple[State, State, State], omega: Array, gravity: Array,
+    step: float,
+) -> Array:  # fmt: skip
     """(6,) what a carried body does to its interface node: its weight minus its rate of momentum, mesh axes."""
     model = run.formulation.mechanism.links[number].model
     node = model.interface_nodes[body.interface].node
@@ -142,9 +160,8 @@ def _weight_and_inertia(
         frames.append(frame[:3, :3])
         centres.append(frame[:3, :3] @ (model.nodes[node] + body.offset + shape @ q) + frame[:3, 3])
         turned.append(rotation @ q)
-    gravity = run.formulation.mechanism.gravity
-    pull = gravity - (centres[0] - 2 * centres[1] + centres[2]) / step**2
-    force = body.mass * (frames[1].T @ pull)
+    pulled = gravity - (centres[0] - 2 * centres[1] + centres[2]) / step**2
+    force = body.mass * (frames[1].T @ pulled)
     spin = omega + (turned[2] - turned[0]) / (2 * step)
     faster = frames[1].T @ frames[2], frames[1].T @ frames[0]  # [α] + [ω]² = (R₊ - 2 R + R₋) / h² in the frame's axes
     twice = (faster[0] + faster[1] - 2 * np.eye(3)) / step**2

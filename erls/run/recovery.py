@@ -103,7 +103,7 @@ def export_recovery(
     values = _recovered(run, link, times, maps.quantity, static_correction)
     units = [f"{name} [{unit}]" for name, unit in zip(maps.components, UNITS[maps.quantity], strict=True)]
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        rows = csv.writer(file)
+        rows = csv.writer(file)  # numbers, below names of our own
         rows.writerow(["t [s]", "node", "element", "x [m]", "y [m]", "z [m]", *units])
         for time, places in zip(times.tolist(), values, strict=True):
             for node, element, row in zip(maps.nodes.tolist(), maps.elements.tolist(), places, strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from erls.mechanism.profiles import Load as Profile
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
 from erls.scene.records import Pose, Record, SceneFile, SceneTables
@@ -21,7 +22,7 @@ class Point(Record, frozen=True):
     Attributes
     ----------
     name : str
-        What reports, payloads and events call it.
+        What reports, payloads, loads and events call it.
     link : str
         The link that carries it.
     node : str
@@ -55,6 +56,43 @@ class Payload(Record, frozen=True):
     mass: float = 0.0
     inertia: Inertia = (0.0, 0.0, 0.0)
     offset: Vector = (0.0, 0.0, 0.0)
+
+
+class Load(Record, frozen=True):
+    """A force and a moment on a named point, a force all along a link, or one on all mass.
+
+    Attributes
+    ----------
+    point : str
+        A name from ``[[points]]``; give this or ``link``.
+    link : str
+        All of which bears the force; for ``force_per_length`` one made of beams.
+    force : (3,) floats
+        On the point [N].
+    moment : (3,) floats
+        On the point [N m]: an interface, or another node that turns.
+    force_per_length : (3,) floats
+        Along the link [N/m].
+    force_per_mass : (3,) floats
+        On all mass of the link, payloads and motors included, or of all links unless one is named [N/kg].
+    axes : str
+        Of force and moment: those of the ``world``, or the mesh axes of the ``link``, which turn with its inboard
+        interface.
+    follower : bool
+        They turn with the displaced node that they act on: they are given in the link's mesh axes as built.
+    factor : list of Load
+        Profiles over time, which add up and multiply all; they act in full at all times unless given.
+    """
+
+    point: str = ""
+    link: str = ""
+    force: Vector = (0.0, 0.0, 0.0)
+    moment: Vector = (0.0, 0.0, 0.0)
+    force_per_length: Vector = (0.0, 0.0, 0.0)
+    force_per_mass: Vector = (0.0, 0.0, 0.0)
+    axes: str = "world"
+    follower: bool = False
+    factor: tuple[Profile, ...] = ()
 
 
 class Event(Record, frozen=True):
@@ -124,6 +162,8 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
         What is reported and drawn, ``[[points]]``.
     payloads : list of Payload
         Rigid bodies on points, ``[[payloads]]``.
+    loads : list of Load
+        Forces and moments on points and links, ``[[loads]]``.
     initial : Initial
         How links start.
     loops : list of Loop
@@ -138,6 +178,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     base: Base = Base()
     points: list[Point] = []
     payloads: list[Payload] = []
+    loads: list[Load] = []
     initial: Initial = Initial()
     loops: list[Loop] = []
     events: list[Event] = []

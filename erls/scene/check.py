@@ -6,7 +6,7 @@ from erls.errors import SceneError
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.build_joints import GROUND, joint_coordinates
-from erls.scene.chain import Event, SceneRecord
+from erls.scene.chain import Event, Load, SceneRecord
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
@@ -18,6 +18,7 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
+AXES = ("world", "link")  # of loads
 # on one coordinate
 _ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
 
@@ -63,6 +64,8 @@ def check_scene(scene: SceneRecord, file: str) -> None:
             raise bad(f"{file}: points[{k}]", "give exactly one of 'node' and 'position'", point.name, remedy)
     for k, payload in enumerate(scene.payloads):
         choose(payload.point, [p.name for p in scene.points], f"{file}: payloads[{k}].point", SceneError)
+    for k, load in enumerate(scene.loads):
+        _check_load(load, scene, f"{file}: loads[{k}]")
     for k, loop in enumerate(scene.loops):
         _check_loop(loop, scene, f"{file}: loops[{k}]")
     for k, event in enumerate(scene.events):
@@ -80,6 +83,36 @@ def check_scene(scene: SceneRecord, file: str) -> None:
                 _check_feed_forward(coordinate, f"{file}: joints[{k}].coordinates.{name}")
         for k, loop in enumerate(scene.loops):
             _check_feed_forward(loop, f"{file}: loops[{k}]")
+
+
+_BORNE = {"point": ("force", "moment"), "link": ("force_per_length", "force_per_mass"), "mass": ("force_per_mass",)}
+
+
+def _check_load(load: Load, scene: SceneRecord, place: str) -> None:
+    if load.point and load.link:
+        raise bad(place, "give one of 'point' and 'link'", load.point, "remove the other")
+    choose(load.axes, AXES, f"{place}.axes", SceneError)
+    if load.point:
+        choose(load.point, [point.name for point in scene.points], f"{place}.point", SceneError)
+    if load.link:
+        choose(load.link, [link.name for link in scene.links], f"{place}.link", SceneError)
+    where = "point" if load.point else "link" if load.link else "mass"
+    given = [field for field in (*_BORNE["point"], *_BORNE["link"]) if any(getattr(load, field))]
+    if not given:
+        wanted = " or ".join(_BORNE[where])
+        raise bad(place, "no force" if where != "point" else "neither a force nor a moment", None, f"give {wanted}")
+    for field in given:
+        if field not in _BORNE[where]:
+            missing = "point" if field in _BORNE["point"] else "link"
+            here = f"a {where} bears none" if where != "mass" else f"'{missing}' is missing"
+            raise bad(f"{place}.{field}", here, getattr(load, field), f"name a {missing} for it, or remove it")
+    if where != "point" and len(given) > 1:
+        raise bad(f"{place}.{given[1]}", "one force for one load", getattr(load, given[1]), "make two loads of them")
+    if load.follower and (load.axes != "world" or "force_per_mass" in given):
+        field, message = ("axes", "a follower has the axes of its node")
+        if "force_per_mass" in given:
+            field, message = "follower", "mass turns with no node"
+        raise bad(f"{place}.{field}", message, getattr(load, field), "remove 'axes' or 'follower'")
 
 
 def _check_feed_forward(acting: Acting, place: str) -> None:

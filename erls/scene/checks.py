@@ -93,6 +93,12 @@ def not_negative(where: str, value: float, message: str = "must not be negative"
         raise bad(where, message, value, "give 0 or more")
 
 
+def check_wrench(where: str, force: Sequence[float], moment: Sequence[float]) -> None:
+    """A load has a force or a moment."""
+    if not any(force) and not any(moment):
+        raise bad(where, "neither a force nor a moment", None, "give one, or remove the load")
+
+
 def directed(where: str, axis: Sequence[float] | None) -> None:
     """An axis, if there is one, has a direction."""
     if axis is not None and not any(axis):

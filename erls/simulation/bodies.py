@@ -10,17 +10,20 @@ from erls.equations.nodal.redundant import refuse_open
 from erls.equations.nodal.scenes.build import Assembly, assemble
 from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
 from erls.equations.nodal.statics import Statics, solve_statics
+from erls.errors import Cause, SceneError
 from erls.integrate.choice import TIED_STEPS, body_options, compiling_steps
 from erls.integrate.constrained import ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.jit import announcing
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest, Modes, work
+from erls.run.file import self_contained
 from erls.run.watches.base import BodyPlan, Started
 from erls.run.watches.watching import Warnings, Watching
 from erls.scene.bodies.analyses import TANGENTS, AtRest, Buckling, Dynamics, Frequencies, StaticSteps
 from erls.scene.bodies.schema import BodyScene
 from erls.simulation.asked import Asked
+from erls.simulation.statements import with_statement
 
 
 def run_bodies(scene: BodyScene, asked: Asked) -> BodyMotion | BodyRest:
@@ -34,6 +37,9 @@ def run_bodies(scene: BodyScene, asked: Asked) -> BodyMotion | BodyRest:
         A failure or an interrupt; what was computed is in its attribute ``run``.
     """
     analysis = scene.record.simulation
+    if asked.until is not None:
+        message, remedy = "a run of bodies and beams cannot be extended", "simulate with a longer simulation.duration"
+        raise SceneError(Cause.BAD_FIELD, message, where="--until", value=asked.until, remedy=remedy)
     with announcing(asked.tell), compiling_steps(TIED_STEPS if isinstance(analysis, Dynamics) else None):
         assembly = assemble(scene)
     if isinstance(analysis, Dynamics):
@@ -53,13 +59,16 @@ def _stated(run: BodyMotion | BodyRest, asked: Asked) -> BodyMotion | BodyRest:
         return run
     from erls.accuracy.bodies import stated_bodies  # here: runs without a verdict need none of it
 
-    return stated_bodies(run)
+    return with_statement(run, stated_bodies)
 
 
 def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, asked: Asked) -> BodyMotion:
-    begun, warnings = time.perf_counter(), Warnings(asked.tell)
+    if asked.checkpoints is not None:
+        asked.checkpoints.identify(self_contained(scene))
+    checkpoint = asked.checkpoint(scene)
+    begun, warnings = time.perf_counter() - (0.0 if checkpoint is None else checkpoint.spent), Warnings(asked.tell)
     warnings(_redundancy(assembly))
-    watching = Watching(BodyPlan(scene), warnings, asked.watches())
+    watching = Watching(BodyPlan(scene), warnings, asked.watches(checkpoint))
 
     def run_of(found: ConstrainedSolution) -> BodyMotion:
         return BodyMotion(scene, assembly, time.perf_counter() - begun, tuple(warnings.texts), found)
@@ -67,9 +76,9 @@ def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, asked: Ask
     watching.begins(Started(analysis.duration, run_of))
     times = (0.0, analysis.duration)
     system = assembly.system
-    found = watching.ended(
-        lie_generalized_alpha(system, times, system.start, assembly.velocity, body_options(analysis), watching.observe)
-    )
+    options = replace(body_options(analysis), keeper=checkpoint)
+    start = system.start, assembly.velocity
+    found = watching.ended(lie_generalized_alpha(system, times, *start, options, watching.observe))
     assert isinstance(found, ConstrainedSolution)
     run = watching.judged(run_of(found))
     if assembly.left_out:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from erls.accuracy.kernels import kernels_of
 from erls.equations.registry import FORMULATIONS, formulate
 from erls.errors import SceneError
 from erls.integrate.base import Solution
+from erls.integrate.charts import joined
 from erls.integrate.choice import compile_kernels, compiled_steps, compiling_steps, integrator, options_of
 from erls.maths.beside import compiling_beside
 from erls.maths.jit import announcing
@@ -22,6 +24,7 @@ from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.simulation.asked import Asked
 from erls.simulation.kept import kept_to
+from erls.simulation.statements import with_statement
 from fe_import.description.records import LinkDescription
 from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
@@ -31,24 +34,33 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     """Build the mechanism of a scene and run it, with all effects that it names or those that ``auto`` chooses."""
     settings = scene.record.simulation
     choose(settings.formulation, FORMULATIONS, f"{scene.path}: simulation.formulation", SceneError)
+    if asked.until is not None:
+        from erls.simulation.extension import extended, refuse_time, refuse_unextendable  # here: it runs mechanisms
+
+        refuse_time(settings, asked.until)
     like, tell = asked.like, asked.tell
     built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
+    if asked.checkpoints is not None:
+        links = built.mechanism.links
+        asked.checkpoints.identify(scene, [part.model for link in links for part in (link, *link.pieces)])
     warnings = Warnings(tell)
     warnings(built.warnings)
-    run = partial(_run, asked=asked, warnings=warnings)
+    run = partial(run_mechanism, asked=asked, warnings=warnings)
     if settings.effects == "auto":
         from erls.auto.automatic import automatic  # here: most runs need none of it
 
         found = automatic(scene, built.mechanism, run, tell, asked.strict)
     else:
         found = run(scene, built.mechanism)
+    if asked.until is not None:
+        return extended(refuse_unextendable(found, asked.until), asked.until, asked)
     if not asked.verdict:
         return found
     from erls.accuracy.statement import stated  # here: runs without a verdict need none of it
 
     with announcing(tell):
-        found = stated(found)
+        found = with_statement(found, stated)
         if asked.strict:
             return kept_to(found, lambda other: run(other, _mechanism(other, found, tell)), tell)
     return found
@@ -70,24 +82,32 @@ def models_of(run: ChainRun) -> tuple[list[ModalModel], list[LinkDescription | N
     return [link.model for link in links], [link.description for link in links], pieces
 
 
-def _run(scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings) -> ChainRun:
-    """Run a mechanism as the scene says."""
+def run_mechanism(
+    scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings, before: ChainRun | None = None
+) -> ChainRun:
+    """Run a mechanism as the scene says, from the end of a run that was before it, if there is one."""
     settings, plan, told = scene.record.simulation, Plan(scene, mechanism), warnings.beside()
-    watching = Watching(plan, told, asked.watches())
+    checkpoint = asked.checkpoint(scene)
+    watching = Watching(plan, told, asked.watches(checkpoint))
     watching.before()
     later = kernels_of(mechanism, settings) if asked.verdict else ()
     steps = compiled_steps(mechanism, settings)
     with announcing(asked.tell), compiling_beside(*later), compiling_steps(steps):
         formulation = formulate(mechanism, settings)
         compile_kernels(formulation, settings)
-    y, v = formulation.initial_state()
-    begun = time.perf_counter()
+    if before is None:
+        start, spent, state = 0.0, 0.0, formulation.initial_state()
+    else:
+        start, spent, state = before.end, before.wall_s, (before.solution.y[-1], before.solution.v[-1])
+    begun = time.perf_counter() - spent - (0.0 if checkpoint is None else checkpoint.spent)
 
     def run_of(solution: Solution) -> ChainRun:
-        return ChainRun(scene, formulation, solution, time.perf_counter() - begun, tuple(told.texts))
+        whole = joined(None if before is None else before.solution, solution)
+        return ChainRun(scene, formulation, whole, time.perf_counter() - begun, tuple(told.texts))
 
-    watching.begins(Begun(settings.duration, run_of, plan, formulation))
+    since = start if checkpoint is None else max(start, checkpoint.since)
+    watching.begins(Begun(settings.duration, run_of, plan, formulation, since=since))
     integrate = integrator(mechanism, settings)
-    times, options = (0.0, settings.duration), options_of(settings)
-    solution = integrate(formulation, times, y, v, options, watching.observe)
+    times, options = (start, settings.duration), replace(options_of(settings), keeper=checkpoint)
+    solution = integrate(formulation, times, *state, options, watching.observe)
     return watching.judged(run_of(watching.ended(solution)))

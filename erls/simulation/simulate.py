@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from erls.run.chain.run import ChainRun
+from erls.run.checkpoints import Checkpoints
 from erls.run.record import Run
 from erls.scene.bodies.schema import BodyScene
 from erls.scene.build import Message
@@ -35,10 +36,11 @@ def simulate(
     *,
     progress: Progress | None = ...,
     tell: Message = ...,
-    checkpoint: Path | None = ...,
+    checkpoint: Path | Checkpoints | None = ...,
     strict: bool = ...,
     like: ChainRun | None = ...,
     verdict: bool = ...,
+    until: float | None = ...,
 ) -> ChainRun: ...
 
 
@@ -48,10 +50,11 @@ def simulate(
     *,
     progress: Progress | None = ...,
     tell: Message = ...,
-    checkpoint: Path | None = ...,
+    checkpoint: Path | Checkpoints | None = ...,
     strict: bool = ...,
     like: ChainRun | None = ...,
     verdict: bool = ...,
+    until: float | None = ...,
 ) -> Run: ...
 
 
@@ -60,10 +63,11 @@ def simulate(
     *,
     progress: Progress | None = None,
     tell: Message = lambda text: None,
-    checkpoint: Path | None = None,
+    checkpoint: Path | Checkpoints | None = None,
     strict: bool = False,
     like: ChainRun | None = None,
     verdict: bool = True,
+    until: float | None = None,
 ) -> Run:
     """Simulate a scene.
 
@@ -74,8 +78,10 @@ def simulate(
         Called with (time, duration) after each step.
     tell : callable, optional
         Told about each preparation that takes time, and every warning as soon as it is known.
-    checkpoint : Path, optional
-        Run file to which a long motion saves what it has, every 20 s of work.
+    checkpoint : Path or Checkpoints, optional
+        Run file to which a motion saves what it has from its first second of work on; with what was saved,
+        ``Checkpoints(path, saved=read_checkpoint(path))`` of `erls.run.checkpoints`, it goes on from there, and equals
+        the run that was not interrupted bit for bit on the same machine.
     strict : bool
         Whether to repeat a run whose stated error passes its tolerance with what keeps it, and to fail where nothing
         does.
@@ -85,6 +91,9 @@ def simulate(
     verdict : bool
         Whether the run states its error, ``accuracy``, and whether it can be relied on, ``trust``; nothing is computed
         for it otherwise.
+    until : float, optional
+        Go on up to this time [s] once the run has come to its end, with what was settled for it
+        (`erls.simulation.extension`).
 
     Returns
     -------
@@ -95,7 +104,7 @@ def simulate(
     Raises
     ------
     SceneError, FEImportError
-        Bad input: names file, field, value and remedy.
+        Bad input: names file, field, value and remedy; CHANGED: the checkpoint is of something else.
     SimulationError
         The integration failed or was interrupted: says when, why and what to try. What was computed is in its
         attribute ``run``.
@@ -111,4 +120,5 @@ def simulate(
     True
     """
     loaded = load_scene(scene) if isinstance(scene, (Path, str)) else scene
-    return RUNS[type(loaded)](loaded, Asked(progress, tell, checkpoint, strict, like, verdict))
+    saving = Checkpoints(checkpoint) if isinstance(checkpoint, Path) else checkpoint
+    return RUNS[type(loaded)](loaded, Asked(progress, tell, saving, strict, like, verdict, until))

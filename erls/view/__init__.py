@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from erls.files.output import check_writable, replacing
+from erls.files.results import MARK
 from erls.run.record import Run
 from erls.view.camera import Size
 from erls.view.checks import Progress, bad, check, drawing, no_picture, surveyed
@@ -23,8 +24,9 @@ from erls.view.window import Window
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+    from PIL.PngImagePlugin import PngInfo
 
-__all__ = ["film", "picture", "show", "write_view"]
+__all__ = ["film", "picture", "show", "view_kind", "write_view"]
 
 _INSTANTS = 6
 PICTURES = (".png", ".jpg", ".jpeg")
@@ -61,7 +63,18 @@ def picture(
     check(magnification, size, path, PICTURES)
     with replacing(path) as temporary:
         image = _picture(run, times, magnification, size)
-        image.save(temporary, **({"quality": 95} if temporary.suffix.lower() != ".png" else {"optimize": True}))
+        if temporary.suffix.lower() == ".png":
+            image.save(temporary, optimize=True, pnginfo=_remark())
+        else:
+            image.save(temporary, quality=95, comment=MARK)
+
+
+def _remark() -> PngInfo:
+    from PIL.PngImagePlugin import PngInfo
+
+    remark = PngInfo()
+    remark.add_text("Comment", MARK)
+    return remark
 
 
 def _picture(run: Run, times: Sequence[float] | None, magnification: float, size: Size) -> Image:
@@ -108,6 +121,21 @@ def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800)) -> None
         window.interact(f"{run.title}  ·  {displacement(run, magnification)}")
 
 
+def view_kind(path: Path | str) -> str:
+    """The ending of a name, in small letters, which says what is written.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (*PICTURES, *FILMS, ".pvd", ".csv"):
+        remedy = "end it in .png or .jpg (picture), .mp4 or .gif (film), .pvd (ParaView) or .csv (table)"
+        raise bad("-o", "the ending of the name does not say what to write", str(path), None, remedy)
+    return suffix
+
+
 def write_view(
     run: Run,
     path: Path | str,
@@ -141,10 +169,7 @@ def write_view(
     SimulationError
         NO_PICTURE.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (*PICTURES, *FILMS, ".pvd", ".csv"):
-        remedy = "end it in .png or .jpg (picture), .mp4 or .gif (film), .pvd (ParaView) or .csv (table)"
-        raise bad("-o", "the ending of the name does not say what to write", str(path), None, remedy)
+    suffix = view_kind(path)
     check_writable(path)
     if suffix in FILMS:
         if times is not None and len(times):

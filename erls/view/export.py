@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import re
 import shutil
 import xml.etree.ElementTree as ET
@@ -14,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from erls.errors import Cause, SceneError
+from erls.files.csv_table import write_table
 from erls.files.output import check_writable, not_writable, replacing, temporary_name
+from erls.files.results import MARK
 from erls.maths.so3 import Array
 from erls.run.record import Run
 from erls.view.figure import PartMesh
@@ -67,6 +68,7 @@ def export_paraview(
     figure = figure_of(run, magnification)
     poses = figure.poses(_times(run, times, _PARAVIEW_TIMES))
     root = ET.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
+    root.append(ET.Comment(f" {MARK} "))
     collection = ET.SubElement(root, "Collection")
     with replacing(target) as index, _replacing_folder(folder, path) as temporary:
         for number, pose in enumerate(poses):
@@ -90,8 +92,11 @@ def _write_mesh(mesh: PartMesh, data: dict[str, Any], path: Path) -> None:
 
 def _check_replaceable(folder: Path) -> None:
     """Refuse to replace a folder that holds anything but an earlier export."""
-    if not folder.exists():
-        return
+    try:
+        if not folder.exists():
+            return
+    except OSError as problem:  # too long a name
+        raise not_writable(folder, problem.strerror, "choose a shorter name") from None
     foreign = folder.name
     if folder.is_dir() and not folder.is_symlink():
         foreign = next((f.name for f in sorted(folder.iterdir()) if not _OURS.fullmatch(f.name)), "")
@@ -139,9 +144,7 @@ def export_csv(run: Run, path: Path | str, times: Sequence[float] | None = None)
     columns = run.columns(_times(run, times, _TABLE_TIMES))
     rows = np.column_stack(list(columns.values()))
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([format(value, ".17g") for value in row] for row in rows.tolist())
+        write_table(file, columns, ([format(value, ".17g") for value in row] for row in rows.tolist()))
 
 
 def _times(run: Run, times: Sequence[float] | None, count: int) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import subprocess
 import tempfile
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 
 from erls.errors import Cause, SimulationError
 from erls.files.output import replacing
+from erls.files.results import MARK
 from erls.maths.so3 import Array
 from erls.run.record import Run
 from erls.view.camera import Size
@@ -27,7 +29,10 @@ _MOST_FRAMES = 100_000
 # every frame of a .gif with its own 256 colours: nothing has to wait in memory for the last one
 _GIF = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"
 _CODECS = {
-    ".mp4": ["-c:v", "libx264", "-crf", "16", "-preset", "medium", "-pix_fmt", "yuv420p", "-movflags", "+faststart"],
+    ".mp4": [
+        *("-c:v", "libx264", "-crf", "16", "-preset", "medium", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
+        *("-metadata", f"comment={MARK}"),
+    ],
     ".gif": ["-filter_complex", _GIF, "-loop", "0"],
 }
 FILMS = tuple(_CODECS)
@@ -84,6 +89,16 @@ def film(
                 writer.add(sheet.image)
                 if progress is not None:
                     progress(k + 1, len(times))
+        if temporary.suffix.lower() == ".gif":
+            _remark(temporary)
+
+
+def _remark(path: Path) -> None:
+    """Put a comment before the end of a .gif; its encoder has none."""
+    text = MARK.encode()
+    with path.open("r+b") as file:
+        file.seek(-1, os.SEEK_END)
+        file.write(b"\x21\xfe" + bytes([len(text)]) + text + b"\x00\x3b")
 
 
 def _frame_times(run: Run, fps: int, speed: float, most: int) -> Array:

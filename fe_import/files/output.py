@@ -24,7 +24,7 @@ def check_writable(path: Path | str, error: type[ReportedError], cause: enum.Str
         target = Path(os.path.realpath(path))
         problem, remedy = _refusal(target) or ("", "")
     except (OSError, ValueError) as failure:
-        problem, remedy = str(failure), "choose another path"
+        problem, remedy = getattr(failure, "strerror", None) or str(failure), "choose another path"
     if problem:
         raise not_writable(path, problem, remedy, error, cause)
     return target
@@ -70,4 +70,7 @@ def _refusal(target: Path) -> tuple[str, str] | None:
         return "it is not a regular file", "choose another path"
     if not os.access(folder, os.W_OK | os.X_OK) or (target.exists() and not os.access(target, os.W_OK)):
         return "no permission", "choose another folder, or change its permissions"
+    trial = temporary_name(target)  # whatever else a file system has against it, and too long an ending
+    os.close(os.open(trial, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
+    trial.unlink()
     return None

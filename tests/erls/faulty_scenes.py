@@ -23,6 +23,7 @@ def torque(*profiles: dict[str, Any]) -> tuple[str, Any]:
 SLIDER = ("joints.0", {"name": "s", "type": "prismatic", "dh": {"convention": "standard"}})
 SECOND_JOINT = ("joints.1", {"name": "j", "dh": {"convention": "standard"}})
 SECOND_LINK = ("links.1", {"name": "m", "model": "link.toml"})
+LOAD = ("loads", [{"point": "tip", "force": [0.0, 0.0, 1.0]}])
 PAYLOAD = ("payloads", [{"point": "tip", "mass": 1.0}])
 
 # edits of the sound scene, place of the error, words in it
@@ -263,6 +264,70 @@ FAULTS: dict[str, tuple[list[tuple[str, Any]], str, str]] = {
             ("payloads.0.inertia", [1, 1, 1]),
         ],
         "payloads[0]",
+        "no rotation",
+    ),
+    # loads
+    "load on an unknown point": ([LOAD, ("loads.0.point", "hand")], "loads[0].point", "elbow, tip"),
+    "load of nothing": ([LOAD, ("loads.0.force", [0, 0, 0])], "loads[0]", "neither a force nor a moment"),
+    "load of nothing on nothing": ([("loads", [{"axes": "world"}])], "loads[0]", "force_per_mass"),
+    "load nowhere": ([LOAD, ("loads.0", {"force": [0, 0, 1]})], "loads[0].force", "'point' is missing"),
+    "load along nothing": ([("loads", [{"force_per_length": [0, 0, 1]}])], "force_per_length", "'link' is missing"),
+    "load on a point and a link": ([LOAD, ("loads.0.link", "l")], "loads[0]", "one of 'point' and 'link'"),
+    "two forces along a link": (
+        [("loads", [{"link": "l", "force_per_length": [0, 0, 1], "force_per_mass": [0, 0, 1]}])],
+        "loads[0].force_per_mass",
+        "two loads",
+    ),
+    "mass that follows": ([("loads", [{"force_per_mass": [0, 0, 1], "follower": True}])], "loads[0].follower", "mass"),
+    "load per length on a point": ([LOAD, ("loads.0.force_per_length", [0, 0, 1])], "force_per_length", "point"),
+    "force on a link": ([("loads", [{"link": "l", "force": [0, 0, 1]}])], "loads[0].force", "a link bears none"),
+    "load along an unknown link": (
+        [("loads", [{"link": "m", "force_per_length": [0, 0, 1]}])],
+        "loads[0].link",
+        "loads[0].link",
+    ),
+    "no load along a link": ([("loads", [{"link": "l"}])], "loads[0]", "give force_per_length or force_per_mass"),
+    "load along a solid link": (
+        [
+            ("links.0", {"name": "l", "modal_file": "solid.modal.h5"}),
+            ("loads", [{"link": "l", "force_per_length": [0, 0, 1]}]),
+        ],
+        "loads[0].link",
+        "made of beams",
+    ),
+    "load in unknown axes": ([LOAD, ("loads.0.axes", "body")], "loads[0].axes", "world, link"),
+    "follower in axes of the link": (
+        [LOAD, ("loads.0.axes", "link"), ("loads.0.follower", True)],
+        "loads[0].axes",
+        "axes of its node",
+    ),
+    "load inf": ([LOAD, ("loads.0.force", [0, INF, 0])], "loads[0].force[1]", "finite"),
+    "load moment NaN": ([LOAD, ("loads.0.moment", [0, 0, NAN])], "loads[0].moment[2]", "finite"),
+    "load of two numbers": ([LOAD, ("loads.0.force", [0, 1])], "loads[0].force", "3"),
+    "load on a node": ([LOAD, ("loads.0.node", "tip")], "loads[0].node", "node"),
+    "load of unknown shape": ([LOAD, ("loads.0.factor", [{"shape": "sine"}])], "loads[0].factor[0]", "sine_burst"),
+    "load that ends before it starts": (
+        [LOAD, ("loads.0.factor", [{"shape": "step", "start": 0.0, "value": 1.0, "end": -1.0}])],
+        "loads[0].factor[0].end",
+        "not after the start",
+    ),
+    "load from a faulty table": ([LOAD, ("loads.0.factor", [TABLE])], "load.csv", "number"),
+    "moment on a node without rotation": (
+        [
+            ("links.0", {"name": "l", "modal_file": "solid.modal.h5"}),
+            LOAD,
+            ("loads.0", {"point": "elbow", "moment": [0, 0, 1]}),
+        ],
+        "loads[0].moment",
+        "no rotation",
+    ),
+    "follower on a node without rotation": (
+        [
+            ("links.0", {"name": "l", "modal_file": "solid.modal.h5"}),
+            LOAD,
+            ("loads.0", {"point": "elbow", "force": [0, 0, 1], "follower": True}),
+        ],
+        "loads[0].follower",
         "no rotation",
     ),
     "unknown deformation": ([("initial.deformation", "relaxed")], "initial.deformation", "zero, static"),

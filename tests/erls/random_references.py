@@ -40,7 +40,7 @@ from erls.simulation.asked import Asked
 from erls.simulation.chains import run_chain
 from fe_import.errors import ReportedError
 
-MOST_STEPS, MOST_CALLS, MOST_NODAL_CALLS = 20_000, 120_000, 30_000
+MOST_STEPS, MOST_CALLS, MOST_NODAL_CALLS = 25_000, 150_000, 40_000
 MORE = 3  # times as much may references take
 TIGHTER, TIGHT = 100.0, 30.0
 _TIMES, _EVERY = 201, 20

@@ -61,8 +61,9 @@ def ratio(row: Row, part: str) -> float | None:
     """Stated over actual error; None where either is missing or the reference is in doubt by too much.
 
     Both are counted from `FLOOR` on, so that what is stated below it is enough for what is below it. Up to a stated
-    horizon the error is stated to be within the tolerance: that is what counts where the reference is in doubt later
-    on, and where the motion is farther off by then.
+    horizon the error is stated to be within the tolerance, and beyond it nothing is relied on: that is what counts
+    where the reference is in doubt later on, where the motion is farther off by then, and where it is farther off at
+    the end than the total says.
     """
     stated, actual = row.get("stated") or {}, (row.get("actual") or {}).get(part)
     error = judged(row, part)
@@ -80,9 +81,7 @@ def ratio(row: Row, part: str) -> float | None:
     if horizon is None:
         return whole
     before = over(row["tolerance"], horizon)
-    if whole is None or (before is not None and before < 1):
-        return before
-    return whole
+    return before if whole is None or (before is not None and min(whole, before) < 1) else whole
 
 
 def print_table(rows: list[Row], subjects: Sequence[str]) -> int:

@@ -43,6 +43,9 @@ HOLD = {
     "swing, nodes": ("l_shape/steel_tall.toml", ("simulation.formulation=nodal", "simulation.step=1e-3", SHORT)),
     "swing, static modes": ("l_shape/steel_tall.toml", ("simulation.bandwidth=500",)),
     "torque": ("l_shape/torque.toml", ()),
+    "follower force": ("beck/column.toml", ()),
+    "follower force, floating frames": ("beck/column.toml", ("simulation.formulation=ffr", SHORT)),
+    "follower force, nodes": ("beck/column.toml", ("simulation.formulation=nodal", "simulation.step=5e-4", SHORT)),
     "torque, steps": ("l_shape/torque.toml", (*ALPHA, "simulation.step=1e-3")),
     "torque, coarse steps": ("l_shape/torque.toml", (*ALPHA, "simulation.step=1e-2")),
     "torque, most damping": (
@@ -147,6 +150,15 @@ def test_a_wrong_power_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """A torque that gives a tenth more than the equations say."""
     run = simulated("l_shape/torque.toml")
     monkeypatch.setattr("erls.accuracy.energy_balance.known_power", lambda *at: 1.1 * known_power(*at))
+    assert breaches(run) == {"energy"}
+
+
+@pytest.mark.parametrize("name", ["erls", "ffr"])
+def test_power_of_a_load_that_is_forgotten_is_told(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """A follower force, of which the balance of energy knows."""
+    run = simulated("beck/column.toml", (f"simulation.formulation={name}", SHORT))
+    assert not breaches(run)
+    monkeypatch.setattr(SerialFormulation, "load_power", lambda self, t, y, v: np.zeros(len(t)))
     assert breaches(run) == {"energy"}
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scenes
 from body_scenes_data import PENDULUM, STRIP, body_scene
+from checkpoint_times import at_every_look
 
 import erls
 from erls.errors import Cause, SceneError
@@ -121,7 +122,7 @@ def test_files_need_nothing_else(tmp_path: Path) -> None:
 
 def test_checkpoints_and_interrupts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A long motion saves what it has."""
-    monkeypatch.setattr("erls.run.watches.progress.CHECKPOINT_S", 0.0)
+    at_every_look(monkeypatch)
     told: list[float] = []
     erls.simulate(body_scene(tmp_path, PENDULUM), checkpoint=tmp_path / "p.h5", progress=lambda t, d: told.append(t))
     assert told[-1] == pytest.approx(0.2)

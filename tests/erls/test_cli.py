@@ -17,6 +17,7 @@ import scenes
 
 from erls.cli.main import main
 from erls.errors import Cause
+from erls.files.results import claim
 from fe_import.modal.file import read_modal_file
 
 SIMULATE = {
@@ -246,6 +247,7 @@ def test_compare_writes_what_it_prints(folder: Path, capsys: pytest.CaptureFixtu
     stored = json.loads((folder / "c.json").read_text(encoding="utf-8"))
     walls = [o["formulations"][n].pop("wall_s") for o in (found, stored) for n in ("erls", "erls-minimum-norm")]
     assert min(walls) > 0
+    assert stored.pop("written_by") == "erls"
     assert found == {**stored, "output": "c.json"}
     (pair,) = found["pairs"]
     assert (pair["a"], pair["b"], pair["as_expected"]) == ("erls", "erls-minimum-norm", True)
@@ -254,6 +256,8 @@ def test_compare_writes_what_it_prints(folder: Path, capsys: pytest.CaptureFixtu
     assert shown in out
     assert f"<td>{shown}</td>" in (folder / "c.html").read_text(encoding="utf-8")
     run(capsys, *arguments, "c.csv")
+    for name in ("c.json", "c.html", "c.csv"):
+        claim(Path(name), Path(name).suffix, [])  # a result of this command, which the next may replace
     assert (folder / "c.csv").read_text(encoding="utf-8").startswith("t [s],erls: position elbow x [m]")
 
 

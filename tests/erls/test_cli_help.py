@@ -13,16 +13,18 @@ import pytest
 from erls.cli.main import main
 
 OPTIONS = {
-    "reduce": ["--output", "-o", "--method", "--modes", "--json"],
-    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict", "--json"],
-    "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--json"],
+    "reduce": ["--output", "-o", "--method", "--modes", "--force", "--json"],
+    "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict",
+                 "--resume", "--until", "--force", "--json"],
+    "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--force", "--json"],
     "study modes": ["--output", "-o", "--counts", "--link", "--tolerance", "--load-tolerance", "--frequency-tolerance",
-                    "--beside", "--set", "--workers", "--json"],
+                    "--beside", "--set", "--workers", "--force", "--json"],
     "study cost": ["--output", "-o", "--tolerance", "--formulations", "--modes", "--integrators", "--effects",
-                   "--points", "--norm", "--reference", "--budget", "--apply", "--set", "--workers", "--json"],
+                   "--points", "--norm", "--reference", "--budget", "--apply", "--set", "--workers", "--force",
+                   "--json"],
     "effects": ["--set", "--json"],
     "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--json"],
+    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--force", "--json"],
 }
 
 

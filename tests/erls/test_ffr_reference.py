@@ -25,7 +25,7 @@ EULER = {"theory": "euler-bernoulli", "torsion": "polar"}
 
 def _table(name: str) -> dict[str, Array]:
     path = Path(__file__).parents[1] / "data" / f"{name}.csv"
-    comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    comments = [line for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
     columns = comments[-1].lstrip("# ").split(",")
     return dict(zip(columns, np.loadtxt(path, delimiter=",").T, strict=True))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -22,11 +23,11 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSI
 START = """
 import sys
 import erls.scene.build
-import erls.run.watches.progress
+import erls.run.watches.checkpoint
 from erls.cli.main import main
 from erls.cli.terminal import Progress
 
-erls.run.watches.progress.CHECKPOINT_S = {checkpoint}
+erls.run.watches.checkpoint.FIRST_S = {checkpoint}
 advance = Progress.advance
 
 def tell(self, done, total):
@@ -78,7 +79,7 @@ def until(condition: Callable[[], bool]) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stopped_simulation_keeps_what_it_computed(folder: Path, number: int) -> None:
-    """Ctrl-C and a polite kill: exit code 130, a run file that loads, nothing else; one JSON object."""
+    """Ctrl-C and a polite kill: exit code 130, a run file that loads, the last checkpoint; one JSON object."""
     process = start(folder, "simulate", "scene.toml", "-o", "r.h5", "--json", checkpoint=0.2)
     wait(process, "stepping")
     until(lambda: (folder / "r.h5.partial").exists())
@@ -89,7 +90,8 @@ def test_a_stopped_simulation_keeps_what_it_computed(folder: Path, number: int) 
     assert out.count("\n") == 1
     assert "what was computed, up to t = " in err
     assert "Traceback" not in err
-    assert sorted(p.name for p in folder.iterdir()) == ["link.toml", "r.h5", "scene.toml"]
+    assert "erls simulate scene.toml --resume r.h5 goes on" in err
+    assert sorted(p.name for p in folder.iterdir()) == ["link.toml", "r.h5", "r.h5.partial", "scene.toml"]
     run = load_run(folder / "r.h5")
     assert run.failure is not None
     assert run.failure.cause == Cause.INTERRUPTED
@@ -153,3 +155,18 @@ def test_a_stopped_reduction_on_the_fly_leaves_nothing(folder: Path, monkeypatch
     assert (process.returncode, out) == (130, "")
     assert err.splitlines()[-1].startswith("error: ")
     assert not [p for p in folder.rglob("*") if p.suffix in (".h5", ".tmp", ".partial")]
+
+
+@pytest.mark.skipif(os.environ.get("ERLS_JIT") == "0", reason="nothing is compiled")
+def test_a_kill_while_kernels_are_compiled(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exit code 130; neither a run nor half a file of compiled code."""
+    monkeypatch.setenv("ERLS_KERNELS", str(folder / "kernels"))
+    process = start(folder, "simulate", "scene.toml", "-o", "r.h5")
+    until(lambda: any((folder / "kernels").rglob("*.nbc")))
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert err.splitlines()[-1] == "error: interrupted; start again"
+    assert "Traceback" not in err
+    assert sorted(p.name for p in folder.iterdir()) == ["kernels", "link.toml", "scene.toml"]
+    assert {p.suffix for p in (folder / "kernels").rglob("*") if p.is_file()} <= {".nbc", ".nbi"}

@@ -303,6 +303,24 @@ def test_conditions_left_out_are_watched(tmp_path: Path) -> None:
     assert caught.value.cause == Cause.LOOP_OPEN
 
 
+@pytest.mark.parametrize("formulation", ["erls", "ffr", "nodal"])
+def test_loops_that_do_not_fit_to_the_last_digit(tmp_path: Path, formulation: str) -> None:
+    """A pivot 0.1 nm out of the plane, in which nothing moves: assembled, told, and the motion of one that fits."""
+    data = loop_scenes.four_bar()
+    fits = loop_scenes.run(tmp_path, data, duration=0.02, formulation=formulation)
+    data["loops"][0]["position"][1] = 1e-10
+    run = loop_scenes.run(tmp_path, data, duration=0.02, formulation=formulation)
+    at = np.linspace(0.0, 0.02, 5)
+    gap = np.abs(run.position("coupler tip", at) - fits.position("coupler tip", at)).max()
+    assert gap < 2e-10  # the plane moves by less than the gap
+    if formulation != "nodal":
+        assert any("leave 1e-10 m open, within the assembly tolerance of 4.5e-09 m" in text for text in run.warnings)
+    data["loops"][0]["position"][1] = 1e-8
+    with pytest.raises(SimulationError, match="stays open") as caught:
+        loop_scenes.run(tmp_path, data, formulation=formulation)
+    assert caught.value.cause == Cause.LOOP_OPEN
+
+
 def test_joints_near_the_ground_keep_their_start(tmp_path: Path) -> None:
     """Whatever the guess, the crank stays where it was put, and rates of the others follow."""
     data = loop_scenes.four_bar()

@@ -55,7 +55,8 @@ def _swing(system: NodalSystem, end: float, step: float, matrix: str = "auto") -
 
 def _distance(found: ConstrainedSolution) -> float:
     """Largest distance of the tip from the reference [m]."""
-    names = [line for line in DATA.read_text().splitlines() if line.startswith("#")][-1].lstrip("# ").split(",")
+    text = DATA.read_text(encoding="utf-8")
+    names = [line for line in text.splitlines() if line.startswith("#")][-1].lstrip("# ").split(",")
     table = dict(zip(names, np.loadtxt(DATA, delimiter=",").T, strict=True))
     times = table["t"][table["t"] <= found.t[-1]]
     exact = np.stack([table[f"steel_tall_{axis}"][: len(times)] for axis in "xyz"], axis=1)

@@ -166,7 +166,7 @@ def test_closer_than_truncation(path: Path, overrides: list[str], bandwidth: flo
 
 def test_payload_on_the_robot(tmp_path: Path) -> None:
     """Interface loads: half the arm's mass at its end, off the axis. Positions, joint torques, reactions."""
-    text = ROBOT.read_text().replace("links/arm.toml", str(ROBOT.parent / "links/arm.toml"))
+    text = ROBOT.read_text(encoding="utf-8").replace("links/arm.toml", str(ROBOT.parent / "links/arm.toml"))
     text += '[[payloads]]\npoint = "end2"\nmass = 0.07\noffset = [0.0, 0.03, 0.02]\n'
     path = tmp_path / "loaded.toml"
     path.write_text(text)

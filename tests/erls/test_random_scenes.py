@@ -23,12 +23,11 @@ FAULTY = (879, 1216)
 
 WORK = 0.25
 STORED = ROOT / "tests/data/random_scenes.csv"
-UNCOVERED = frozenset({174, 180, 199, 270, 285})
-"""Seeds whose stated total is below the actual one: more than the one in a hundred that is aimed at.
+UNCOVERED = frozenset({174, 199, 270, 285})
+"""Seeds whose stated total is below the actual one: 1.3 % of all, where 1 % is aimed at.
 
-270 and 285 are nearly chaotic: what modes leave out grows faster than it is followed. In 199, that spins fast, joints
-drift six times as far as is found; in 174 friction decides within the first hundredth of the run; in 180 steps are off
-by 2e-7 m where 7e-8 are found.
+In 174 and 285 friction decides what becomes of a small disturbance; in 199, that spins fast, and in 270 joints drift
+farther than is found.
 """
 
 
@@ -68,7 +67,7 @@ def _check_statement(row: dict[str, Any]) -> None:
 
 
 def test_few_statements_are_too_low() -> None:
-    assert len(UNCOVERED) <= len(SEEDS) / 50
+    assert len(UNCOVERED) <= len(SEEDS) / 75
 
 
 def test_a_seed_gives_the_same_scene() -> None:

@@ -111,7 +111,7 @@ def test_the_outer_joint_loads_the_inner_link(tmp_path: Path) -> None:
     assert moment < 2e-3
 
 
-def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any]) -> ChainRun:
+def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any], **more: Any) -> ChainRun:
     """A straight arm of 40 elements along x, turned about z at a constant rate, with a payload on its tip.
 
     Strongly damped: what the sudden centrifugal force stirs up is gone after 10 ms.
@@ -136,17 +136,51 @@ def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any]) 
         "links": [{"name": "a", "model": "arm.toml", "mesh_pose": {"frame": "joint"}, "damping": {"ratio": 0.7}}],
         "points": [{"name": "end", "link": "a", "node": "tip"}],
         "payloads": [{"point": "end", **payload}],
+        **more,
     }
     return erls.simulate(scenes.write_toml(folder / "turning.toml", data))
 
 
-def test_a_payload_at_rest_loads_the_tip(tmp_path: Path) -> None:
-    """Shear is its weight, bending and torsion follow from its offset; 1/80 of the arm's own 5.3 N is the element's."""
-    run = turning(tmp_path, 0.0, 9.81, {"mass": 2.0, "offset": [0.03, 0.02, 0.0], "inertia": [1e-3, 1e-3, 1e-3]})
+@pytest.mark.parametrize("given", ["gravity", "load"])
+def test_a_payload_at_rest_loads_the_tip(tmp_path: Path, given: str) -> None:
+    """Shear is its weight, bending and torsion follow from its offset; 1/80 of the arm's own 5.3 N is the element's.
+
+    A load on all mass in place of gravity does the same.
+    """
+    payload = {"mass": 2.0, "offset": [0.03, 0.02, 0.0], "inertia": [1e-3, 1e-3, 1e-3]}
+    if given == "gravity":
+        run = turning(tmp_path, 0.0, 9.81, payload)
+    else:
+        run = turning(tmp_path, 0.0, 0.0, payload, loads=[{"force_per_mass": [0.0, 0.0, -9.81]}])
     weight = 2.0 * 9.81
     found = at_node(run, "a", np.array([0.0, 0.01]), "tip")
     expected = np.array([0.0, 0.0, -weight, -0.02 * weight, 0.03 * weight, 0.0])
     np.testing.assert_allclose(found, np.tile(expected, (2, 1)), atol=1.1 * 5.3 / 80)
+
+
+@pytest.mark.parametrize("given", [{}, {"axes": "link"}, {"follower": True}])
+def test_a_load_at_rest_loads_the_tip(tmp_path: Path, given: dict[str, object]) -> None:
+    """Force and moment at the tip of a cantilever, from two modes: what the load is there, and at the clamp its
+    reaction, to what the turn of the tip makes of it (0.5 mrad).
+    """
+    scenes.l_link(tmp_path, 4, **ENDS)
+    force, moment = [1.0, -2.0, 3.0], [0.4, 0.3, -0.2]
+    joint = {**scenes.L_SCENE["joints"][0], "type": "fixed"}
+    path = scenes.l_scene(
+        tmp_path,
+        joints=[joint],
+        links=[{"name": "l", "model": "link.toml", "elastic_modes": 2}],
+        loads=[{"point": "tip", "force": force, "moment": moment, **given}],
+        gravity=[0.0, 0.0, 0.0],
+        initial={"deformation": "static"},
+        simulation={"duration": 1e-3, "step": 1e-3},
+    )
+    run = erls.simulate(path)
+    t = np.zeros(1)
+    expected = np.array([[-2.0, -1.0, 3.0, 0.3, -0.4, -0.2]])  # the last leg lies along y
+    assert max(relative(at_node(run, "l", t, "tip"), expected)) < 2e-3
+    reaction = -in_link_axes(run, 0, "shoulder", t)
+    assert max(relative(at_node(run, "l", t, "root"), reaction)) < 2e-3
 
 
 def test_a_turning_payload_pulls(tmp_path: Path) -> None:

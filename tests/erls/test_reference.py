@@ -21,7 +21,7 @@ EULER = {"theory": "euler-bernoulli"}
 
 def _table(name: str) -> dict[str, np.ndarray]:
     path = Path(__file__).parents[1] / "data" / f"{name}.csv"
-    lines = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
     columns = lines[-1].lstrip("# ").split(",")
     values = np.loadtxt(path, delimiter=",")
     return dict(zip(columns, values.T, strict=True))

@@ -74,7 +74,7 @@ def test_several_rigid_links_against_recursion(tmp_path: Path, kind: str, gauge:
     With payload; rotor inertia and motors on the way.
     """
     path = _chain(tmp_path, False, kind)
-    text = path.read_text().replace('"name" = "j2"', '"name" = "j2", "motor" = { rotor_inertia = 1e-4, '
+    text = path.read_text(encoding="utf-8").replace('"name" = "j2"', '"name" = "j2", "motor" = { rotor_inertia = 1e-4, '
                                     "gear_ratio = 50.0, mass = 0.3, inertia = [1e-4, 1e-4, 2e-4] }")  # fmt: skip
     path.write_text(text)
     chain = scenes.mechanism(path)

@@ -18,7 +18,8 @@ from erls.report.runs import run_report
 from erls.run.record import Run
 from erls.view import picture, write_view
 
-SCENES = [p for p in sorted((scenes.ROOT / "data").rglob("*.toml")) if "simulation" in tomllib.loads(p.read_text())]
+_FILES = sorted((scenes.ROOT / "data").rglob("*.toml"))
+SCENES = [p for p in _FILES if "simulation" in tomllib.loads(p.read_text(encoding="utf-8"))]
 
 
 def _changes(path: Path) -> list[str]:
@@ -63,7 +64,7 @@ def test_one_front_end(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert (np.ptp(drawn, axis=2) > 40).sum() > 50
     for name in ("a.csv", "a.pvd"):
         write_view(loaded, tmp_path / name, times=[run.end])
-    head, row = (tmp_path / "a.csv").read_text().splitlines()
+    head, row = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
     assert head.split(",")[0].startswith(run.axis.symbol)
     assert np.isfinite([float(x) for x in row.split(",")]).all()
     assert list((tmp_path / "a_files").iterdir())

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from checkpoint_times import at_every_look
 
 import erls
 from erls.cli.main import main
@@ -237,8 +238,7 @@ def test_breakpoints_of_drives_are_knots(tmp_path: Path, integrator: str) -> Non
 
 def test_checkpoints(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A long run saves what it has; the file loads, is marked unfinished, and gives the same answers."""
-    monkeypatch.setattr("erls.run.watches.progress.CHECKPOINT_S", 0.0)
-    monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 11)
+    at_every_look(monkeypatch)
     partial, found = tmp_path / "r.h5.partial", []
 
     def look(t: float, end: float) -> None:
@@ -258,10 +258,10 @@ def test_the_command_line_removes_its_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Once the run itself is written; also after a failure. One from before stays until then."""
-    monkeypatch.setattr("erls.run.watches.progress.CHECKPOINT_S", 0.0)
-    monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 11)
+    at_every_look(monkeypatch)
     output, partial = tmp_path / "r.h5", tmp_path / "r.h5.partial"
-    partial.write_text("from a run that was killed", encoding="utf-8")
+    assert main(["simulate", str(scene(tmp_path)), "-o", str(output)]) == 0
+    output.rename(partial)  # as a run that was killed leaves it
     assert main(["simulate", str(scene(tmp_path)), "-o", str(output), "--set", "links.l.model=nix.toml"]) == 2
     assert partial.exists()
     assert main(["simulate", str(scene(tmp_path)), "-o", str(output)]) == 0
@@ -274,7 +274,7 @@ def test_a_checkpoint_that_cannot_be_written_does_not_end_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A full disk may have room again at the end."""
-    monkeypatch.setattr("erls.run.watches.progress.CHECKPOINT_S", 0.0)
+    at_every_look(monkeypatch)
     messages: list[str] = []
     path = scene(tmp_path)
     run = erls.simulate(path, tell=messages.append, checkpoint=tmp_path / "nix" / "r.partial")

@@ -164,7 +164,8 @@ def test_frequencies_of_turning_beams(tmp_path: Path, kind: type) -> None:
 
 def _table(name: str) -> dict[str, np.ndarray]:
     path = Path(__file__).parents[1] / "data" / f"{name}.csv"
-    columns = [line for line in path.read_text().splitlines() if line.startswith("#")][-1].lstrip("# ").split(",")
+    text = path.read_text(encoding="utf-8")
+    columns = [line for line in text.splitlines() if line.startswith("#")][-1].lstrip("# ").split(",")
     return dict(zip(columns, np.loadtxt(path, delimiter=",").T, strict=True))
 
 

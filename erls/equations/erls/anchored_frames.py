@@ -14,6 +14,8 @@ no velocity.
 
 from __future__ import annotations
 
+from typing import Any
+
 from erls.equations.erls.records import (
     BEND_STATE,
     LINK,
@@ -37,7 +39,7 @@ from erls.equations.serial.records import (
 from erls.maths.jit import part
 from erls.maths.products import copy
 from erls.maths.so3 import Array
-from erls.maths.spatial import add_motion_cross, compose_poses, rotate_back, transform_motion
+from erls.maths.spatial import add_motion_cross, compose_poses, rotate_back, step_back, transform_motion
 from fe_import.model import IntArray
 
 
@@ -135,3 +137,18 @@ def set_pose(serial: Serial, chain: Chain, reals: Array, integers: IntArray, scr
         compose_poses(moved.pose, pose, whole)
     else:
         copy(pose, whole)
+
+
+@part
+def to_world(
+    serial: Serial, chain: Chain, reals: Array, integers: IntArray, scratch: Array, k: int, pose: Array, spare: Array,
+    bends: Any,
+) -> None:  # fmt: skip
+    """A pose (12,) in the frame of link k becomes that in the world, after frames were moved."""
+    while k >= 0:
+        step = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose
+        if bends is not None:
+            set_pose(serial, chain, reals, integers, scratch, k)
+            step = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).pose
+        step_back(step, pose, spare)
+        k = read_link(reals, integers, chain.links + k * LINK).parent

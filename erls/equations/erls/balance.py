@@ -16,6 +16,7 @@ from erls.equations.erls.records import (
     LINK,
     LINK_STATE,
     Chain,
+    call_loads,
     read_chain,
     read_link,
     read_link_state,
@@ -124,6 +125,8 @@ def balance(
     else:
         move_anchored(serial, chain, reals, integers, scratch, t, y, v, a)
     _forces_of_links(serial, chain, reals, integers, scratch, len(a) > 0, bends)
+    if serial.loads >= 0:
+        call_loads(serial.loads, at, reals, integers, scratch, t, y, v, out)
     for k in range(serial.links - 1, -1, -1):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         motion = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)

@@ -9,32 +9,28 @@ from __future__ import annotations
 from typing import Any
 
 from erls.equations import compiled_system as contract
-from erls.equations.erls.anchored_frames import move_anchored, set_pose
+from erls.equations.erls.anchored_frames import move_anchored, to_world
 from erls.equations.erls.balance import hand_back, push_joint
 from erls.equations.erls.frames import move_frames
 from erls.equations.erls.records import (
-    BEND_STATE,
     LINK,
     LINK_STATE,
     Chain,
-    read_bend_state,
     read_chain,
     read_link,
     read_link_state,
 )
 from erls.equations.serial.ends import END, END_STATE, column_of, move_end, read_end, read_end_state
 from erls.equations.serial.records import (
-    JOINT_STATE,
     MODES,
     Serial,
-    read_joint_state,
     read_modes,
     read_serial,
 )
 from erls.maths.jit import kernel, part
-from erls.maths.products import clear, copy
+from erls.maths.products import clear
 from erls.maths.so3 import Array
-from erls.maths.spatial import compose_poses, transform_force_back
+from erls.maths.spatial import transform_force_back
 from fe_import.model import IntArray
 
 
@@ -47,17 +43,8 @@ def _move_end(
     end = read_end(reals, integers, chain.ends + number * END)
     moved = read_end_state(scratch, integers, chain.end_states + number * END_STATE)
     state = read_link_state(scratch, integers, chain.states + end.link * LINK_STATE)
-    pose = found[:12]
     move_end(end, moved, state.q, state.q_rate, state.q_acceleration, state.twist, state.twist_rate, found[:24])
-    k = end.link
-    while k >= 0:
-        copy(pose, moved.spare)
-        step = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose
-        if bends is not None:
-            set_pose(serial, chain, reals, integers, scratch, k)
-            step = read_bend_state(scratch, integers, chain.bend_states + k * BEND_STATE).pose
-        compose_poses(step, moved.spare, pose)
-        k = read_link(reals, integers, chain.links + k * LINK).parent
+    to_world(serial, chain, reals, integers, scratch, end.link, found[:12], moved.spare, bends)
 
 
 @part

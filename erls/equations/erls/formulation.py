@@ -67,7 +67,9 @@ class Erls(SerialFormulation):
         """See `erls.equations.formulation.Modular`."""
         own = f"erls.equations.erls.{'stiffened_' if self.stiffened else ''}"
         seen = self._module("energy"), self._module("states")
-        return tuple(dict.fromkeys((f"{own}residual", f"{own}mass_matrix", *seen, "erls.equations.serial.stiffness")))
+        loads = ("erls.equations.erls.loads",) if self.mechanism.loads else ()
+        every = f"{own}residual", f"{own}mass_matrix", *seen, *loads, "erls.equations.serial.stiffness"
+        return tuple(dict.fromkeys(every))
 
     @cached_property
     def length_scales(self) -> Array:

@@ -13,6 +13,7 @@ from erls.equations.serial import pack, segments
 from erls.equations.serial.condensed import condensed as elimination_memory
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.ends import end_state
+from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.modal_inertia_kernels import warp_record, warp_state
 from erls.equations.serial.nodes import RESTING, Node, node_record, node_state
@@ -276,9 +277,10 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
             constants,
             [pack.modes_record(int(firsts[k]), masses[k][6:, 6:], links[k], decoupled[k]) for k in range(count)],
         ),
-        **pack.addresses(mechanism),
+        **pack.addresses(mechanism, own.call_loads),
         rigid_links=rigid,
         rigid_states=rigid_state,
+        **put_loads(mechanism, [shape.modes for shape in found], curved, constants, scratch),
         own=0,
         gravity=mechanism.gravity,
     )

@@ -9,8 +9,12 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from erls.equations.serial.loads import LOADS
+from erls.maths.calls import caller
 from erls.maths.records import Matrix, Stack, reader, room, table_size
 from erls.maths.so3 import Array
+
+call_loads = caller(LOADS, "erls.equations.erls.loads:loads")
 
 
 class Chain(NamedTuple):

@@ -148,7 +148,7 @@ def joint_loops(given: Given) -> list[Loop]:
 def pack_absolute(given: Given, metres: Array) -> CompiledLoops:
     """Links as they float, with their joints as conditions; see `floating`."""
     loops = joint_loops(given)
-    system = pack_frames(replace(given, every_axis=True, ends=loop_ends(loops)))
+    system = pack_frames(replace(given, every_axis=True, absolute=True, ends=loop_ends(loops)))
     serial = _see_serial(system.reals, system.integers, int(system.integers[0]))
     count = len(loops)
     n = 6 * count + sum(data.size for data in given.data)

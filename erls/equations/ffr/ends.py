@@ -7,7 +7,7 @@ as all forces do.
 from __future__ import annotations
 
 from erls.equations import compiled_system as contract
-from erls.equations.ffr.motion import move_frames
+from erls.equations.ffr.motion import move_frames, to_world
 from erls.equations.ffr.records import (
     BODY,
     BODY_STATE,
@@ -23,19 +23,12 @@ from erls.equations.ffr.records import (
 from erls.equations.ffr.residual import hand_back, pass_joint, pull_node
 from erls.equations.serial.ends import carry_end, column_of
 from erls.equations.serial.nodes import NODE, NODE_STATE, move_node, place_node, read_node, read_node_state
-from erls.equations.serial.records import JOINT_STATE, MODES, Serial, read_joint_state, read_modes, read_serial
+from erls.equations.serial.records import MODES, Serial, read_modes, read_serial
 from erls.maths.jit import kernel, part
-from erls.maths.products import clear, copy
+from erls.maths.products import clear
 from erls.maths.so3 import Array
-from erls.maths.spatial import compose_poses, transform_force_back
+from erls.maths.spatial import transform_force_back
 from fe_import.model import IntArray
-
-
-@part
-def _go_back(step: Array, pose: Array, spare: Array) -> None:
-    """A pose (12,) in one frame becomes that in the frame before, in which the former stands at ``step``."""
-    copy(pose, spare)
-    compose_poses(step, spare, pose)
 
 
 @part
@@ -54,17 +47,7 @@ def _move_end(
         place_node(node, moved, y[first:last])
         move_node(node, moved, v[first:last], y[0:0])
     carry_end(moved.pose, moved.twist, moved.twist_rate, end.offset, state.twist, state.twist_rate, found)
-    k, pose = end.link, found[:12]
-    while k >= 0:
-        if read_node(reals, integers, frames.nodes + (2 * k + 1) * NODE).moves:
-            _go_back(
-                read_node_state(scratch, integers, frames.node_states + (2 * k + 1) * NODE_STATE).back, pose, room.pose
-            )
-        _go_back(read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose, pose, room.pose)
-        if read_node(reals, integers, frames.nodes + 2 * k * NODE).moves:
-            base = read_node_state(scratch, integers, frames.node_states + 2 * k * NODE_STATE)
-            _go_back(base.pose, pose, room.pose)
-        k = read_body(reals, integers, frames.bodies + k * BODY).parent
+    to_world(serial, frames, reals, integers, scratch, end.link, found[:12], room.pose)
 
 
 @part

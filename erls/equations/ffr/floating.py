@@ -15,6 +15,7 @@ from erls.equations.ffr.records import (
     END,
     Frames,
     call_bend_link,
+    call_floating_loads,
     read_body,
     read_body_state,
     read_end,
@@ -69,6 +70,8 @@ def residual(
         link_forces(frames, reals, integers, scratch, k, modes, q, v[first : first + e], moved, forces)
         for i in range(6):
             out[6 * k + i] = state.wrench[i]
+    if serial.loads >= 0:
+        call_floating_loads(serial.loads, integers[0], reals, integers, scratch, t, y, v, out)
 
 
 @kernel(contract.MASS_MATRIX, counted=False)

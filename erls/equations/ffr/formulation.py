@@ -87,7 +87,9 @@ class Ffr(SerialFormulation):
     def kernels(self) -> tuple[str, ...]:
         """See `erls.equations.formulation.Modular`."""
         own = "erls.equations.ffr"
-        return f"{own}.residual", f"{own}.mass", f"{own}.energy", f"{own}.states", "erls.equations.serial.stiffness"
+        loads = (f"{own}.loads",) if self.mechanism.loads else ()
+        states = f"{own}.energy", f"{own}.states"
+        return f"{own}.residual", f"{own}.mass", *states, *loads, "erls.equations.serial.stiffness"
 
     @cached_property
     def length_scales(self) -> Array:

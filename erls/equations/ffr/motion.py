@@ -31,7 +31,7 @@ from erls.equations.serial.records import (
 from erls.maths.jit import part
 from erls.maths.products import clear
 from erls.maths.so3 import Array
-from erls.maths.spatial import add_motion_cross, rotate_back, transform_motion
+from erls.maths.spatial import add_motion_cross, rotate_back, step_back, transform_motion
 from fe_import.model import IntArray
 
 
@@ -135,3 +135,19 @@ def _arrive(inner: NodeState, state: BodyState) -> None:
     transform_motion(inner.back, twist, twist)
     transform_motion(inner.back, rate, rate)
     rotate_back(inner.back, state.gravity, state.gravity)
+
+
+@part
+def to_world(
+    serial: Serial, frames: Frames, reals: Array, integers: IntArray, scratch: Array, k: int, pose: Array, spare: Array
+) -> None:
+    """A pose (12,) in the floating frame of link k becomes that in the world."""
+    while k >= 0:
+        if read_node(reals, integers, frames.nodes + (2 * k + 1) * NODE).moves:
+            inner = read_node_state(scratch, integers, frames.node_states + (2 * k + 1) * NODE_STATE)
+            step_back(inner.back, pose, spare)
+        step_back(read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE).pose, pose, spare)
+        if read_node(reals, integers, frames.nodes + 2 * k * NODE).moves:
+            base = read_node_state(scratch, integers, frames.node_states + 2 * k * NODE_STATE)
+            step_back(base.pose, pose, spare)
+        k = read_body(reals, integers, frames.bodies + k * BODY).parent

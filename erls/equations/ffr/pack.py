@@ -15,6 +15,7 @@ from erls.equations.ffr.standard_data import StandardData
 from erls.equations.serial import pack
 from erls.equations.serial.condensed import condensed
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
+from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import modal_inertia
 from erls.equations.serial.modal_inertia_kernels import Warp, warp_record, warp_state
 from erls.equations.serial.nodes import RESTING, Node, node_record, node_state
@@ -50,6 +51,8 @@ class Given:
         Frames that loops hold, or whatever else ties links.
     every_axis : bool
         Count all moments on frames that turn about one axis only, which no joint feels.
+    absolute : bool
+        For links that float freely, see `erls.equations.ffr.floating`.
     """
 
     mechanism: Mechanism
@@ -59,6 +62,7 @@ class Given:
     stiffened: bool
     ends: list[tuple[int, LoopEnd]]
     every_axis: bool = False
+    absolute: bool = False
 
     @property
     def parents(self) -> list[int]:
@@ -265,9 +269,10 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
             joints=pack.put_all(constants, joints),
             joint_states=pack.joint_states(working, len(joints)),
             modes=pack.put_all(constants, modes),
-            **pack.addresses(mechanism),
+            **pack.addresses(mechanism, records.call_floating_loads if given.absolute else records.call_loads),
             rigid_links=rigid_links,
             rigid_states=rigid_states,
+            **put_loads(mechanism, given.bases, [given.bent(k) for k in links], constants, working),
             own=own,
             gravity=mechanism.gravity,
         )

@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from erls.equations import compiled_system as contract
+from erls.equations.serial.loads import LOADS
 from erls.maths.calls import caller
 from erls.maths.jit import ENABLED
 from erls.maths.records import Matrix, Stack, Vector, reader, room, table_size
@@ -35,6 +36,8 @@ call_bend_link = caller(BEND_LINK, "erls.equations.ffr.bent:bend_link")
 call_correct_twist = caller(CORRECT_TWIST, "erls.equations.ffr.bent:correct_twist")
 call_bent_forces = caller(BENT_FORCES, "erls.equations.ffr.bent:bent_forces")
 call_correct_arrival = caller(CORRECT_ARRIVAL, "erls.equations.ffr.bent:correct_arrival")
+call_loads = caller(LOADS, "erls.equations.ffr.loads:loads")
+call_floating_loads = caller(LOADS, "erls.equations.ffr.floating_loads:floating_loads")
 
 
 class Frames(NamedTuple):

@@ -10,7 +10,15 @@ from typing import Any
 from erls.equations import compiled_system as contract
 from erls.equations.ffr.inertia import link_forces
 from erls.equations.ffr.motion import move_frames
-from erls.equations.ffr.records import BODY, BODY_STATE, Frames, read_body, read_body_state, read_frames
+from erls.equations.ffr.records import (
+    BODY,
+    BODY_STATE,
+    Frames,
+    call_loads,
+    read_body,
+    read_body_state,
+    read_frames,
+)
 from erls.equations.serial.joints import effort
 from erls.equations.serial.nodes import NODE, NODE_STATE, from_node_axes, read_node, read_node_state
 from erls.equations.serial.records import (
@@ -100,6 +108,8 @@ def residual(
         first, last = modes.first, modes.first + len(modes.stiffness)
         q, rates, accelerations = y[first:last], v[first:last], a[first:last] if len(a) > 0 else a
         link_forces(frames, reals, integers, scratch, k, modes, q, rates, accelerations, out[first:last])
+    if serial.loads >= 0:
+        call_loads(serial.loads, integers[0], reals, integers, scratch, t, y, v, out)
     for k in range(serial.links - 1, -1, -1):
         joint = read_joint(reals, integers, serial.joints + k * JOINT)
         moved = read_joint_state(scratch, integers, serial.joint_states + k * JOINT_STATE)

@@ -18,9 +18,9 @@ import scipy.linalg as la
 
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
 from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
-from erls.equations.loops.failures import comes_apart, locks, warnings_of
+from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.rows import Closure, applied
-from erls.equations.loops.start import Start, find_start, start_velocity
+from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
 from erls.equations.loops.static import closed_equilibrium
 from erls.equations.loops.tied import OPEN, Tied
 from erls.equations.serial.equilibrium import elastic_on_diagonal
@@ -101,7 +101,7 @@ class ClosedChain(Tied):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know about the loops."""
-        return warnings_of(self.redundant)
+        return (*warnings_of(self.redundant), *assembled_warning(self.start, ASSEMBLED * self.reach))
 
     def refuse_open(self, t: float, found: Closure) -> None:
         """Raise when a loop has come apart.
@@ -192,15 +192,21 @@ class ClosedChain(Tied):
 
     def initial_state(self) -> tuple[Array, Array]:
         """(y, v) at time 0: loops closed on the undeformed chain, or in static equilibrium; rates that keep to them."""
-        y = self.start.y
-        if self.mechanism.static_start:
-            y = self._static[0].copy()
+        y = self._static[0].copy() if self.mechanism.static_start else self._closed_start
         return y, self.start_velocity(y)
+
+    @property
+    def _closed_start(self) -> Array:
+        """(n,) loops closed, links undeformed unless loops need it."""
+        if not self.start.where:
+            return self.start.y
+        # the gap is all in conditions that others leave to it, or links bend by as much
+        return self.closed(0.0, self.start.y, np.zeros(self.size))[0]
 
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
         """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness."""
-        return closed_equilibrium(self, self.exact, self.start.y, self.start.held)
+        return closed_equilibrium(self, self.exact, self._closed_start, self.start.held)
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
         """Small motions about a closed state on the ways that the loops leave, with their forces as they are there."""
@@ -260,6 +266,10 @@ class ClosedChain(Tied):
                 result[i, 0] += 0.5 * found.rotor_inertia * efforts[k].rate ** 2
                 result[i, 3] += 0.5 * found.forces.stiffness * (efforts[k].coordinate - found.forces.rest) ** 2
         return result
+
+    def load_power(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) that of the tree."""
+        return self.bare.load_power(t, y, v)
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """The same at one time."""

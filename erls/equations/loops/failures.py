@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from erls.equations.loops.start import Start
 from erls.errors import Cause, SimulationError
 
 
@@ -29,6 +30,15 @@ def locks(t: float, loop: str, value: float, start: float) -> SimulationError:
         value=f"{value:.3g} metres per metre",
         limit=f"{start:.3g} at the start",
         remedy="keep the drive within what the lengths of the links allow, or end the run before",
+    )
+
+
+def assembled_warning(start: Start, limit: float) -> tuple[str, ...]:
+    """What the user should know about loops that rigid links do not close to rounding."""
+    if not start.where:
+        return ()
+    return (
+        f"{start.where}: rigid links leave {start.gap:.3g} m open, within the assembly tolerance of {limit:.3g} m",
     )
 
 

@@ -16,7 +16,8 @@ from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
-_CLOSED = 1e-11  # of the size of the mechanism
+_CLOSED = 1e-11  # of the size of the mechanism: rounding
+ASSEMBLED = 1e-8  # of it: what rigid links may leave open. Axes off by so much still count as parallel (`DEPENDENT`)
 _DEPENDENT = 1e-6  # share of a joint's motion that others cannot make up for: below, it does not decide anything
 _NUDGES = (0.0, 0.1, -0.1)  # rad or reaches, to leave singular guesses (links in line)
 _ALTERNATE = 0.6180339887498949  # no two joints are nudged alike
@@ -32,15 +33,21 @@ class Start:
         Links undeformed.
     held, following : int arrays
         Free joints, by their place in y, that keep their initial coordinates, and those that close the loops.
+    gap : float
+        What stays open [m]: dimensions that do not fit to the last digit, in a direction in which nothing moves.
+    where : str
+        Its loop and direction; empty where that is rounding.
     """
 
     y: Array
     held: IntArray
     following: IntArray
+    gap: float = 0.0
+    where: str = ""
 
 
 def find_start(chain: Tied) -> Start:
-    """Close the loops on the undeformed chain.
+    """Close the loops on the undeformed chain, to rounding or else as well as may be within the assembly tolerance.
 
     Raises
     ------
@@ -51,7 +58,7 @@ def find_start(chain: Tied) -> Start:
     given = np.zeros(chain.size)
     given[:count] = [chain.mechanism.joints[k].position for k in chain.bare.free_joints]
     every = np.arange(count)
-    best: tuple[float, str] = (np.inf, "")
+    best = Start(given, every, every, np.inf)
     for some in (True, False):
         for nudge in _NUDGES:
             guess = given.copy()
@@ -63,19 +70,25 @@ def find_start(chain: Tied) -> Start:
             found = chain.closure(0.0, y, np.zeros(chain.size))
             gap, where = _gap(chain, found)
             if gap <= _CLOSED * chain.reach:
-                following = _following(chain, _joint_rows(chain, y))
-                return Start(y, np.setdiff1d(every, following), following)
-            if gap < best[0]:
-                best = (gap, where)
+                return _start(chain, y)
+            if gap < best.gap:
+                best = Start(y, every, every, gap, where)
+    if best.gap <= ASSEMBLED * chain.reach:
+        return _start(chain, best.y, best.gap, best.where)
     raise SimulationError(
         Cause.LOOP_OPEN,
-        f"the links do not reach: {best[1]} stays open",
+        f"the links do not reach: {best.where} stays open",
         where="loops",
-        value=f"{best[0]:.3g} m",
-        limit=f"{_CLOSED * chain.reach:.3g} m",
+        value=f"{best.gap:.3g} m",
+        limit=f"{ASSEMBLED * chain.reach:.3g} m",
         remedy="check lengths, position and axis of the loop, and start nearer to a closed position: "
         "joints.initial.position",
     )
+
+
+def _start(chain: Tied, y: Array, gap: float = 0.0, where: str = "") -> Start:
+    following = _following(chain, _joint_rows(chain, y))
+    return Start(y, np.setdiff1d(np.arange(len(chain.bare.free_joints)), following), following, gap, where)
 
 
 def start_velocity(chain: Tied, y: Array, following: IntArray) -> Array:

@@ -7,7 +7,7 @@ end to the other without force follows from the frames as built, and from how fa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,14 +110,20 @@ class Beams:
 def lumped(beams: Sequence[Beam], poses: Array) -> list[RigidBody]:
     """Half of each beam's mass and rotary inertia as rigid bodies at its nodes; give `Beams` sections without then."""
     bodies = []
+    for node, local, half in halves(beams, poses):
+        turn = local[:3, :3]
+        inertia = turn @ half[3:, 3:] @ turn.T
+        bodies.append(RigidBody(node, float(half[0, 0]), (inertia + inertia.T) / 2, local[:3, 3]))
+    return bodies
+
+
+def halves(beams: Sequence[Beam], poses: Array) -> Iterator[tuple[int, Array, Array]]:
+    """Of both ends of each beam the node, the section's frame (4, 4) in it, and half of the beam's inertia (6, 6) in
+    axes of the section.
+    """
     for beam in beams:
-        section = beam.section.inertia
         d = motions.log(motions.inverse(beam.frames[0]) @ beam.frames[1])
         half = float(np.linalg.norm(d[:3])) / 2
         for node, frame in zip(beam.nodes, beam.frames, strict=True):
-            local = motions.inverse(poses[node]) @ frame
-            turn = local[:3, :3]
-            inertia = half * turn @ section[3:, 3:] @ turn.T
-            bodies.append(RigidBody(node, half * float(section[0, 0]), (inertia + inertia.T) / 2, local[:3, 3]))
-    return bodies
+            yield node, motions.inverse(poses[node]) @ frame, half * beam.section.inertia
 

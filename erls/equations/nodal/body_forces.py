@@ -76,12 +76,19 @@ def _fill(out: Array, j: int, scale: float, column: Twist) -> None:
 
 @part
 def _load(model: Model, poses: Array, k: int, factor: float) -> Twist:
-    """In node axes."""
+    """In node axes, about the node."""
     force, moment = scaled(factor, vector(model.loads, k, 0)), scaled(factor, vector(model.loads, k, 3))
     if model.load_dead[k]:
-        turn = nine(poses, model.load_nodes[k], 3)
-        return turned(turn, force), turned(turn, moment)
-    return force, moment
+        force, moment = _into_node(model, poses, k, force), _into_node(model, poses, k, moment)
+    return force, plus(moment, cross(vector(model.load_positions, k, 0), force))
+
+
+@part
+def _into_node(model: Model, poses: Array, k: int, x: Vector) -> Vector:
+    """From the axes in which load k is given to those of its node."""
+    if model.load_nodes[k, 1] >= 0:
+        x = times(nine(poses, model.load_nodes[k, 1], 3), x)
+    return turned(nine(poses, model.load_nodes[k, 0], 3), x)
 
 
 @part
@@ -89,7 +96,7 @@ def load_forces(model: Model, work: Work, sample: Array) -> None:
     """Subtract loads from ``work.force``; their factors follow the joints in ``sample``."""
     first = 3 * len(model.joint_nodes)
     for k in range(len(model.load_nodes)):
-        at = 6 * model.load_nodes[k]
+        at = 6 * model.load_nodes[k, 0]
         force, moment = _load(model, work.poses, k, -sample[first + k])
         add(work.force, at, force)
         add(work.force, at + 3, moment)
@@ -97,11 +104,19 @@ def load_forces(model: Model, work: Work, sample: Array) -> None:
 
 @part
 def load_derivatives(model: Model, work: Work, sample: Array, k: int, block: Array) -> None:
-    """Stiffness of load k into a block of zeros: dead ones turn in the node's axes."""
-    if model.load_dead[k]:
-        force, moment = _load(model, work.poses, k, sample[3 * len(model.joint_nodes) + k])
-        for j in range(3):
-            _fill(block[2], 3 + j, 1.0, (cross(unit(j), force), cross(unit(j), moment)))
+    """Stiffness of load k into a block of zeros: dead ones turn in the node's axes, and with those of another node."""
+    if not model.load_dead[k]:
+        return
+    factor, arm = sample[3 * len(model.joint_nodes) + k], vector(model.load_positions, k, 0)
+    given = scaled(factor, vector(model.loads, k, 0)), scaled(factor, vector(model.loads, k, 3))
+    force, moment = _into_node(model, work.poses, k, given[0]), _into_node(model, work.poses, k, given[1])
+    for j in range(3):
+        push = cross(unit(j), force)
+        _fill(block[2], 3 + j, 1.0, (push, plus(cross(unit(j), moment), cross(arm, push))))
+        if model.load_nodes[k, 1] >= 0:
+            push = _into_node(model, work.poses, k, cross(unit(j), given[0]))
+            turn = _into_node(model, work.poses, k, cross(unit(j), given[1]))
+            _fill(block[2], 9 + j, -1.0, (push, plus(turn, cross(arm, push))))
 
 
 @part

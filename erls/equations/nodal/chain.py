@@ -13,9 +13,10 @@ import numpy as np
 from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.nodal.actuators import Actuator, Actuators
 from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.beam import Beams
+from erls.equations.nodal.beam import Beams, halves
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import GROUND, Joint, Motion
+from erls.equations.nodal.loads import NodalLoad, NodalLoads
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.redundant import without_redundant
@@ -28,6 +29,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.chain import poses as link_poses
 from erls.mechanism.joint_types import Freedom, Z, single
 from erls.mechanism.joints import Joint as MechanismJoint
+from erls.mechanism.loads import CENTRE, PointLoad
 from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 
@@ -162,6 +164,8 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
         passive.append(elastic)
     if bodies:
         passive.append(RigidBodies(bodies, mechanism.gravity))
+    if mechanism.loads:
+        passive.append(NodalLoads([x for load in mechanism.loads for x in _loads(mechanism, links, ends, load)]))
     seats = _seats(mechanism, links, ends)
     closing = tuple(_closing(mechanism, links, ends, loop) for loop in mechanism.loops)
     acting = _actuators(mechanism, seats, positions)
@@ -175,6 +179,36 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
         system = ChainSystem(poses, passive, actuators, joints) if left_out else full
     firsts = np.cumsum([0, *(len(part.beams) for part in links)])[:-1].tolist()
     return Chain(system, full, left_out, elastic, nodes, tuple(firsts), seats, closing)
+
+
+def _loads(
+    mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int], load: PointLoad
+) -> list[NodalLoad]:
+    """A load on the node that carries its node; that on a link's mass on all of its nodes, half of each beam's at its
+    ends.
+    """
+
+    def at(link: int, node: int) -> tuple[int, Array]:
+        number = node_at(links[link], node, f"link {mechanism.links[link].name!r}")
+        return firsts[link] + number, mechanism.links[link].model.nodes[node] - links[link].nodes[number]
+
+    places = [(*at(load.link, load.node), 1.0)] if load.node != CENTRE else _masses(links[load.link], firsts[load.link])
+    axes = GROUND if load.axes is None else at(*load.axes)[0]
+    factor: Callable[[float], float] = (lambda t: 1.0) if load.factor is None else load.factor.value
+    times = factor, load.breakpoints
+    result = []
+    for node, position, mass in places:
+        own, (force, moment) = axes == node, (mass * load.wrench).reshape(2, 3)
+        result.append(NodalLoad(node, force, moment, own, position, GROUND if own else axes, *times))
+    return result
+
+
+def _masses(parts: LinkParts, first: int) -> list[tuple[int, Array, float]]:
+    """Node, place in its axes [m] and mass [kg] of all that a link consists of, half of each beam at its ends."""
+    poses = np.array([pose(position=x) for x in parts.nodes])
+    found = [(first + node, local[:3, 3], float(half[0, 0])) for node, local, half in halves(parts.beams, poses)]
+    found += [(first + body.node, body.centre, body.mass) for body in parts.bodies]
+    return [(node, place, mass) for node, place, mass in found if mass]
 
 
 def _seats(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int]) -> tuple[Seat, ...]:

@@ -35,8 +35,9 @@ class Model(NamedTuple):
         (e, 2), (e, 24), (e, 6), (e, 6, 6) per length, (e, 6, 6) times length, (e,) whether it has inertia.
     body_nodes, bodies : arrays
         (b,), (b, 6, 6).
-    load_nodes, loads, load_dead : arrays
-        (l,), (l, 6), (l,) whether the load keeps its direction in the world.
+    load_nodes, load_positions, loads, load_dead : arrays
+        (l, 2) where they act and in whose axes they are given, -1 for the world; (l, 3), (l, 6), (l,) whether the load
+        keeps its direction there, rather than in the axes of its own node.
     actuator_nodes, actuator_frames, actuator_along, actuator_active, actuators : arrays
         (a, 2), (a, 24), (a,) row of the twist, (a,), and (a, 9): rotor, stiffness, rest, damping, friction, transition
         rate, proportional and derivative gain, limit.
@@ -62,7 +63,8 @@ class Model(NamedTuple):
     beam_moving: Indices
     body_nodes: Indices
     bodies: Stack
-    load_nodes: Indices
+    load_nodes: Pairs
+    load_positions: Matrix
     loads: Matrix
     load_dead: Indices
     actuator_nodes: Pairs

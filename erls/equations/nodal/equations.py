@@ -200,6 +200,14 @@ class Nodal:
         kinetic, elastic, gravity, _, springs = self.system.energies(q, velocity).tolist()
         return Energy(kinetic, elastic, gravity, springs)
 
+    def load_power(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) power of loads at times (k,) [W]."""
+        loads, result = self.system.kinds.loads, np.zeros(len(t))
+        for k, at in enumerate(t.tolist() if loads.loads else ()):
+            q, velocity = self.configuration(y[k], v[k])
+            result[k] = loads.power(at, q.poses, velocity.reshape(-1, 6))
+        return result
+
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """(n,) ÿ of frames and joint coordinates; 0 for the rest."""
         q, velocity = self.configuration(y, v)

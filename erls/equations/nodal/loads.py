@@ -1,4 +1,6 @@
-"""Forces and moments at nodes: dead ones keep their direction in the world, follower ones turn with the node."""
+"""Forces and moments at nodes: dead ones keep their direction, in the world or in the axes of another node, follower
+ones turn with the node.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from erls.equations.nodal.joints import GROUND
 from erls.equations.nodal.scatter import IntArray
-from erls.maths.so3 import Array
+from erls.maths.so3 import Array, cross
 
 
 def _ramp(t: float) -> float:
@@ -25,6 +28,10 @@ class NodalLoad:
     force, moment : (3,) array
         [N], [N m]; in the world's axes, or the node's if ``follower``.
     follower : bool
+    position : (3,) array
+        Where the force acts, in the node's axes [m].
+    axes : int
+        Another node in whose axes force and moment are given; `GROUND` for the world.
     factor : callable
         What multiplies both at a time; t itself unless given, the load parameter of `erls.equations.nodal.statics`.
     breakpoints : tuple
@@ -35,6 +42,8 @@ class NodalLoad:
     force: Array = field(default_factory=lambda: np.zeros(3))
     moment: Array = field(default_factory=lambda: np.zeros(3))
     follower: bool = False
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    axes: int = GROUND
     factor: Callable[[float], float] = _ramp
     breakpoints: tuple[float, ...] = ()
 
@@ -44,9 +53,22 @@ class NodalLoads:
 
     def __init__(self, loads: Sequence[NodalLoad]) -> None:
         self.loads = tuple(loads)
-        self.nodes: IntArray = np.array([[x.node] for x in loads], dtype=np.int64).reshape(-1, 1)
+        self.nodes: IntArray = np.array([[x.node, x.axes] for x in loads], dtype=np.int64).reshape(-1, 2)
+        self.positions = np.array([x.position for x in loads], dtype=float).reshape(-1, 3)
         self.wrenches = np.array([[*x.force, *x.moment] for x in loads], dtype=float).reshape(-1, 6)
         self.dead = np.array([not x.follower for x in loads], dtype=np.int64)
+
+    def power(self, t: float, poses: Array, twists: Array) -> float:
+        """Of all [W], at poses (k, 4, 4) and twists (k, 6) of the nodes in their own axes."""
+        total = 0.0
+        for x in self.loads:
+            force, moment, turn = x.force, x.moment, poses[x.node, :3, :3]
+            if not x.follower:
+                given = np.eye(3) if x.axes == GROUND else poses[x.axes, :3, :3]
+                force, moment = turn.T @ given @ force, turn.T @ given @ moment
+            speed, spin = twists[x.node, :3], twists[x.node, 3:]
+            total += x.factor(t) * float(force @ (speed + cross(spin, x.position)) + moment @ spin)
+        return total
 
     @property
     def breakpoints(self) -> tuple[float, ...]:

@@ -112,7 +112,7 @@ def node_at(parts: LinkParts, number: int, where: str) -> int:
     if abs(parts.fractions[number] - end) > _SAME:
         raise SceneError(
             Cause.BAD_FIELD,
-            "a payload or a joint sits between the nodes",
+            "a payload, a load or a joint sits between the nodes",
             where=where,
             value=f"node {number}",
             remedy="let simulation.elements_per_member be a multiple of the link's own elements",

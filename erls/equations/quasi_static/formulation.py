@@ -323,6 +323,10 @@ class QuasiStatic:
         """The same at one time."""
         return single_energy(self.energy_series(np.array([t]), np.array([y]), np.array([v])))
 
+    def load_power(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) that of loads at times (k,) [W], with the rates of the static deflection."""
+        return self.inner.load_power(t, *self.all_modes_at(t, y, v)[:2])
+
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions, with all modes under load."""
         return self.reaction_series(np.array([t]), y[None], v[None]).reactions(0)

@@ -260,5 +260,5 @@ class Angles:
         return found.angles[:, self._joints]
 
     def conditions(self, y: Array) -> tuple[Array, Array]:
-        """How far they are from there, and their derivatives (m, n), which are constant where angles are coordinates."""
+        """How far they are from there, and their derivatives (m, n): constant where angles are coordinates."""
         return self._at(y[None])[0] - self._held, derivatives(self._at, y, self._steps)

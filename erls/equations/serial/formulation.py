@@ -17,16 +17,21 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization, derivatives, difference_steps
 from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
+from erls.equations.serial.loads import load_powers
+from erls.equations.serial.records import Serial
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
 from erls.equations.series import mass_series, residual_series
 from erls.equations.stability import Bearing, Stability, stability_of
 from erls.equations.system import metre_scales
+from erls.maths.records import python_reader
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, cross_all
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.loops import loop_ends
 from erls.mechanism.thermal import elastic_rest
+
+_see_serial = python_reader(Serial)
 
 
 class SerialFormulation(TreeFormulation):
@@ -67,8 +72,8 @@ class SerialFormulation(TreeFormulation):
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
-        """Breakpoints of all drives."""
-        return tuple(sorted({b for joint in self.mechanism.joints for b in joint.drive.breakpoints}))
+        """Breakpoints of all drives and loads."""
+        return self.mechanism.breakpoints
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
         """(n,) forces out of balance on the independent coordinates."""
@@ -122,6 +127,17 @@ class SerialFormulation(TreeFormulation):
             return np.array([self.acceleration(*at) for at in zip(t.tolist(), y, v, strict=True)]).reshape(y.shape)
         half = np.linalg.solve(lower, -forces[..., None])
         return np.asarray(np.linalg.solve(lower.swapaxes(1, 2), half)[..., 0])
+
+    def load_power(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) power of loads at times (k,) [W]."""
+        system, result = self.compiled, np.zeros(len(t))
+        if not self.mechanism.loads:
+            return result
+        powers = load_powers(system, _see_serial(system.reals, system.integers, int(system.integers[0])))
+        for k, at in enumerate(t.tolist()):
+            residual(system, at, y[k], v[k], np.zeros(0))
+            result[k] = sum(float(power[0]) for power in powers)
+        return result
 
     def elastic_name(self, place: int) -> str:
         """What messages call an elastic coordinate, by its place among them."""

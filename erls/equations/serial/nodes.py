@@ -116,6 +116,22 @@ def node_record(k: int, link: Link, basis: Array, node: int, bent: bool) -> Node
     return Node(k, int(e > 0), link.model.nodes[node], shapes, second)
 
 
+def centre_record(k: int, link: Link, basis: Array, bent: bool) -> Node:
+    """The centre of mass of link k with what it carries, which turns with nothing; arguments as of `node_record`."""
+    momentum = (link.invariants.rigid.T @ link.invariants.m)[:3]  # per rate of modal coordinates
+    moment = link.invariants.rigid_mass_matrix[3:, :3]
+    mass, e = float(np.trace(link.invariants.rigid_mass_matrix[:3, :3])) / 3, basis.shape[1]
+    if mass <= 0.0:
+        return Node(k, 0, np.zeros(3), np.zeros((6, e)), np.zeros((0, 0)))
+    second = np.zeros((0, 0))
+    if bent:
+        assert link.second_order is not None
+        moved = np.concatenate([link.second_order.momentum[:3] / mass, np.zeros((3, *link.invariants.m.shape))])
+        second = (basis.T @ moved @ basis).transpose(2, 0, 1).reshape(e, 6 * e)
+    place = np.array([moment[2, 1], moment[0, 2], moment[1, 0]]) / mass
+    return Node(k, int(e > 0), place, np.vstack([momentum / mass @ basis, np.zeros((3, e))]), second)
+
+
 read_node, read_node_state = reader(Node), reader(NodeState)
 NODE, NODE_STATE = table_size(Node), table_size(NodeState)
 

@@ -141,12 +141,16 @@ def end_record(link: Link, modes: Array | None, curved: bool, end: LoopEnd) -> E
     )
 
 
-def addresses(mechanism: Mechanism) -> dict[str, int]:
-    """Of the functions that `Serial` names, which are compiled now, where the mechanism needs them."""
+def addresses(mechanism: Mechanism, call_loads: Any) -> dict[str, int]:
+    """Of the functions that `Serial` names, which are compiled now, where the mechanism needs them.
+
+    ``call_loads`` calls that of the formulation for loads.
+    """
     feeds = any(joint.drive.feed_forward for joint in mechanism.joints)
     return {
         "feeds": address_for(call_feed_forward, feeds),
         "vectors": address_for(call_turn_by_vector, bool(mechanism.rotation_vectors)),
+        "loads": address_for(call_loads, bool(mechanism.loads)),
     }
 
 

@@ -39,6 +39,13 @@ class Serial(NamedTuple):
         `erls.equations.serial.rotation_vector`, where a joint has one; otherwise -1, and nothing of them is compiled.
     rigid_links, rigid_states : int
         Where a drive feeds forward, places of the first of these.
+    loads : int
+        Address of the formulation's function that lets loads act (`erls.equations.serial.loads`); -1 without any, and
+        nothing of it is compiled.
+    load_count, load_records, load_states : int
+        How many, and places of the first `Load` and `LoadState`.
+    load_nodes, load_node_states : int
+        Places of the first `Node` and `NodeState`, of which each load has two: where it acts, and what turns it.
     own : int
         Place of the record of the formulation.
     gravity : (3,) array
@@ -53,6 +60,12 @@ class Serial(NamedTuple):
     vectors: int
     rigid_links: int
     rigid_states: int
+    loads: int
+    load_count: int
+    load_records: int
+    load_states: int
+    load_nodes: int
+    load_node_states: int
     own: int
     gravity: Vector
 

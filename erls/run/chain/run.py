@@ -141,13 +141,13 @@ class ChainRun(ChainMotion):
 
     @property
     def conservative(self) -> bool:
-        """Whether total energy should stay constant: no drives, damping or friction."""
+        """Whether total energy should stay constant: no drives, loads, damping or friction."""
         mechanism = self.formulation.mechanism
         joints: list[Joint | LoopFreedom] = [*mechanism.joints]
         joints += [x.freedom for x in mechanism.loops if x.freedom is not None]
         passive = all(_passive(j) for j in joints)
         damped = any(link.damping.any() for link in mechanism.links)
-        return passive and not damped and conserves_energy(mechanism.effects)
+        return passive and not damped and not mechanism.loads and conserves_energy(mechanism.effects)
 
     def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
         """Joints and points at given times, as in the JSON of ``erls simulate``."""

@@ -10,8 +10,8 @@ three things, judged from the computed motion alone; no second-order data of the
 
       r₂ = -2 W₂ / qᵀΩ²q,    r₃ = -(3 W₃ + 2 V) / qᵀΩ²q,
 
-  where V = Σ m a·u₂ is the work of the accelerations a that displacements get from the turning of the link, which
-  second-order kinematics counts to lower order. A deflection δ is then wrong by δ |r|.
+  q without what only stretches the link. V = Σ m a·u₂ is the work of the accelerations a that displacements get from
+  the turning of the link, which second-order kinematics counts to lower order. A deflection δ is then wrong by δ |r|.
 - Vibrations run ahead or behind by the time τ = ½ ∫ r dt, so that a point that they move at the rate δ̇ is off by
   |δ̇| |τ|. For r stands the mean so far, of work against energy. Both together are at most 2 max δ.
 - Round a loop, what one of its links is off moves all of them, by levers that the linkage has: counted twice.

@@ -15,10 +15,13 @@ from erls.integrate.base import hermite
 from erls.maths.so3 import Array, cross_all
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link, link_mass_properties, node_shape6
+from erls.mechanism.loads import CENTRE
+from erls.run.chain.loads import pull, wrenches
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.lines import Lines, lines
 
 _SAMPLES, _SAMPLES_OF_LOOPS = 61, 31  # forces of loops are found time by time
+_TURNING = 1e-8  # of the most that a unit of energy turns stations: rounding
 _STEP = 1e-5  # s, of central differences, as in `erls.run.link_loads`
 
 
@@ -50,11 +53,11 @@ class Bending:
     dragged : (k, s, 3) array
         What the turning of the axes adds to accelerations of the stations because they are displaced [m/s²].
     forces, moments : (k, s, 3) arrays
-        Of joints, weight and inertia [N, N m].
+        Of joints, loads, weight and inertia [N, N m].
     masses : (s,) array
         [kg]
     strain : (k,) array
-        Twice the elastic energy [J].
+        Twice the elastic energy that the turns of its stations take [J].
     axes : (k, 3, 3) array
         To the world.
     places : (k, s, 3) array
@@ -100,7 +103,7 @@ class BendingRun:
 
 
 class _Differences(NamedTuple):
-    """What accelerations are found with: step of differences [s], acceleration of gravity (3,)."""
+    """What accelerations are found with: step of differences [s], gravity and other forces per mass (k, 3)."""
 
     step: float
     gravity: Array
@@ -124,7 +127,7 @@ class _Seat(NamedTuple):
 
 
 class _Given(NamedTuple):
-    """Force (k, 3) and moment (k, 3) about the origin of a closing joint on a node of a link, in the world."""
+    """Force (k, 3) of a closing joint or a load on a node of a link, and its moment (k, 3) about the origin; world."""
 
     link: int
     node: int
@@ -146,16 +149,16 @@ def bending(run: ChainRun, nodes: Sequence[tuple[int, int]]) -> BendingRun:
     step = min(_STEP, (run.end - float(run.solution.t[0])) / 4)
     times = run.looks(_SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES, step)
     seen = replace(run, formulation=formulation).series(np.concatenate([times - step, times, times + step]))
-    differences = _Differences(step, mechanism.gravity)
-    loops = _loop_loads(run, mechanism, times)
+    loads = _loop_loads(run, mechanism, times) + _given_loads(mechanism, seen, len(times))
     ends = {end.link for loop in mechanism.loops for end in (loop.inner, loop.outer)}
     sums: list[_Sums | None] = [None] * len(mechanism.links)
     found: dict[int, Bending] = {}
     for number in reversed(range(len(mechanism.links))):
         link = mechanism.links[number]
+        differences = _Differences(step, pull(mechanism, number, seen)[len(times) : 2 * len(times)])
         beyond = [(mechanism.joints[k].seat, sums[k], not freed(mechanism, k)) for k in mechanism.standing_on(number)]
         seats = [_Seat(seat.node, part, turns) for seat, part, turns in beyond if seat is not None and part is not None]
-        given = [load for load in loops if load.link == number]
+        given = [load for load in loads if load.link == number]
         if link.elastic_modes:
             asked = [node for at, node in nodes if at == number] + [seat.node for seat in seats]
             asked += [load.node for load in given] + [payload.node for payload in link.payloads]
@@ -211,15 +214,15 @@ def _bent(
     masses = line.shares * link.model.full_mass_properties.mass
     for payload in link.payloads:
         masses[line.nodes[payload.node]] += payload.mass
-    pull = masses[:, None] * (gravity - _acceleration(places, step))
+    pulled = masses[:, None] * (gravity[:, None] - _acceleration(places, step))
     at = places[here]
-    moments = np.zeros_like(pull)
-    force, moment = pull.sum(axis=1), cross_all(at, pull).sum(axis=1)
+    moments = np.zeros_like(pulled)
+    force, moment = pulled.sum(axis=1), cross_all(at, pulled).sum(axis=1)
     mass, centre = float(masses.sum()), np.einsum("s,ksi->ki", masses, at)
     carried = []
     for node, part, turns in seats:
         station = line.nodes[node]
-        pull[:, station] += part.force
+        pulled[:, station] += part.force
         moments[:, station] += part.moment - cross_all(at[:, station], part.force)
         force, moment = force + part.force, moment + part.moment
         if part.mass > 0:
@@ -228,7 +231,7 @@ def _bent(
             mass, centre = mass + part.mass, centre + part.place
     for load in given:
         station = line.nodes[load.node]
-        pull[:, station] += load.force
+        pulled[:, station] += load.force
         moments[:, station] += load.moment - cross_all(at[:, station], load.force)
         force, moment = force + load.force, moment + load.moment
     omega = spin[:, None]
@@ -241,16 +244,27 @@ def _bent(
         rates,
         local(line.rotation, rate),
         2 * cross_all(omega, rates) + cross_all(alpha[:, None], moved) + cross_all(omega, cross_all(omega, moved)),
-        pull @ axes,
+        pulled @ axes,
         moments @ axes,
         masses,
-        elastic[here] ** 2 @ link.stiffness,
+        _bending_energy(link, line.rotation @ held, elastic[here]),
         axes,
         at,
         carried,
         floating,
     )
     return bent, _Sums(force, moment, mass, centre)
+
+
+def _bending_energy(link: Link, rotation: Array, elastic: Array) -> Array:
+    """(k,) twice the least elastic energy with the turns of the stations that elastic coordinates (k, e) make by their
+    rotations (s, 3, e): that of a stretch, which no second order of displacements softens, is not in it.
+    """
+    roots = np.sqrt(link.stiffness)
+    turning = rotation.reshape(-1, link.elastic_modes) / roots
+    _, sizes, rows = np.linalg.svd(turning, full_matrices=False)
+    known = rows[sizes > _TURNING * sizes.max(initial=0.0)]
+    return np.asarray(((elastic * roots @ known.T) ** 2).sum(axis=1))
 
 
 def _rigid(link: Link, frames: Array, differences: _Differences, seats: list[_Seat], given: list[_Given]) -> _Sums:
@@ -325,4 +339,18 @@ def _loop_loads(run: ChainRun, mechanism: Mechanism, times: Array) -> list[_Give
         for end, sign in ((loop.outer, 1.0), (loop.inner, -1.0)):
             if end.link is not None:
                 result.append(_Given(end.link, end.node, sign * force, sign * moment))
+    return result
+
+
+def _given_loads(mechanism: Mechanism, seen: StateSeries, k: int) -> list[_Given]:
+    """Loads of the scene, at the k times in the middle of three rounds."""
+    middle, result = slice(k, 2 * k), []
+    for load in mechanism.loads:
+        if load.node == CENTRE:
+            continue
+        found = wrenches(mechanism, load, seen)[middle]
+        model = mechanism.links[load.link].model
+        local = model.nodes[load.node] + seen.modal[load.link] @ model.translation_shapes[load.node].T
+        at = _world(seen.poses[load.link], local[:, None])[middle, 0]
+        result.append(_Given(load.link, load.node, found[:, 0], found[:, 1] + cross_all(at, found[:, 0])))
     return result

@@ -21,7 +21,7 @@ Rules for adding a watch:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
@@ -103,10 +103,14 @@ class BodyPlan:
 
 @dataclass(frozen=True)
 class Started:
-    """A run of any kind of scene: how long it will be [s]; ``run_of`` makes a run of knots so far."""
+    """A run of any kind of scene: how long it will be [s]; ``run_of`` makes a run of knots so far.
+
+    One that is resumed was looked at before, up to ``since`` [s].
+    """
 
     duration: float
     run_of: Callable[[Any], Run]
+    since: float = field(default=0.0, kw_only=True)
 
 
 @dataclass(frozen=True)

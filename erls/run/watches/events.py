@@ -11,7 +11,6 @@ class Events(Watch):
     """Finds events whose knots have to be kept, or that end the run; `Run.events` finds the others afterwards."""
 
     def __init__(self) -> None:
-        self._since = 0.0
         self._happened: Happening | None = None
 
     @staticmethod
@@ -24,6 +23,7 @@ class Events(Watch):
         """Nothing; it learns which events stop the run."""
         self._events, self._formulation = begun.plan.scene.record.events, begun.formulation
         self._stops = {event.name for event in self._events if event.stop}
+        self._since = begun.since
         return NOTHING
 
     def during(self, t: float, knots: Knots) -> Finding:

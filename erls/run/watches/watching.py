@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from typing import TypeVar
 
+from erls.errors import Cause, SimulationError
 from erls.integrate.base import Solution, StopRun
 from erls.run.events import cut
 from erls.run.record import Run
@@ -101,7 +102,7 @@ class Watching:
 
     def ended(self, solution: Solution) -> Solution:
         """What the watches leave of what was computed, with why it ended."""
-        for watch in self._watches:
+        for watch in self._after(solution.failure):
             finding = watch.ends(solution)
             self._tell(finding)
             if finding.failure is not None:
@@ -119,7 +120,7 @@ class Watching:
             It failed, or a watch finds it wrong; ``run`` of the error is the run.
         """
         ended, errors, failure = Ended(run), [], None  # type: ignore[arg-type]  # see `Watch.of_bodies`
-        for watch in self._watches:
+        for watch in self._after(run.failure):
             finding = watch.after(ended)
             self._tell(finding)
             if finding.error is not None:
@@ -132,6 +133,10 @@ class Watching:
             failure.run = run
             raise failure
         return run
+
+    def _after(self, failure: SimulationError | None) -> list[Watch]:
+        """Those that look at a run when it has come to its end; none where there is no memory left to look with."""
+        return [] if failure is not None and failure.cause == Cause.OUT_OF_MEMORY else self._watches
 
     def _tell(self, finding: Finding) -> None:
         self._warnings(finding.warnings)

@@ -12,6 +12,7 @@ from erls.scene.checks import (
     check_names,
     check_stepping,
     check_tables,
+    check_wrench,
     directed,
     not_negative,
     positive,
@@ -165,5 +166,4 @@ def _check_spring(spring: Spring, nodes: list[str], place: str) -> None:
 
 def _check_load(load: Load, nodes: list[str], place: str) -> None:
     choose(load.node, nodes, f"{place}.node", SceneError)
-    if not any(load.force) and not any(load.moment):
-        raise bad(place, "neither a force nor a moment", None, "give one, or remove the load")
+    check_wrench(place, load.force, load.moment)

@@ -19,6 +19,7 @@ from fe_import.errors import Cause, FEImportError, ReportedError
 from fe_import.model import Array, IntArray
 
 REMEDY = "make the file again with the tool that wrote it"
+_BLOCK = 16_000_000  # bytes of an array that are copied at a time
 _MAX_TEXT = 16_000_000  # bytes of all strings of one dataset
 
 Shape = tuple[int | None, ...]
@@ -99,6 +100,13 @@ class Reader:
             self._refuse_first(name, values >= high, values, "too large", f"below {high}")
         return values
 
+    def numbers(self, name: str) -> Array | IntArray:
+        """A float64 dataset, all values finite, or an int64 dataset, of any shape."""
+        with translated(self.place(name), self.error, self.cause):
+            dataset = self._item(name, h5py.Dataset)
+            whole, shape = dataset.dtype.kind == "i", (None,) * dataset.ndim
+        return self.integers(name, shape) if whole else self.array(name, shape)
+
     def scalar(self, name: str) -> float:
         """A float64 dataset of one finite value."""
         return float(self.array(name, ()))
@@ -178,10 +186,19 @@ def _bytes(text: str) -> bytes:
 
 
 def write_array(group: h5py.Group, name: str, values: Any, unit: str, description: str) -> None:
-    """Store float64 or int64 values with their unit and meaning; groups in ``name`` are made."""
+    """Store float64 or int64 values with their unit and meaning; groups in ``name`` are made.
+
+    Large arrays go a block at a time: a run that ended for lack of memory has none for copies.
+    """
     values = np.asarray(values)
     dtype = np.int64 if values.dtype.kind in "iu" else np.float64
-    dataset = group.create_dataset(name, data=values.astype(dtype, copy=False), track_times=False)
+    if values.nbytes <= _BLOCK:
+        dataset = group.create_dataset(name, data=values.astype(dtype, copy=False), track_times=False)
+    else:
+        dataset = group.create_dataset(name, values.shape, dtype, track_times=False)
+        rows = max(1, _BLOCK * len(values) // values.nbytes)
+        for begin in range(0, len(values), rows):
+            dataset[begin : begin + rows] = values[begin : begin + rows]
     write_attribute(dataset, "unit", unit)
     write_attribute(dataset, "description", description)
 

@@ -16,6 +16,7 @@ from erls.equations.erls.paper.records import (
     BODY,
     BODY_STATE,
     Paper,
+    call_loads,
     read_balance,
     read_body,
     read_body_state,
@@ -102,6 +103,9 @@ def residual(
     clear(force)
     for k in range(serial.links):
         _load_link(paper, reals, integers, scratch, k)
+    if serial.loads >= 0:
+        call_loads(serial.loads, integers[0], reals, integers, scratch, t, y, v, out)
+    for k in range(serial.links):
         state = read_body_state(scratch, integers, paper.body_states + k * BODY_STATE)
         add_columns(state.moves, state.force, 1.0, force)
         modes = read_modes(reals, integers, serial.modes + k * MODES)

@@ -14,8 +14,17 @@ from erls.equations.erls.paper.bent_records import (
     call_correct_twist,
 )
 from erls.equations.erls.paper.compatibility_records import Elimination, JointRows, RowState
-from erls.equations.erls.paper.records import Balance, Body, BodyState, Paper, call_eliminate, call_extra_rows
+from erls.equations.erls.paper.records import (
+    Balance,
+    Body,
+    BodyState,
+    Paper,
+    call_eliminate,
+    call_extra_rows,
+    call_loads,
+)
 from erls.equations.serial.ends import end_state
+from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.pack import (
     addresses,
@@ -158,6 +167,11 @@ def _bodies(mechanism: Mechanism) -> list[Body]:
     ]
 
 
+def _modal_bases(mechanism: Mechanism) -> list[Array]:
+    """(m, m) of each link, whose modal coordinates are its coordinates."""
+    return [np.eye(link.model.modes) for link in mechanism.links]
+
+
 def _bent_body(mechanism: Mechanism, link: Link, curved: bool) -> BentBody:
     empty = np.zeros((0, 0))
     if not curved or link.second_order is None:
@@ -234,9 +248,10 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
             joints=joints,
             joint_states=states,
             modes=modes,
-            **addresses(mechanism),
+            **addresses(mechanism, call_loads),
             rigid_links=rigid,
             rigid_states=rigid_states,
+            **put_loads(mechanism, _modal_bases(mechanism), [len(b.coupling) > 0 for b in bent], constants, working),
             own=own,
             gravity=mechanism.gravity,
         )

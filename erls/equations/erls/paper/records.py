@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from erls.equations import compiled_system as contract
+from erls.equations.serial.loads import LOADS
 from erls.maths.calls import caller
 from erls.maths.jit import ENABLED
 from erls.maths.records import Matrix, Stack, Vector, reader, table_size
@@ -23,6 +24,7 @@ if ENABLED:
     ELIMINATE, EXTRA_ROWS = _t.int64(*_memory), _t.void(*_memory)
 
 call_eliminate = caller(ELIMINATE, "erls.equations.erls.paper.elimination:eliminate")
+call_loads = caller(LOADS, "erls.equations.erls.paper.loads:loads")
 call_extra_rows = caller(EXTRA_ROWS, "erls.equations.erls.paper.second_order_rows:extra_rows")
 
 

@@ -215,7 +215,8 @@ def _load(record: Load, node: int, place: Place, dynamic: bool) -> NodalLoad:
     if record.factor:
         curve = build_loads(record.factor, place, "factor")
         factor, breakpoints = curve.value, curve.breakpoints
-    return NodalLoad(node, np.array(record.force), np.array(record.moment), record.follower, factor, breakpoints)
+    wrench = np.array(record.force), np.array(record.moment)
+    return NodalLoad(node, *wrench, record.follower, factor=factor, breakpoints=breakpoints)
 
 
 def _velocity(record: BodySceneRecord, numbers: dict[str, int], poses: Array, world: bool) -> Array:

@@ -1,0 +1,233 @@
+"""Forces and moments on displaced nodes of links: what they do to a link's frame and to its coordinates.
+
+With the node's pose N(q) in the frame of its link and its twist Ad(N⁻¹) ν + A(q) q̇ in its own axes, the virtual power
+of a wrench W there is
+
+    W · (Ad(N⁻¹) ν + A q̇)  =  Ad(N)⁻ᵀ W · ν + Aᵀ W · q̇,
+
+the generalized forces on ν and on q (ERLS-CMS paper, section 4.4, eq. 64-67, there for small displacements of the
+node). A follower gives W itself; other loads are turned into the axes of the node, from the world or from those of
+another node.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from erls.equations import compiled_system as contract
+from erls.equations.serial.nodes import (
+    NODE,
+    NODE_STATE,
+    Node,
+    NodeState,
+    centre_record,
+    from_node_axes,
+    move_node,
+    node_record,
+    node_state,
+    place_node,
+    read_node,
+    read_node_state,
+)
+from erls.equations.serial.records import MODES, Serial, read_modes
+from erls.equations.serial.time_curves import curve, put_curve
+from erls.maths.jit import ENABLED, part
+from erls.maths.products import add_columns, clear
+from erls.maths.records import Memory, Vector, python_reader, reader, room, table_size
+from erls.maths.so3 import Array
+from erls.maths.spatial import dot6, rotate, rotate_back, transform_force_back, transform_motion
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import Link
+from erls.mechanism.loads import CENTRE
+from fe_import.model import IntArray
+
+LOADS: Any = None
+"""Signature of a formulation's ``loads``: place of the `Serial`, memory, time, y, v, forces."""
+if ENABLED:
+    from numba import types as _t
+
+    _memory = (contract.REALS, contract.INTEGERS, contract.REALS)
+    LOADS = _t.void(_t.int64, *_memory, _t.float64, contract.REALS, contract.REALS, contract.REALS)
+
+
+class Load(NamedTuple):
+    """A wrench on a node.
+
+    Attributes
+    ----------
+    link : int
+        That carries the node.
+    reference : int
+        Link whose node turns the wrench; -1 for the axes of the world.
+    follower : int
+        Whether that is the node itself.
+    factor : int
+        Place of the curve that multiplies the wrench; -1 without.
+    wrench : (6,) array
+        Force [N] and moment [N m].
+    """
+
+    link: int
+    reference: int
+    follower: int
+    factor: int
+    wrench: Vector
+
+
+class LoadState(NamedTuple):
+    """Working memory of a load on a link with n coordinates.
+
+    Attributes
+    ----------
+    pose, other, spare : (12,) arrays
+        Of the link and of the one whose node turns the wrench, in the world, where their axes are asked for; spare.
+    given : (6,) array
+        The wrench in the axes of its node.
+    wrench, forces : (6,), (n,) arrays
+        On the link's frame and on its coordinates.
+    moved : (6,) array
+        Twist of the node in its axes.
+    power : (1,) array
+        [W]
+    """
+
+    pose: Annotated[Array, "12"]
+    other: Annotated[Array, "12"]
+    spare: Annotated[Array, "12"]
+    given: Annotated[Array, "6"]
+    wrench: Annotated[Array, "6"]
+    forces: Annotated[Array, "n"]
+    moved: Annotated[Array, "6"]
+    power: Annotated[Array, "1"]
+
+
+read_load, read_load_state = reader(Load), reader(LoadState)
+LOAD, LOAD_STATE = table_size(Load), table_size(LoadState)
+_see_state = python_reader(LoadState)
+
+
+def put_loads(
+    mechanism: Mechanism, bases: list[Array], bent: list[bool], constants: Memory, scratch: Memory
+) -> dict[str, int]:
+    """Records of all loads; the places of the first, by the names of fields of `Serial`.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    bases : list of (m, n) arrays
+        Modal coordinates of each link per coordinate that the formulation has of it.
+    bent : list of bool
+        Which links have second-order displacements.
+    constants, scratch : Memory
+    """
+    own = mechanism.loads
+
+    def at(k: int, node: int) -> Node:
+        given = k, mechanism.links[k], bases[k]
+        return centre_record(*given, bent[k]) if node == CENTRE else node_record(*given, node, bent[k])
+
+    nodes = [node for load in own for node in (at(load.link, load.node), at(*(load.axes or (load.link, load.node))))]
+    records = [
+        Load(
+            link=load.link,
+            reference=load.axes[0] if load.axes else -1,
+            follower=int(load.follower),
+            factor=put_curve(constants, load.factor),
+            wrench=load.wrench * (_mass(mechanism.links[load.link]) if load.node == CENTRE else 1.0),
+        )
+        for load in own
+    ]
+    tables: dict[str, tuple[Memory, list[Any]]] = {
+        "load_records": (constants, records),
+        "load_nodes": (constants, nodes),
+        "load_states": (scratch, [room(LoadState, n=bases[load.link].shape[1]) for load in own]),
+        "load_node_states": (scratch, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in nodes]),
+    }
+    places = {name: [memory.put(record) for record in every] for name, (memory, every) in tables.items()}
+    return {"load_count": len(own), **{name: every[0] if every else -1 for name, every in places.items()}}
+
+
+def _mass(link: Link) -> float:
+    """Of a link with what it carries [kg]."""
+    return float(np.trace(link.invariants.rigid_mass_matrix[:3, :3])) / 3
+
+
+def load_powers(system: contract.CompiledSystem, serial: Serial) -> list[Array]:
+    """Views (1,) of the power that a residual leaves of every load [W]."""
+    places = (serial.load_states + k * LOAD_STATE for k in range(serial.load_count))
+    return [_see_state(system.scratch, system.integers, at).power for at in places]
+
+
+@part
+def elastic_places(serial: Serial, reals: Array, integers: IntArray, k: int, shift: int) -> tuple[int, int]:
+    """Places of the elastic coordinates of link k, ``shift`` behind those among the independent coordinates."""
+    modes = read_modes(reals, integers, serial.modes + k * MODES)
+    return modes.first + shift, modes.first + shift + len(modes.stiffness)
+
+
+@part
+def needs_world(load: Load) -> bool:
+    """Whether the wrench is turned by what stands on another link than its node, or by nothing."""
+    return load.reference != load.link
+
+
+@part
+def act(
+    serial: Serial, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, q: Array, rates: Array,
+    q_reference: Array, twist: Array,
+) -> None:  # fmt: skip
+    """A load in the motion of its link: ``wrench`` and ``forces``, what it does to the frame and to the coordinates.
+
+    Parameters
+    ----------
+    serial, reals, integers, scratch : Serial, arrays
+    number : int
+        Of the load, whose ``pose`` and ``other`` stand in its memory if `needs_world`.
+    t : float
+    q, rates : (n,) arrays
+        Coordinates of the link and their rates.
+    q_reference : array
+        Coordinates of the link whose node turns the wrench.
+    twist : (6,) array
+        Of the link's frame, in its axes.
+    """
+    load = read_load(reals, integers, serial.load_records + number * LOAD)
+    work = read_load_state(scratch, integers, serial.load_states + number * LOAD_STATE)
+    node = read_node(reals, integers, serial.load_nodes + 2 * number * NODE)
+    moved = read_node_state(scratch, integers, serial.load_node_states + 2 * number * NODE_STATE)
+    place_node(node, moved, q)
+    move_node(node, moved, rates, rates[0:0])
+    factor = 1.0 + 0.0 * load.wrench[0]
+    if load.factor >= 0:
+        factor = curve(reals, integers, load.factor, t)[0]
+    for i in range(6):
+        work.given[i] = factor * load.wrench[i]
+    if not load.follower:
+        turner = read_node(reals, integers, serial.load_nodes + (2 * number + 1) * NODE)
+        turned = read_node_state(scratch, integers, serial.load_node_states + (2 * number + 1) * NODE_STATE)
+        if load.reference >= 0:
+            place_node(turner, turned, q_reference)
+        _turn(load, work, turned, moved, work.given[:3])
+        _turn(load, work, turned, moved, work.given[3:])
+    transform_motion(moved.pose, twist, work.moved)
+    for i in range(6):
+        work.moved[i] += moved.twist[i]
+    work.power[0] = dot6(work.given, work.moved)
+    transform_force_back(moved.pose, work.given, work.wrench)
+    from_node_axes(moved.pose, moved.tangent, work.given, work.moved)
+    clear(work.forces)
+    add_columns(moved.rows, work.moved, 1.0, work.forces)
+
+
+@part
+def _turn(load: Load, work: LoadState, turned: NodeState, moved: NodeState, x: Array) -> None:
+    """A vector (3,) from the axes in which it is given into those of the node."""
+    if load.reference >= 0:
+        rotate(turned.pose, x, x)
+    if needs_world(load):
+        if load.reference >= 0:
+            rotate(work.other, x, x)
+        rotate_back(work.pose, x, x)
+    rotate_back(moved.pose, x, x)

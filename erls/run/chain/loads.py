@@ -1,0 +1,34 @@
+"""Loads of a scene along a motion, in the world."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from erls.equations.serial.state_series import StateSeries
+from erls.maths.rotation_maps import exp
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import node_shape6
+from erls.mechanism.loads import CENTRE, PointLoad
+
+
+def wrenches(mechanism: Mechanism, load: PointLoad, series: StateSeries) -> Array:
+    """(k, 2, 3) force [N] and moment [N m] of a load on its node at the times of a series, or force per mass [N/kg];
+    world axes.
+    """
+    given = np.array([load.at(t) for t in series.times.tolist()]).reshape(-1, 2, 3)
+    if load.axes is None:
+        return given
+    link, node = load.axes
+    _, rotation = node_shape6(mechanism.links[link].model, node)
+    turns = series.poses[link][:, :3, :3] @ exp(series.modal[link] @ rotation.T)
+    return np.asarray(np.einsum("kij,kmj->kmi", turns, given))
+
+
+def pull(mechanism: Mechanism, number: int, series: StateSeries) -> Array:
+    """(k, 3) gravity and forces per mass on a link [m/s²], world axes."""
+    result = np.tile(mechanism.gravity, (len(series.times), 1))
+    for load in mechanism.loads:
+        if load.link == number and load.node == CENTRE:
+            result += wrenches(mechanism, load, series)[:, 0]
+    return result

@@ -1,0 +1,98 @@
+"""Compiled code on disk: whatever happens to it, the next use compiles anew, or keeps nothing, and says so once."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from erls.maths import jit
+
+pytestmark = pytest.mark.skipif(not jit.ENABLED, reason="nothing is compiled with ERLS_JIT=0")
+
+
+def _twice(x: float) -> float:
+    return 2.0 * x
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What the user is told."""
+    texts: list[str] = []
+    monkeypatch.setattr(jit, "_listeners", [texts.append])
+    monkeypatch.setattr(jit, "_told", {jit._EQUATIONS})
+    return texts
+
+
+def _compiled(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Any:
+    """The function, from disk if it is there."""
+    from numba import float64
+
+    monkeypatch.setattr(jit, "folder", lambda module: folder / "kernels")
+    return jit.kernel(float64(float64), counted=False)(_twice)
+
+
+def _flip(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+DAMAGE: dict[str, Callable[[Path], object]] = {
+    "empty": lambda path: path.write_bytes(b""),
+    "cut off": lambda path: path.write_bytes(path.read_bytes()[:-100]),
+    "one bit": _flip,
+    "something else": lambda path: path.write_bytes(os.urandom(1000)),
+}
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damaged_code_is_compiled_anew(
+    damage: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: list[str]
+) -> None:
+    """Index or code; told once, and what was compiled anew is read the next time."""
+    _compiled(monkeypatch, tmp_path)
+    (file,) = tmp_path.rglob(f"*.{ending}")
+    DAMAGE[damage](file)
+    again = _compiled(monkeypatch, tmp_path)
+    assert again(3.0) == 6.0
+    assert sum(again.stats.cache_hits.values()) == 0
+    assert told == [f"compiled code in {tmp_path} is damaged: compiled anew"]
+    assert sum(_compiled(monkeypatch, tmp_path).stats.cache_hits.values()) == 1
+    assert len(told) == 1
+
+
+def test_a_folder_that_cannot_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: list[str]) -> None:
+    """Nothing is kept, least of all beside the source, where it would be found after what it calls has changed."""
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    beside = set(Path(__file__).parent.glob("__pycache__/*.nb?"))
+    for _ in range(2):
+        assert _compiled(monkeypatch, tmp_path / "file")(3.0) == 6.0
+    assert len(told) == 1
+    assert "cannot be kept" in told[0]
+    assert "ERLS_KERNELS" in told[0]
+    assert set(Path(__file__).parent.glob("__pycache__/*.nb?")) == beside
+
+
+def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: list[str]) -> None:
+    """Nothing half-written stays; what was there before is still read where nothing can be written."""
+
+    def full(*names: str, **more: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", full)
+        assert _compiled(patched, tmp_path)(3.0) == 6.0
+        assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+    assert len(told) == 1
+    assert "No space left on device" in told[0]
+    _compiled(monkeypatch, tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", full)
+        patched.setattr(os, "makedirs", full)
+        assert sum(_compiled(patched, tmp_path).stats.cache_hits.values()) == 1
