@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from erls.equations.formulation import Formulation
 from erls.equations.linearization import Linearization, roots
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
@@ -66,6 +67,18 @@ class Stability:
         """Whether the motion begins near an equilibrium with the joints released, so that its root tells of it."""
         return self.distance <= _NEAR * self.size
 
+    @property
+    def line(self) -> str:
+        """Of the report of a run."""
+        held = f"{100 * self.stiffness_left:.3g} % of the stiffness left under load with the joints held"
+        if self.softest_link:
+            held += f" (link {self.softest_link!r})"
+        if self.root is None:
+            return f"static start: {held}"
+        imaginary = f" ± {abs(self.root.imag):.4g} i" if self.root.imag else ""
+        away = "" if self.near_equilibrium or self.root.real <= 0 else ", far from an equilibrium"
+        return f"static start: {held}; rightmost root with the joints released {self.root.real:.4g}{imaginary} 1/s{away}"
+
     def summary(self) -> dict[str, Any]:
         """The key ``stability`` of the JSON of ``erls simulate``."""
         root = self.root
@@ -112,9 +125,25 @@ def stability_of(
     return Stability(*bearing, root, distance, size)
 
 
-def unstable(link: str, share: float, allowed: bool) -> SimulationError:
-    """A link buckles at a share of its loads."""
-    there = "; no equilibrium was found beyond that" if allowed else ""
+def start_stability(formulation: Formulation) -> Stability | None:
+    """Of a static start; None of other starts, of formulations that do not know it, and where nothing can be solved.
+
+    Parameters
+    ----------
+    formulation : Formulation
+        What is integrated: of the pieces, where links are split.
+    """
+    if not formulation.mechanism.static_start or not isinstance(formulation, Started):
+        return None
+    try:
+        return formulation.stability
+    except (SimulationError, np.linalg.LinAlgError):  # a mass matrix that is singular is told by the run
+        return None
+
+
+def unstable(link: str, share: float, beyond: bool) -> SimulationError:
+    """A link buckles at a share of its loads; there is an equilibrium beyond, or none was found."""
+    there = "" if beyond else "; no equilibrium was found beyond that"
     remedy = "stiffen the link, or let it bear less; start from deformation = 'zero', or turned to where loads bend it"
     return SimulationError(
         Cause.UNSTABLE_START,
@@ -122,7 +151,7 @@ def unstable(link: str, share: float, allowed: bool) -> SimulationError:
         where="initial.deformation",
         value=f"{1 / share:.3g} times what it buckles at",
         limit="below 1",
-        remedy=remedy if allowed else f"{remedy}; initial.allow_unstable = true starts on the unstable equilibrium",
+        remedy=f"{remedy}; initial.allow_unstable = true starts on the unstable equilibrium" if beyond else remedy,
     )
 
 

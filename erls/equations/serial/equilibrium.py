@@ -14,14 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from erls.equations.formulation import TreeFormulation
 from erls.equations.linearization import derivatives, difference_steps, stiffness_left, ways_left
 from erls.equations.serial.state_series import state_series
-from erls.equations.series import residual_series
 from erls.equations.stability import Bearing, too_soft, unstable
 from erls.equations.system import metre_scales
 from erls.maths.so3 import Array
@@ -38,6 +38,13 @@ _BUCKLED = 0.5  # of the stiffness, left where a path ends: it ends for lack of 
 _UNHELD = 1e-12  # of the stiffness of a mode: given to ways that bend no link
 
 
+class Forces(Protocol):
+    """(k, n) forces out of balance at places (k, n), with those of multipliers (r,)."""
+
+    def __call__(self, many: Array, multipliers: Array) -> Array:
+        """R + Φ_yᵀ λ."""
+
+
 @dataclass(frozen=True)
 class Held:
     """A mechanism at rest with its joints held.
@@ -45,8 +52,7 @@ class Held:
     Attributes
     ----------
     mechanism : Mechanism
-    forces : callable
-        (k, n) forces out of balance at places (k, n), with those of multipliers (r,): R + Φ_yᵀ λ.
+    forces : Forces
     conditions : callable
         Φ (m,) and its rows (m, n) at a place (n,), none of them following from others: r conditions of loops, then
         those that hold joints, whose rows hardly change.
@@ -63,7 +69,7 @@ class Held:
     """
 
     mechanism: Mechanism
-    forces: Callable[[Array, Array], Array]
+    forces: Forces
     conditions: Callable[[Array], tuple[Array, Array]]
     loops: int
     stiffness: Array
@@ -75,7 +81,7 @@ class Held:
     @property
     def elastic(self) -> Array:
         """(n,) which coordinates are elastic."""
-        return self.stiffness > 0
+        return np.asarray(self.stiffness > 0)
 
 
 class _Found(NamedTuple):
@@ -117,7 +123,7 @@ def equilibrium(held: Held, y: Array) -> tuple[Array, Bearing]:
     if whole.balanced and held.mechanism.allow_unstable:
         return whole.y, bearing
     if path.bearing.left < _BUCKLED:
-        raise unstable(path.bearing.link, path.share, held.mechanism.allow_unstable)
+        raise unstable(path.bearing.link, path.share, whole.balanced)
     raise too_soft(held.what, whole.deflection, held.size)
 
 
@@ -152,8 +158,7 @@ def _balance(held: Held, share: float, y: Array, multipliers: Array) -> _Found:
     slope = np.zeros((len(y), len(y)))
     for _ in range(_ITERATIONS):
         conditions, rows = held.conditions(y)
-        given = multipliers
-        slope = share * derivatives(lambda at, given=given: held.forces(at, given), y, steps)
+        slope = share * derivatives(partial(held.forces, multipliers=multipliers), y, steps)
         slope[np.diag_indices(len(y))] += (1 - share) * held.stiffness
         first = slope if first is None else first
         force = share * held.forces(y[None], np.zeros(held.loops))[0] + (1 - share) * held.stiffness * (y - held.rest)
@@ -212,11 +217,10 @@ def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray
     """
     metres, size = metre_scales(equations), size_of(equations.mechanism)
     angles = Angles(equations, held_joints, y, metres, size)
-    still = np.zeros((2 * len(y), len(y)))
+    still = np.zeros(len(y))
 
     def forces(many: Array, multipliers: Array) -> Array:
-        rest = still[: len(many)]
-        return residual_series(equations.compiled, np.zeros(len(many)), many, rest, rest)
+        return np.array([equations.residual(0.0, at, still, still) for at in many]).reshape(many.shape)
 
     stiffness, rest = elastic_on_diagonal(equations)
     return equilibrium(Held(equations.mechanism, forces, angles.conditions, 0, stiffness, rest, metres, size), y)
