@@ -77,7 +77,8 @@ class Stability:
             return f"static start: {held}"
         imaginary = f" ± {abs(self.root.imag):.4g} i" if self.root.imag else ""
         away = "" if self.near_equilibrium or self.root.real <= 0 else ", far from an equilibrium"
-        return f"static start: {held}; rightmost root with the joints released {self.root.real:.4g}{imaginary} 1/s{away}"
+        root = f"{self.root.real:.4g}{imaginary} 1/s{away}"
+        return f"static start: {held}; rightmost root with the joints released {root}"
 
     def summary(self) -> dict[str, Any]:
         """The key ``stability`` of the JSON of ``erls simulate``."""
