@@ -27,6 +27,7 @@ class Cause(enum.StrEnum):
     INCONSISTENT_START = "start that does not fulfil the constraints"
     LOOP_OPEN = "loop cannot be closed"
     NO_EQUILIBRIUM = "no static equilibrium"
+    UNSTABLE_START = "unstable static equilibrium"
     NEWTON_FAILED = "Newton iteration did not converge"
     NOT_FINITE = "solution is no longer finite"
     STEP_TOO_SMALL = "step size became too small"

@@ -43,6 +43,8 @@ class Mechanism:
         World axes [m/s²].
     static_start : bool
         Whether the motion starts from static equilibrium with the joints held, instead of undeformed.
+    allow_unstable : bool
+        Whether that equilibrium may be unstable.
     loops : tuple of Loop
         Joints that close it.
     loads : tuple of PointLoad
@@ -59,6 +61,7 @@ class Mechanism:
     points: tuple[Point, ...]
     gravity: Array
     static_start: bool = False
+    allow_unstable: bool = False
     loops: tuple[Loop, ...] = ()
     loads: tuple[PointLoad, ...] = ()
     effects: frozenset[str] = ALL

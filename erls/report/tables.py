@@ -122,6 +122,8 @@ def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
         f"energy: {s['energy']['initial']:.6g} J at the start, {s['energy']['final']:.6g} J at the end"
         + (f", drift at most {drift:.2g} J" if drift is not None else " (driven, loaded or damped: not conserved)"),
     ]
+    if run.stability is not None:
+        lines.append(run.stability.line)
     lines += statement_lines(run)
     if run.failure is not None:
         lines.append(f"stopped early: {run.failure}")

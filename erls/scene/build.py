@@ -115,6 +115,7 @@ def build_mechanism(
         loads=tuple(build_loads(scene, links, points, whole.numbers)),
         gravity=np.array(record.gravity),
         static_start=record.initial.deformation == "static",
+        allow_unstable=record.initial.allow_unstable,
         bandwidth=record.simulation.bandwidth,
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")

@@ -133,9 +133,12 @@ class Initial(Record, frozen=True):
     ----------
     deformation : str
         ``zero``: undeformed; ``static``: in static equilibrium with the joints held.
+    allow_unstable : bool
+        Whether a static start may lie on an unstable equilibrium, with links loaded beyond buckling; refused otherwise.
     """
 
     deformation: str = "zero"
+    allow_unstable: bool = False
 
 
 class SceneRecord(SceneTables, frozen=True, kw_only=True):

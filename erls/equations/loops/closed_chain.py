@@ -17,11 +17,13 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
+from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.rows import Closure, applied
 from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
 from erls.equations.loops.static import closed_equilibrium
 from erls.equations.loops.tied import OPEN, Tied
+from erls.equations.serial.equilibrium import elastic_on_diagonal
 from erls.equations.serial.state_series import (
     ReactionSeries,
     StateSeries,
@@ -31,6 +33,7 @@ from erls.equations.serial.state_series import (
     single_energy,
     state_series,
 )
+from erls.equations.stability import Bearing, Stability, stability_of
 from erls.errors import SimulationError
 from erls.maths.so3 import Array, cross_all
 from fe_import.model import IntArray
@@ -189,12 +192,44 @@ class ClosedChain(Tied):
 
     def initial_state(self) -> tuple[Array, Array]:
         """(y, v) at time 0: loops closed on the undeformed chain, or in static equilibrium; rates that keep to them."""
-        y = self.start.y
-        if self.start.where:  # the gap is all in conditions that others leave to it, or links bend by as much
-            y = self.closed(0.0, y, np.zeros(self.size))[0]
-        if self.mechanism.static_start:
-            y = closed_equilibrium(self, y, self.start.held, self.kept)
+        y = self._static[0].copy() if self.mechanism.static_start else self._closed_start
         return y, self.start_velocity(y)
+
+    @property
+    def _closed_start(self) -> Array:
+        """(n,) loops closed, links undeformed unless loops need it."""
+        if not self.start.where:
+            return self.start.y
+        # the gap is all in conditions that others leave to it, or links bend by as much
+        return self.closed(0.0, self.start.y, np.zeros(self.size))[0]
+
+    @cached_property
+    def _static(self) -> tuple[Array, Bearing]:
+        """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness."""
+        return closed_equilibrium(self, self.exact, self._closed_start, self.start.held)
+
+    def linearized(self, t: float, y: Array, v: Array) -> Linearization:
+        """Small motions about a closed state on the ways that the loops leave, with their forces as they are there."""
+        a = self._accelerate(self.exact, t, y, v)
+        multipliers = self.exact.room.multipliers.copy()
+        stiffness, _ = elastic_on_diagonal(self.bare)
+        steps = difference_steps(self.metres, self.reach, stiffness)
+
+        def forces(y: Array, v: Array) -> Array:
+            every = (np.tile(x, (len(y), 1)) for x in (a, multipliers))
+            return self.exact.held(np.full(len(y), t), y, v, *every)
+
+        slope = derivatives(lambda many: forces(many, np.tile(v, (len(many), 1))), y, steps)
+        damping = derivatives(lambda many: forces(np.tile(y, (len(many), 1)), many), v, steps)
+        rows = self.closure(t, y, v).rows[self.kept][:, self.bare.free]
+        return restricted(self.exact.masses(t, y), damping, slope, ways_left(rows, 1 / self.metres))
+
+    @cached_property
+    def stability(self) -> Stability:
+        """Of the static start."""
+        y, v = self.initial_state()
+        a = self._accelerate(self.exact, 0.0, y, v)
+        return stability_of(self._static[1], self.linearized(0.0, y, v), a, self.metres, self.reach)
 
     def start_velocity(self, y: Array) -> Array:
         """(n,) rates at a closed start that keep it closed."""

@@ -7,6 +7,7 @@ follow from time.
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,15 @@ import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
-from erls.equations.serial.equilibrium import held_equilibrium
+from erls.equations.linearization import Linearization, derivatives, difference_steps
+from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
 from erls.equations.serial.loads import load_powers
 from erls.equations.serial.records import Serial
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
 from erls.equations.series import mass_series, residual_series
+from erls.equations.stability import Bearing, Stability, stability_of
+from erls.equations.system import metre_scales
 from erls.maths.records import python_reader
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array, cross_all
@@ -149,7 +153,32 @@ class SerialFormulation(TreeFormulation):
     def initial_state(self) -> tuple[Array, Array]:
         """(y, v) at time 0: the joints' initial angles and rates, links undeformed or in static equilibrium."""
         y, v = self.undeformed_start()
-        return (held_equilibrium(self, y, self.free_joints) if self.mechanism.static_start else y), v
+        return (self._static[0].copy() if self.mechanism.static_start else y), v
+
+    @cached_property
+    def _static(self) -> tuple[Array, Bearing]:
+        """Static equilibrium with the joints held, and what loads leave of the stiffness."""
+        return held_equilibrium(self, self.undeformed_start()[0], self.free_joints)
+
+    def linearized(self, t: float, y: Array, v: Array) -> Linearization:
+        """Small motions about a state, with the accelerations of the equations of motion."""
+        a = self.acceleration(t, y, v)
+        stiffness, _ = elastic_on_diagonal(self)
+        steps = difference_steps(metre_scales(self), size_of(self.mechanism), stiffness)
+
+        def forces(y: Array, v: Array) -> Array:
+            return residual_series(self.compiled, np.full(len(y), t), y, v, np.tile(a, (len(y), 1)))
+
+        slope = derivatives(lambda many: forces(many, np.tile(v, (len(many), 1))), y, steps)
+        damping = derivatives(lambda many: forces(np.tile(y, (len(many), 1)), many), v, steps)
+        return Linearization(self.mass_matrix(t, y), damping, slope, np.eye(self.size))
+
+    @cached_property
+    def stability(self) -> Stability:
+        """Of the static start."""
+        y, v = self.initial_state()
+        a, size = self.acceleration(0.0, y, v), size_of(self.mechanism)
+        return stability_of(self._static[1], self.linearized(0.0, y, v), a, metre_scales(self), size)
 
     def frames(self, t: float, y: Array, v: Array) -> list[FrameMotion]:
         """Frames that the loops of the mechanism hold; see `TreeFormulation`."""

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from erls.equations.formulation import Energy, LoopFormulation
 from erls.equations.serial.state_series import ReactionSeries, energy_series, reaction_series
+from erls.equations.stability import Stability, start_stability
 from erls.equations.substructures import solved
 from erls.errors import SceneError
 from erls.maths.so3 import Array
@@ -139,6 +140,11 @@ class ChainRun(ChainMotion):
         found = [what(chain, *at, number) for at in zip(flat.tolist(), y, v, strict=True)]
         return np.array(found).reshape(np.shape(t))
 
+    @cached_property
+    def stability(self) -> Stability | None:
+        """Of a static start of links that are linear in their own frames; None of other starts."""
+        return start_stability(solved(self.formulation))
+
     @property
     def conservative(self) -> bool:
         """Whether total energy should stay constant: no drives, loads, damping or friction."""
@@ -221,6 +227,7 @@ class ChainRun(ChainMotion):
                 "final": float(np.asarray(totals)[-1]),
                 "max_drift": float(np.ptp(totals)) if self.conservative else None,
             },
+            **({} if self.stability is None else {"stability": self.stability.summary()}),
             **self.stated(),
             "samples": self.samples(times),
             **({"events": [asdict(happening) for happening in self.events]} if self.scene.record.events else {}),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from erls.run.watches.base import Watch
 from erls.run.watches.deflection_range import DeflectionRange
 from erls.run.watches.events import Events
+from erls.run.watches.growing_disturbances import GrowingDisturbances
 from erls.run.watches.impulses import Impulses
 from erls.run.watches.integration import Integration
 from erls.run.watches.loop_conditions import LoopConditions
@@ -20,6 +21,7 @@ from erls.run.watches.stored_output import StoredOutput
 WATCHES: tuple[type[Watch], ...] = (
     Impulses,
     SecondOrderData,
+    GrowingDisturbances,
     LoopConditions,
     Events,
     Runaway,

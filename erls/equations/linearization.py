@@ -1,0 +1,193 @@
+"""Small motions about a state: M ẍ + D ẋ + K x = 0, and their roots, det(s² M + s D + K) = 0.
+
+For forces out of balance R(t, y, v, a), which are M a - f, the tangents at a state are
+
+    M = ∂R/∂a,    D = ∂R/∂v,    K = ∂R/∂y.
+
+D holds damping C and what speeds do (G, gyroscopic and Coriolis forces), K all that forces change with the place:
+elastic forces, weight, tension, centrifugal forces, controllers, loads that follow the mechanism. Neither need be
+symmetric. Where conditions Φ(t, y) = 0 hold, with multipliers λ, K = ∂(R + Φ_yᵀ λ)/∂y, and x = N z goes the ways that
+they leave, Φ_y N = 0. That is exact about equilibria; of a state that moves, tangents are those of the instant, and N
+is taken as constant.
+
+A system says R at many states at once, and its derivatives are central differences: R is quadratic in v but for
+friction, so that those by v are exact to rounding; those by y have an error of 1e-12 of what changes R over the size
+of the mechanism, and rounding of 1e-10 of R over that size. Functions that are compiled take no complex steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import scipy.linalg as la
+
+from erls.maths.so3 import Array
+
+Series = Callable[[Array], Array]
+"""(k, m) forces of (k, n) states."""
+
+STEP = 1e-6  # of the size of the mechanism, of differences
+_ROUNDING = 1e-12  # of the largest root: real parts below are zero
+_SYMMETRIC = 1e-7  # of a matrix of stiffness: less is rounding of differences
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """M z̈ + D ż + K z = 0 in f coordinates z, which move those of a system by x = N z.
+
+    Attributes
+    ----------
+    mass, damping, stiffness : (f, f) arrays
+    ways : (n, f) array
+        N; the unit matrix where no conditions hold.
+    """
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    ways: Array
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates z."""
+        return len(self.mass)
+
+
+@runtime_checkable
+class Linearizable(Protocol):
+    """A formulation that knows small motions about its states."""
+
+    def linearized(self, t: float, y: Array, v: Array) -> Linearization:
+        """Small motions about a state (n,), with the accelerations of the equations of motion."""
+
+
+def derivatives(forces: Series, at: Array, steps: Array) -> Array:
+    """(m, n) derivatives of forces (m,) by coordinates (n,), by central differences.
+
+    Parameters
+    ----------
+    forces : callable
+        Of (k, n) states.
+    at : (n,) array
+    steps : (n,) array
+        Of every coordinate.
+    """
+    n = len(at)
+    if not n:
+        return np.zeros((forces(at[None]).shape[1], 0))
+    moved = np.tile(at, (2 * n, 1))
+    numbers = np.arange(n)
+    moved[numbers, numbers] += steps
+    moved[n + numbers, numbers] -= steps
+    taken = (moved[numbers, numbers] - moved[n + numbers, numbers])[:, None]  # what rounding leaves of two steps
+    found = forces(moved)
+    return np.asarray(((found[:n] - found[n:]) / taken).T)
+
+
+def difference_steps(metres: Array, size: float, stiffness: Array) -> Array:
+    """(n,) steps of differences, each of about the same displacement.
+
+    Parameters
+    ----------
+    metres : (n,) array
+        Displacement per unit of each coordinate [m].
+    size : float
+        Of the mechanism [m].
+    stiffness : (n,) array
+        Of each coordinate by itself, 0 where nothing holds it: one that moves no node (torsion of the last link) takes
+        as much energy as the others.
+    """
+    steps = STEP * size / metres
+    energies = stiffness * steps**2
+    held = energies > 0
+    if held.any():
+        steps[held] *= np.sqrt(np.minimum(1.0, np.median(energies[held]) / energies[held]))
+    return np.asarray(steps)
+
+
+def ways_left(rows: Array, scales: Array) -> Array:
+    """(n, f) ways N that conditions leave, B N = 0: orthonormal in coordinates x / ``scales``.
+
+    Parameters
+    ----------
+    rows : (m, n) array
+        B, its rows independent.
+    scales : (n,) array
+        Units of the coordinates.
+    """
+    if not len(rows):
+        return np.diag(scales)
+    scaled = rows * scales
+    scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=1), 1e-300)[:, None]
+    q, _ = la.qr(scaled.T)
+    return np.asarray(scales[:, None] * q[:, len(rows) :])
+
+
+def restricted(mass: Array, damping: Array, stiffness: Array, ways: Array) -> Linearization:
+    """Small motions on the ways (n, f) that conditions leave of tangents (n, n)."""
+    return Linearization(ways.T @ mass @ ways, ways.T @ damping @ ways, ways.T @ stiffness @ ways, ways)
+
+
+def roots(motions: Linearization) -> Array:
+    """(2 f,) complex roots s of s² M + s D + K, the rightmost first, of several the slowest [1/s].
+
+    Coordinates are turned into modes of M and the symmetric part of K, and their places measured in units of their
+    rates, so that stiff and soft ones do not spoil each other: a root of size |s| beside the largest ω is right to
+    1e-14 ω, or to the square root of that share where two coincide. Ways without mass have no roots.
+
+    Parameters
+    ----------
+    motions : Linearization
+    """
+    modes = _modes(motions)
+    stiffness, damping = (modes.T @ part @ modes for part in (motions.stiffness, motions.damping))
+    n = len(stiffness)
+    if not n:
+        return np.zeros(0, dtype=complex)
+    rates = np.sqrt(np.abs(np.diag(stiffness)))
+    rates = np.maximum(rates, 1e-8 * rates.max()) if rates.any() else np.ones(n)
+    state = np.block([[np.zeros((n, n)), np.diag(rates)], [-stiffness / rates, -damping]])
+    found = np.linalg.eigvals(state).astype(complex)
+    found.real[np.abs(found.real) <= _ROUNDING * np.abs(found).max()] = 0.0
+    return np.asarray(found[np.lexsort((-found.imag, np.abs(found.imag), -found.real))])
+
+
+def _modes(motions: Linearization) -> Array:
+    """(f, k) shapes, orthonormal in M; without mass, shapes that follow the others are in them."""
+    stiffness = (motions.stiffness + motions.stiffness.T) / 2
+    try:
+        return np.asarray(la.eigh(stiffness, motions.mass)[1])
+    except la.LinAlgError:  # some ways have no mass
+        masses, shapes = la.eigh(motions.mass)
+        heavy, light = np.split(shapes, [int((masses <= 1e-14 * masses[-1]).sum())], axis=1)[::-1]
+        follow = np.linalg.lstsq(light.T @ stiffness @ light, light.T @ stiffness @ heavy, rcond=None)[0]
+        moving = heavy - light @ follow
+        return np.asarray(moving @ la.eigh(moving.T @ stiffness @ moving, moving.T @ motions.mass @ moving)[1])
+
+
+def stiffness_left(stiffness: Array, unloaded: Array) -> tuple[float, Array]:
+    """What loads leave of a stiffness: the lowest κ of K φ = κ K₀ φ, and its shape φ (n,).
+
+    κ is 1 without load, 0 where the equilibrium buckles, and 1 - P / P_c under a load P of which K depends linearly.
+    Of a K that is not symmetric it is the lowest real part.
+
+    Parameters
+    ----------
+    stiffness : (n, n) array
+        K, under load.
+    unloaded : (n, n) array
+        K₀, symmetric and positive definite.
+    """
+    lower = la.cholesky(unloaded, lower=True)
+    half = la.solve_triangular(lower, stiffness, lower=True)
+    scaled = la.solve_triangular(lower, half.T, lower=True).T
+    if np.abs(scaled - scaled.T).max(initial=0.0) <= _SYMMETRIC * np.abs(scaled).max(initial=0.0):
+        values, shapes = la.eigh((scaled + scaled.T) / 2, subset_by_index=[0, 0])
+    else:
+        values, shapes = la.eig(scaled)
+        values, shapes = values.real, shapes.real[:, [int(values.real.argmin())]]
+    shape = la.solve_triangular(lower, shapes[:, 0], lower=True, trans="T")
+    return float(values.min()), np.asarray(shape)
