@@ -97,7 +97,7 @@ def test_failures(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str])
 
 def test_no_equilibrium(tmp_path: Path) -> None:
     """A failure before the first step has no run, and names the field that asked for it."""
-    path = scene(tmp_path, initial={"deformation": "static"}, gravity=[0, 0, -9e6])
+    path = scene(tmp_path, initial={"deformation": "static"}, gravity=[0, 0, -9e6], simulation={"effects": "linear"})
     with pytest.raises(SimulationError) as caught:
         erls.simulate(path)
     assert caught.value.cause == Cause.NO_EQUILIBRIUM

@@ -38,7 +38,7 @@ def _column(folder: Path, times: float, tilt_deg: float = 0.0, **initial: Any) -
         },
     )
     constants = {"area": 1.0, "inertia_y": 1e-6, "inertia_z": 4e-6, "torsion_constant": 2e-6}  # soft across one axis
-    data["sections"]["s"] = {"shape": "constants", **constants}
+    data["sections"] = {"s": {"shape": "constants", **constants}}
     data["frame"]["members"] = [{**data["frame"]["members"][0], "elements": 8}]
     data["reduction"] = {"method": "craig-bampton", "fixed_interface_modes": 8}
     scenes.write_toml(folder / "column.toml", data)
