@@ -29,7 +29,7 @@ SUDDEN = 3.0
 """Times as large an error where forces change all at once, at an instant that small vibrations decide."""
 
 ITERATED = 0.03
-"""Of what the integration aims at: what Newton's iterations leave, which is no smooth error."""
+"""Of what the integration aims at: what Newton's iterations and rounding may leave, which is no smooth error."""
 
 _MANY = 200  # steps from which on positions alone tell a motion better than with rates, which vibrations spoil
 _EXPECTED = 5.0  # times what the integration aimed at

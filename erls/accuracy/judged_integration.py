@@ -1,9 +1,9 @@
 """How the integration of a chain's run is judged: by the error equation, by a second run, or by a companion.
 
-The error equation (`erls.accuracy.integration`) costs a sixth of a run, and errs to the large side where steps are
-coarse or leave vibrations unresolved. A second run (`erls.accuracy.second_run`) costs half of one, and is made where
-the equation cannot be followed, or where its estimate would decide over the total. Generalized-alpha has companions
-with larger steps (`erls.accuracy.constrained_integration`).
+The error equation (`erls.accuracy.integration`) costs less than a second run, and errs to the large side where steps
+are coarse or leave vibrations unresolved. A second run (`erls.accuracy.second_run`) costs half of one, and is made
+where the equation cannot be followed, or where its estimate would decide over the total. Generalized-alpha has
+companions with larger steps (`erls.accuracy.constrained_integration`).
 """
 
 from __future__ import annotations

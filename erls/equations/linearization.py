@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy.linalg as la
@@ -54,14 +53,6 @@ class Linearization:
     def size(self) -> int:
         """Number of coordinates z."""
         return len(self.mass)
-
-
-@runtime_checkable
-class Linearizable(Protocol):
-    """A formulation that knows small motions about its states."""
-
-    def linearized(self, t: float, y: Array, v: Array) -> Linearization:
-        """Small motions about a state (n,), with the accelerations of the equations of motion."""
 
 
 def derivatives(forces: Series, at: Array, steps: Array) -> Array:

@@ -16,6 +16,7 @@ import pytest
 import scenes
 from body_scenes_data import PENDULUM, body_scene
 from checkpoint_times import at_every_look
+from resumed_runs import chunks_of, equal, l_scene, refused
 
 import erls
 from erls.cli.main import main
@@ -23,13 +24,11 @@ from erls.equations.registry import formulate
 from erls.errors import Cause, SceneError, SimulationError
 from erls.integrate.base import Solution
 from erls.integrate.choice import integrator, options_of
-from erls.integrate.driver import Pace
 from erls.integrate.memory import Memory
 from erls.run.checkpoints import Checkpoints, key_of, read_checkpoint
 from erls.run.file import load_run
 from erls.scene.build import build_mechanism
 from erls.scene.read import load_chain
-from erls.simulation import extension
 
 DATA = scenes.ROOT / "data"
 L, CRANK = DATA / "l_shape/steel_tall.toml", DATA / "slider_crank/flexible.toml"
@@ -78,24 +77,6 @@ class Kept:
         self.all.append({name: values.copy() for name, values in memory().items()})
 
 
-def equal(one: Solution, other: Solution, work: bool = True) -> bool:
-    """Whether all knots are equal bit for bit, and so is the work."""
-    same = [np.array_equal(getattr(one, name), getattr(other, name)) for name in "tyva"]
-    return all(same) and (one.work == other.work or not work)
-
-
-def chunks_of(numbers: random.Random, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps in chunks that have nothing to do with how fast they are."""
-    size = Pace.size
-
-    def drawn(self: Pace) -> int:
-        size(self)
-        self._asked = numbers.randint(1, 5)
-        return self._asked
-
-    monkeypatch.setattr(Pace, "size", drawn)
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_integrators_go_on(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From any of five moments, with other chunks of steps than before; offering changes nothing."""
@@ -125,14 +106,6 @@ def test_integrators_go_on(name: str, tmp_path: Path, monkeypatch: pytest.Monkey
         assert equal(found, whole, counted), f"from {kept.all[k]['time']}"
         assert found.halved == whole.halved
         assert all(offered["time"] > kept.all[k]["time"] for offered in resumed.all)
-
-
-def l_scene(folder: Path, **changes: Any) -> Path:
-    scenes.l_link(folder)
-    settings = {"duration": 0.2, "integrator": "lobatto", "step": None}
-    found = scenes.merged({"simulation": settings}, changes)
-    found["simulation"] = {key: value for key, value in found["simulation"].items() if value is not None}
-    return scenes.write_toml(folder / "scene.toml", {**scenes.L_SCENE, **found})
 
 
 def stopped(scene: Path, checkpoint: Path, looks: int, changes: tuple[str, ...] = ()) -> float:
@@ -215,14 +188,6 @@ def test_effects_that_were_chosen_go_on(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 # the command
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """Exit code 2 and one line."""
-    assert main(["simulate", *arguments]) == 2
-    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
-    assert len(lines) == 1
-    return lines[0]
 
 
 def test_the_command_goes_on(
@@ -315,60 +280,6 @@ def test_integrators_that_cannot_go_on_are_refused(
     erls.simulate(scene, checkpoint=path, verdict=False)
     assert load_run(path).end > 0
     assert "cannot go on from a checkpoint" in refused(capsys, str(scene), "--resume", str(tmp_path / "r.h5"))
-
-
-def test_finished_runs_are_extended(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """As though the same --until had been given at once, accuracy included, also with a stop between; the first part is
-    what it was.
-    """
-    at_every_look(monkeypatch)
-    chunks_of(random.Random(8), monkeypatch)
-    scene, once, twice = l_scene(tmp_path), tmp_path / "once.h5", tmp_path / "twice.h5"
-    assert main(["simulate", str(scene), "--until", "0.3", "--at", "0.25", "-o", str(once)]) == 0
-    assert main(["simulate", str(scene), "-o", str(twice)]) == 0
-    first, whole = load_run(twice), load_run(once)
-    extend, left = extension.extend, [4]
-
-    def stop(t: float, end: float) -> None:
-        left[0] -= 1
-        if left[0] < 0:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(extension, "extend", lambda *a, **k: extend(*a, **{**k, "progress": stop}))
-        assert main(["simulate", str(scene), "--resume", str(twice), "--until", "0.3"]) == 130
-    assert load_run(twice).end == 0.2
-    assert (tmp_path / "twice.h5.partial").exists()
-    assert main(["simulate", str(scene), "--resume", str(twice), "--until", "0.3"]) == 0
-    run = load_run(twice)
-    assert run.end == 0.3
-    assert equal(run.solution, whole.solution)
-    assert (run.accuracy, run.trust, run.warnings) == (whole.accuracy, whole.trust, whole.warnings)
-    for name in "tyva":
-        assert np.array_equal(getattr(run.solution, name)[: len(first.solution.t)], getattr(first.solution, name))
-    capsys.readouterr()
-    assert "beyond 0.3 s" in refused(capsys, str(scene), "--resume", str(twice), "--until", "0.25")
-    assert "beyond 0.2 s" in refused(capsys, str(scene), "--until", "0.1")
-    slow = ("--set", "simulation.bandwidth=200.0")
-    assert "simulation.bandwidth" in refused(capsys, str(scene), "--until", "0.3", *slow)
-    assert "leave one of them out" in refused(capsys, str(scene), "--strict", "--until", "0.25")
-    turned = ("--set", "joints.0.initial.rate=1.0")
-    assert "joints" in refused(capsys, str(scene), "--resume", str(twice), "--until", "0.4", *turned)
-    body = body_scene(tmp_path, PENDULUM)
-    assert "bodies and beams cannot" in refused(capsys, str(body), "--until", "9.0")
-
-
-def test_an_extended_motion_is_that_of_a_longer_run(tmp_path: Path) -> None:
-    """Within what both state of their integration: their steps differ."""
-    scene = l_scene(tmp_path)
-    run, longer = erls.simulate(scene, until=0.3), erls.simulate(erls.load_scene(scene, ["simulation.duration=0.3"]))
-    times = np.linspace(0.0, 0.3, 31)
-    apart = np.linalg.norm(run.position("tip", times) - longer.position("tip", times), axis=1).max()
-    assert run.accuracy is not None
-    assert longer.accuracy is not None
-    assert 0 < apart < run.accuracy.integration + longer.accuracy.integration
 
 
 START = """

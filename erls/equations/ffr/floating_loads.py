@@ -15,7 +15,7 @@ from fe_import.model import IntArray
 def floating_loads(
     at: int, reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, out: Array
 ) -> None:
-    """The same for links that float freely (`erls.equations.ffr.floating`)."""
+    """Subtract what loads do from the forces on twists and elastic coordinates of their links."""
     serial = read_serial(reals, integers, at)
     free = read_frames(reals, integers, serial.own).free
     in_y, in_v = 12 * serial.links - free, 6 * serial.links - free
