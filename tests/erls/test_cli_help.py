@@ -69,10 +69,13 @@ def test_help_needs_no_heavy_package() -> None:
 
 
 def test_runs_on_reduced_links_load_no_solver(tmp_path: Path) -> None:
-    """Elements, reductions and sparse matrices are for links that were never reduced before, and for the verdict."""
+    """Elements, reductions and sparse matrices are for links that were never reduced before, and for the verdict;
+    kernels of loops for loops.
+    """
+    heavy = {"fe_import.reduce", "fe_import.solver", "scipy.sparse", "erls.equations.loops.closure"}
     code = (
         "import sys\nfrom erls.cli.main import main\nassert main(['simulate', sys.argv[1], '--no-verdict']) == 0\n"
-        "print('loaded', *sorted({'fe_import.reduce', 'fe_import.solver', 'scipy.sparse'} & set(sys.modules)))"
+        f"print('loaded', *sorted({heavy} & set(sys.modules)))"
     )
     scene = str(Path(__file__).parents[2] / "data/l_shape/steel_flat.toml")
     environment = {**os.environ, "ERLS_CACHE": str(tmp_path), "ERLS_KERNELS": os.environ["ERLS_KERNELS"]}

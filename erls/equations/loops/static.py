@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from erls.equations.loops.compiled import CompiledLoops
 from erls.equations.loops.tied import Tied
 from erls.equations.serial.equilibrium import Angles, Held, elastic_on_diagonal, equilibrium
 from erls.equations.stability import Bearing
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.equations.loops.compiled import CompiledLoops
 
 
 def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray) -> tuple[Array, Bearing]:
