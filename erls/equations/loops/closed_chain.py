@@ -17,13 +17,15 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
-from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
+from erls.equations.linearization import Linearization
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
+from erls.equations.loops.neighbours import LoopNeighbours
 from erls.equations.loops.rows import Closure, applied
 from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
 from erls.equations.loops.static import closed_equilibrium
 from erls.equations.loops.tied import OPEN, Tied
-from erls.equations.serial.equilibrium import elastic_on_diagonal
+from erls.equations.neighbours import small_motions
+from erls.equations.serial.neighbours import TreeNeighbours
 from erls.equations.serial.state_series import (
     ReactionSeries,
     StateSeries,
@@ -208,21 +210,15 @@ class ClosedChain(Tied):
         """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness."""
         return closed_equilibrium(self, self.exact, self._closed_start, self.start.held)
 
-    def linearized(self, t: float, y: Array, v: Array) -> Linearization:
-        """Small motions about a closed state on the ways that the loops leave, with their forces as they are there."""
+    def neighbours(self, t: float, y: Array, v: Array) -> LoopNeighbours:
+        """States beside a closed one, with the forces of the loops as they are there."""
         a = self._accelerate(self.exact, t, y, v)
         multipliers = self.exact.room.multipliers.copy()
-        stiffness, _ = elastic_on_diagonal(self.bare)
-        steps = difference_steps(self.metres, self.reach, stiffness)
+        return LoopNeighbours(self, TreeNeighbours(self.bare, t, y, v, a), multipliers, self.kept)
 
-        def forces(y: Array, v: Array) -> Array:
-            every = (np.tile(x, (len(y), 1)) for x in (a, multipliers))
-            return self.exact.held(np.full(len(y), t), y, v, *every)
-
-        slope = derivatives(lambda many: forces(many, np.tile(v, (len(many), 1))), y, steps)
-        damping = derivatives(lambda many: forces(np.tile(y, (len(many), 1)), many), v, steps)
-        rows = self.closure(t, y, v).rows[self.kept][:, self.bare.free]
-        return restricted(self.exact.masses(t, y), damping, slope, ways_left(rows, 1 / self.metres))
+    def linearized(self, t: float, y: Array, v: Array) -> Linearization:
+        """Small motions about a closed state on the ways that the loops leave."""
+        return small_motions(self.neighbours(t, y, v))
 
     @cached_property
     def stability(self) -> Stability:
