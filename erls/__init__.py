@@ -11,10 +11,11 @@ The command line in three lines::
 
 from typing import Any
 
-__all__ = ["load_run", "load_scene", "save_run", "section_forces", "simulate", "simulate_many", "stress"]
+__all__ = ["linearize", "load_run", "load_scene", "save_run", "section_forces", "simulate", "simulate_many", "stress"]
 
 _HOME = {
     "load_scene": ("erls.scene.read", "load_scene"),
+    "linearize": ("erls.linear.linearize", "linearize"),
     "simulate": ("erls.simulation.simulate", "simulate"),
     "simulate_many": ("erls.simulation.batch", "simulate_many"),
     "load_run": ("erls.run.file", "load_run"),

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg as la
@@ -176,7 +176,12 @@ def ways_left(rows: Array, scales: Array) -> Array:
 
 
 def roots(motions: Linearization) -> Array:
-    """(2 f,) complex roots s of s² M + s D + K, the rightmost first, of several the slowest [1/s].
+    """(2 f,) complex roots s of s² M + s D + K, the rightmost first, of several the slowest [1/s]: `small_modes`."""
+    return _state_matrix(motions).sorted(np.linalg.eigvals)[0]
+
+
+def small_modes(motions: Linearization) -> tuple[Array, Array]:
+    """The same with their shapes, (f, 2 f).
 
     Coordinates are turned into modes of M and the symmetric part of K, and their places measured in units of their
     rates, so that stiff and soft ones do not spoil each other: a root of size |s| beside the largest ω is right to
@@ -186,17 +191,34 @@ def roots(motions: Linearization) -> Array:
     ----------
     motions : Linearization
     """
+    state = _state_matrix(motions)
+    found, vectors = state.sorted(np.linalg.eig)
+    return found, state.shapes @ vectors[: state.shapes.shape[1]]
+
+
+class _State(NamedTuple):
+    """Matrix (2 n, 2 n) of modal places in units of their rates, then of rates; and shapes (f, n) of these units."""
+
+    matrix: Array
+    shapes: Array
+
+    def sorted(self, solve: Callable[[Array], Any]) -> tuple[Array, Array]:
+        """Roots, and what ``solve`` finds beside them."""
+        solved = solve(self.matrix)
+        values, vectors = (solved, self.matrix) if isinstance(solved, np.ndarray) else solved
+        found = values.astype(complex)
+        found.real[np.abs(found.real) <= _ROUNDING * np.abs(found).max(initial=0.0)] = 0.0
+        order = np.lexsort((-found.imag, np.abs(found.imag), -found.real))
+        return found[order], vectors[:, order]
+
+
+def _state_matrix(motions: Linearization) -> _State:
     modes = _modes(motions)
     stiffness, damping = (modes.T @ part @ modes for part in (motions.stiffness, motions.damping))
     n = len(stiffness)
-    if not n:
-        return np.zeros(0, dtype=complex)
     rates = np.sqrt(np.abs(np.diag(stiffness)))
     rates = np.maximum(rates, 1e-8 * rates.max()) if rates.any() else np.ones(n)
-    state = np.block([[np.zeros((n, n)), np.diag(rates)], [-stiffness / rates, -damping]])
-    found = np.linalg.eigvals(state).astype(complex)
-    found.real[np.abs(found.real) <= _ROUNDING * np.abs(found).max()] = 0.0
-    return np.asarray(found[np.lexsort((-found.imag, np.abs(found.imag), -found.real))])
+    return _State(np.block([[np.zeros((n, n)), np.diag(rates)], [-stiffness / rates, -damping]]), modes / rates)
 
 
 def _modes(motions: Linearization) -> Array:

@@ -12,6 +12,7 @@ right to 1e-6, and vanish at rest. Tangents are those of the instant: of a motio
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -182,8 +183,11 @@ def short_time(near: Neighbours) -> float:
     return min(far / fast if fast else np.inf, (2 * far / faster) ** 0.5 if faster else np.inf)
 
 
-def over_time(now: Array, before: Array, after: Array, tau: float) -> Moving:
-    """Directions from those a short time before and after."""
+def over_time(now: Array, beside: Sequence[Array], tau: float) -> Moving:
+    """Directions from those a short time before and after; they stay where there is no such time."""
+    if not tau:
+        return Moving.fixed(now)
+    before, after = beside
     return Moving(now, (after - before) / (2 * tau), (after - 2 * now + before) / tau**2)
 
 
@@ -192,8 +196,7 @@ def ways_of(near: Neighbours) -> Moving:
     basis, tau = split(near), short_time(near)
     if not basis.across.shape[1] or not tau:
         return Moving.fixed(basis.ways)
-    before, after = (_kept(near.later(s).rows(), basis) for s in (-tau, tau))
-    return over_time(basis.ways, before, after, tau)
+    return over_time(basis.ways, [_kept(near.later(s).rows(), basis) for s in (-tau, tau)], tau)
 
 
 def _kept(rows: Array, basis: Split) -> Array:

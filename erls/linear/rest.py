@@ -1,0 +1,77 @@
+"""Equilibria with all joints free, stable or not: where forces balance at rest, next to a state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg as la
+
+from erls.equations.neighbours import Neighbours, along, split
+from erls.errors import Cause, SimulationError
+from erls.maths.so3 import Array
+
+_ITERATIONS = 60
+_LARGEST = 0.2  # of the size of the mechanism: a step
+_SETTLED = 1e-11  # the same: a step that ends the search
+_FREE = 1e-12  # of the largest ω²: held by nothing
+_BALANCED, _ROUNDING = 1e-6, 1e-13  # m/s², and of the largest ω² times the size: accelerations of what is at rest
+
+
+def at_rest(near: Neighbours) -> Neighbours:
+    """The states beside the equilibrium next to a state, motions that are prescribed as they are: Newton's method.
+
+    What nothing holds stays where it is: of all steps the shortest one, weighed by mass, is taken.
+
+    Raises
+    ------
+    SimulationError
+        NO_EQUILIBRIUM: nothing balances the forces, or the search does not come to an end.
+    """
+    near, left = near.at_rest(np.zeros(len(near.metres)), np.zeros_like(near.multipliers)), np.inf
+    for _ in range(_ITERATIONS):
+        step = _step(near)
+        far = float(np.abs(near.metres * step.moved).max(initial=0.0)) / near.size
+        if not np.isfinite(far):
+            break
+        share = min(1.0, _LARGEST / far) if far else 1.0
+        near, left = near.at_rest(share * step.moved, near.multipliers + share * step.pulled), step.left
+        if far <= _SETTLED and left <= 0:
+            return near
+        if far <= _SETTLED:
+            break
+    free = "nothing balances its forces" if np.isfinite(left) and left > 0 else "the search comes to no end"
+    raise SimulationError(
+        Cause.NO_EQUILIBRIUM,
+        f"no equilibrium with the joints free next to the start: {free}",
+        where="at = 'equilibrium'",
+        remedy="start nearer to it, hold joints by drives or springs, or linearize at a time (--at)",
+    )
+
+
+class _Step(NamedTuple):
+    """Displacement (n,), change of the multipliers (m,), and by how much [m/s²] too much stays out of balance."""
+
+    moved: Array
+    pulled: Array
+    left: float
+
+
+def _step(near: Neighbours) -> _Step:
+    basis, still = split(near), np.zeros((1, len(near.metres)))
+    rows, across = near.rows(), basis.across
+    closing = across @ np.linalg.solve(rows @ across, -near.violation()) if len(rows) else np.zeros(len(near.metres))
+    stiff = along(near, np.hstack([basis.ways, closing[:, None]]), 0)
+    force = near.forces(still, still, still)[0] + stiff[:, -1]
+    lower = la.cholesky(basis.ways.T @ near.mass() @ basis.ways, lower=True)
+    ways = la.solve_triangular(lower, basis.ways.T, lower=True).T  # of unit mass
+    own = la.solve_triangular(lower, (ways.T @ stiff[:, :-1]).T, lower=True).T
+    push = ways.T @ force
+    found = np.linalg.lstsq(own, -push, rcond=_FREE)[0]
+    left = float(np.abs(near.metres * (ways @ (own @ found + push))).max(initial=0.0))
+    largest = float(np.abs(own).max(initial=0.0))
+    in_ways = la.solve_triangular(lower, found, lower=True, trans="T")
+    pulled = np.zeros(len(rows))
+    if len(rows):
+        pulled = np.linalg.solve((rows @ across).T, -across.T @ (force + stiff[:, :-1] @ in_ways))
+    return _Step(basis.ways @ in_ways + closing, pulled, left - _BALANCED - _ROUNDING * largest * near.size)
