@@ -6,8 +6,9 @@ make, to first order. Where conditions Φ = 0 hold, B x = 0 with B(t) = Φ_y alo
     ẋ = N ż + Ṅ z,    ẍ = N z̈ + 2 Ṅ ż + N̈ z,
 
 and a coordinate s that moves the conditions themselves adds P(t) s with B P = -Φ_s. N and P are those that lie in fixed
-planes across the conditions of the instant, which keeps them smooth in time; Ṅ and N̈ are differences along the motion,
-right to 1e-6, and vanish at rest. Tangents are those of the instant: of a motion that is not steady they change.
+planes across the conditions of the instant, which keeps them smooth in time; Ṅ and N̈ are differences of fourth order
+along y + τ ẏ + τ² ÿ/2, right to 1e-7, and vanish at rest. Tangents are those of the instant: of a motion that is not
+steady they change.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ import scipy.linalg as la
 from erls.equations.formulation import Formulation
 from erls.equations.linearization import WIDE, Linearization, difference_steps, slopes
 from erls.maths.so3 import Array
+
+_FAR, _FASTER = 1e-3, 1e-4  # of the size of the mechanism: what rates and accelerations cover between states
 
 
 class States(NamedTuple):
@@ -174,29 +177,32 @@ def split(near: Neighbours) -> Split:
     return Split(whole[:, len(rows) :], whole[:, : len(rows)])
 
 
-def short_time(near: Neighbours) -> float:
-    """Within which the motion covers little of the size of the mechanism [s]; 0 at rest."""
+def short_times(near: Neighbours) -> tuple[float, ...]:
+    """Times for `over_time` beside that of a motion, which covers little within them [s]; none at rest."""
     fast, faster = (float(np.abs(near.metres * x).max(initial=0.0)) for x in (near.speed, near.acceleration))
     if not fast and not faster:
-        return 0.0
-    far = WIDE * near.size
-    return min(far / fast if fast else np.inf, (2 * far / faster) ** 0.5 if faster else np.inf)
+        return ()
+    tau = min(
+        _FAR * near.size / fast if fast else np.inf, (2 * _FASTER * near.size / faster) ** 0.5 if faster else np.inf
+    )
+    return (-2 * tau, -tau, tau, 2 * tau)
 
 
-def over_time(now: Array, beside: Sequence[Array], tau: float) -> Moving:
-    """Directions from those a short time before and after; they stay where there is no such time."""
-    if not tau:
+def over_time(now: Array, beside: Sequence[Array], times: Sequence[float]) -> Moving:
+    """Directions from those at `short_times`; they stay where there are none."""
+    if not len(times):
         return Moving.fixed(now)
-    before, after = beside
-    return Moving(now, (after - before) / (2 * tau), (after - 2 * now + before) / tau**2)
+    first, second, third, fourth = beside
+    tau = times[2]
+    rate = (8 * (third - second) - (fourth - first)) / (12 * tau)
+    return Moving(now, rate, (16 * (second + third) - (first + fourth) - 30 * now) / (12 * tau**2))
 
 
 def ways_of(near: Neighbours) -> Moving:
     """N, (n, f)."""
-    basis, tau = split(near), short_time(near)
-    if not basis.across.shape[1] or not tau:
-        return Moving.fixed(basis.ways)
-    return over_time(basis.ways, [_kept(near.later(s).rows(), basis) for s in (-tau, tau)], tau)
+    basis = split(near)
+    times = short_times(near) if basis.across.shape[1] else ()
+    return over_time(basis.ways, [_kept(near.later(tau).rows(), basis) for tau in times], times)
 
 
 def _kept(rows: Array, basis: Split) -> Array:

@@ -20,7 +20,7 @@ from erls.equations.neighbours import (
     Split,
     States,
     over_time,
-    short_time,
+    short_times,
     split,
     steps_along,
     tangents,
@@ -74,32 +74,30 @@ def linear_model(
         through=through,
         moved=at.moved,
         values=_values(at, outputs),
-        steady=not at.tau,
+        steady=not at.times,
         warnings=tuple(warnings),
     )
 
 
 class _About(NamedTuple):
-    """A plant with directions W, a short time of its motion and W and the plant a little before and after."""
+    """A plant with directions W; plants and W at short times along its motion."""
 
     plant: Plant
     inputs: Sequence[Input]
     moved: Array
     directions: Moving
     beside: tuple[tuple[Plant, Array], ...]
-    tau: float
+    times: tuple[float, ...]
 
     @classmethod
     def of(cls, plant: Plant, inputs: Sequence[Input]) -> _About:
         moved = np.array([given.kind.motion for given in inputs], dtype=bool)
         motions = [given for given in inputs if given.kind.motion]
-        basis, tau = split(plant.near), short_time(plant.near)
+        basis, times = split(plant.near), short_times(plant.near)
         now = _directions(plant, basis, motions)
-        if not tau:
-            return cls(plant, inputs, moved, Moving.fixed(now), (), tau)
-        others = [plant.at(plant.near.later(s)) for s in (-tau, tau)]
+        others = [plant.at(plant.near.later(tau)) for tau in times]
         beside = tuple((other, _directions(other, basis, motions)) for other in others)
-        return cls(plant, inputs, moved, over_time(now, [w for _, w in beside], tau), beside, tau)
+        return cls(plant, inputs, moved, over_time(now, [w for _, w in beside], times), beside, times)
 
 
 def _directions(plant: Plant, basis: Split, motions: Sequence[Input]) -> Array:
@@ -187,7 +185,7 @@ def _places(at: _About, outputs: Sequence[Output]) -> tuple[Array, Array]:
 
     now = jacobian(at.plant, at.directions.now)
     beside = [jacobian(*other) for other in at.beside]
-    moving = over_time(now, beside, at.tau)
+    moving = over_time(now, beside, at.times)
     rows = np.zeros((3, *now.shape))
     for k, output in enumerate(outputs):
         parts = ((moving.now,), (moving.rate, moving.now), (moving.second, 2 * moving.rate, moving.now))
@@ -200,7 +198,7 @@ def _others(at: _About, outputs: Sequence[Output]) -> tuple[Array, Array]:
     """The same of other outputs."""
     plant, w = at.plant, at.directions
     by_place, by_rate, by_last = (_by(plant, outputs, w.now, order) for order in range(3))
-    if at.tau:
+    if at.times:
         by_place = by_place + _by(plant, outputs, w.rate, 1) + _by(plant, outputs, w.second, 2)
         by_rate = by_rate + 2 * _by(plant, outputs, w.rate, 2)
     return np.array([by_place, by_rate, by_last]), _direct(at, outputs, plant, False)
@@ -216,7 +214,7 @@ def _values(at: _About, outputs: Sequence[Output]) -> Array:
 
     now = look(at.plant)
     beside = [look(other) for other, _ in at.beside]
-    moving = over_time(now, beside, at.tau)
+    moving = over_time(now, beside, at.times)
     for k, output in enumerate(outputs):
         result[k] = (moving.now, moving.rate, moving.second)[output.kind.order or 0][k]
     return result

@@ -11,7 +11,7 @@ import numpy as np
 from erls.equations.formulation import Formulation
 from erls.equations.loops.tied import Tied
 from erls.equations.neighbours import States
-from erls.equations.serial.neighbours import TreeNeighbours, moved_on
+from erls.equations.serial.neighbours import TreeNeighbours
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -96,11 +96,8 @@ class LoopNeighbours:
         return self.tree.states(x, w, b)
 
     def later(self, tau: float) -> LoopNeighbours:
-        """See `Neighbours`; on closed loops, which what is left out of the motion would open."""
-        own = self.tree
-        y, v = moved_on(own.y, own.v, own.a, tau)
-        y, v = self.loops.closed(own.time + tau, y, v)
-        return replace(self, tree=replace(own, time=own.time + tau, y=y, v=v))
+        """See `Neighbours`."""
+        return replace(self, tree=self.tree.later(tau))
 
     def at_rest(self, x: Array, multipliers: Array) -> LoopNeighbours:
         """See `Neighbours`."""

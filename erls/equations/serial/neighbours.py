@@ -87,8 +87,8 @@ class TreeNeighbours:
 
     def later(self, tau: float) -> TreeNeighbours:
         """See `Neighbours`."""
-        y, v = moved_on(self.y, self.v, self.a, tau)
-        return replace(self, time=self.time + tau, y=y, v=v)
+        y = self.y + tau * self.v + tau**2 / 2 * self.a
+        return replace(self, time=self.time + tau, y=y, v=self.v + tau * self.a)
 
     def at_rest(self, x: Array, multipliers: Array) -> TreeNeighbours:
         """See `Neighbours`."""
@@ -98,8 +98,3 @@ class TreeNeighbours:
     def of(self, formulation: Formulation) -> TreeNeighbours:
         """See `Neighbours`."""
         return replace(self, equations=formulation)  # type: ignore[arg-type]  # a tree like this one
-
-
-def moved_on(y: Array, v: Array, a: Array, tau: float) -> tuple[Array, Array]:
-    """Coordinates and rates after a short time [s]."""
-    return y + tau * v + tau**2 / 2 * a, v + tau * a
