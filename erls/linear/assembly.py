@@ -143,7 +143,7 @@ def _by_input(given: Input, plant: Plant, value: Callable[[Plant], Array], motio
 def _look(plant: Plant, outputs: Sequence[Output], states: States) -> Array:
     """(k, p)"""
     sight = plant.seen(states)
-    return np.array([output.value(sight) for output in outputs]).T
+    return np.array([output.value(sight) for output in outputs]).reshape(len(outputs), len(states.t)).T
 
 
 def _by(plant: Plant, outputs: Sequence[Output], directions: Array, order: int) -> Array:

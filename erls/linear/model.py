@@ -60,7 +60,7 @@ class Mode(NamedTuple):
     @property
     def damping_ratio(self) -> float:
         """Negative where it grows; 0 at rest."""
-        return -self.pole.real / abs(self.pole) if self.pole else 0.0
+        return 0.0 - self.pole.real / abs(self.pole) if self.pole else 0.0
 
 
 @dataclass(frozen=True)
