@@ -95,7 +95,7 @@ def _json(path: Path, model: LinearModel) -> None:
 def _npz(path: Path, model: LinearModel) -> None:
     with path.open("wb") as file:
         own: dict[str, Any] = {name: np.asarray(value) for name, value in arrays(model).items()}
-        np.savez(file, written_by=np.bytes_(MARK), **own)
+        np.savez(file, written_by=np.bytes_(f"{MARK}\n"), **own)
 
 
 def _mat(path: Path, model: LinearModel) -> None:

@@ -17,6 +17,7 @@ from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 _ZERO = 1e-9  # of the fastest pole: a real part that rounding and differences may leave
+_SAME = 1e-6  # of a pole: distance of a zero that lies on it
 _FAR = 1e4  # times the fastest pole: a zero at infinity
 
 
@@ -240,7 +241,8 @@ class LinearModel:
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Array:
         """(k,) complex transmission zeros [1/s] between as many inputs as outputs, all unless given.
 
-        At a zero s the pencil [A - s, B; C, D] is singular. Zeros beyond 1e4 times the fastest pole count as infinite.
+        At a zero s the pencil [A - s, B; C, D] is singular. Left out are those on poles, of modes that these inputs do
+        not move or these outputs do not see, and those beyond 1e4 times the fastest pole, which count as infinite.
 
         Raises
         ------
@@ -251,7 +253,8 @@ class LinearModel:
         if len(own) != len(seen) or not len(own):
             message, remedy = "zeros are those of as many outputs as inputs", "name inputs and outputs, one each"
             raise SceneError(Cause.BAD_FIELD, message, where="inputs", value=len(own), limit=len(seen), remedy=remedy)
-        return transmission_zeros(self.A, self.B[:, own], self.C[seen], self.D[np.ix_(seen, own)])
+        found = transmission_zeros(self.A, self.B[:, own], self.C[seen], self.D[np.ix_(seen, own)])
+        return _without(found, self.poles)
 
     def state_space(self) -> Any:
         """As a `scipy.signal.StateSpace`."""
@@ -274,6 +277,18 @@ class LinearModel:
             raise SceneError(Cause.BAD_FIELD, message, where="LinearModel.control", remedy=remedy) from None
         names = {"inputs": [c.name for c in self.inputs], "outputs": [c.name for c in self.outputs]}
         return control.ss(self.A, self.B, self.C, self.D, states=list(self.states), **names)
+
+
+def _without(zeros: Array, poles: Array) -> Array:
+    """Zeros that lie on no pole, each pole taken once."""
+    left, kept = list(poles.tolist()), []
+    for zero in zeros.tolist():
+        near = [k for k, pole in enumerate(left) if abs(zero - pole) <= _SAME * abs(pole)]
+        if near:
+            left.pop(near[0])
+        else:
+            kept.append(zero)
+    return np.array(kept, dtype=complex)
 
 
 def transmission_zeros(a: Array, b: Array, c: Array, d: Array) -> Array:
