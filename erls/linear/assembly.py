@@ -112,7 +112,7 @@ def _directions(plant: Plant, basis: Split, motions: Sequence[Input]) -> Array:
 
 
 def _still(near: Neighbours) -> Array:
-    return np.zeros((1, len(near.metres)))
+    return np.zeros((1, len(near.speed)))
 
 
 def _forces(plant: Plant) -> Array:

@@ -263,7 +263,7 @@ class LinearModel:
         return StateSpace(self.A, self.B, self.C, self.D)
 
     def control(self) -> Any:
-        """As a ``control.StateSpace`` of the package python-control.
+        """As a ``control.StateSpace`` of the package python-control, whose names have ``_`` in place of dots.
 
         Raises
         ------
@@ -275,8 +275,9 @@ class LinearModel:
         except ImportError:
             message, remedy = "the package 'control' is not installed", "pip install 'erls[control]'"
             raise SceneError(Cause.BAD_FIELD, message, where="LinearModel.control", remedy=remedy) from None
-        names = {"inputs": [c.name for c in self.inputs], "outputs": [c.name for c in self.outputs]}
-        return control.ss(self.A, self.B, self.C, self.D, states=list(self.states), **names)
+        own = ([c.name for c in self.inputs], [c.name for c in self.outputs], self.states)
+        inputs, outputs, states = ([name.replace(".", "_") for name in names] for names in own)
+        return control.ss(self.A, self.B, self.C, self.D, inputs=inputs, outputs=outputs, states=states)
 
 
 def _without(zeros: Array, poles: Array) -> Array:

@@ -9,7 +9,7 @@ Rules for a further kind of scene:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol, cast
 
@@ -95,6 +95,7 @@ class ChainPlant:
     formulation: Formulation
     settings: Simulation
     near: Neighbours
+    _made: dict[object, Formulation] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -131,43 +132,37 @@ class ChainPlant:
     def _loop(self, joint: str) -> int:
         return [loop.name for loop in self.mechanism.loops].index(joint)
 
-    def _changed(self, mechanism: Mechanism) -> ChainPlant:
-        formulation = formulate(mechanism, self.settings)
-        return replace(self, formulation=formulation, near=self.near.of(solved(formulation)))
-
-    def _driven(self, name: str, change: Callable[[Drive], Drive]) -> ChainPlant:
-        """With another drive in a joint, or in a closing one."""
-        joints = tuple(
-            replace(joint, drive=change(joint.drive)) if joint.name == name else joint
-            for joint in self.mechanism.joints
-        )
-        loops = tuple(
-            replace(loop, freedom=replace(loop.freedom, drive=change(loop.freedom.drive)))
-            if loop.name == name and loop.freedom is not None
-            else loop
-            for loop in self.mechanism.loops
-        )
-        return self._changed(replace(self.mechanism, joints=joints, loops=loops))
+    def _changed(self, key: object, change: Callable[[Mechanism], Mechanism]) -> ChainPlant:
+        """In equations of a changed mechanism, which plants of the same one at other states share by a key."""
+        if key not in self._made:
+            self._made[key] = formulate(change(self.mechanism), self.settings)
+        formulation = self._made[key]
+        return replace(self, formulation=formulation, near=self.near.of(solved(formulation)), _made={})
 
     def with_effort(self, joint: str, effort: float) -> ChainPlant:
         """See `Plant`."""
 
         def pushed(drive: Drive) -> Drive:
             kind = "torque" if drive.kind == "free" else drive.kind
-            return replace(drive, kind=kind, load=_added(drive.load, self.near.time, effort, 0.0, 0.0))
+            return replace(drive, kind=kind, load=_added(drive.load, 0.0, effort, 0.0, 0.0))
 
-        return self._driven(joint, pushed)
+        return self._changed(("effort", joint, effort), lambda own: _driven(own, joint, pushed))
 
     def with_motion(self, joint: str, place: float, rate: float, acceleration: float) -> ChainPlant:
         """See `Plant`."""
-        more = self.near.time, place, rate, acceleration
-        return self._driven(joint, lambda drive: replace(drive, motion=_added(drive.motion, *more)))
+        more = self.near.time if rate or acceleration else 0.0, place, rate, acceleration
+
+        def moved(drive: Drive) -> Drive:
+            return replace(drive, motion=_added(drive.motion, *more))
+
+        return self._changed(("motion", joint, *more), lambda own: _driven(own, joint, moved))
 
     def with_wrench(self, point: str, wrench: Array) -> ChainPlant:
         """See `Plant`."""
         found = self.mechanism.points[self.points.index(point)]
         load = PointLoad(found.link, found.node, wrench)
-        return self._changed(replace(self.mechanism, loads=(*self.mechanism.loads, load)))
+        key = "wrench", point, *wrench.tolist()
+        return self._changed(key, lambda own: replace(own, loads=(*own.loads, load)))
 
     def at(self, near: Neighbours) -> ChainPlant:
         """See `Plant`."""
@@ -176,6 +171,20 @@ class ChainPlant:
     def seen(self, states: States) -> ChainSight:
         """See `Plant`."""
         return ChainSight(self.formulation, states)
+
+
+def _driven(mechanism: Mechanism, name: str, change: Callable[[Drive], Drive]) -> Mechanism:
+    """With another drive in a joint, or in a closing one."""
+    joints = tuple(
+        replace(joint, drive=change(joint.drive)) if joint.name == name else joint for joint in mechanism.joints
+    )
+    loops = tuple(
+        replace(loop, freedom=replace(loop.freedom, drive=change(loop.freedom.drive)))
+        if loop.name == name and loop.freedom is not None
+        else loop
+        for loop in mechanism.loops
+    )
+    return replace(mechanism, joints=joints, loops=loops)
 
 
 def _added(curve: Curve | None, t: float, place: float, rate: float, acceleration: float) -> Curve:

@@ -12,7 +12,7 @@ from erls.errors import Cause, SceneError
 from erls.linear.model import LinearModel
 from erls.maths.so3 import Array
 
-_AROUND = 10.0  # frequencies that are looked at: from the slowest mode over this to the fastest times it
+_BEFORE, _BEHIND = 10.0, 2.0  # frequencies that are looked at: from the slowest mode to the fastest, and beyond
 _PER_MODE = 12  # frequencies around each mode
 _STEPS = 600  # of a step response
 _PERIODS, _MOST = 12.0, 1e4  # of the slowest mode; and of the fastest one
@@ -60,14 +60,14 @@ def frequency_response(
     return np.asarray(rows @ moved + through)
 
 
-def telling_frequencies(model: LinearModel, most_hz: float | None = None) -> Array:
+def telling_frequencies(model: LinearModel) -> Array:
     """(k,) rising frequencies [Hz] that show a response: even on a logarithmic scale, and more about each mode."""
     modes = np.array([mode.frequency_hz for mode in model.modes if mode.frequency_hz > 0])
     modes = modes[modes > 1e-6 * modes.max(initial=0.0)]  # others are at rest, but for rounding
     if not len(modes):
         modes = np.ones(1)
-    last = min(_AROUND * float(modes.max()), most_hz or np.inf)
-    first = min(float(modes.min()), last) / _AROUND
+    last = _BEHIND * float(modes.max())
+    first = float(modes.min()) / _BEFORE
     even = np.geomspace(first, last, 400)
     damped = {mode.frequency_hz: max(abs(mode.damping_ratio), 1e-4) for mode in model.modes}
     near = [f * (1 + damped[f] * np.linspace(-4, 4, _PER_MODE + 1)) for f in modes.tolist()]
