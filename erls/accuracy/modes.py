@@ -20,7 +20,6 @@ from erls.accuracy.configurations import configurations
 from erls.accuracy.finer_links import finer_links, lumped
 from erls.accuracy.integration import sudden
 from erls.accuracy.left_out_vibrations import left_out_vibrations
-from erls.accuracy.mesh_of_beams import mesh_error
 from erls.accuracy.slow_answer import slow_answer, start_of_loops
 from erls.accuracy.slow_motion import parted
 from erls.equations.registry import TREES
@@ -51,6 +50,8 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
         return 0.0, ""
     try:
         if run.scene.record.simulation.formulation not in TREES:
+            from erls.accuracy.mesh_of_beams import mesh_error  # here: it imports nodal elements
+
             return mesh_error(run)
         finer = finer_links(run.scene, run.formulation.mechanism, moving.mechanism)
     except FEImportError as problem:
