@@ -83,8 +83,8 @@ class Substructured:
             poses.append(frame)
             modal.append(nearest @ np.concatenate([moved, _reach(link) * turned]).ravel())
         joints = self.parts.joints
-        moved = (x[joints] for x in (found.coordinates, found.angles, found.rates))
-        return State(t, poses, modal, *moved, nodes, every)
+        coordinates, angles, rates = (x[joints] for x in (found.coordinates, found.angles, found.rates))
+        return State(t, poses, modal, coordinates, angles, rates, nodes, every)
 
     def _displaced(self, found: State, number: int) -> tuple[Array, Array]:
         """Places (n, 3) and turns (n, 3, 3) of the nodes of a link in the world."""

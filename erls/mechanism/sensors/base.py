@@ -59,7 +59,8 @@ class NodeMotion:
 
 class Moved(NamedTuple):
     """A joint, or a closing one behind them, by its number; what its motor turns by per turn of the joint, and the
-    inertia of its rotor as the joint feels it [kg m² or kg]; unit of its coordinate and of the force along it.
+    inertia of its rotor as the joint feels it [kg m² or kg]; unit of its coordinate and of the force along it; whether
+    it is a closing one, whose acceleration is not known.
     """
 
     number: int
@@ -67,6 +68,7 @@ class Moved(NamedTuple):
     rotor: float
     unit: str
     effort_unit: str
+    closing: bool = False
 
 
 @dataclass(frozen=True)
@@ -215,6 +217,9 @@ class TurningSensor(PointSensor, frozen=True, kw_only=True):
         """The node, and what turns vectors (k, 3) of the world into these axes."""
         place.choice("axes", self.axes, AXES)
         at = finder.node(self.point, self.axes == "node", place)
+        if self.axes == "link" and at.link < 0:
+            remedy = "use axes = 'node' or 'world'"
+            raise place.error("axes", "there are no links here", self.axes, remedy=remedy)
         if self.axes == "world":
             return at, lambda seen, vectors: vectors
         if self.axes == "link":

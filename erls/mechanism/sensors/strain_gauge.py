@@ -8,8 +8,6 @@ from erls.maths.so3 import Array
 from erls.mechanism.place import Place
 from erls.mechanism.sensors.base import Finder, Seen, Sensor, SensorRecord, unit_vector
 
-_SIX = 6
-
 
 class StrainGauge(SensorRecord, frozen=True, kw_only=True, tag="strain_gauge"):
     """Strain of a link along one direction at a point [m/m], from its recovered stress or section forces; expansion by
@@ -42,16 +40,21 @@ class StrainGauge(SensorRecord, frozen=True, kw_only=True, tag="strain_gauge"):
     def bind(self, finder: Finder, place: Place) -> Sensor:
         """Check, and say what is read."""
         at = finder.site(self.point, "", self.element, place)
-        if self.compliance is not None:
-            if len(self.compliance) != _SIX:
-                raise place.error("compliance", "one number for each component", len(self.compliance), _SIX,
-                                  remedy=f"give six: {', '.join(at.components)}")  # fmt: skip
-            row = np.array(self.compliance)
-        else:
-            way = None if self.direction is None else unit_vector(self.direction, place)
-            row = finder.compliance(at, way, np.array(self.offset), place)
+        row = self.strain_row(finder, place)
 
         def read(seen: Seen) -> Array:
             return np.asarray((seen.recovered(at) @ row)[:, None])
 
         return Sensor(self.name, [("", "1")], read)
+
+    def strain_row(self, finder: Finder, place: Place) -> Array:
+        """(6,) strain per unit of each component."""
+        at = finder.site(self.point, "", self.element, place)
+        way = None if self.direction is None else unit_vector(self.direction, place)
+        if self.compliance is None:
+            return finder.compliance(at, way, np.array(self.offset), place)
+        if len(self.compliance) != len(at.components):
+            remedy = f"give {len(at.components)}: {', '.join(at.components)}"
+            message = "one number for each component"
+            raise place.error("compliance", message, len(self.compliance), len(at.components), remedy=remedy)
+        return np.array(self.compliance)
