@@ -140,16 +140,17 @@ class Erls(SerialFormulation):
             result.append((link.wrench, forces[:1], forces[1:]))
         return result
 
+    @cached_property
+    def _moving(self) -> list[Array]:
+        """Views of what a residual leaves: six of each link, and the acceleration of each joint."""
+        views: list[Array] = []
+        for s in self._links(self.complete):
+            views += [s.twist, s.twist_rate, s.u_rate, s.q_rate[6:], s.u_acceleration, s.q_acceleration[6:]]
+        return views + self.joint_accelerations()
+
     def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
         """Motion at (k,) times: twists of the frames that the poses are of, and what the links do in them."""
-        system = self.complete
-        first = _see_serial(system.reals, system.integers, int(system.integers[0])).joint_states
-        views: list[Array] = []
-        for s in self._links(system):
-            views += [s.twist, s.twist_rate, s.u_rate, s.q_rate[6:], s.u_acceleration, s.q_acceleration[6:]]
-        places = [first + k * JOINT_STATE for k in range(self.joints)]
-        views += [_see_joint(system.scratch, system.integers, place).coordinate[2:] for place in places]
-        left = self.left_by_residuals(views, t, y, v, a)
+        left = self.left_by_residuals(self._moving, t, y, v, a)
         links, angles = left[: 6 * self.joints], left[6 * self.joints :]
         pairs = [list(zip(links[i::6], links[i + 1 :: 6], strict=True)) for i in (2, 4)]  # u̇ and q̇_d, ü and q̈_d
         rates, accelerations = (

@@ -172,14 +172,15 @@ class Ffr(SerialFormulation):
             result.append((body.wrench, forces[:1], forces[1:]))
         return result
 
+    @cached_property
+    def _moving(self) -> list[Array]:
+        """Views of what a residual leaves: two of each link, and the acceleration of each joint."""
+        frames = [x for body in self._bodies(self.complete) for x in (body.twist, body.twist_rate)]
+        return frames + self.joint_accelerations()
+
     def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
         """Motion at (k,) times: of the floating frames, and of the fields that deform the links in them."""
-        system = self.complete
-        first = _read_serial(system.reals, system.integers, int(system.integers[0])).joint_states
-        views = [x for body in self._bodies(system) for x in (body.twist, body.twist_rate)]
-        places = [first + k * JOINT_STATE for k in range(self.joints)]
-        views += [_read_joint_state(system.scratch, system.integers, place).coordinate[2:] for place in places]
-        left = self.left_by_residuals(views, t, y, v, a)
+        left = self.left_by_residuals(self._moving, t, y, v, a)
         frames, angles = left[: 2 * self.joints], left[2 * self.joints :]
         own = [np.asarray(x)[:, len(self.free_joints) :] for x in (v, a)]
         rates, accelerations = (

@@ -19,7 +19,7 @@ from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization, derivatives, difference_steps
 from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
 from erls.equations.serial.loads import load_powers
-from erls.equations.serial.records import Serial
+from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
 from erls.equations.series import mass_series, residual_series
@@ -32,7 +32,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.loops import loop_ends
 from erls.mechanism.thermal import elastic_rest
 
-_see_serial = python_reader(Serial)
+_see_serial, _see_joint = python_reader(Serial), python_reader(JointState)
 
 
 class SerialFormulation(TreeFormulation):
@@ -224,6 +224,12 @@ class SerialFormulation(TreeFormulation):
             moment[:, k] = np.einsum("tij,tj->ti", turn, wrench[:, 3:] - cross_all(place, push))
             effort[:, k] = (whole if joint.drive.prescribed else given)[:, 0]
         return ReactionSeries(force, moment, effort)
+
+    def joint_accelerations(self) -> list[Array]:
+        """Views (1,) of what a residual of `complete` leaves of each joint."""
+        reals, integers, scratch = self.complete.reals, self.complete.integers, self.complete.scratch
+        first = _see_serial(reals, integers, int(integers[0])).joint_states
+        return [_see_joint(scratch, integers, first + k * JOINT_STATE).coordinate[2:] for k in range(self.joints)]
 
     def left_by_residuals(self, views: Sequence[Array], t: Array, y: Array, v: Array, a: Array) -> list[Array]:
         """(k, ...) what residuals of `complete` at times (k,) leave in each of some views of its working memory."""

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from erls.equations.serial.motion_series import MotionSeries, spin_of
-from erls.maths.rotation_maps import exp, tangent, tangent_derivative
-from erls.maths.so3 import Array, cross_all
+from erls.maths.rotation_maps import exp, skews, tangent, tangent_derivative
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import node_shape6
 from erls.mechanism.sensors.base import NodeMotion
@@ -40,9 +40,9 @@ def node_motion(mechanism: Mechanism, motion: MotionSeries, link: int, node: int
     v, w = motion.twists[link][:, :3], motion.twists[link][:, 3:]
     dv, dw = motion.twist_rates[link][:, :3], motion.twist_rates[link][:, 3:]
     u, du, ddu, psi, dpsi, ddpsi = _displacements(mechanism, motion, link, node)
-    x, turn = mechanism.links[link].model.nodes[node] + u, pose[:, :3, :3]
-    carried = v + cross_all(w, x) + du
-    acceleration = dv + cross_all(dw, x) + cross_all(w, carried + du) + ddu
+    x, turn, spinning = mechanism.links[link].model.nodes[node] + u, pose[:, :3, :3], skews(w)
+    carried = v + _turned(spinning, x) + du
+    acceleration = dv + _turned(skews(dw), x) + _turned(spinning, carried + du) + ddu
     own, rows = exp(psi), tangent(psi)
     about = _turned(rows, dpsi)
     slope = _turned(tangent_derivative(psi, dpsi), dpsi) + _turned(rows, ddpsi)
@@ -53,7 +53,7 @@ def node_motion(mechanism: Mechanism, motion: MotionSeries, link: int, node: int
         _turned(turn, acceleration),
         turn @ own,
         _turned(turn, w + own_spin),
-        _turned(turn, dw + own_rate + cross_all(w, own_spin)),
+        _turned(turn, dw + own_rate + _turned(spinning, own_spin)),
     )
 
 
@@ -64,16 +64,14 @@ def _displacements(mechanism: Mechanism, motion: MotionSeries, link: int, node: 
     q, rate, acceleration = motion.states.modal[link], motion.modal_rates[link], motion.modal_accelerations[link]
     values, rates, accelerations = (x @ shape.T for x in (q, rate, acceleration))
     if "foreshortening" in mechanism.effects and own.second_order is not None:
-        bent = own.second_order.node(node)
-        bent = (bent + bent.transpose(0, 2, 1)) / 2
-        along = np.tensordot(q, bent, (1, 1))  # (k, 6, m)
-        values = values + np.einsum("kcm,km->kc", along, q) / 2
-        rates = rates + np.einsum("kcm,km->kc", along, rate)
-        accelerations = accelerations + np.einsum("kcm,km->kc", along, acceleration)
-        accelerations += np.einsum("cab,ka,kb->kc", bent, rate, rate, optimize=True)
+        bent = own.second_order.bending(node)
+        along, speeding = (np.tensordot(x, bent, (1, 1)) for x in (q, rate))  # (k, 6, m)
+        values = values + (along @ q[:, :, None])[..., 0] / 2
+        rates = rates + (along @ rate[:, :, None])[..., 0]
+        accelerations = accelerations + (along @ acceleration[:, :, None] + speeding @ rate[:, :, None])[..., 0]
     return tuple(x[:, part] for part in (slice(3), slice(3, 6)) for x in (values, rates, accelerations))
 
 
 def _turned(matrices: Array, vectors: Array) -> Array:
     """(k, 3) of matrices (k, 3, 3) and vectors (k, 3)."""
-    return np.asarray(np.einsum("kij,kj->ki", matrices, vectors))
+    return np.asarray((matrices @ vectors[:, :, None])[..., 0])
