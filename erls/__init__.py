@@ -11,7 +11,17 @@ The command line in three lines::
 
 from typing import Any
 
-__all__ = ["linearize", "load_run", "load_scene", "save_run", "section_forces", "simulate", "simulate_many", "stress"]
+__all__ = [
+    "linearize",
+    "load_run",
+    "load_scene",
+    "save_run",
+    "section_forces",
+    "simulate",
+    "simulate_many",
+    "stepper",
+    "stress",
+]
 
 _HOME = {
     "load_scene": ("erls.scene.read", "load_scene"),
@@ -21,6 +31,7 @@ _HOME = {
     "load_run": ("erls.run.file", "load_run"),
     "save_run": ("erls.run.file", "write_run"),
     "section_forces": ("erls.run.recovery", "section_forces"),
+    "stepper": ("erls.simulation.stepper", "Stepper"),
     "stress": ("erls.run.recovery", "stress"),
 }
 

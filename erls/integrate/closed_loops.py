@@ -99,6 +99,19 @@ class TiedCoordinates:
         self.chain.refuse_open(t, self.chain.closure(t, q, v))
 
 
+def tied_options(options: Options) -> ConstrainedOptions:
+    """The same for constrained coordinates."""
+    return ConstrainedOptions(
+        options.step,
+        options.rtol,
+        options.atol,
+        options.spectral_radius,
+        options.newton_tolerance,
+        output_step=options.output_step,
+        keeper=options.keeper,
+    )
+
+
 def loop_integrator(name: str) -> Integrator:
     """The integrator of that name for a `ClosedChain`; failures near a dead point name the loop."""
 
@@ -113,16 +126,7 @@ def loop_integrator(name: str) -> Integrator:
         assert isinstance(system, ClosedChain)
         solution: Solution
         if name == "generalized_alpha" and len(system.kept):
-            settings = ConstrainedOptions(
-                options.step,
-                options.rtol,
-                options.atol,
-                options.spectral_radius,
-                options.newton_tolerance,
-                output_step=options.output_step,
-                keeper=options.keeper,
-            )
-            solution = lie_generalized_alpha(TiedCoordinates(system), times, y, v, settings, observer)
+            solution = lie_generalized_alpha(TiedCoordinates(system), times, y, v, tied_options(options), observer)
         else:
             watch = Watch(system, observer, time_of(options.keeper))
             solution = integrator_named(name)(system, times, y, v, options, watch)

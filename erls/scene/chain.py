@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from erls.mechanism.profiles import Load as Profile
+from erls.mechanism.sensors.registry import AnySensor
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
 from erls.scene.records import Pose, Record, SceneFile, SceneTables
@@ -170,6 +171,8 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
         Joints that close the chain, ``[[loops]]``.
     events : list of Event
         Crossings that are told after the run, or end it, ``[[events]]``.
+    sensors : list of AnySensor
+        Instruments whose readings are columns of tables, files and reports, ``[[sensors]]``.
     """
 
     simulation: Simulation
@@ -182,6 +185,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     initial: Initial = Initial()
     loops: list[Loop] = []
     events: list[Event] = []
+    sensors: list[AnySensor] = []
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, Load, SceneRecord
+from erls.scene.check_sensors import check_sensors
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
@@ -70,6 +71,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         _check_loop(loop, scene, f"{file}: loops[{k}]")
     for k, event in enumerate(scene.events):
         _check_event(event, scene, f"{file}: events[{k}]")
+    _check_sensors(scene, file)
     if scene.simulation.bandwidth is not None:
         _check_bandwidth(scene, f"{file}: simulation.bandwidth")
     _check_compound(scene, f"{file}: simulation")
@@ -83,6 +85,14 @@ def check_scene(scene: SceneRecord, file: str) -> None:
                 _check_feed_forward(coordinate, f"{file}: joints[{k}].coordinates.{name}")
         for k, loop in enumerate(scene.loops):
             _check_feed_forward(loop, f"{file}: loops[{k}]")
+
+
+def _check_sensors(scene: SceneRecord, file: str) -> None:
+    points = [point.name for point in scene.points]
+    moving = [name for joint in scene.joints for name in joint_coordinates(joint)]
+    moving += [loop.name for loop in scene.loops if JOINT_TYPES[loop.type].one is not None]
+    taken = {*points, *(joint.name for joint in scene.joints), *(loop.name for loop in scene.loops), "t", "energy"}
+    check_sensors(scene.sensors, file, {"point": points, "joint": moving}, taken)
 
 
 _BORNE = {"point": ("force", "moment"), "link": ("force_per_length", "force_per_mass"), "mass": ("force_per_mass",)}

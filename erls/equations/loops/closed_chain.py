@@ -25,6 +25,7 @@ from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_veloc
 from erls.equations.loops.static import closed_equilibrium
 from erls.equations.loops.tied import OPEN, Tied
 from erls.equations.neighbours import small_motions
+from erls.equations.serial.motion_series import MotionSeries, motion_series
 from erls.equations.serial.neighbours import TreeNeighbours
 from erls.equations.serial.state_series import (
     ReactionSeries,
@@ -174,6 +175,11 @@ class ClosedChain(Tied):
         """(n,) accelerations, with decay of what loops are open by; NaN where they lock: integrators step around it."""
         return self._accelerate(self.loops, t, y, v)
 
+    def acceleration_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, n) of the nearest closed states at times (k,), without such decay: what runs report."""
+        at = zip(t.tolist(), *self._closed_at(t, y, v), strict=True)
+        return np.array([self.accelerations(*state)[0] for state in at]).reshape(y.shape)
+
     def mass_matrix(self, t: float, y: Array) -> Array:
         """(n, n) of the chain, with rotors in closing joints."""
         return self.loops.masses(t, y)
@@ -248,6 +254,10 @@ class ClosedChain(Tied):
     def series(self, t: Array, y: Array, v: Array) -> StateSeries:
         """The same at times (k,)."""
         return state_series(self.bare, t, *self._closed_at(t, y, v))
+
+    def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
+        """Motion at times (k,) with accelerations (k, n)."""
+        return motion_series(self.bare, t, *self._closed_at(t, y, v), a)
 
     def energy_series(self, t: Array, y: Array, v: Array) -> Array:
         """(k, 4) energies at times (k,), with those of springs and rotors in closing joints."""

@@ -188,9 +188,8 @@ class Nodal:
             psi = self._vector(q, k)
             angles[k : k + 3] = psi
             rates[k : k + 3] = rotations.tangent_inverse(psi) @ self._spin(q, velocity, k)
-        return State(
-            t, [x.frame for x in found], [x.modal for x in found], angles, angles, rates, [x.nodes for x in found]
-        )
+        frames, modal = [x.frame for x in found], [x.modal for x in found]
+        return State(t, frames, modal, angles, angles, rates, [x.nodes for x in found], [x.turns for x in found])
 
     def _frames_of(self, q: Nodes, seat: Seat) -> tuple[Array, Array]:
         """(4, 4) frames of a joint in the world: the inner and the outer one."""
