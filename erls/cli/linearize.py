@@ -51,10 +51,11 @@ def linearize(
         About the equilibrium with all joints free next to the start, stable or not.
     inputs
         Separated by commas: joint.NAME.effort, joint.NAME.acceleration of a prescribed or wanted motion,
-        point.NAME.force.x, point.NAME.moment.x. Efforts of drives and prescribed motions unless given.
+        point.NAME.force.x, point.NAME.moment.x, load.NUMBER.factor. Efforts of drives and prescribed motions unless
+        given.
     outputs
         Separated by commas: joint.NAME.angle, .rate, .acceleration, .effort, point.NAME.x, .velocity.x,
-        .acceleration.x. Angles and places unless given.
+        .acceleration.x, sensor.NAME. Angles, places and sensors unless given.
     campbell
         JOINT=FROM:TO:COUNT: poles over the speed of a joint [rad/s], which turns evenly; for example hub=0:100:21.
     locus

@@ -82,6 +82,14 @@ INPUTS: tuple[InputKind, ...] = (
         lambda plant, name: f"{plant.units(name)[0]}/s²",
         lambda plant, name, amounts: plant.with_motion(name, *amounts),
     ),
+    InputKind(
+        "load",
+        "factor",
+        False,
+        lambda plant: plant.loads,
+        lambda plant, name: "1",
+        lambda plant, name, amounts: plant.with_factor(name, amounts[2]),
+    ),
     *(
         InputKind(
             "point", f"force.{axis}", False, lambda plant: plant.points, lambda plant, name: "N", _on_point(k)
@@ -95,7 +103,7 @@ INPUTS: tuple[InputKind, ...] = (
         for k, axis in enumerate("xyz")
     ),
 )
-"""Efforts of drives, prescribed and wanted motions, forces and moments on points in axes of the world."""
+"""Efforts of drives, prescribed and wanted motions, factors of loads, forces and moments on points in the world."""
 
 
 def inputs_of(plant: Plant, names: Sequence[str] | None = None) -> tuple[Input, ...]:

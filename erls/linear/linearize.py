@@ -23,6 +23,7 @@ from erls.maths.jit import announcing
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
+from erls.run.chain.sensors import sensors_of
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.read import load_chain
@@ -51,11 +52,11 @@ def linearize(
         where forces balance at rest with all joints free, next to the start.
     inputs : sequence of str, optional
         ``joint.NAME.effort``; ``joint.NAME.acceleration`` of a prescribed or wanted motion, whose place and rate are
-        two more states; ``point.NAME.force.x`` and ``.moment.x``, in the world. Efforts of all drives and all
-        prescribed motions unless given.
+        two more states; ``point.NAME.force.x`` and ``.moment.x``, in the world; ``load.NUMBER.factor`` of a load of the
+        scene. Efforts of all drives and all prescribed motions unless given.
     outputs : sequence of str, optional
         ``joint.NAME.angle``, ``.rate``, ``.acceleration``, ``.effort``; ``point.NAME.x``, ``.velocity.x``,
-        ``.acceleration.x``. Angles and places unless given.
+        ``.acceleration.x``; ``sensor.NAME``, ``sensor.NAME.x``. Angles, places and sensors unless given.
     tell : callable, optional
         Told about each preparation that takes time.
 
@@ -140,12 +141,12 @@ def plant_of(
     """A mechanism in the state that is asked for: that of a run, or else the start or the equilibrium next to it."""
     settings = scene.record.simulation
     formulation = formulate(mechanism, settings) if run is None else run.formulation
-    equations = solved(formulation)
+    equations, sensors = solved(formulation), sensors_of(scene, mechanism)
     if isinstance(at, str):
         near = at_rest(_near(equations, 0.0, *equations.initial_state()))
-        return StateOf(ChainPlant(formulation, settings, near), scene.name, at, tuple(warnings))
+        return StateOf(ChainPlant(formulation, settings, near, sensors), scene.name, at, tuple(warnings))
     y, v = equations.initial_state() if run is None else (part[0] for part in run.coordinates([at]))
-    plant = ChainPlant(formulation, settings, _near(equations, at, y, v))
+    plant = ChainPlant(formulation, settings, _near(equations, at, y, v), sensors)
     return StateOf(plant, scene.name, f"t = {at:g} s", tuple(warnings))
 
 

@@ -21,7 +21,7 @@ class OutputKind(NamedTuple):
     Attributes
     ----------
     subject, quantity : str
-        ``subject.NAME.quantity``
+        ``subject.NAME.quantity``, or ``subject.NAME`` without a quantity.
     order : int or None
         Of places alone: how often they are differentiated by time. None of what depends on rates and accelerations.
     names : callable
@@ -50,7 +50,7 @@ class Output:
     @property
     def name(self) -> str:
         """As it is asked for."""
-        return f"{self.kind.subject}.{self.subject}.{self.kind.quantity}"
+        return f"{self.kind.subject}.{self.subject}.{self.kind.quantity}".rstrip(".")
 
     def value(self, sight: Sight) -> Array:
         """(k,) of states."""
@@ -94,12 +94,20 @@ OUTPUTS: tuple[OutputKind, ...] = (
         lambda sight, name: sight.effort(name),
     ),
     *(_point(axis, order) for order in range(3) for axis in range(3)),
+    OutputKind(
+        "sensor",
+        "",
+        None,
+        lambda plant: list(plant.readings),
+        lambda plant, name: plant.readings[name],
+        lambda sight, name: sight.reading(name),
+    ),
 )
-"""Physical angles of joints and their efforts, places of points in the world."""
+"""Physical angles of joints and their efforts, places of points in the world, readings of the sensors of the scene."""
 
 
 def outputs_of(plant: Plant, names: Sequence[str] | None = None) -> tuple[Output, ...]:
-    """Outputs by name; unless given, angles of joints and places of points.
+    """Outputs by name; unless given, angles of joints, places of points, and all that sensors read.
 
     Raises
     ------
@@ -113,5 +121,5 @@ def outputs_of(plant: Plant, names: Sequence[str] | None = None) -> tuple[Output
         for found in (Output(kind, name, kind.unit(plant, name)),)
     }
     if names is None:
-        return tuple(found for found in known.values() if found.kind.order == 0)
+        return tuple(x for x in known.values() if x.kind.order == 0 or x.kind.subject == "sensor")
     return tuple(known[name] for name in checked("output", names, list(known)))

@@ -8,7 +8,7 @@ Rules for a further kind of scene:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol, cast
@@ -18,7 +18,7 @@ import numpy as np
 from erls.equations.formulation import Formulation, LoopFormulation
 from erls.equations.neighbours import Neighbours, States
 from erls.equations.registry import formulate
-from erls.equations.serial.state_series import StateSeries, reaction_series, state_series
+from erls.equations.serial.state_series import StateSeries, state_series
 from erls.equations.substructures import solved
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
@@ -26,6 +26,8 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.curves import Curve, Sum, piecewise
 from erls.mechanism.drives import Drive
 from erls.mechanism.loads import PointLoad
+from erls.mechanism.sensors.base import Sensor
+from erls.run.chain.instants import Instants
 from erls.run.chain.places import point_position
 from erls.scene.settings import Simulation
 
@@ -41,6 +43,9 @@ class Sight(Protocol):
 
     def effort(self, joint: str) -> Array:
         """(k,) of drive, spring, damper and friction; for a prescribed motion what its motor must give [N m or N]."""
+
+    def reading(self, name: str) -> Array:
+        """(k,) of a sensor, or of its component."""
 
 
 class Plant(Protocol):
@@ -62,8 +67,19 @@ class Plant(Protocol):
     def joints(self) -> dict[str, str]:
         """Joints that can be seen, with what moves them: ``free``, ``torque``, ``pd``, ``motion`` or ``fixed``."""
 
+    @property
+    def readings(self) -> dict[str, str]:
+        """What sensors read, component by component, with units."""
+
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """Numbers of the loads of the scene."""
+
     def units(self, joint: str) -> tuple[str, str]:
         """Of coordinate and effort."""
+
+    def with_factor(self, load: str, more: float) -> Plant:
+        """With this added to the factor of a load."""
 
     def with_effort(self, joint: str, effort: float) -> Plant:
         """Pushed by a drive."""
@@ -90,11 +106,14 @@ class ChainPlant:
     formulation : Formulation
     settings : Simulation
         By which it is formulated.
+    sensors : tuple of Sensor
+        Of the scene.
     """
 
     formulation: Formulation
     settings: Simulation
     near: Neighbours
+    sensors: tuple[Sensor, ...] = ()
     _made: dict[object, Formulation] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -119,6 +138,16 @@ class ChainPlant:
         found = {joint.name: "fixed" if joint.fixed else joint.drive.kind for joint in self.mechanism.joints}
         own = ((loop.name, loop.freedom) for loop in self.mechanism.loops)
         return {**found, **{name: free.drive.kind for name, free in own if free is not None}}
+
+    @cached_property
+    def readings(self) -> dict[str, str]:
+        """See `Plant`."""
+        return {name: sensor.columns[k][1] for name, (sensor, k) in parts_of(self.sensors).items()}
+
+    @cached_property
+    def loads(self) -> tuple[str, ...]:
+        """See `Plant`."""
+        return tuple(dict.fromkeys(str(load.number) for load in self.mechanism.loads))
 
     def units(self, joint: str) -> tuple[str, str]:
         """See `Plant`."""
@@ -164,13 +193,24 @@ class ChainPlant:
         key = "wrench", point, *wrench.tolist()
         return self._changed(key, lambda own: replace(own, loads=(*own.loads, load)))
 
+    def with_factor(self, load: str, more: float) -> ChainPlant:
+        """See `Plant`."""
+
+        def changed(own: Mechanism) -> Mechanism:
+            def multiplied(x: PointLoad) -> PointLoad:
+                return replace(x, factor=_added(x.factor, 0.0, more + float(x.factor is None), 0.0, 0.0))
+
+            return replace(own, loads=tuple(multiplied(x) if str(x.number) == load else x for x in own.loads))
+
+        return self._changed(("factor", load, more), changed)
+
     def at(self, near: Neighbours) -> ChainPlant:
         """See `Plant`."""
         return replace(self, near=near)
 
     def seen(self, states: States) -> ChainSight:
         """See `Plant`."""
-        return ChainSight(self.formulation, states)
+        return ChainSight(self.formulation, states, self.sensors)
 
 
 def _driven(mechanism: Mechanism, name: str, change: Callable[[Drive], Drive]) -> Mechanism:
@@ -200,6 +240,22 @@ class ChainSight:
 
     formulation: Formulation
     states: States
+    sensors: tuple[Sensor, ...]
+
+    @cached_property
+    def _instants(self) -> Instants:
+        return Instants(self.formulation, *self.states)
+
+    def reading(self, name: str) -> Array:
+        """See `Sight`."""
+        sensor, column = parts_of(self.sensors)[name]
+        if sensor.name not in self._read:
+            self._read[sensor.name] = sensor.read(self._instants)
+        return np.asarray(self._read[sensor.name][:, column])
+
+    @cached_property
+    def _read(self) -> dict[str, Array]:
+        return {}
 
     @cached_property
     def series(self) -> StateSeries:
@@ -222,13 +278,8 @@ class ChainSight:
         """See `Sight`."""
         number = self._number(joint)
         if number is not None:
-            return np.asarray(self._efforts[:, number])
+            return np.asarray(self._instants.reactions.effort[:, number])
         return self._of_loop(lambda chain, *at: chain.loop_effort(*at), joint)
-
-    @cached_property
-    def _efforts(self) -> Array:
-        t, y, v, a = self.states
-        return reaction_series(self.formulation, t, y, v, a).effort
 
     def _number(self, joint: str) -> int | None:
         names = [each.name for each in self.formulation.mechanism.joints]
@@ -238,6 +289,15 @@ class ChainSight:
         number = [loop.name for loop in self.formulation.mechanism.loops].index(joint)
         chain, (t, y, v, _) = cast(LoopFormulation, solved(self.formulation)), self.states
         return np.array([what(chain, *at, number) for at in zip(t.tolist(), y, v, strict=True)])
+
+
+def parts_of(sensors: Sequence[Sensor]) -> dict[str, tuple[Sensor, int]]:
+    """Sensors and their components by name, with the number of the component."""
+    return {
+        f"{sensor.name}.{part}" if part else sensor.name: (sensor, k)
+        for sensor in sensors
+        for k, (part, _) in enumerate(sensor.columns)
+    }
 
 
 def unknown(what: str, name: str, known: tuple[str, ...] | list[str]) -> SceneError:

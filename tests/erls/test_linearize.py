@@ -22,6 +22,7 @@ WANTED = {"shape": "sine", "amplitude": 0.3, "frequency_hz": 1.5, "offset": -0.5
 OUTPUTS = [
     *("joint.j1.angle", "joint.j1.rate", "joint.j2.acceleration", "joint.j1.effort", "joint.j2.effort"),
     *("point.tip.x", "point.tip.velocity.z", "point.tip.acceleration.x", "point.tip.acceleration.z"),
+    *("sensor.imu", "sensor.gyro.z"),
 ]
 
 
@@ -45,6 +46,11 @@ def arm(folder: Path, **changes: Any) -> Path:
         "joints": joints,
         "links": links,
         "points": [{"name": "tip", "link": "l2", "node": "tip"}],
+        "loads": [{"point": "tip", "force": [2.0, 0.0, 1.0]}],
+        "sensors": [
+            {"type": "accelerometer", "name": "imu", "point": "tip", "direction": [1.0, 0.0, 0.0]},
+            {"type": "gyroscope", "name": "gyro", "point": "tip"},
+        ],
     }
     return scenes.write_toml(folder / "arm.toml", scenes.merged(data, changes))
 
@@ -93,11 +99,11 @@ def _near(found: Any, wanted: Any, share: float = 1e-10) -> None:
 
 @pytest.mark.parametrize("formulation", ["erls", "ffr"])
 def test_moving_arm_against_hand_derived_equations(tmp_path: Path, formulation: str) -> None:
-    """A, B, C, D of a two-link arm in full motion, with efforts, a wanted motion and a force on its tip, to 1e-10.
+    """A, B, C, D of a two-link arm in full motion, to 1e-10: efforts, a wanted motion, a load and a force; sensors.
 
     Closed form differentiated by the complex step.
     """
-    inputs = ["joint.j1.effort", "joint.j2.effort", "joint.j2.acceleration", "point.tip.force.z"]
+    inputs = ["joint.j1.effort", "joint.j2.effort", "joint.j2.acceleration", "point.tip.force.z", "load.0.factor"]
     path = arm(tmp_path, simulation={"duration": 1.0, "step": 1e-3, "formulation": formulation})
     model = erls.linearize(path, inputs=inputs, outputs=OUTPUTS)
     omega, phase = 2 * np.pi * 1.5, np.radians(30.0)
@@ -107,7 +113,9 @@ def test_moving_arm_against_hand_derived_equations(tmp_path: Path, formulation: 
         q, v, s, rate = x[:2], x[2:4], x[4], x[5]
         efforts = np.array([-5.0 * q[0] - 0.7 * v[0] + u[0], GAINS[0] * (s - q[1]) + GAINS[1] * (rate - v[1]) + u[1]])
         (l1, l2), p = LENGTHS, q[0] + q[1]
-        push = u[3] * np.array([l1 * np.cos(q[0]) + l2 * np.cos(p), l2 * np.cos(p)])
+        pushes = 2.0 * (1.0 + u[4]), u[3] + 1.0 + u[4]
+        push = pushes[0] * np.array([-l1 * np.sin(q[0]) - l2 * np.sin(p), -l2 * np.sin(p)])
+        push = push + pushes[1] * np.array([l1 * np.cos(q[0]) + l2 * np.cos(p), l2 * np.cos(p)])
         return efforts, push, _accelerations(q, v, efforts + push)
 
     def rates(x: Any, u: Any) -> Any:
@@ -116,10 +124,12 @@ def test_moving_arm_against_hand_derived_equations(tmp_path: Path, formulation: 
     def seen(x: Any, u: Any) -> Any:
         efforts, _, a = parts(x, u)
         tip = _tip(x[:2], x[2:4], a)
-        return np.array([x[0], x[2], a[1], *efforts, tip[0, 0], tip[1, 1], *tip[2]])
+        p = x[0] + x[1]
+        felt = tip[2, 0] * np.cos(p) + (tip[2, 1] + G) * np.sin(p)
+        return np.array([x[0], x[2], a[1], *efforts, tip[0, 0], tip[1, 1], *tip[2], felt, x[2] + x[3]])
 
     start = np.array([0.4, -0.9, 1.1, -2.3, *motion])
-    still = np.array([0.0, 0.0, -0.3 * omega**2 * np.sin(phase), 0.0])
+    still = np.array([0.0, 0.0, -0.3 * omega**2 * np.sin(phase), 0.0, 0.0])
     (a, b), (c, d) = _complex_step(rates, start, still), _complex_step(seen, start, still)
     _near(model.A, a)
     _near(model.B, b)
@@ -142,6 +152,7 @@ def test_prescribed_joint_against_hand_derived_equations(tmp_path: Path) -> None
     data["joints"][0].pop("initial")
     data["joints"][1]["drive"] = {"type": "free"}
     data["joints"][1]["initial"] = {"position_deg": float(np.degrees(-0.9))}
+    data["loads"] = []
     outputs = ["joint.j1.effort", "joint.j2.angle", "point.tip.z"]
     scenes.write_toml(path, data)
     model = erls.linearize(path, outputs=outputs)
