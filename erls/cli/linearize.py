@@ -13,8 +13,8 @@ from erls.cli.terminal import Force, Json, Output, print_json, tell
 
 if TYPE_CHECKING:
     from erls.linear.diagrams import Diagram
-    from erls.run.chain.run import ChainRun
-    from erls.scene.chain import Scene
+    from erls.run.record import Run
+    from erls.scene.read import AnyScene
 
 _MOST = 1000  # values of a diagram
 
@@ -94,21 +94,17 @@ def linearize(
     tell_written(output)
 
 
-def _loaded(path: Path, changes: list[str]) -> Scene | ChainRun:
-    """A scene, or the run of a chain."""
+def _loaded(path: Path, changes: list[str]) -> AnyScene | Run:
+    """A scene, or a run."""
     from erls.files.results import RUN, schema_of
-    from erls.run.chain.run import ChainRun
     from erls.run.file import load_run
-    from erls.scene.read import load_chain
+    from erls.scene.read import load_scene
 
     if schema_of(path) != RUN:
-        return load_chain(path, changes)
+        return load_scene(path, changes)
     if changes:
         raise bad("a run is as it was made", "--set", changes[0], "give the scene instead of the run")
-    found = load_run(path)
-    if not isinstance(found, ChainRun):
-        raise bad("a run of bodies and beams, which are no chain", str(path), found.scene.name, "give one of a chain")
-    return found
+    return load_run(path)
 
 
 def _diagram(

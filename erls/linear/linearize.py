@@ -17,16 +17,19 @@ from erls.linear.assembly import linear_model
 from erls.linear.inputs import inputs_of
 from erls.linear.model import LinearModel
 from erls.linear.outputs import outputs_of
-from erls.linear.plants import ChainPlant
+from erls.linear.plants import ChainPlant, Plant
 from erls.linear.rest import at_rest
 from erls.maths.jit import announcing
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
 from erls.run.chain.sensors import sensors_of
+from erls.run.record import Run
+from erls.scene.bodies.analyses import Dynamics
+from erls.scene.bodies.schema import BodyScene
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
-from erls.scene.read import load_chain
+from erls.scene.read import AnyScene, load_scene
 from erls.simulation.simulate import simulate
 
 EQUILIBRIUM = "equilibrium"
@@ -34,7 +37,7 @@ Message = Callable[[str], None]
 
 
 def linearize(
-    scene: Scene | ChainRun | Path | str,
+    scene: AnyScene | Run | Path | str,
     *,
     at: float | str = 0.0,
     inputs: Sequence[str] | None = None,
@@ -45,11 +48,12 @@ def linearize(
 
     Parameters
     ----------
-    scene : Scene, ChainRun, Path or str
+    scene : Scene, BodyScene, Run, Path or str
         A scene, or a run of it.
     at : float or str
         A time of the motion [s], which is computed up to it unless a run is given; 0 is the start. ``"equilibrium"``:
-        where forces balance at rest with all joints free, next to the start.
+        where forces balance at rest with all joints free, next to the start. A scene of bodies that asks for equilibria
+        is taken in the last one.
     inputs : sequence of str, optional
         ``joint.NAME.effort``; ``joint.NAME.acceleration`` of a prescribed or wanted motion, whose place and rate are
         two more states; ``point.NAME.force.x`` and ``.moment.x``, in the world; ``load.NUMBER.factor`` of a load of the
@@ -89,13 +93,13 @@ def linearize(
 class StateOf(NamedTuple):
     """A plant in its state, the names of its scene and of that state, and what the user should know."""
 
-    plant: ChainPlant
+    plant: Plant
     scene: str
     at: str
     warnings: tuple[str, ...]
 
 
-def state_of(given: Scene | ChainRun | Path | str, at: float | str, tell: Message = lambda text: None) -> StateOf:
+def state_of(given: AnyScene | Run | Path | str, at: float | str, tell: Message = lambda text: None) -> StateOf:
     """What `linearize` linearizes.
 
     Raises
@@ -110,7 +114,9 @@ def state_of(given: Scene | ChainRun | Path | str, at: float | str, tell: Messag
         message, remedy = "not a time of the motion", "give a time in seconds, 0 or later"
         raise SceneError(Cause.TIME_OUT_OF_RANGE, message, where="at", value=at, remedy=remedy)
     if isinstance(given, (str, Path)):
-        given = load_chain(given)
+        given = load_scene(given)
+    if not isinstance(given, (Scene, ChainRun)):
+        return _of_bodies(given, at, tell)
     scene = with_all_modes(given.scene if isinstance(given, ChainRun) else given)
     if isinstance(given, ChainRun):
         moving = not isinstance(at, str)
@@ -125,6 +131,36 @@ def state_of(given: Scene | ChainRun | Path | str, at: float | str, tell: Messag
     short = Scene(scene.path, msgspec.structs.replace(scene.record, simulation=settings))
     run = simulate(short, tell=tell, verdict=False)
     return plant_of(run.formulation.mechanism, scene, at, run, run.warnings)
+
+
+def _of_bodies(given: BodyScene | Run, at: float | str, tell: Message) -> StateOf:
+    """The same of a scene of bodies and beams."""
+    from erls.equations.nodal.scenes.build import assemble  # here: nodal elements, which chains do not need
+    from erls.linear import bodies
+    from erls.run.bodies.motion import BodyMotion
+    from erls.run.bodies.rest import BodyRest
+    from erls.run.bodies.run import BodyRun
+
+    scene = given.scene if isinstance(given, BodyRun) else given
+    assert isinstance(scene, BodyScene)
+    moving, analysis = not isinstance(at, str), scene.record.simulation
+    if not isinstance(analysis, Dynamics):
+        run = simulate(scene, tell=tell, verdict=False) if isinstance(given, BodyScene) else given
+        assert isinstance(run, BodyRest)
+        return StateOf(bodies.rested(run), scene.name, EQUILIBRIUM, run.warnings)
+    if not moving or at == 0.0:
+        assembly = given.assembly if isinstance(given, BodyRun) else assemble(scene)
+        plant, warnings = bodies.started(assembly), tuple[str, ...]()
+        plant = plant if moving else plant.at(at_rest(plant.near))
+    else:
+        assert not isinstance(at, str)
+        if isinstance(given, BodyScene):
+            short = msgspec.structs.replace(analysis, duration=at, output_step=None)
+            record = msgspec.structs.replace(scene.record, simulation=short)
+            given = simulate(BodyScene(scene.path, record), tell=tell, verdict=False)
+        assert isinstance(given, BodyMotion)
+        plant, warnings = bodies.reached(given, at), given.warnings
+    return StateOf(plant, scene.name, f"t = {at:g} s" if moving else EQUILIBRIUM, warnings)
 
 
 def with_all_modes(scene: Scene) -> Scene:

@@ -10,10 +10,13 @@ import loop_scenes
 import numpy as np
 import pytest
 import scenes
+from body_scenes_data import PENDULUM, STRIP, body_scene
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
+from erls.linear.diagrams import campbell
 from erls.linear.model import transmission_zeros
+from erls.linear.response import frequency_response
 
 G = 9.81
 LENGTHS, MASSES = (0.6, 0.4), (2.0, 1.5)
@@ -274,7 +277,38 @@ def test_faulty_requests(tmp_path: Path, arguments: dict[str, Any], cause: Cause
     assert caught.value.cause == cause
 
 
-def test_scenes_of_bodies_are_refused() -> None:
+def test_hanging_body_swings_at_its_closed_form(tmp_path: Path) -> None:
+    """A scene of bodies, its pin five conditions: ω² = m g l / (J + m l²), and 1 / (J + m l²) per force on it."""
+    bodies = [{**PENDULUM["bodies"][0], "position": [0.3, 0.0, -0.9]}]
+    path = body_scene(tmp_path, PENDULUM, bodies=bodies)
+    outputs = ["point.bob.z", "point.bob.x", "point.bob.acceleration.x"]
+    model = erls.linearize(path, at="equilibrium", inputs=["point.bob.force.x"], outputs=outputs)
+    length = np.hypot(0.3, 0.9)
+    inertia = 0.2 + 2.0 * length**2
+    assert model.size == 1
+    np.testing.assert_allclose(model.poles**2, [-2.0 * G * length / inertia] * 2, rtol=1e-9)
+    np.testing.assert_allclose(model.values[:2], [-length, 0.0], atol=1e-9)
+    np.testing.assert_allclose(model.D[:, 0], [0.0, 0.0, length**2 / inertia], atol=1e-9)
+
+
+def test_strip_gives_way_as_it_is_pushed(tmp_path: Path) -> None:
+    """Beams: L³ / 3 EI at the tip, by a force and by the factor of a load that hardly bends them.
+
+    Of 8 and 16 elements, whose errors are of second order; shear gives 6e-5.
+    """
+    found = []
+    for elements in (8, 16):
+        beams, loads = [{**STRIP["beams"][0], "elements": elements}], [{"node": "tip", "force": [0.0, 0.0, 1e-6]}]
+        path = body_scene(tmp_path, STRIP, beams=beams, loads=loads)
+        model = erls.linearize(path, inputs=["point.tip.force.z", "load.0.factor"], outputs=["point.tip.z"])
+        found.append(frequency_response(model, [1e-5])[0, 0].real)
+    bending, compliance = 1e6 * 0.1 * 0.02**3 / 12, (4 * found[1] - found[0]) / 3
+    np.testing.assert_allclose(compliance, np.array([1.0, 1e-6]) * 2.0**3 / (3 * bending), rtol=2e-4)
+    with pytest.raises(SceneError, match="no such input"):
+        erls.linearize(path, inputs=["joint.clamp.effort"])
+
+
+def test_diagrams_of_scenes_of_bodies_are_refused() -> None:
     """By name."""
     with pytest.raises(SceneError, match="scene of bodies"):
-        erls.linearize(scenes.ROOT / "data/heavy_top/fast.toml")
+        campbell(scenes.ROOT / "data/heavy_top/fast.toml", "tip", [1.0])

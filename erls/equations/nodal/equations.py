@@ -7,6 +7,7 @@ integrator found with them: the rates of the nodes' twists and the multipliers.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -145,8 +146,8 @@ class Nodal:
         velocity = v.ravel()
         if self.chain.closing:  # links that bend at the start do not move as rigid ones do
             velocity = consistent_velocity(self.system, 0.0, q, velocity)
-        found = consistent_acceleration(self.system, 0.0, q, velocity)
-        return _stored(self.system, 0.0, q, velocity, *found)[:2]
+        a, multipliers = consistent_acceleration(self.system, 0.0, q, velocity)
+        return _stored(self.system, 0.0, q, velocity, a, lambda: multipliers)[:2]
 
     def neighbours(self, t: float, y: Array, v: Array) -> NodalNeighbours:
         """States beside one, with accelerations and multipliers that go with it."""
@@ -310,11 +311,11 @@ class Nodal:
 
 
 def _stored(
-    system: NodalSystem, t: float, q: Nodes, v: Array, a: Array, multipliers: Array
+    system: NodalSystem, t: float, q: Nodes, v: Array, a: Array, multipliers: Callable[[], Array]
 ) -> tuple[Array, Array, Array]:
     """y with its derivatives, those of what the integrator finds left out."""
     y, *rates = system.stored(t, q, v, a)
-    found = np.concatenate([a, multipliers])
+    found = np.concatenate([a, multipliers()])
     return np.concatenate([y, found]), *(np.concatenate([rate, 0 * found]) for rate in rates)  # type: ignore[return-value]
 
 

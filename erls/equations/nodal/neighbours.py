@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from erls.equations.system import metre_scales
 from erls.maths.saddle import dense
 from erls.maths.so3 import Array
 
-Stored = Callable[[NodalSystem, float, Nodes, Array, Array, Array], tuple[Array, Array, Array]]
+Stored = Callable[[NodalSystem, float, Nodes, Array, Array, Callable[[], Array]], tuple[Array, Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,8 @@ class NodalNeighbours:
     Attributes
     ----------
     stored : callable
-        What a run stores of a state: coordinates, rates and accelerations.
+        What a run stores of a state: coordinates, rates and accelerations. It may ask for the multipliers (m,) that
+        go with them.
     names : tuple of str
         (n,)
     """
@@ -103,16 +104,19 @@ class NodalNeighbours:
         return self.system.constraint(self.time, self.q)
 
     def states(self, x: Array, w: Array, b: Array) -> States:
-        """See `Neighbours`; with the multipliers that go with the accelerations."""
+        """See `Neighbours`."""
         found = []
         for each in zip(x, w, b, strict=True):
             q, v, a = self._moved(*each)
-            rows = dense(self.system.constraint_matrix(self.time, q))
-            force = self.system.residual(self.time, q, v, a) / self.metres
-            multipliers = np.asarray(np.linalg.lstsq((rows / self.metres).T, -force, rcond=None)[0])
-            found.append(self.stored(self.system, self.time, q, v, a, multipliers))
+            found.append(self.stored(self.system, self.time, q, v, a, partial(self._balancing, q, v, a)))
         y, v, a = (np.array(parts) for parts in zip(*found, strict=True))
         return States(np.full(len(x), self.time), y, v, a)
+
+    def _balancing(self, q: Nodes, v: Array, a: Array) -> Array:
+        """(m,) multipliers that go with accelerations."""
+        rows = dense(self.system.constraint_matrix(self.time, q)) / self.metres
+        force = self.system.residual(self.time, q, v, a) / self.metres
+        return np.asarray(np.linalg.lstsq(rows.T, -force, rcond=None)[0])
 
     def later(self, tau: float) -> NodalNeighbours:
         """See `Neighbours`."""
