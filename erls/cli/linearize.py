@@ -30,6 +30,7 @@ def linearize(
     outputs: str | None = None,
     campbell: str = "",
     locus: str = "",
+    mode: int | None = None,
     set_: Set = None,
     force: Force = False,
     json: Json = False,
@@ -61,6 +62,8 @@ def linearize(
     locus
         KEY=FROM:TO:COUNT: poles over a field of the scene, as --set names it; for example
         joints.elbow.drive.proportional_gain=0:200:21.
+    mode
+        Write this mode, counted from 1, as a run file for erls view: one period in a second.
     set_
         Change a field of the scene, KEY=VALUE; may be repeated.
     force
@@ -75,6 +78,8 @@ def linearize(
 
     if at is not None and equilibrium:
         raise bad("two states at once", "--at", at, "give --at or --equilibrium")
+    if mode is not None:
+        return _mode(scene, mode, output, EQUILIBRIUM if equilibrium else at or 0.0, set_ or [], force, json)
     if campbell or locus:
         return _diagram(scene, output, at, equilibrium, campbell, locus, set_ or [], force, json)
     check_output(output, [scene], set_ or [], (*FORMATS, ".html"), force)
@@ -92,6 +97,30 @@ def linearize(
         return print_json({**summary(model), "output": None if output is None else str(output)})
     print(model_text(model))
     tell_written(output)
+
+
+def _mode(
+    scene: Path, number: int, output: Path | None, at: float | str, changes: list[str], force: bool, json: bool
+) -> None:
+    """A mode as a run."""
+    from erls.cli.reports import read_by
+    from erls.files.results import RUN, claim
+    from erls.linear.mode_run import mode_run
+    from erls.run.chain.run import ChainRun
+    from erls.run.file import write_run
+    from erls.scene.chain import Scene
+
+    if output is None:
+        raise bad("a mode is written as a run file", "--output", "nothing", "give -o MODE.run.h5")
+    claim(output, RUN, read_by([scene], changes), force)
+    loaded = _loaded(scene, changes)
+    if not isinstance(loaded, (Scene, ChainRun)):
+        raise bad("a scene of bodies and beams", "--mode", number, "simulate it with type = 'frequencies'")
+    found = mode_run(loaded, number, at, tell)
+    write_run(output, found)
+    if json:
+        return print_json({"scene": found.scene.name, "output": str(output)})
+    print(f"{found.scene.name}\nwritten to {output}")
 
 
 def _loaded(path: Path, changes: list[str]) -> AnyScene | Run:

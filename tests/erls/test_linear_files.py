@@ -151,3 +151,15 @@ def test_faulty_commands(words: list[str], told: str, tmp_path: Path, capsys: py
     assert len(lines) == 1
     assert told in lines[0]
     assert not list(tmp_path.iterdir())
+
+
+def test_mode_is_drawn_from_a_run_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One period in a second, a tenth of the link at its largest displacement; the hand as the model says, to 1 %."""
+    path = tmp_path / "mode.run.h5"
+    assert "mode 4, 16.65 Hz" in run(capsys, JOINT, "--equilibrium", "--mode", "4", "-o", path)[0]
+    found = erls.load_run(path)
+    model = erls.linearize(JOINT, at="equilibrium", inputs=[], outputs=["point.hand.y"])
+    swing = found.position("hand", [0.0, 0.5])[:, 1]
+    assert np.ptp(swing) == pytest.approx(2 * 0.1 * 0.5 * abs(model.modes[3].seen[0].real), rel=0.01)
+    assert "there is no such mode" in run(capsys, JOINT, "--mode", "99", "-o", path, code=2)[1]
+    assert "-o MODE.run.h5" in run(capsys, JOINT, "--mode", "1", code=2)[1]
