@@ -61,6 +61,10 @@ class Neighbours(Protocol):
 
     @property
     def size(self) -> float:
+        """Of what steps of differences are a share of [m]."""
+
+    @property
+    def reach(self) -> float:
         """Of the mechanism [m]."""
 
     @property

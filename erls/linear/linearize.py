@@ -155,7 +155,7 @@ def _of_bodies(given: BodyScene | Run, at: float | str, tell: Message) -> StateO
     else:
         assert not isinstance(at, str)
         if isinstance(given, BodyScene):
-            short = msgspec.structs.replace(analysis, duration=at, output_step=None)
+            short = msgspec.structs.replace(analysis, duration=at)
             record = msgspec.structs.replace(scene.record, simulation=short)
             given = simulate(BodyScene(scene.path, record), tell=tell, verdict=False)
         assert isinstance(given, BodyMotion)

@@ -207,7 +207,7 @@ class LinearModel:
             scale = moved[far] * self.metres[far] or 1.0
             seen = (self.seen[0] + pole * self.seen[1] + pole**2 * self.seen[2]) @ z
             found.append(Mode(pole, moved / scale, seen / scale, self.coordinates[far]))
-        return tuple(sorted(found, key=lambda mode: (abs(mode.pole.imag), -mode.pole.real)))
+        return tuple(sorted(found, key=lambda mode: (abs(mode.pole), -mode.pole.real)))
 
     @property
     def poles(self) -> Array:

@@ -65,6 +65,11 @@ class LoopNeighbours:
         return self.chain.reach
 
     @property
+    def reach(self) -> float:
+        """See `Neighbours`."""
+        return self.chain.reach
+
+    @property
     def speed(self) -> Array:
         """See `Neighbours`."""
         return self.tree.v

@@ -62,6 +62,11 @@ class NodalNeighbours:
         return float(self.metres.reshape(-1, 6)[:, 3:].min())
 
     @property
+    def reach(self) -> float:
+        """See `Neighbours`: of the farthest nodes, or of what turns about the only one."""
+        return max(self.size, float(np.linalg.norm(np.ptp(self.q.poses[:, :3, 3], axis=0))))
+
+    @property
     def speed(self) -> Array:
         """See `Neighbours`."""
         return self.v

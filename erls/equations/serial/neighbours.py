@@ -46,6 +46,11 @@ class TreeNeighbours:
     @property
     def size(self) -> float:
         """See `Neighbours`."""
+        return self.reach
+
+    @property
+    def reach(self) -> float:
+        """See `Neighbours`: of its largest link."""
         return self.equations.mechanism.reach
 
     @property
