@@ -63,11 +63,12 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
     duration = run.end - float(run.solution.t[0])
     places = configurations(compared, motion)
     start = motion.start if run.formulation.mechanism.static_start else None
-    static, drift = slow_answer(compared, motion.slow, places, duration, start)
+    jumps = sudden(run)
+    static, drift = slow_answer(compared, motion.slow, places, duration, start, jumps)
     if compared.tied is not None and start is not None:
         static = static + start_of_loops(compared, start)
     off, follows = left_out_vibrations(compared, motion, places, duration)
     parts = static + _SUDDEN * follows + off + drift
-    margin = _MARGIN_SUDDEN if sudden(run) else _MARGIN
+    margin = _MARGIN_SUDDEN if jumps else _MARGIN
     error = float(margin * parts.max(initial=0.0))
     return (error, "; ".join(finer.notes)) if np.isfinite(error) else (None, "motion without bound")

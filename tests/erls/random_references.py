@@ -43,6 +43,7 @@ from erls.simulation.chains import run_chain
 from fe_import.errors import ReportedError
 
 MOST_STEPS, MOST_CALLS, MOST_NODAL_CALLS = 25_000, 150_000, 40_000
+PER_BALANCE = 20  # evaluations of all modes in one of those that follow statically
 MORE = 3  # times as much may references take
 TIGHTER, TIGHT = 100.0, 30.0
 _TIMES, _EVERY = 201, 20
@@ -90,7 +91,10 @@ def limited_run(scene: Scene, more: float = 1.0, verdict: bool = False) -> Chain
     verdict : bool
         Whether it states its accuracy.
     """
-    calls = MOST_NODAL_CALLS if scene.record.simulation.formulation == "nodal" else MOST_CALLS
+    settings = scene.record.simulation
+    calls = MOST_NODAL_CALLS if settings.formulation == "nodal" else MOST_CALLS
+    if settings.bandwidth is not None:
+        calls //= PER_BALANCE
     limits = {"calls": round(more * calls), "steps": round(more * MOST_STEPS)}
     asked = Limited(None, lambda text: None, None, False, None, verdict, **limits)
     return run_chain(scene, asked)
