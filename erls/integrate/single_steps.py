@@ -77,6 +77,8 @@ class SingleSteps:
         if not np.isfinite(a).all():
             raise not_finite(t, a)
         self._steps.begin(y, v, a)
+        if self._steps.h:
+            self._steps.set_step(self._steps.h)  # which foretells nothing from before
 
     def advance(self, leg: Leg) -> None:
         """One step over a leg; where Newton's method fails, in parts.

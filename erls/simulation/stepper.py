@@ -7,6 +7,7 @@ run of the scene with that step.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,13 +120,14 @@ class Stepper:
         self._numbers = {name: k for k, name in enumerate(self.input_names)}
         self._sensors = sensors_of(self.scene, built.mechanism)
         self.sensor_names = tuple(sensor.name for sensor in self._sensors)
-        own = {t for known in inputs if known.own is not None for t in known.own.breakpoints}
-        self._jumps = _Jumps(tuple(sorted({*own, *self._formulation.breakpoints})))  # type: ignore[attr-defined]
+        jumps = [(t, known.name) for known in inputs if known.own is not None for t in known.own.breakpoints]
+        jumps += [(t, "") for t in self._formulation.breakpoints]  # type: ignore[attr-defined]
+        self._jumps = sorted(jumps)
         self._charts = mechanism.rotation_vector_places
         self.step_size = settings.step or STEP
         options = Options(self.step_size, spectral_radius=settings.spectral_radius)
         self.time, self._fresh = 0.0, True
-        start = legs(self._jumps, (0.0, self.step_size))[0].first
+        start = legs(self._ahead({}, self.step_size), (0.0, self.step_size))[0].first
         self._set({}, start, False)
         y, v = self._formulation.initial_state()
         self._steps = SingleSteps(self._formulation, options)
@@ -164,11 +166,12 @@ class Stepper:
         given, h = dict(inputs or {}), self.step_size if h is None else h
         self._check(given, h)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
-            for leg in legs(self._jumps, (self.time, self.time + h)):
-                if (given if self._fresh else self._jumps.at(leg.start)):
+            jumps = self._ahead(given, h)
+            for leg in legs(jumps, (self.time, self.time + h)):
+                if given if self._fresh else jumps.at(leg.start):
                     self._set(given, leg.first, False)
                     self._steps.begin(leg.first, *self._steps.state[:2], False)
-                last = leg.last if self._jumps.at(leg.end) else leg.end
+                last = leg.last if jumps.at(leg.end) else leg.end
                 self._set(given, last, True)
                 self._steps.advance(leg._replace(last=last))
                 self.time, self._fresh = leg.end, False
@@ -199,6 +202,12 @@ class Stepper:
         self._steps.restore(saved.memory)
         self._inputs.set(saved.inputs)
         self.time, self._fresh = saved.time, saved.fresh
+
+    def _ahead(self, given: Mapping[str, float], h: float) -> _Jumps:
+        """Jumps of what acts in the next step, its ends included."""
+        first = bisect_left(self._jumps, (self.time - _Jumps.NEAR * max(1.0, self.time), ""))
+        last = bisect_left(self._jumps, (self.time + h + _Jumps.NEAR * max(1.0, self.time + h), "\uffff"))
+        return _Jumps(tuple(t for t, name in self._jumps[first:last] if name not in given))
 
     def _set(self, given: Mapping[str, float], t: float, left: bool) -> None:
         """Inputs at a time; ``left``: before a jump there."""
@@ -233,7 +242,9 @@ class Stepper:
 
 
 class _Jumps:
-    """Times at which what the scene says jumps; as `erls.equations.system.MovingSystem` for `legs`."""
+    """Times at which forces jump; as `erls.equations.system.MovingSystem` for `legs`."""
+
+    NEAR = 1e-12  # s, or of a time: what rounding leaves
 
     def __init__(self, times: tuple[float, ...]) -> None:
         self.breakpoints = times
@@ -241,7 +252,7 @@ class _Jumps:
 
     def at(self, t: float) -> bool:
         """Whether there is one."""
-        return any(abs(b - t) <= 1e-12 * max(1.0, abs(t)) for b in self.breakpoints)
+        return any(abs(b - t) <= self.NEAR * max(1.0, abs(t)) for b in self.breakpoints)
 
 
 def _refuse_auto(scene: Scene) -> None:

@@ -24,6 +24,8 @@ from erls.run.readings import output_names, outputs
 
 Array = NDArray[np.float64]
 
+FORCES = ["N [N]", "Vy [N]", "Vz [N]", "T [N m]", "My [N m]", "Mz [N m]"]
+
 # of each type: its fields, and the heads of its columns
 KINDS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "position": ({"point": "tip"}, ["s.x [m]", "s.y [m]", "s.z [m]"]),
@@ -31,7 +33,7 @@ KINDS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "accelerometer": ({"point": "tip", "axes": "link"}, ["s.x [m/s2]", "s.y [m/s2]", "s.z [m/s2]"]),
     "gyroscope": ({"point": "tip"}, ["s.x [rad/s]", "s.y [rad/s]", "s.z [rad/s]"]),
     "strain_gauge": ({"point": "tip", "offset": [0.0, 0.005, 0.0]}, ["s [1]"]),
-    "section_force": ({"point": "tip"}, [f"s.{c} [N]" for c in ("N", "Vy", "Vz")] + [f"s.{c} [N m]" for c in ("T", "My", "Mz")]),
+    "section_force": ({"point": "tip"}, [f"s.{c}" for c in FORCES]),
     "stress": ({"point": "tip", "component": "von_mises"}, ["s [Pa]"]),
     "joint_angle": ({"joint": "shoulder"}, ["s [rad]"]),
     "joint_rate": ({"joint": "shoulder"}, ["s [rad/s]"]),
@@ -66,7 +68,7 @@ def every(tmp_path_factory: pytest.TempPathFactory) -> ChainRun:
 
 
 def test_readings_are_columns_curves_and_samples(every: ChainRun, tmp_path: Path, capsys: Any) -> None:
-    """The same numbers in the table, in the run file, in its summary and in a run that is read; files before us stay."""
+    """The same numbers in the table, in the run file, in its summary and in a run that is read."""
     times = every.spread(5)
     columns = every.columns(times)
     for kind, (_, heads) in KINDS.items():
@@ -306,7 +308,8 @@ def test_effort_on_both_sides_of_the_gear(tmp_path: Path) -> None:
     """
     motor = {"rotor_inertia": 2e-4, "gear_ratio": 20.0}
     motion = {"shape": "sine", "amplitude": 0.5, "frequency_hz": 2.0, "phase_deg": 30.0}
-    controller = {"type": "pd", "motion": motion, "proportional_gain": 100.0, "derivative_gain": 3.0, "torque_limit": 9.0}
+    gains = {"proportional_gain": 100.0, "derivative_gain": 3.0, "torque_limit": 9.0}
+    controller = {"type": "pd", "motion": motion, **gains}
     acting = {"motor": motor, "damping": 0.2, "stiffness": 5.0, "friction": {"force": 0.3, "transition_rate": 0.05}}
     read = [
         {"name": f"{kind} {side}", "type": kind, "joint": "shoulder", "side": side}
@@ -334,7 +337,8 @@ def test_effort_on_both_sides_of_the_gear(tmp_path: Path) -> None:
 def test_closing_joints_and_bodies_read_too(tmp_path: Path) -> None:
     """Angle and rate of a closing joint; node, gyroscope and connection of a scene of bodies, against differences."""
     path = scenes.ROOT / "data" / "four_bar" / "flexible.toml"
-    found = [{"name": "s", "type": "joint_angle", "joint": "rocker_pivot"}, {"name": "r", "type": "joint_rate", "joint": "rocker_pivot"}]  # fmt: skip
+    own = {"joint": "rocker_pivot"}
+    found = [{"name": "s", "type": "joint_angle", **own}, {"name": "r", "type": "joint_rate", **own}]
     data = scenes.read_toml(path)
     for link in data["links"]:
         link["model"] = str(path.parent / link["model"])
