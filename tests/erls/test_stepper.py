@@ -73,7 +73,7 @@ def driven(folder: Path, **changes: Any) -> Path:
 @pytest.mark.parametrize("formulation", ["erls", "ffr"])
 def test_inputs_of_the_scene_give_its_run(tmp_path: Path, formulation: str) -> None:
     """Torques and loads with jumps: left to the scene, and set by hand where they do not jump. To rounding; readings of
-    accelerations to what Newton's method leaves of them, 1e-11 m / STEP².
+    accelerations to what Newton's method leaves of them, 4e-11 m / STEP².
     """
     path = driven(tmp_path)
     scene = erls.load_scene(path, [f"simulation.formulation={formulation}"])
@@ -85,7 +85,7 @@ def test_inputs_of_the_scene_give_its_run(tmp_path: Path, formulation: str) -> N
         readings = stepper.step(given)
         t = stepper.time
         if k in (2, 7, 19):
-            np.testing.assert_allclose(readings["acc"], run.sensor("acc", t), rtol=0, atol=1e-5)
+            np.testing.assert_allclose(readings["acc"], run.sensor("acc", t), rtol=0, atol=5e-5)
             np.testing.assert_allclose(readings["angle"], run.sensor("angle", t), rtol=0, atol=1e-13)
     assert apart(stepper, run)[0] < 1e-12
     assert apart(stepper, run)[1] < 1e-9
