@@ -10,6 +10,7 @@ from erls.equations.consistency import consistent_acceleration, consistent_start
 from erls.equations.formulation import Formulation
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.system import SecondOrderSystem
+from erls.errors import SimulationError
 from erls.integrate.alpha_rules import Limit
 from erls.integrate.alpha_steps import Steps, equal_steps
 from erls.integrate.base import Leg, Options
@@ -77,9 +78,11 @@ class SingleSteps:
         if not np.isfinite(a).all():
             raise not_finite(t, a)
         self._steps.begin(y, v, a)
+        if self._steps.h:
+            self._steps.set_step(self._steps.h)  # which foretells nothing from before
 
     def advance(self, leg: Leg) -> None:
-        """One step over a leg; where Newton's method fails, in parts.
+        """One step over a leg; where Newton's method fails, in parts, all of them or none.
 
         Raises
         ------
@@ -89,8 +92,15 @@ class SingleSteps:
         steps, h = self._steps, leg.end - leg.start
         if abs(steps.h - h) > _SAME * h:
             steps.set_step(h)
-        if steps.stretch(np.array([leg.end]), leg.last, Limit())[1] != DONE:
+        if steps.stretch(np.array([leg.end]), leg.last, Limit())[1] == DONE:
+            return
+        before = self.memory()
+        try:
             equal_steps(steps, leg, h, True, self.recorder)
+        except SimulationError:
+            self.restore(before)
+            steps.h = 0.0  # of which no factors are known: those that there are belong to what failed
+            raise
 
     @property
     def state(self) -> tuple[Array, Array, Array]:

@@ -42,7 +42,7 @@ def reading(sensors: Sequence[Sensor], name: str, seen: Seen, shape: tuple[int, 
 def shaped(sensor: Sensor, seen: Seen, shape: tuple[int, ...]) -> Array:
     """The same: a sensor of one component has no axis of its own."""
     found = sensor.read(seen)
-    return found.reshape(shape if sensor.columns[0][0] == "" else (*shape, len(sensor.columns)))
+    return found.reshape(shape if len(sensor.columns) == 1 else (*shape, len(sensor.columns)))
 
 
 def reading_columns(sensors: Sequence[Sensor], seen: Seen, count: int) -> dict[str, Array]:

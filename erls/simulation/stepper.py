@@ -7,6 +7,7 @@ run of the scene with that step.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,7 @@ class Saved:
     """A state of a `Stepper`; nothing changes it."""
 
     time: float
+    clock: tuple[float, float, int]
     inputs: Array
     memory: Memory
     fresh: bool
@@ -71,6 +73,8 @@ class Stepper:
     Attributes
     ----------
     scene : Scene
+    formulation : Formulation
+        The equations of motion, with the mechanism, its inputs as they are set.
     time : float
         [s]
     warnings : tuple of str
@@ -112,25 +116,27 @@ class Stepper:
         self.scene = self_contained(loaded)
         mechanism, inputs = with_inputs(built.mechanism)
         with announcing(tell), compiling_steps(compiled_steps(mechanism, settings)):
-            self._formulation = formulate(mechanism, settings)
-            compile_kernels(self._formulation, settings)
-        self._inputs = Inputs(self._formulation, inputs)
+            self.formulation = formulate(mechanism, settings)
+            compile_kernels(self.formulation, settings)
+        self._inputs = Inputs(self.formulation, inputs)
         self.input_names = tuple(known.name for known in inputs)
         self._numbers = {name: k for k, name in enumerate(self.input_names)}
         self._sensors = sensors_of(self.scene, built.mechanism)
         self.sensor_names = tuple(sensor.name for sensor in self._sensors)
-        own = {t for known in inputs if known.own is not None for t in known.own.breakpoints}
-        self._jumps = _Jumps(tuple(sorted({*own, *self._formulation.breakpoints})))  # type: ignore[attr-defined]
+        jumps = [(t, known.name) for known in inputs if known.own is not None for t in known.own.breakpoints]
+        jumps += [(t, "") for t in self.formulation.breakpoints]  # type: ignore[attr-defined]
+        self._jumps = sorted(jumps)
         self._charts = mechanism.rotation_vector_places
         self.step_size = settings.step or STEP
         options = Options(self.step_size, spectral_radius=settings.spectral_radius)
         self.time, self._fresh = 0.0, True
-        start = legs(self._jumps, (0.0, self.step_size))[0].first
+        self._clock = 0.0, 0.0, 0  # where steps of this length began, and how many there were
+        start = legs(self._ahead({}, self.step_size), (0.0, self.step_size))[0].first
         self._set({}, start, False)
-        y, v = self._formulation.initial_state()
-        self._steps = SingleSteps(self._formulation, options)
+        y, v = self.formulation.initial_state()
+        self._steps = SingleSteps(self.formulation, options)
         self._steps.begin(start, *exchanged(y, v, self._charts), True)
-        self.warnings = (*built.warnings, *getattr(self._formulation, "warnings", ()))
+        self.warnings = (*built.warnings, *getattr(self.formulation, "warnings", ()))
 
     @property
     def state(self) -> tuple[Array, Array, Array]:
@@ -159,19 +165,24 @@ class Stepper:
         SceneError
             BAD_FIELD, BAD_REFERENCE: an unknown input, or a number that is none.
         SimulationError
-            The step fails: says when, why and what to try; the stepper stands where the last good part of it ended.
+            The step fails: says when, why and what to try; the stepper stands where it began, or at the last jump that
+            it met.
         """
         given, h = dict(inputs or {}), self.step_size if h is None else h
         self._check(given, h)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
-            for leg in legs(self._jumps, (self.time, self.time + h)):
-                if (given if self._fresh else self._jumps.at(leg.start)):
+            origin, width, count = self._clock if self._clock[1] == h else (self.time, h, 0)
+            end, jumps = origin + (count + 1) * width, self._ahead(given, h)
+            self._clock = self.time, 0.0, 0  # of a step that fails
+            for leg in legs(jumps, (self.time, end)):
+                if self._fresh or jumps.at(leg.start):
                     self._set(given, leg.first, False)
                     self._steps.begin(leg.first, *self._steps.state[:2], False)
-                last = leg.last if self._jumps.at(leg.end) else leg.end
+                last = leg.last if jumps.at(leg.end) else leg.end
                 self._set(given, last, True)
                 self._steps.advance(leg._replace(last=last))
                 self.time, self._fresh = leg.end, False
+            self._clock = origin, width, count + 1
         self._exchange()
         return self.readings()
 
@@ -180,12 +191,12 @@ class Stepper:
         if not self._sensors:
             return {}
         y, v, a = self.state
-        seen = Instants(self._formulation, np.array([self.time]), y[None], v[None], a[None])
+        seen = Instants(self.formulation, np.array([self.time]), y[None], v[None], a[None])
         return {sensor.name: shaped(sensor, seen, (1,))[0] for sensor in self._sensors}
 
     def save(self) -> Saved:
         """The present state, all that later steps depend on."""
-        return Saved(self.time, self._inputs.values, self._steps.memory(), self._fresh)
+        return Saved(self.time, self._clock, self._inputs.values, self._steps.memory(), self._fresh)
 
     def restore(self, saved: Saved) -> None:
         """Stand where the state was saved, by this stepper or another one of the same scene; steps from there on are
@@ -198,7 +209,13 @@ class Stepper:
         """
         self._steps.restore(saved.memory)
         self._inputs.set(saved.inputs)
-        self.time, self._fresh = saved.time, saved.fresh
+        self.time, self._clock, self._fresh = saved.time, saved.clock, saved.fresh
+
+    def _ahead(self, given: Mapping[str, float], h: float) -> _Jumps:
+        """Jumps of what acts in the next step, its ends included."""
+        first = bisect_left(self._jumps, (self.time - _Jumps.NEAR * max(1.0, self.time), ""))
+        last = bisect_left(self._jumps, (self.time + h + _Jumps.NEAR * max(1.0, self.time + h), "\uffff"))
+        return _Jumps(tuple(t for t, name in self._jumps[first:last] if name not in given))
 
     def _set(self, given: Mapping[str, float], t: float, left: bool) -> None:
         """Inputs at a time; ``left``: before a jump there."""
@@ -233,7 +250,9 @@ class Stepper:
 
 
 class _Jumps:
-    """Times at which what the scene says jumps; as `erls.equations.system.MovingSystem` for `legs`."""
+    """Times at which forces jump; as `erls.equations.system.MovingSystem` for `legs`."""
+
+    NEAR = 1e-12  # s, or of a time: what rounding leaves
 
     def __init__(self, times: tuple[float, ...]) -> None:
         self.breakpoints = times
@@ -241,7 +260,7 @@ class _Jumps:
 
     def at(self, t: float) -> bool:
         """Whether there is one."""
-        return any(abs(b - t) <= 1e-12 * max(1.0, abs(t)) for b in self.breakpoints)
+        return any(abs(b - t) <= self.NEAR * max(1.0, abs(t)) for b in self.breakpoints)
 
 
 def _refuse_auto(scene: Scene) -> None:

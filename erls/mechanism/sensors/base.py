@@ -59,8 +59,8 @@ class NodeMotion:
 
 class Moved(NamedTuple):
     """A joint, or a closing one behind them, by its number; what its motor turns by per turn of the joint, and the
-    inertia of its rotor as the joint feels it [kg m² or kg]; unit of its coordinate and of the force along it; whether
-    it is a closing one, whose acceleration is not known.
+    inertia of its rotor as the joint feels it [kg m² or kg]; unit of its coordinate and of the force along it, which is
+    empty where that is not known; whether it is a closing one, whose acceleration is not known.
     """
 
     number: int

@@ -18,7 +18,7 @@ class Effort(JointSensor, frozen=True, kw_only=True, tag="effort"):
 
     def bind(self, finder: Finder, place: Place) -> Sensor:
         """Check, and say what is read."""
-        at = self.found(finder, place)
+        at = self.found(finder, place, forced=True)
         if self.side == "load" and at.rotor and at.closing:
             remedy = "use side = 'motor'"
             raise place.error("side", "what the rotor of a closing joint takes is not known", "load", remedy=remedy)

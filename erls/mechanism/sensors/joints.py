@@ -23,10 +23,14 @@ class JointSensor(SensorRecord, frozen=True, kw_only=True):
     joint: str
     side: str = "load"
 
-    def found(self, finder: Finder, place: Place) -> Moved:
-        """The joint."""
+    def found(self, finder: Finder, place: Place, forced: bool = False) -> Moved:
+        """The joint; ``forced``: what acts along it is read, too."""
         place.choice("side", self.side, SIDES)
-        return finder.joint(self.joint, place)
+        at = finder.joint(self.joint, place)
+        if not at.effort_unit and (forced or self.side == "motor"):
+            remedy = "read its joint_angle or joint_rate, side = 'load'"
+            raise place.error("joint", "connections have no motors", self.joint, remedy=remedy)
+        return at
 
     def geared(self, at: Moved, per_time: str, read: Callable[[Seen], Array]) -> Sensor:
         """Reading of the joint's coordinate, or a derivative, (k,), on the side that is asked for."""
