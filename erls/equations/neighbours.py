@@ -75,6 +75,10 @@ class Neighbours(Protocol):
     def acceleration(self) -> Array:
         """(n,) its accelerations."""
 
+    @property
+    def driven(self) -> tuple[float, float]:
+        """Speed [m/s] and acceleration [m/s²] of what moves as prescribed, where the coordinates leave it out."""
+
     def forces(self, x: Array, w: Array, b: Array) -> Array:
         """(k, n) forces out of balance, those of the conditions included, as they are in the state."""
 
@@ -94,7 +98,13 @@ class Neighbours(Protocol):
         """Those of the state that the motion reaches after a short time [s]."""
 
     def at_rest(self, x: Array, multipliers: Array) -> Neighbours:
-        """Those of a displaced state (n,) without motion, with multipliers (m,) of the conditions."""
+        """Those of a displaced state (n,) whose coordinates rest, with multipliers (m,) of the conditions.
+
+        Raises
+        ------
+        SceneError
+            BAD_FIELD: they cannot, since something moves as prescribed.
+        """
 
     @property
     def multipliers(self) -> Array:
@@ -183,7 +193,8 @@ def split(near: Neighbours) -> Split:
 
 def short_times(near: Neighbours) -> tuple[float, ...]:
     """Times for `over_time` beside that of a motion, which covers little within them [s]; none at rest."""
-    fast, faster = (float(np.abs(near.metres * x).max(initial=0.0)) for x in (near.speed, near.acceleration))
+    own = (float(np.abs(near.metres * x).max(initial=0.0)) for x in (near.speed, near.acceleration))
+    fast, faster = map(max, own, near.driven)
     if not fast and not faster:
         return ()
     tau = min(
@@ -206,12 +217,17 @@ def ways_of(near: Neighbours) -> Moving:
     """N, (n, f)."""
     basis = split(near)
     times = short_times(near) if basis.across.shape[1] else ()
-    return over_time(basis.ways, [_kept(near.later(tau).rows(), basis) for tau in times], times)
+    none = np.zeros((basis.across.shape[1], 0))
+    return over_time(basis.ways, [kept(near.later(tau).rows(), basis, none) for tau in times], times)
 
 
-def _kept(rows: Array, basis: Split) -> Array:
-    """The ways, turned so that they keep to other rows."""
-    return np.asarray(basis.ways - basis.across @ np.linalg.solve(rows @ basis.across, rows @ basis.ways))
+def kept(rows: Array, basis: Split, opened: Array) -> Array:
+    """(n, f + s) N and P that keep to conditions with these rows (m, n), which motions open by Φ_s (m, s)."""
+    found = np.hstack([basis.ways, np.zeros((len(basis.ways), opened.shape[1]))])
+    if not len(rows):
+        return found
+    wrong = np.hstack([rows @ basis.ways, opened])
+    return np.asarray(found - basis.across @ np.linalg.solve(rows @ basis.across, wrong))
 
 
 def small_motions(near: Neighbours) -> Linearization:

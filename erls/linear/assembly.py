@@ -19,6 +19,7 @@ from erls.equations.neighbours import (
     Neighbours,
     Split,
     States,
+    kept,
     over_time,
     short_times,
     split,
@@ -74,7 +75,7 @@ def linear_model(
         through=through,
         moved=at.moved,
         values=_values(at, outputs),
-        steady=not at.times,
+        steady=not (near.speed.any() or near.acceleration.any() or near.driven[1]),
         warnings=tuple(warnings),
     )
 
@@ -103,12 +104,10 @@ class _About(NamedTuple):
 def _directions(plant: Plant, basis: Split, motions: Sequence[Input]) -> Array:
     """(n, f + s) W where conditions are those of a plant at its state."""
     rows = plant.near.rows()
-    if not len(rows):
-        return np.hstack([basis.ways, np.zeros((len(basis.ways), len(motions)))])
-    open_by = [_by_place(given, plant, lambda other: other.near.violation()) for given in motions]
-    wrong = np.column_stack([rows @ basis.ways, *open_by])
-    found = np.hstack([basis.ways, np.zeros((len(basis.ways), len(motions)))])
-    return np.asarray(found - basis.across @ np.linalg.solve(rows @ basis.across, wrong))
+    opened = np.zeros((len(rows), len(motions)))
+    for k, given in enumerate(motions if len(rows) else ()):
+        opened[:, k] = _by_place(given, plant, lambda other: other.near.violation())
+    return kept(rows, basis, opened)
 
 
 def _still(near: Neighbours) -> Array:

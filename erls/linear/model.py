@@ -100,7 +100,8 @@ class LinearModel:
     values : (p,) array
         Outputs in the state itself.
     steady : bool
-        Whether the mechanism is at rest, so that the model holds for longer than the instant.
+        Whether the mechanism is at rest, but for joints that move evenly as prescribed, so that the model holds for
+        longer than the instant.
     warnings : tuple of str
     """
 

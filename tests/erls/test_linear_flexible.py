@@ -11,6 +11,7 @@ import pytest
 import scenes
 
 import erls
+from erls.errors import SceneError
 from erls.linear.diagrams import campbell, root_locus
 from erls.linear.model import LinearModel
 from erls.linear.response import frequency_response, step_response, telling_frequencies, telling_times
@@ -73,6 +74,30 @@ def test_campbell_diagram_of_a_hinged_blade(tmp_path: Path, axis_deg: float, fla
     found = campbell(_blade(tmp_path, axis_deg), "mast", speeds)
     expected = np.array(speeds) * np.sqrt(0.2 * 0.5 * 3 + flaps)
     np.testing.assert_allclose(found.poles[:, 0], 1j * expected, rtol=1e-9)
+
+
+def test_nodes_of_a_spinning_joint_are_never_at_rest(tmp_path: Path) -> None:
+    """Refused by name."""
+    scene = erls.load_scene(_blade(tmp_path, 0.0), ["simulation.formulation=nodal"])
+    with pytest.raises(SceneError, match="never at rest"):
+        campbell(scene, "mast", [1.0])
+
+
+def test_places_seen_from_a_turning_hub(tmp_path: Path) -> None:
+    """A blade that rests on a hub of even speed Ω: its velocity in the world is J̇ z + J ż, with J̇ = ±Ω J turned, exact.
+
+    At the start along x: lag angle φ moves the tip by 1 m along y, and as the hub turns by Ω t, along -x at Ω.
+    """
+    path = _blade(tmp_path, 0.0)
+    data = scenes.read_toml(path)
+    motion = {"shape": "table", "times": [-1.0, 0.0, 1.0, 2.0], "values": [-3.0, 0.0, 3.0, 6.0], "rates": [3.0, 3.0]}
+    data["joints"][0]["drive"] = {"type": "motion", "motion": motion}
+    data["points"] = [{"name": "tip", "link": "blade", "node": "tip"}]
+    outputs = [f"point.tip.{way}" for way in ("x", "y", "velocity.x", "velocity.y")]
+    model = erls.linearize(scenes.write_toml(path, data), at="equilibrium", inputs=[], outputs=outputs)
+    np.testing.assert_allclose(model.values, [1.2, 0.0, 0.0, 3.6], atol=1e-8)
+    np.testing.assert_allclose(model.C, [[0.0, 0.0], [1.0, 0.0], [-3.0, 0.0], [0.0, 1.0]], atol=1e-7)
+    assert model.steady
 
 
 def test_campbell_diagram_tells_of_weight_across_the_axis(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from erls.equations.formulation import Formulation
 from erls.equations.loops.tied import Tied
 from erls.equations.neighbours import States
-from erls.equations.serial.neighbours import TreeNeighbours
+from erls.equations.serial.neighbours import TreeNeighbours, fastest
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -78,6 +78,14 @@ class LoopNeighbours:
     def acceleration(self) -> Array:
         """See `Neighbours`."""
         return self.tree.a
+
+    @property
+    def driven(self) -> tuple[float, float]:
+        """See `Neighbours`."""
+        found = (loop.freedom for loop in self.chain.mechanism.loops if loop.prescribed)
+        own = fastest([(free.drive, free.freedom) for free in found if free is not None], self.time, self.reach)
+        fast, faster = map(max, own, self.tree.driven)
+        return fast, faster
 
     def forces(self, x: Array, w: Array, b: Array) -> Array:
         """See `Neighbours`."""

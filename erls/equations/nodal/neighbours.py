@@ -18,6 +18,7 @@ from erls.equations.neighbours import States
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.system import metre_scales
+from erls.errors import Cause, SceneError
 from erls.maths.saddle import dense
 from erls.maths.so3 import Array
 
@@ -76,6 +77,11 @@ class NodalNeighbours:
         """See `Neighbours`."""
         return self.a
 
+    @property
+    def driven(self) -> tuple[float, float]:
+        """See `Neighbours`: nodes leave nothing out."""
+        return 0.0, 0.0
+
     def _moved(self, x: Array, w: Array, b: Array) -> tuple[Nodes, Array, Array]:
         q = self.system.compose(self.q, x)
         if not self.v.any() and not self.a.any():
@@ -130,6 +136,10 @@ class NodalNeighbours:
 
     def at_rest(self, x: Array, multipliers: Array) -> NodalNeighbours:
         """See `Neighbours`."""
+        if self.system.constraint_rate(self.time, self.q).any():
+            message = "a joint moves as prescribed, so that its nodes are never at rest"
+            remedy = "use formulation = 'erls' or 'ffr', whose coordinates are relative, or a time at which it rests"
+            raise SceneError(Cause.BAD_FIELD, message, where="formulation", value="nodal", remedy=remedy)
         still = np.zeros(self.system.size)
         return replace(self, q=self.system.compose(self.q, x), v=still, a=still, multipliers=multipliers)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,6 +14,8 @@ from erls.equations.serial.equilibrium import elastic_on_diagonal
 from erls.equations.series import residual_series
 from erls.equations.system import metre_scales
 from erls.maths.so3 import Array
+from erls.mechanism.drives import Drive
+from erls.mechanism.joint_types import Freedom
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,12 @@ class TreeNeighbours:
         return self.a
 
     @property
+    def driven(self) -> tuple[float, float]:
+        """See `Neighbours`."""
+        joints = [joint for joint in self.equations.mechanism.joints if joint.drive.prescribed]
+        return fastest([(joint.drive, joint.freedom) for joint in joints], self.time, self.reach)
+
+    @property
     def multipliers(self) -> Array:
         """None."""
         return np.zeros(0)
@@ -103,3 +112,15 @@ class TreeNeighbours:
     def of(self, formulation: Formulation) -> TreeNeighbours:
         """See `Neighbours`."""
         return replace(self, equations=formulation)  # type: ignore[arg-type]  # a tree like this one
+
+
+def fastest(motions: Sequence[tuple[Drive, Freedom]], t: float, reach: float) -> tuple[float, float]:
+    """Largest speed [m/s] and acceleration [m/s²] of prescribed motions, of a turn at the end of a link."""
+    found = [(0.0, 0.0)]
+    for drive, freedom in motions:
+        assert drive.motion is not None
+        _, rate, acceleration = drive.motion.derivatives(t)
+        arm = reach if freedom.turns else 1.0
+        found.append((arm * abs(rate), arm * abs(acceleration)))
+    fast, faster = zip(*found, strict=True)
+    return max(fast), max(faster)
