@@ -26,6 +26,7 @@ from erls.equations.neighbours import (
     steps_along,
     tangents,
 )
+from erls.errors import Cause, SimulationError
 from erls.linear.inputs import Input
 from erls.linear.model import Channel, LinearModel
 from erls.linear.outputs import Output
@@ -38,7 +39,31 @@ _WEIGHTS = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))  # of differen
 def linear_model(
     plant: Plant, inputs: Sequence[Input], outputs: Sequence[Output], named: tuple[str, str], warnings: Sequence[str]
 ) -> LinearModel:
-    """Of a plant at its state; ``named`` are the scene and the state."""
+    """Of a plant at its state; ``named`` are the scene and the state.
+
+    Raises
+    ------
+    SimulationError
+        NOT_FINITE: the mechanism locks in this state, or its forces are beyond all numbers.
+    """
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # of what is refused below
+            model = _assembled(plant, inputs, outputs, named, warnings)
+        matrices = model.mass, model.damping, model.stiffness, model.forces, model.seen, model.through
+        fine = all(np.isfinite(matrix).all() for matrix in matrices)
+    except np.linalg.LinAlgError:
+        fine = False
+    if not fine:
+        message = "no small motions about this state: loops lock, or forces have no bounds"
+        raise SimulationError(
+            Cause.NOT_FINITE, message, where=f"{named[0]}, {named[1]}", remedy="choose another state"
+        )
+    return model
+
+
+def _assembled(
+    plant: Plant, inputs: Sequence[Input], outputs: Sequence[Output], named: tuple[str, str], warnings: Sequence[str]
+) -> LinearModel:
     near, at = plant.near, _About.of(plant, inputs)
     ways = at.directions.now.shape[1] - int(at.moved.sum())
     found = tangents(near, at.directions)

@@ -29,8 +29,22 @@ def at_rest(near: Neighbours) -> Neighbours:
     Raises
     ------
     SimulationError
-        NO_EQUILIBRIUM: nothing balances the forces, or the search does not come to an end.
+        NO_EQUILIBRIUM: nothing balances the forces, or the search does not come to an end. SINGULAR_MASS: something
+        that can move has no mass, or loops lock.
     """
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # of a step too far, which ends the search
+            return _found(near)
+    except np.linalg.LinAlgError:
+        raise SimulationError(
+            Cause.SINGULAR_MASS,
+            "the search for an equilibrium needs mass in every motion, and loops that do not lock",
+            where="at = 'equilibrium'",
+            remedy="give every moving part a mass and a moment of inertia, or start elsewhere",
+        ) from None
+
+
+def _found(near: Neighbours) -> Neighbours:
     near, left = near.at_rest(np.zeros(len(near.metres)), np.zeros_like(near.multipliers)), np.inf
     for _ in range(_ITERATIONS):
         step = _step(near)
@@ -64,6 +78,8 @@ def _step(near: Neighbours) -> _Step:
     closing = across @ np.linalg.solve(rows @ across, -near.violation()) if len(rows) else np.zeros(len(near.metres))
     stiff = along(near, np.hstack([basis.ways, closing[:, None]]), 0)
     force = near.forces(still, still, still)[0] + stiff[:, -1]
+    if not (np.isfinite(stiff).all() and np.isfinite(force).all()):
+        return _Step(np.full(len(near.metres), np.nan), np.zeros(len(rows)), np.nan)
     lower = la.cholesky(basis.ways.T @ near.mass() @ basis.ways, lower=True)
     ways = la.solve_triangular(lower, basis.ways.T, lower=True).T  # of unit mass
     own = la.solve_triangular(lower, (ways.T @ stiff[:, :-1]).T, lower=True).T

@@ -134,6 +134,7 @@ def test_command_draws_diagrams(tmp_path: Path, capsys: pytest.CaptureFixture[st
         (["--campbell", "motor=0:10"], "not a range of values"),
         (["--campbell", "motor=0:10:1"], "not a range of values"),
         (["--campbell", "motor=nan:10:4"], "not a range of values"),
+        (["--campbell", "motor=0:10:2", "-o", "model.npz"], "decides its form"),
         (["--campbell", "nobody=0:10:3"], "no such joint"),
         (["--campbell", "motor=0:1:2", "--locus", "joints.gear.stiffness=1:2:2"], "two diagrams at once"),
         (["--campbell", "motor=0:1:2", "--at", "0.1"], "equilibrium"),

@@ -11,7 +11,7 @@ import pytest
 import scenes
 
 import erls
-from erls.errors import SceneError
+from erls.errors import SceneError, SimulationError
 from erls.linear.diagrams import campbell, root_locus
 from erls.linear.model import LinearModel
 from erls.linear.response import frequency_response, step_response, telling_frequencies, telling_times
@@ -74,6 +74,12 @@ def test_campbell_diagram_of_a_hinged_blade(tmp_path: Path, axis_deg: float, fla
     found = campbell(_blade(tmp_path, axis_deg), "mast", speeds)
     expected = np.array(speeds) * np.sqrt(0.2 * 0.5 * 3 + flaps)
     np.testing.assert_allclose(found.poles[:, 0], 1j * expected, rtol=1e-9)
+
+
+def test_speed_beyond_all_numbers_has_no_equilibrium(tmp_path: Path) -> None:
+    """Is told, and nothing else."""
+    with pytest.raises(SimulationError, match="no equilibrium"):
+        campbell(_blade(tmp_path, 0.0), "mast", [1e300])
 
 
 def test_nodes_of_a_spinning_joint_are_never_at_rest(tmp_path: Path) -> None:
