@@ -24,7 +24,7 @@ OPTIONS = {
                    "--json"],
     "effects": ["--set", "--json"],
     "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--force", "--json"],
+    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--overlay", "--force", "--json"],
 }
 
 
