@@ -17,7 +17,6 @@ from erls.maths.beside import compiling_beside
 from erls.maths.jit import announcing
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
-from erls.run.chain.sensors import with_compliances
 from erls.run.file import self_contained
 from erls.run.watches.base import Begun, Plan
 from erls.run.watches.watching import Warnings, Watching
@@ -42,6 +41,8 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     like, tell = asked.like, asked.tell
     built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))
     if scene.record.sensors:
+        from erls.run.chain.sensors import with_compliances  # here: scenes without sensors need none of it
+
         scene = with_compliances(scene, built.mechanism)
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
     if asked.checkpoints is not None:

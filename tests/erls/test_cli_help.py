@@ -26,7 +26,7 @@ OPTIONS = {
     "linearize": ["--output", "-o", "--at", "--equilibrium", "--inputs", "--outputs", "--campbell", "--locus", "--mode",
                   "--set", "--force", "--json"],
     "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--force", "--json"],
+    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--overlay", "--force", "--json"],
 }
 
 

@@ -21,7 +21,6 @@ from erls.mechanism.joints import Joint
 from erls.mechanism.loops import LoopFreedom
 from erls.mechanism.sensors.base import Sensor
 from erls.run.chain.kinematics import ChainMotion
-from erls.run.chain.sensors import sensors_of
 from erls.run.events import Happening, happenings
 from erls.run.readings import reading, reading_columns, reading_curves, reading_samples
 from erls.run.record import Curve, plain, vector
@@ -146,7 +145,11 @@ class ChainRun(ChainMotion):
     @cached_property
     def sensors(self) -> tuple[Sensor, ...]:
         """Those of the scene."""
-        return sensors_of(self.scene, self.formulation.mechanism) if self.scene.record.sensors else ()
+        if not self.scene.record.sensors:
+            return ()
+        from erls.run.chain.sensors import sensors_of  # here: scenes without sensors need none of it
+
+        return sensors_of(self.scene, self.formulation.mechanism)
 
     def sensor(self, name: str, t: ArrayLike) -> Array:
         """(...) reading of a sensor with one component, (..., c) of others."""
