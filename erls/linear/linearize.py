@@ -30,6 +30,7 @@ from erls.scene.bodies.schema import BodyScene
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.read import AnyScene, load_scene
+from erls.simulation.chains import models_of
 from erls.simulation.simulate import simulate
 
 EQUILIBRIUM = "equilibrium"
@@ -119,11 +120,12 @@ def state_of(given: AnyScene | Run | Path | str, at: float | str, tell: Message 
         return _of_bodies(given, at, tell)
     scene = with_all_modes(given.scene if isinstance(given, ChainRun) else given)
     if isinstance(given, ChainRun):
-        moving = not isinstance(at, str)
-        if moving and scene.record.simulation != given.scene.record.simulation:
+        if isinstance(at, str):
+            return plant_of(build_mechanism(scene, tell, *models_of(given)).mechanism, scene, at, None, ())
+        if scene.record.simulation != given.scene.record.simulation:
             message = "the run left out modes or effects, or used absolute coordinates: its states are not those of all"
             raise SceneError(Cause.BAD_FIELD, message, where="at", value=at, remedy="give the scene instead of the run")
-        return plant_of(given.formulation.mechanism, scene, at, given if moving else None, ())
+        return plant_of(given.formulation.mechanism, scene, at, given, ())
     if isinstance(at, str) or at == 0.0:
         built = build_mechanism(scene, tell)
         return plant_of(built.mechanism, scene, at, None, built.warnings)

@@ -154,6 +154,22 @@ def test_faulty_commands(words: list[str], told: str, tmp_path: Path, capsys: py
     assert not list(tmp_path.iterdir())
 
 
+def test_runs_are_linearized(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A run file in place of the scene: at its time as from the scene; at rest with modes that it left out."""
+    changes = ["simulation.duration=0.02", "simulation.step=1e-3"]
+    made = erls.simulate(erls.load_scene(JOINT, changes), verdict=False)
+    erls.save_run(tmp_path / "joint.run.h5", made)
+    at = "--at", "0.02", "--json"
+    of_run = json.loads(run(capsys, tmp_path / "joint.run.h5", *at)[0])
+    of_scene = json.loads(run(capsys, JOINT, *at, "--set", changes[1])[0])
+    np.testing.assert_allclose(of_run["A"], of_scene["A"], rtol=1e-9, atol=1e-6)
+    assert "0.03" in run(capsys, tmp_path / "joint.run.h5", "--at", "0.03", code=2)[1]
+    slow = erls.simulate(erls.load_scene(JOINT, [*changes, "simulation.bandwidth=50"]), verdict=False)
+    assert erls.linearize(slow, at="equilibrium").size == 14
+    with pytest.raises(SceneError, match="left out modes"):
+        erls.linearize(slow, at=0.01)
+
+
 def test_mode_is_drawn_from_a_run_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One period in a second, a tenth of the link at its largest displacement; the hand as the model says, to 1 %."""
     path = tmp_path / "mode.run.h5"
