@@ -54,7 +54,9 @@ class SingleSteps:
         self.recorder = Latest(formulation.size)
         self._system: SecondOrderSystem = cast(Any, formulation)
         self._tied: TiedCoordinates | None = None
-        self._steps: Steps
+        self._steps: Steps | None = None  # where every motion is prescribed and no link deforms
+        if not formulation.size:
+            return
         if isinstance(formulation, ClosedChain) and len(formulation.kept):
             self._tied = TiedCoordinates(formulation)
             self._steps = tied_steps(self._tied, tied_options(options), self.recorder, formulation.size)
@@ -68,6 +70,8 @@ class SingleSteps:
         ------
         SimulationError
         """
+        if self._steps is None:
+            return
         if self._tied is None:
             a = self._system.acceleration(t, y, v)
         else:
@@ -90,6 +94,8 @@ class SingleSteps:
             NEWTON_FAILED, or what the system says of a state that it refuses.
         """
         steps, h = self._steps, leg.end - leg.start
+        if steps is None:
+            return
         if abs(steps.h - h) > _SAME * h:
             steps.set_step(h)
         if steps.stretch(np.array([leg.end]), leg.last, Limit())[1] == DONE:
@@ -105,13 +111,16 @@ class SingleSteps:
     @property
     def state(self) -> tuple[Array, Array, Array]:
         """(n,) coordinates, rates and accelerations, copies."""
+        if self._steps is None:
+            return np.zeros(0), np.zeros(0), np.zeros(0)
         y, v = self._steps.end()
         return y, v, self._steps.accelerations[: len(v)]
 
     def memory(self) -> Memory:
         """Copies of all that the next step depends on."""
-        return {name: np.array(array) for name, array in self._steps.memory().items()}
+        return {} if self._steps is None else {name: np.array(x) for name, x in self._steps.memory().items()}
 
     def restore(self, memory: Memory) -> None:
         """Stand where a memory was taken."""
-        self._steps.restore(memory)
+        if self._steps is not None:
+            self._steps.restore(memory)

@@ -34,7 +34,7 @@ from erls.run.readings import shaped
 from erls.scene.build import Message, build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
-from erls.scene.read import load_chain
+from erls.scene.read import AnyScene, load_chain
 
 STEP = 1e-3
 """Of scenes that give none [s]."""
@@ -106,8 +106,9 @@ class Stepper:
     0.0
     """
 
-    def __init__(self, scene: Scene | Path | str, *, tell: Message = lambda text: None) -> None:
-        loaded = scene if isinstance(scene, Scene) else load_chain(scene)
+    def __init__(self, scene: AnyScene | Path | str, *, tell: Message = lambda text: None) -> None:
+        path = scene if isinstance(scene, (Path, str)) else scene.path
+        loaded = scene if isinstance(scene, Scene) else load_chain(path)
         settings = msgspec.structs.replace(loaded.record.simulation, integrator=FIXED_STEP, output_step=None)
         _refuse_auto(loaded)
         built = build_mechanism(loaded, tell)

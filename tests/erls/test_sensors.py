@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import scenes
 from numpy.typing import NDArray
+from sensor_cases import ENDS, KINDS, refused, sensor
 
 import erls
 from erls.cli.main import main
 from erls.equations.serial.state_series import state_series
-from erls.errors import Cause, ReportedError
+from erls.errors import ReportedError
 from erls.mechanism.sensors.base import Node
 from erls.mechanism.sensors.registry import AnySensor
 from erls.run.chain.instants import Instants
@@ -23,29 +24,6 @@ from erls.run.chain.run import ChainRun
 from erls.run.readings import output_names, outputs
 
 Array = NDArray[np.float64]
-
-FORCES = ["N [N]", "Vy [N]", "Vz [N]", "T [N m]", "My [N m]", "Mz [N m]"]
-
-# of each type: its fields, and the heads of its columns
-KINDS: dict[str, tuple[dict[str, Any], list[str]]] = {
-    "position": ({"point": "tip"}, ["s.x [m]", "s.y [m]", "s.z [m]"]),
-    "velocity": ({"point": "tip", "direction": [0, 0, 2]}, ["s [m/s]"]),
-    "accelerometer": ({"point": "tip", "axes": "link"}, ["s.x [m/s2]", "s.y [m/s2]", "s.z [m/s2]"]),
-    "gyroscope": ({"point": "tip"}, ["s.x [rad/s]", "s.y [rad/s]", "s.z [rad/s]"]),
-    "strain_gauge": ({"point": "tip", "offset": [0.0, 0.005, 0.0]}, ["s [1]"]),
-    "section_force": ({"point": "tip"}, [f"s.{c}" for c in FORCES]),
-    "stress": ({"point": "tip", "component": "von_mises"}, ["s [Pa]"]),
-    "joint_angle": ({"joint": "shoulder"}, ["s [rad]"]),
-    "joint_rate": ({"joint": "shoulder"}, ["s [rad/s]"]),
-    "effort": ({"joint": "shoulder", "side": "motor"}, ["s [N m]"]),
-}  # fmt: skip
-ENDS = {"recovery": {"nodes": ["root", "tip"]}}
-
-
-def sensor(kind: str, **more: Any) -> dict[str, Any]:
-    """One of `KINDS`, as a table of a scene."""
-    return {"name": "s", "type": kind, **KINDS[kind][0], **more}
-
 
 def l_run(folder: Path, *sensors: dict[str, Any], **changes: Any) -> ChainRun:
     """20 ms of the L pendulum, with sensors."""
@@ -290,18 +268,9 @@ def test_gauges_of_a_solid(tmp_path: Path) -> None:
     xx, yy, zz, xy, yz, zx = np.linalg.solve(stiffness, found)  # tensor strains
     strain = way @ np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]) @ way
     assert float(run.sensor("strain", 2e-3)) == pytest.approx(strain, rel=1e-9)
-    said = _refused(path, ['sensors.acc.axes="node"'])
+    said = refused(path, ['sensors.acc.axes="node"'])
     assert "no rotation" in said
     assert "sensors[3].point" in said
-
-
-def _refused(path: Path, changes: list[str]) -> str:
-    """What is said of a scene that is not run."""
-    with pytest.raises(ReportedError) as caught:
-        erls.simulate(erls.load_scene(path, changes), verdict=False)
-    assert caught.value.exit_code == 2
-    assert str(caught.value.cause) in {str(Cause.BAD_FIELD), str(Cause.BAD_REFERENCE)}
-    return str(caught.value)
 
 
 def test_effort_on_both_sides_of_the_gear(tmp_path: Path) -> None:
@@ -368,47 +337,9 @@ def test_closing_joints_and_bodies_read_too(tmp_path: Path) -> None:
     felt = body.sensor("acc", t)  # type: ignore[attr-defined]
     angle = body.sensor("angle", t)  # type: ignore[attr-defined]
     np.testing.assert_allclose(felt[:, 1], -body.sensor("rate", t) ** 2 + 9.81 * np.sin(angle), rtol=1e-3)  # type: ignore[attr-defined]
-    said = _refused(path, ['sensors.0={name="x", type="effort", joint="point"}'])
+    said = refused(path, ['sensors.0={name="x", type="effort", joint="point"}'])
     assert "connections have no motors" in said
-    assert "links" in _refused(path, ['sensors.0.axes="link"'])
-
-
-@pytest.mark.parametrize(
-    ("given", "place", "said"),
-    [
-        ({"type": "thermometer"}, "sensors[0]", "thermometer"),
-        ({"point": "top"}, "sensors[0].point", "tip"),
-        (sensor("joint_angle", joint="elbow"), "sensors[0].joint", "shoulder"),
-        ({"name": "tip"}, "sensors[0].name", "rename"),
-        ({"name": "a/b"}, "sensors[0].name", "rename"),
-        ({"direction": [0.0, 0.0, 0.0]}, "sensors[0].direction", "not all 0"),
-        ({"axes": "mesh"}, "sensors[0].axes", "node, link, world"),
-        ({"colour": 1}, "sensors[0]", "colour"),
-        (sensor("effort", side="gear"), "sensors[0].side", "load, motor"),
-        (sensor("stress"), "sensors[0].point", "section_force"),
-        (sensor("section_force", component="Q"), "sensors[0].component", "Vy"),
-        (sensor("section_force", element=3), "sensors[0].element", "7"),
-        (sensor("section_force", point="elbow"), "sensors[0].point", "[recovery]"),
-        (sensor("strain_gauge", direction=[1.0, 0.0, 0.0]), "sensors[0].direction", "[0.0, 1.0, 0.0]"),
-        (sensor("strain_gauge", compliance=[1.0]), "sensors[0].compliance", "give 6"),
-    ],
-)  # fmt: skip
-def test_bad_sensors_are_refused(tmp_path: Path, given: dict[str, Any], place: str, said: str, capsys: Any) -> None:
-    """With file, field and remedy, exit code 2, before anything moves."""
-    scenes.l_link(tmp_path, 4, **ENDS)
-    first = given if len(given) > 1 else {**sensor("accelerometer", axes="node"), **given}
-    path = scenes.l_scene(tmp_path, sensors=[first], simulation={"duration": 0.01})
-    assert main(["simulate", str(path)]) == 2
-    told = capsys.readouterr().err
-    assert place in told
-    assert said in told
-
-
-def test_what_links_do_not_say_is_asked_for(tmp_path: Path) -> None:
-    """A link without [recovery]; and one that is a modal file, which takes its strain per component from the scene."""
-    scenes.l_link(tmp_path, 4)
-    path = scenes.l_scene(tmp_path, sensors=[sensor("section_force")], simulation={"duration": 0.01})
-    assert "[recovery]" in _refused(path, [])
+    assert "links" in refused(path, ['sensors.0.axes="link"'])
 
 
 def test_outputs_depend_on_the_state_alone(every: ChainRun) -> None:

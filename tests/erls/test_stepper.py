@@ -189,8 +189,10 @@ def test_what_cannot_be_stepped_is_said(tmp_path: Path) -> None:
             erls.stepper(erls.load_scene(path, [change]))
         assert field in str(caught.value)
         assert caught.value.exit_code == 2
-    with pytest.raises(ReportedError, match="chain"):
-        erls.stepper(scenes.ROOT / "data" / "heavy_top" / "slow.toml")
+    bodies = scenes.ROOT / "data" / "heavy_top" / "slow.toml"
+    for given in (bodies, erls.load_scene(bodies)):
+        with pytest.raises(ReportedError, match="chain"):
+            erls.stepper(given)
     stepper, other = erls.stepper(path), erls.stepper(path)
     for _ in range(2):
         with pytest.raises(SimulationError, match="t = "):
@@ -199,3 +201,39 @@ def test_what_cannot_be_stepped_is_said(tmp_path: Path) -> None:
         assert stepper.time == other.time
         for a, b in zip(found, wanted, strict=True):  # but for factors that are made anew
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-7 * np.abs(b).max())
+
+
+ENDS = {"root": [0, 0, 0], "bob": [0.5, 0, 0]}
+BODY = {"mass": 2.0, "centre_of_mass": [0.5, 0, 0], "inertia": [0.1] * 3, "points": ENDS}
+RIGID: dict[str, Any] = {
+    "simulation": {"duration": 160 * STEP, "step": STEP},
+    "links": [{"name": "arm", "rigid": BODY, "mesh_pose": {"frame": "joint"}}],
+    "points": [{"name": "bob", "link": "arm", "node": "bob"}],
+    "sensors": [{"name": "at", "type": "position", "point": "bob"}],
+}
+
+
+def test_nothing_free_is_moved_by_time_alone(tmp_path: Path) -> None:
+    """A rigid link whose motion is prescribed has no coordinates, and is where its motion says."""
+    motion = {"shape": "sine", "amplitude": 0.3, "frequency_hz": 1.0}
+    joint = {"name": "j", "dh": {"convention": "standard", "a": 0.5}, "drive": {"type": "motion", "motion": motion}}
+    stepper = erls.stepper(scenes.write_toml(tmp_path / "p.toml", {**RIGID, "joints": [joint]}))
+    saved = stepper.save()
+    angle = 0.3 * np.sin(2 * np.pi * 0.05)
+    for _ in range(2):
+        place = stepper.step({}, 0.05)["at"]
+        np.testing.assert_allclose(place, 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0]), rtol=0, atol=1e-12)
+        stepper.restore(saved)
+    assert (stepper.input_names, len(stepper.state[0])) == ((), 0)
+
+
+def test_rotation_vectors_turn_on(tmp_path: Path) -> None:
+    """A body in a ball joint beyond a full turn, where its vector is exchanged for a shorter one, as in its run."""
+    turning = {"turn_x": {"initial": {"rate": 30.0}}}
+    joint = {"name": "ball", "type": "spherical", "dh": {"convention": "standard", "a": 0.5}, "coordinates": turning}
+    path = scenes.write_toml(tmp_path / "p.toml", {**RIGID, "joints": [joint]})
+    run, stepper = erls.simulate(erls.load_scene(path), verdict=False), erls.stepper(path)
+    y, v, _ = moved(stepper, 160)
+    assert stepper.time * 30.0 > 1.25 * np.pi > np.linalg.norm(y)
+    np.testing.assert_allclose(y, run.solution.y[-1], rtol=0, atol=1e-9)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(v, run.solution.v[-1], rtol=0, atol=1e-7)  # type: ignore[attr-defined]

@@ -14,7 +14,6 @@ Rules for a new kind of sensor:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import msgspec
@@ -35,8 +34,7 @@ class Node(NamedTuple):
     node: int
 
 
-@dataclass(frozen=True)
-class NodeMotion:
+class NodeMotion(NamedTuple):
     """Motion of a node at k times, in the world.
 
     Attributes
@@ -71,8 +69,7 @@ class Moved(NamedTuple):
     closing: bool = False
 
 
-@dataclass(frozen=True)
-class JointMotion:
+class JointMotion(NamedTuple):
     """Motion of a joint at k times: physical angle, rate, acceleration (k,) [rad or m]."""
 
     angle: Array
@@ -80,16 +77,14 @@ class JointMotion:
     acceleration: Array
 
 
-@dataclass(frozen=True)
-class JointForce:
+class JointForce(NamedTuple):
     """What acts along a joint at k times [N m or N]: its drive, and spring, damper and friction together, (k,)."""
 
     drive: Array
     passive: Array
 
 
-@dataclass(frozen=True)
-class Site:
+class Site(NamedTuple):
     """A place of a link for which it has recovery maps: number of the link, of the place within them, names of its six
     components, and unit vectors (3, 3) in whose directions they are counted, in the mesh frame.
     """
@@ -145,8 +140,7 @@ class Finder(Protocol):
         """(6,) strain per unit of each component."""
 
 
-@dataclass(frozen=True)
-class Sensor:
+class Sensor(NamedTuple):
     """A sensor that knows what it reads.
 
     Attributes
