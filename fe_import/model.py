@@ -180,6 +180,8 @@ class FEModel:
         What ``mass`` holds of point masses.
     thermal : ThermalLoad or None
         Where a temperature change is given.
+    left_out : dict of int
+        What stands in the mesh file and is not part of the link, and how often.
     """
 
     name: str
@@ -201,6 +203,7 @@ class FEModel:
     beams: BeamLines | None = None
     added_mass: sp.csc_array | None = None
     thermal: ThermalLoad | None = None
+    left_out: dict[str, int] = field(default_factory=dict)
 
     @property
     def interface_dofs(self) -> IntArray:

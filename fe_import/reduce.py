@@ -174,6 +174,7 @@ def provenance(link: LinkFile, model: FEModel, selection: dict[str, Any] | None 
         "options": json.dumps(options, sort_keys=True),
         **({"selection": json.dumps(selection, sort_keys=True)} if selection else {}),
         **{f"source: {key}": text for key, text in model.notes.items()},
+        **({"left out": json.dumps(model.left_out)} if model.left_out else {}),
         "versions": ", ".join(f"{p} {package_version(p)}" for p in packages),
     }
 

@@ -74,6 +74,11 @@ class DeckReader:
             raise self.fault(f"*{keyword}, INPUT is not followed", result["INPUT"], "join the files into one")
         return result
 
+    @property
+    def number(self) -> int:
+        """Of the line that was read last."""
+        return self._line
+
     def fault(self, message: str, value: str | None = None, remedy: str = _FLAT) -> FEImportError:
         """An error at the line that was read last."""
         return self.file.failure(message, line=self._line, value=value, remedy=remedy)

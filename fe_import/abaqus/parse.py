@@ -39,8 +39,12 @@ class Deck:
     node_sets, element_sets : SetTable
     surfaces : dict
         Name -> whether it is made of nodes, and its data lines.
+    solid_sections : list of str
+        Element sets of *SOLID SECTION.
     keywords : Counter of str
         All keywords, in capitals.
+    lines : dict of int
+        Where keywords and types of elements stand first.
     """
 
     points: dict[int, tuple[float, ...]] = field(default_factory=dict)
@@ -50,7 +54,9 @@ class Deck:
     node_sets: SetTable = field(default_factory=SetTable)
     element_sets: SetTable = field(default_factory=SetTable)
     surfaces: dict[str, tuple[bool, list[list[str]]]] = field(default_factory=dict)
+    solid_sections: list[str] = field(default_factory=list)
     keywords: Counter[str] = field(default_factory=Counter)
+    lines: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.node_sets.nodes_of = self.nodes_of
@@ -84,6 +90,7 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
         while (keyword := reader.keyword()) is not None:
             name, options = keyword
             deck.keywords[name] += 1
+            deck.lines.setdefault(name, reader.number)
             if name == "INCLUDE":
                 raise reader.fault("*INCLUDE is not followed", remedy="join the files into one")
             if name in _ELSEWHERE:
@@ -127,6 +134,7 @@ def _nodes(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
 def _elements(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     kind = _named(options, "TYPE").upper()
     deck.types[kind] = known = element_type(kind)
+    deck.lines.setdefault(kind, reader.number)
     cells = deck.elements.setdefault(kind, {})
     labels: list[int] = []
     while (fields := reader.data()) is not None:
@@ -172,6 +180,10 @@ def _surface(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     deck.surfaces[_named(options, "NAME")] = (options.get("TYPE", "ELEMENT").upper() == "NODE", rows)
 
 
+def _solid_section(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
+    deck.solid_sections.append(_named(options, "ELSET"))
+
+
 def _instance(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     if deck.keywords["INSTANCE"] > 1:
         raise ValueError("several instances; a link is one part")
@@ -186,6 +198,7 @@ _KEYWORDS: dict[str, Callable[[DeckReader, dict[str, str], Deck], None]] = {
     "NSET": _node_set,
     "ELSET": _element_set,
     "SURFACE": _surface,
+    "SOLID SECTION": _solid_section,
     "INSTANCE": _instance,
 }
 

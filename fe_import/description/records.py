@@ -141,12 +141,15 @@ class Solid(_Record, frozen=True):
         Instead of ``material``: one for each set of elements, ``[[solid.regions]]``.
     nodes : dict of (3,) floats
         Names for the mesh nodes nearest to these positions [m]; scenes may refer to them.
+    ignore : list of str
+        Keywords, cards and types of elements of the mesh file that the link is to be without.
     """
 
     mesh: str
     material: str = ""
     regions: list[Region] = []
     nodes: dict[str, Vector] = {}
+    ignore: list[str] = []
 
 
 class Matrices(_Record, frozen=True):

@@ -30,6 +30,8 @@ class SolidMesh:
         File that the mesh came from.
     lost_sets : dict
         Name -> why a set of the file is not among these.
+    left_out : dict of int
+        What stands in the file and is not part of the link, and how often.
     """
 
     nodes: Array
@@ -39,6 +41,7 @@ class SolidMesh:
     node_sets: dict[str, IntArray] = field(default_factory=dict)
     source: str = ""
     lost_sets: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, int] = field(default_factory=dict)
 
     @property
     def element(self) -> SolidElement:

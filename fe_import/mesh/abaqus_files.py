@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
 
+from fe_import.abaqus.keywords import is_read, loss, loss_of_elements
 from fe_import.abaqus.parse import Deck, read_deck
 from fe_import.abaqus.sets import LostSet, indices, surface_nodes
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh.raw import Block, RawMesh
+from fe_import.mesh.raw import Block, LeftOut, RawMesh
 
 
 def read_abaqus(path: Path, name: str) -> RawMesh:
@@ -44,7 +46,30 @@ def read_abaqus(path: Path, name: str) -> RawMesh:
     _add_element_sets(deck, numbers, mesh)
     _add_node_sets(deck, place, mesh)
     _add_surfaces(deck, place, mesh)
+    mesh.left_out += _left_out(deck)
     return mesh
+
+
+def _left_out(deck: Deck) -> list[LeftOut]:
+    """Keywords, and elements that are no solids."""
+    found = [
+        LeftOut(name, count, deck.lines[name], loss(name)) for name, count in deck.keywords.items() if not is_read(name)
+    ]
+    sectioned = _with_sections(deck)
+    for kind, cells in deck.elements.items():
+        if (dimension := deck.types[kind].dimension) != 3:
+            text = loss_of_elements(kind, dimension, not sectioned.isdisjoint(cells))
+            found.append(LeftOut(kind, len(cells), deck.lines[kind], text))
+    return sorted(found, key=lambda item: item.line)
+
+
+def _with_sections(deck: Deck) -> set[int]:
+    """Elements of solid sections; what is lost of their sets is told where a set is asked for."""
+    found: set[int] = set()
+    for name in deck.solid_sections:
+        with contextlib.suppress(LostSet):
+            found |= deck.element_sets.members(name)
+    return found
 
 
 def _add_element_sets(deck: Deck, numbers: list[dict[int, int]], mesh: RawMesh) -> None:

@@ -17,6 +17,26 @@ class Block:
     cells: IntArray
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """What a file holds besides its mesh and this program does not read.
+
+    Attributes
+    ----------
+    name : str
+        Keyword, card or type of elements.
+    count, line : int
+        How many there are, and where the first stands.
+    loss : str
+        What the link would lack; empty where it cannot matter to a link.
+    """
+
+    name: str
+    count: int
+    line: int
+    loss: str = ""
+
+
 @dataclass
 class RawMesh:
     """A mesh as it stands in a file; nothing is checked.
@@ -31,6 +51,7 @@ class RawMesh:
         Name -> points.
     lost : dict
         Name -> why a set of the file is not among these.
+    left_out : list of LeftOut
     mirrored : bool
         Whether the format turns elements inside out, so that all of them may be.
     """
@@ -40,4 +61,5 @@ class RawMesh:
     cell_sets: dict[str, list[Any]] = field(default_factory=dict)
     point_sets: dict[str, Any] = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
+    left_out: list[LeftOut] = field(default_factory=list)
     mirrored: bool = False

@@ -6,7 +6,7 @@ meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import numpy as np
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
+from fe_import.files.toml import choose
 from fe_import.mesh.checks import check_mesh, scaled_jacobians
 from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
@@ -24,7 +25,7 @@ from fe_import.model import IntArray
 _BY_MESHIO_NAME = {element.meshio_name: name for name, element in SOLID_ELEMENTS.items()}
 
 
-def read_mesh(path: Path) -> SolidMesh:
+def read_mesh(path: Path, ignore: Sequence[str] = ()) -> SolidMesh:
     """Read and check a mesh file, or a ``.gz`` of one; its format follows from the suffix.
 
     Named cell sets (gmsh's physical groups, Abaqus' element sets, families of MED) of solid elements become element
@@ -35,6 +36,8 @@ def read_mesh(path: Path) -> SolidMesh:
     Parameters
     ----------
     path : Path
+    ignore : sequence of str
+        Keywords, cards and types of elements of the file that the link is to be without.
 
     Returns
     -------
@@ -45,12 +48,13 @@ def read_mesh(path: Path) -> SolidMesh:
     ------
     FEImportError
         ``FILE_NOT_FOUND``, ``NOT_READABLE``; ``UNSUPPORTED_ELEMENT``: solid elements of another type than
-        tet4/10 and hex8/20/27; ``MESH``: declared sizes that the file cannot hold, no or mixed solid elements, and
+        tet4/10 and hex8/20/27; ``NOT_USED``: masses, springs, constraints and the like; ``MESH``: declared sizes that the file cannot hold, no or mixed solid elements, and
         what ``check_mesh`` finds; ``DISCONNECTED``.
     """
     if not path.exists():
         raise FEImportError(Cause.FILE_NOT_FOUND, "no such mesh file", where=str(path), remedy="check the path")
     raw = _read(path)
+    left_out = _left_out(raw, ignore, str(path))
     element_type, blocks = _solid_blocks(raw, str(path))
     elements = np.concatenate([raw.blocks[b].cells for b in blocks]).astype(np.int64)
     points = np.asarray(raw.points, dtype=np.float64)
@@ -65,7 +69,7 @@ def read_mesh(path: Path) -> SolidMesh:
     dense = np.full(len(points), -1, dtype=np.int64)
     dense[used] = np.arange(len(used))
     element_sets, node_sets, lost = _sets(raw, blocks, dense)
-    mesh = SolidMesh(points[used], dense[elements], element_type, element_sets, node_sets, str(path), lost)
+    mesh = SolidMesh(points[used], dense[elements], element_type, element_sets, node_sets, str(path), lost, left_out)
     if raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
         mesh = replace(mesh, elements=mesh.elements[:, mesh.element.mirrored_order])
     check_mesh(mesh)
@@ -85,6 +89,26 @@ def _read(path: Path) -> RawMesh:
         from fe_import.mesh.meshio_files import read_with_meshio  # meshio is heavy
 
         return read_with_meshio(plain, str(path))
+
+
+def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]:
+    """How many of what the link is without; a loss that nobody asked for is refused."""
+    asked = [name.upper() for name in ignore]
+    for name in asked:
+        choose(name, sorted({item.name for item in raw.left_out}), f"{where}: what to ignore")
+    losses = [item for item in raw.left_out if item.loss and item.name not in asked]
+    if losses:
+        names = ", ".join(f'"{name}"' for name in dict.fromkeys([*asked, *(item.name for item in losses)]))
+        raise FEImportError(
+            Cause.NOT_USED,
+            "the link would lack " + "; ".join(f"{i.loss}: {i.count} {i.name} from line {i.line}" for i in losses),
+            where=where,
+            remedy=f"give them in the link description or the scene where they matter, then ignore = [{names}] in [solid]",
+        )
+    counts: Counter[str] = Counter()
+    for item in raw.left_out:
+        counts[item.name] += item.count
+    return dict(counts)
 
 
 def _solid_blocks(raw: RawMesh, where: str) -> tuple[str, list[int]]:

@@ -38,7 +38,7 @@ def solid_model(link: LinkFile) -> FEModel:
             value=solid.mesh,
             remedy="give a path that starts at the folder of the link description",
         )
-    mesh = read_mesh(path)
+    mesh = read_mesh(path, solid.ignore)
     materials = _materials(description, solid, mesh, where)
     mass, stiffness = assemble_solid(mesh, materials)
     lame = np.empty((len(mesh.elements), 2))
@@ -59,6 +59,7 @@ def solid_model(link: LinkFile) -> FEModel:
         kind="solid",
         source=where,
         stress=solid_stress(mesh, lame),
+        left_out=mesh.left_out,
     )
 
 

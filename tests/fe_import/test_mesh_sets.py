@@ -16,6 +16,7 @@ from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.read import read_mesh
 from fe_import.models.model import build_model
+from fe_import.reduce import reduce_link
 
 TYPES = sorted(SOLID_ELEMENTS)
 ABAQUS = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8R", "hex20": "C3D20"}
@@ -97,20 +98,21 @@ def test_sets_of_decks(tmp_path, name):
 
 @pytest.mark.parametrize("split", [False, True])
 def test_element_sets_of_decks(tmp_path, split):
-    """Sets of one or several *ELEMENT blocks, generated, made of others, with elements that are no solids."""
+    """Sets of one or several *ELEMENT blocks, generated, made of others; lines without a section mark nodes."""
     more = [
         "*ELSET, ELSET=ENDS, GENERATE",
         "1, 3, 2",
         "*ELSET, ELSET=ALL",
         "Ends, 2",
-        "*ELEMENT, TYPE=MASS, ELSET=M",
-        "8, 7",
+        "*ELEMENT, TYPE=T3D2, ELSET=M",
+        "8, 7, 17",
     ]
     found = read(tmp_path, *more, split=split)
     np.testing.assert_array_equal(found.element_sets["Body"], [0, 1, 2])
     np.testing.assert_array_equal(found.element_sets["ENDS"], [0, 2])
     np.testing.assert_array_equal(found.element_sets["ALL"], [0, 1, 2])
-    assert "holds nothing" in found.lost_sets["M"]
+    np.testing.assert_array_equal(found.node_sets["M"], [0, 1])
+    assert found.left_out == {"HEADING": 1, "T3D2": 1}
 
 
 @pytest.mark.parametrize("name", sorted(ABAQUS))
@@ -189,6 +191,81 @@ def test_faulty_decks(tmp_path, name):
     assert caught.value.cause is Cause.NOT_READABLE
     assert words in str(caught.value)
     assert str(tmp_path / "bar.inp") in str(caught.value)
+
+
+NODES = ", ".join(str(label) for label in LABELS[:4])
+LOSSES = {  # lines of the deck, what the message counts, what the link may be without
+    "support": (["*BOUNDARY", "7, 1, 3"], "1 BOUNDARY from line 29", ["BOUNDARY"]),
+    "support in a step": (["*STEP", "*STATIC", "*Boundary", "7, 1, 3", "*END STEP"], "joints hold it): 1 BOUND", ["Boundary"]),
+    "mass": (
+        ["*ELEMENT, TYPE=MASS, ELSET=M", "9, 7", "10, 17", "*MASS, ELSET=M", "1.5"],
+        "point masses: 2 MASS from line 29",
+        ["MASS"],
+    ),
+    "springs": (
+        ["*ELEMENT, TYPE=SPRINGA, ELSET=S", "9, 7, 17", "*SPRING, ELSET=S", "", "100."],
+        "1 SPRINGA",
+        ["SPRING", "SPRINGA"],
+    ),
+    "shells": (
+        ["*ELEMENT, TYPE=S4, ELSET=S", f"9, {NODES}", "*SHELL SECTION, ELSET=S, MATERIAL=M", "0.01"],
+        "shells: 1 SHELL SECTION",
+        ["SHELL SECTION"],
+    ),
+    "beams": (
+        ["*ELEMENT, TYPE=B31, ELSET=B", "9, 7, 17", "*BEAM SECTION, ELSET=B, SECTION=RECT", "1., 1."],
+        "beams: 1 BEAM SECTION",
+        ["BEAM SECTION"],
+    ),
+    "trusses": (
+        ["*ELEMENT, TYPE=T3D2, ELSET=T", "9, 7, 17", "*SOLID SECTION, ELSET=T, MATERIAL=M", "1."],
+        "trusses or plane elements: 1 T3D2",
+        ["T3D2"],
+    ),
+    "equation": (["*EQUATION", "2", "7, 1, 1., 17, 1, -1."], "constraints between nodes: 1 EQUATION", ["EQUATION"]),
+    "rigid body": (["*RIGID BODY, NSET=Half, REF NODE=7"], "1 RIGID BODY", ["RIGID BODY"]),
+    "tie": (["*TIE, NAME=T", "A, B"], "1 TIE", ["TIE"]),
+    "contact": (["*CONTACT PAIR, INTERACTION=I", "A, B"], "contact: 1 CONTACT PAIR", ["CONTACT PAIR"]),
+    "unknown keyword": (["*ODD ONE", "1, 2"], "not known here: 1 ODD ONE", ["ODD ONE"]),
+    "unknown element": (["*ELEMENT, TYPE=Q99", "9, 7, 17"], "not known here: 1 Q99", ["Q99"]),
+}
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_nothing_is_dropped(tmp_path, name):
+    """What a link would lack is refused with count and line; asked for, it is left out and counted."""
+    lines, words, ignored = LOSSES[name]
+    with pytest.raises(FEImportError) as caught:
+        read(tmp_path, *lines)
+    assert caught.value.cause is Cause.NOT_USED
+    assert words in str(caught.value)
+    found = read_mesh(tmp_path / "bar.inp", ignored)
+    np.testing.assert_array_equal(found.elements, BAR.elements)
+    assert {name.upper() for name in ignored} <= found.left_out.keys()
+
+
+def test_all_losses_in_one_message(tmp_path):
+    """The remedy is the whole list, with what was asked for already; a slip in it is refused."""
+    lines = ["*BOUNDARY", "7, 1", "*EQUATION", "2", "7, 1, 1., 17, 1, -1.", "*TIE, NAME=T", "A, B", "*CLOAD", "7, 1, 2."]
+    read_lines = [*lines, "*MATERIAL, NAME=M", "*ELASTIC", "1., .3", "*DENSITY", "1."]
+    with pytest.raises(FEImportError, match="BOUNDARY"):
+        read(tmp_path, *read_lines)
+    with pytest.raises(FEImportError, match=r'ignore = \["TIE", "BOUNDARY", "EQUATION"\]'):
+        read_mesh(tmp_path / "bar.inp", ["tie"])
+    with pytest.raises(FEImportError, match="did you mean 'BOUNDARY'"):
+        read_mesh(tmp_path / "bar.inp", ["BOUNDRY"])
+
+
+def test_what_is_left_out_is_reported(tmp_path):
+    """Counts in the health report and in the provenance of the modal file."""
+    link = solid_link(tmp_path, solid={"ignore": ["BOUNDARY"]})
+    mesh = tmp_path / "box.inp"
+    mesh.write_text(mesh.read_text() + "*BOUNDARY\nx0, 1, 3\n")
+    model = reduce_link(link)
+    (check,) = [c for c in model.health if c.name.startswith("left out of the mesh file")]
+    assert "1 BOUNDARY" in check.name
+    assert check.ok
+    assert '"BOUNDARY": 1' in model.provenance["left out"]
 
 
 @pytest.mark.parametrize("name", sorted(ABAQUS))
