@@ -92,6 +92,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     checks += check_expansion(model, None if thermal is None else thermal.force, modes.omega)
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, where)
     checks += _unit_checks(model, modes.omega, where)
+    checks += _mesh_checks(model, link, shapes, modes.omega)
     residuals = mode_residuals(model, shapes, modes.omega)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
     field, statement = None, "not available in physical form"
@@ -132,6 +133,17 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
         recovery=None if wanted is None else recovery_maps(model, shapes, wanted, where),
         thermal=thermal,
     )
+
+
+def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) -> tuple[HealthCheck, ...]:
+    if link.description.solid is None:
+        return ()
+    from fe_import.elements.solid_stress import SolidStress  # frames have no use for it
+    from fe_import.health.mesh_error import check_mesh_error
+
+    assert isinstance(model.stress, SolidStress)
+    limit = link.description.solid.mesh_error
+    return check_mesh_error(model, model.stress, shapes, omega, limit, str(link.path))
 
 
 def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck, ...]:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fe_import.abaqus.elements import ElementType, element_type
+from fe_import.abaqus.elements import ElementType, element_type, in_mesh_order
 from fe_import.abaqus.lines import DeckReader
 from fe_import.abaqus.sets import Item, NodesOf, SetTable, set_items
 from fe_import.errors import Cause, shortened
@@ -32,7 +32,7 @@ class Deck:
     points : dict
         Label -> position.
     elements : dict
-        Type -> label -> labels of its nodes, none for types that are not known.
+        Type -> label -> labels of its nodes in meshio's order, none for types that are not known.
     types : dict of ElementType
     kinds : dict of str
         Label of an element -> its type.
@@ -147,7 +147,7 @@ def _elements(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
         if not fields:
             continue
         label, *nodes = map(reader.integer, fields)
-        nodes = nodes[: known.nodes]
+        nodes = in_mesh_order(kind, nodes[: known.nodes])
         if deck.kinds.setdefault(label, kind) != kind or cells.setdefault(label, nodes) != nodes:
             raise reader.fault(f"element {label} stands twice, with different nodes or types")
         labels.append(label)

@@ -1,4 +1,4 @@
-"""Mesh files: everything that meshio reads -> a checked mesh of one solid element type with its named sets.
+"""Mesh files: everything that meshio reads -> a checked mesh of solid elements with its named sets.
 
 meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX by `fe_import.mesh.abaqus_files`.
 """
@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fe_import.elements.solid_elements import SOLID_ELEMENTS
-from fe_import.elements.solid_mesh import SolidMesh
+from fe_import.elements.solid_elements import MESH_ELEMENTS
+from fe_import.elements.solid_mesh import ElementBlock, SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
 from fe_import.mesh.checks import check_mesh, scaled_jacobians
@@ -22,7 +22,7 @@ from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
 from fe_import.model import IntArray
 
-_BY_MESHIO_NAME = {element.meshio_name: name for name, element in SOLID_ELEMENTS.items()}
+_BY_MESHIO_NAME = {element.meshio_name: name for name, element in MESH_ELEMENTS.items()}
 
 
 def read_mesh(path: Path, ignore: Sequence[str] = ()) -> SolidMesh:
@@ -47,31 +47,32 @@ def read_mesh(path: Path, ignore: Sequence[str] = ()) -> SolidMesh:
     Raises
     ------
     FEImportError
-        ``FILE_NOT_FOUND``, ``NOT_READABLE``; ``UNSUPPORTED_ELEMENT``: solid elements of another type than
-        tet4/10 and hex8/20/27; ``NOT_USED``: masses, springs, constraints and the like; ``MESH``: declared sizes that the file cannot hold, no or mixed solid elements, and
-        what ``check_mesh`` finds; ``DISCONNECTED``.
+        ``FILE_NOT_FOUND``, ``NOT_READABLE``; ``UNSUPPORTED_ELEMENT``: solid elements of another type than those of
+        `MESH_ELEMENTS`; ``NOT_USED``: masses, springs, constraints and the like; ``MESH``: declared sizes that the
+        file cannot hold, no solid elements, and what ``check_mesh`` finds; ``DISCONNECTED``.
     """
     if not path.exists():
         raise FEImportError(Cause.FILE_NOT_FOUND, "no such mesh file", where=str(path), remedy="check the path")
     raw = _read(path)
     left_out = _left_out(raw, ignore, str(path))
-    element_type, blocks = _solid_blocks(raw, str(path))
-    elements = np.concatenate([raw.blocks[b].cells for b in blocks]).astype(np.int64)
+    solids = _solid_blocks(raw, str(path))
+    used = np.unique(np.concatenate([raw.blocks[b].cells.ravel() for b in solids])).astype(np.int64)
     points = np.asarray(raw.points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3 or elements.min() < 0 or elements.max() >= len(points):
+    if points.ndim != 2 or points.shape[1] != 3 or used[0] < 0 or used[-1] >= len(points):
         raise FEImportError(
             Cause.MESH,
             "elements refer to nodes that are not in the file",
             where=str(path),
             remedy="write the mesh again",
         )
-    used = np.unique(elements)
     dense = np.full(len(points), -1, dtype=np.int64)
     dense[used] = np.arange(len(used))
-    element_sets, node_sets, lost = _sets(raw, blocks, dense)
-    mesh = SolidMesh(points[used], dense[elements], element_type, element_sets, node_sets, str(path), lost, left_out)
+    element_sets, node_sets, lost = _sets(raw, solids, dense)
+    blocks = _joined(raw, solids, dense)
+    mesh = SolidMesh(points[used], blocks, element_sets, node_sets, str(path), lost, left_out)
     if raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
-        mesh = replace(mesh, elements=mesh.elements[:, mesh.element.mirrored_order])
+        turned = (replace(block, elements=block.elements[:, block.element.mirrored_order]) for block in mesh.blocks)
+        mesh = replace(mesh, blocks=tuple(turned))
     check_mesh(mesh)
     return mesh
 
@@ -103,7 +104,7 @@ def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]
             Cause.NOT_USED,
             "the link would lack " + "; ".join(f"{i.loss}: {i.count} {i.name} from line {i.line}" for i in losses),
             where=where,
-            remedy=f"give them in the link description or the scene where they matter, then ignore = [{names}] in [solid]",
+            remedy=f"give them in the link description or the scene if they matter, then ignore = [{names}] in [solid]",
         )
     counts: Counter[str] = Counter()
     for item in raw.left_out:
@@ -111,7 +112,16 @@ def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]
     return dict(counts)
 
 
-def _solid_blocks(raw: RawMesh, where: str) -> tuple[str, list[int]]:
+def _joined(raw: RawMesh, solids: list[int], dense: IntArray) -> tuple[ElementBlock, ...]:
+    """One block of each type."""
+    cells: dict[str, list[IntArray]] = {}
+    for b in solids:
+        cells.setdefault(raw.blocks[b].type, []).append(raw.blocks[b].cells.astype(np.int64))
+    return tuple(ElementBlock(_BY_MESHIO_NAME[name], dense[np.concatenate(parts)]) for name, parts in cells.items())
+
+
+def _solid_blocks(raw: RawMesh, where: str) -> list[int]:
+    """Which blocks hold solid elements, type by type in the order in which types come first."""
     blocks = [b for b, block in enumerate(raw.blocks) if block.dimension == 3 and len(block.cells)]
     counts: Counter[str] = Counter()
     for b in blocks:
@@ -133,14 +143,7 @@ def _solid_blocks(raw: RawMesh, where: str) -> tuple[str, list[int]]:
             where=where,
             remedy="export the volume mesh, not its surface",
         )
-    if len(counts) > 1:
-        raise FEImportError(
-            Cause.MESH,
-            "mixed solid element types: " + _listing(counts.items()),
-            where=where,
-            remedy="mesh the link with one type",
-        )
-    return _BY_MESHIO_NAME[next(iter(counts))], blocks
+    return sorted(blocks, key=lambda b: list(counts).index(raw.blocks[b].type))
 
 
 def _listing(counts: Iterable[tuple[str, int]]) -> str:
@@ -152,7 +155,7 @@ def _sets(
 ) -> tuple[dict[str, IntArray], dict[str, IntArray], dict[str, str]]:
     """Element sets and node sets in the numbering of the checked mesh, and why others are not among them."""
     counts = [len(block.cells) for block in raw.blocks]
-    offset = {b: sum(counts[other] for other in blocks if other < b) for b in blocks}
+    offset = dict(zip(blocks, np.cumsum([0, *(counts[b] for b in blocks)]).tolist(), strict=False))
     element_sets: dict[str, IntArray] = {}
     node_sets: dict[str, IntArray] = {}
     lost = dict(raw.lost)

@@ -8,6 +8,7 @@ from fe_import.description.link import LinkFile
 from fe_import.description.records import LinkDescription, Solid
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
+from fe_import.elements.solid_orders import raised, with_incompatible_modes
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
@@ -39,9 +40,13 @@ def solid_model(link: LinkFile) -> FEModel:
             remedy="give a path that starts at the folder of the link description",
         )
     mesh = read_mesh(path, solid.ignore)
+    if solid.raise_order:
+        mesh = raised(mesh)
+    if solid.hex8 == "incompatible-modes":
+        mesh = with_incompatible_modes(mesh)
     materials = _materials(description, solid, mesh, where)
     mass, stiffness = assemble_solid(mesh, materials)
-    lame = np.empty((len(mesh.elements), 2))
+    lame = np.empty((mesh.count, 2))
     for material in materials:
         lame[slice(None) if material.elements is None else material.elements] = material.lame
     coupled = couple_interfaces(mesh.nodes, _faces(description, mesh, where), where)

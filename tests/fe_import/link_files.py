@@ -93,7 +93,7 @@ def write_box(path: Path, scale: float = 1.0) -> Path:
     lines += [f"{k}, " + ", ".join(repr(float(x * scale)) for x in p) for k, p in enumerate(mesh.nodes, start=1)]
     lines += ["*ELEMENT, TYPE=C3D20, ELSET=all"]
     order = [*range(12), 12, 13, 14, 15, 16, 17, 18, 19]
-    for k, nodes in enumerate(mesh.elements, start=1):
+    for k, nodes in enumerate(mesh.only.elements, start=1):
         numbers = [str(k), *(str(n + 1) for n in nodes[order])]
         lines += [", ".join(numbers[:16]) + ",", ", ".join(numbers[16:])]
     for name in ("x0", "x1"):

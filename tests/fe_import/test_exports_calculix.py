@@ -120,12 +120,10 @@ def four_point_mass(mesh: SolidMesh, density: float) -> np.ndarray:
     a, b = (5 + 3 * np.sqrt(5)) / 20, (5 - np.sqrt(5)) / 20
     points = np.full((3, 4), b)
     points[:, 1:][np.eye(3, dtype=bool)] = a
-    element = mesh.element
-    values = np.empty((10, 4))
-    for local, node in enumerate(element.skfem_order):
-        values[node] = element.shape.lbasis(points, local)[0]
+    element = mesh.only.element
+    values = element.shape_values(points)
     scalar = np.zeros((len(mesh.nodes),) * 2)
-    for nodes in mesh.elements:
+    for nodes in mesh.only.elements:
         edges = mesh.nodes[nodes[1:4]] - mesh.nodes[nodes[0]]
         scalar[np.ix_(nodes, nodes)] += density * abs(np.linalg.det(edges)) / 24 * values @ values.T
     return np.kron(scalar, np.eye(3))
@@ -329,7 +327,7 @@ def test_sets_of_a_deck(tmp_path: Path) -> None:
 def test_pictures_of_solids(kind: str, element_type: str) -> None:
     """The surface closes: areas as vectors sum to zero, and their flux of x/3 is the volume."""
     mesh = box(element_type, (2, 1, 1), (2.0, 1.0, 1.5))
-    lines, triangles = picture({kind: mesh.elements})
+    lines, triangles = picture({kind: mesh.only.elements})
     assert not len(lines)
     a, b, c = (mesh.nodes[triangles[:, k]] for k in range(3))
     areas = np.cross(b - a, c - a) / 2

@@ -90,7 +90,7 @@ def test_sections_of_gmsh(tmp_path, name):
     lines, words = DAMAGED[name]
     path = tmp_path / "a.msh"
     path.write_text(bar())
-    assert len(read_mesh(path).elements) == 2
+    assert len(read_mesh(path).only.elements) == 2
     path.write_text(bar(**lines))
     with pytest.raises(FEImportError) as caught:
         read_mesh(path)
@@ -100,7 +100,7 @@ def test_sections_of_gmsh(tmp_path, name):
 
 def cube(path) -> bytes:
     meshio.write(
-        path, meshio.Mesh(CUBE.nodes, [("hexahedron", CUBE.elements)]), "gmsh22" if path.suffix == ".msh" else None
+        path, meshio.Mesh(CUBE.nodes, [("hexahedron", CUBE.only.elements)]), "gmsh22" if path.suffix == ".msh" else None
     )
     return path.read_bytes()
 

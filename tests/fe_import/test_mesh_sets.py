@@ -9,17 +9,18 @@ import meshio
 import numpy as np
 import pytest
 from link_files import solid_link
-from solid_meshes import box
+from solid_meshes import box, side
 
-from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.read import read_mesh
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
 
-TYPES = sorted(SOLID_ELEMENTS)
-ABAQUS = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8R", "hex20": "C3D20"}
+TYPES = sorted(MESH_ELEMENTS)
+ABAQUS = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8R", "hex20": "C3D20", "wedge6": "C3D6", "wedge15": "C3D15"}
+ABAQUS |= {"pyramid5": "C3D5", "pyramid13": "C3D13"}
 BAR = box("hex8", (3, 1, 1))
 LABELS = 10 * np.arange(len(BAR.nodes)) + 7  # of nodes in decks: neither dense nor from 1
 
@@ -29,8 +30,8 @@ def deck(mesh: SolidMesh, *more: str, split: bool = False) -> str:
     rows = [f"{10 * k + 7}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(mesh.nodes.tolist())]
     text = ["** a comment", "*Heading", "bar", "*Node, nset=Half", *rows[: len(rows) // 2]]
     text += ["*NODE", *rows[len(rows) // 2 :]]
-    head = f"*Element, type={ABAQUS[mesh.element_type].lower()}, elset=Body"
-    for k, nodes in enumerate(mesh.elements):
+    head = f"*Element, type={ABAQUS[mesh.only.type].lower()}, elset=Body"
+    for k, nodes in enumerate(mesh.only.elements):
         if k == 0 or split:
             text.append(head)
         fields = [str(k + 1), *(str(10 * n + 7) for n in nodes)]
@@ -66,7 +67,7 @@ SETS = {  # lines of the deck, node set, what it is
     "several lines": (["*NSET, NSET=X, UNSORTED", "7,17,", "27"], "X", np.array([0, 1, 2])),
     "stands twice": (["*NSET, NSET=X", "7", "*NSET, NSET=x", "17"], "X", np.array([0, 1])),
     "set of sets": (["*NSET, NSET=X", "A, 17", "*NSET, NSET=a", "7"], "X", np.array([0, 1])),
-    "of elements": (["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last"], "X", np.unique(BAR.elements[2])),
+    "of elements": (["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last"], "X", np.unique(BAR.only.elements[2])),
     "of elements twice": (
         ["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last", "*NSET, NSET=X, ELSET=Body", "*NSET, NSET=Z", "X"],
         "Z",
@@ -78,7 +79,7 @@ SETS = {  # lines of the deck, node set, what it is
     "surface of a set": (["*ELSET, ELSET=E", "3", "*SURFACE, NAME=X", "E, s4"], "X", END),
     "surface of nodes": (["*NSET, NSET=E", "7", "*SURFACE, TYPE=NODE, NAME=X", "E,", "17, 1."], "X", np.array([0, 1])),
     "shell elements": (
-        ["*ELEMENT, TYPE=S4, ELSET=X", "9," + ",".join(str(LABELS[n]) for n in BAR.elements[2, [1, 2, 6, 5]])],
+        ["*ELEMENT, TYPE=S4, ELSET=X", "9," + ",".join(str(LABELS[n]) for n in BAR.only.elements[2, [1, 2, 6, 5]])],
         "X",
         END,
     ),
@@ -91,7 +92,7 @@ def test_sets_of_decks(tmp_path, name):
     lines, key, expected = SETS[name]
     found = read(tmp_path, *lines)
     np.testing.assert_allclose(found.nodes, BAR.nodes, atol=0)
-    np.testing.assert_array_equal(found.elements, BAR.elements)
+    np.testing.assert_array_equal(found.only.elements, BAR.only.elements)
     np.testing.assert_array_equal(found.node_sets[key], expected)
     assert found.lost_sets == {}
 
@@ -119,10 +120,10 @@ def test_element_sets_of_decks(tmp_path, split):
 def test_surfaces_of_every_element(tmp_path, name):
     """Faces S1, S2 ... of an element hold the corners and mid-side nodes of one face each; together all of them."""
     mesh = box(name, (1, 1, 1))
-    faces = len(mesh.element.faces)
+    faces = len(mesh.only.element.faces)
     lines = [line for k in range(1, faces + 1) for line in (f"*SURFACE, NAME=F{k}", f"1, S{k}")]
     found = read(tmp_path, *lines, mesh=mesh)
-    ours = {frozenset(face) for face in found.elements[0][found.element.faces].tolist()}
+    ours = {frozenset(found.only.elements[0][face].tolist()) for face in found.only.element.faces}
     theirs = {frozenset(found.node_sets[f"F{k}"].tolist()) for k in range(1, faces + 1)}
     assert ours == theirs
 
@@ -146,7 +147,7 @@ def test_sets_that_cannot_be_followed(tmp_path, name):
     """The mesh is read without them; whoever names one is told why."""
     lines, reason = LOST[name]
     found = read(tmp_path, *lines)
-    assert len(found.elements) == 3
+    assert len(found.only.elements) == 3
     if reason:
         assert reason in found.lost_sets["X"]
         assert "X" not in {**found.node_sets, **found.element_sets}
@@ -196,7 +197,7 @@ def test_faulty_decks(tmp_path, name):
 NODES = ", ".join(str(label) for label in LABELS[:4])
 LOSSES = {  # lines of the deck, what the message counts, what the link may be without
     "support": (["*BOUNDARY", "7, 1, 3"], "1 BOUNDARY from line 29", ["BOUNDARY"]),
-    "support in a step": (["*STEP", "*STATIC", "*Boundary", "7, 1, 3", "*END STEP"], "joints hold it): 1 BOUND", ["Boundary"]),
+    "support in a step": (["*STEP", "*Boundary", "7, 1, 3", "*END STEP"], "joints hold it): 1 BOUND", ["Boundary"]),
     "mass": (
         ["*ELEMENT, TYPE=MASS, ELSET=M", "9, 7", "10, 17", "*MASS, ELSET=M", "1.5"],
         "point masses: 2 MASS from line 29",
@@ -240,14 +241,14 @@ def test_nothing_is_dropped(tmp_path, name):
     assert caught.value.cause is Cause.NOT_USED
     assert words in str(caught.value)
     found = read_mesh(tmp_path / "bar.inp", ignored)
-    np.testing.assert_array_equal(found.elements, BAR.elements)
+    np.testing.assert_array_equal(found.only.elements, BAR.only.elements)
     assert {name.upper() for name in ignored} <= found.left_out.keys()
 
 
 def test_all_losses_in_one_message(tmp_path):
     """The remedy is the whole list, with what was asked for already; a slip in it is refused."""
-    lines = ["*BOUNDARY", "7, 1", "*EQUATION", "2", "7, 1, 1., 17, 1, -1.", "*TIE, NAME=T", "A, B", "*CLOAD", "7, 1, 2."]
-    read_lines = [*lines, "*MATERIAL, NAME=M", "*ELASTIC", "1., .3", "*DENSITY", "1."]
+    lines = ["*BOUNDARY", "7, 1", "*EQUATION", "2", "7, 1, 1., 17, 1, -1.", "*TIE, NAME=T", "A, B"]
+    read_lines = [*lines, "*CLOAD", "7, 1, 2.", "*MATERIAL, NAME=M", "*ELASTIC", "1., .3", "*DENSITY", "1."]
     with pytest.raises(FEImportError, match="BOUNDARY"):
         read(tmp_path, *read_lines)
     with pytest.raises(FEImportError, match=r'ignore = \["TIE", "BOUNDARY", "EQUATION"\]'):
@@ -274,10 +275,9 @@ def test_properties_of_nastran(tmp_path, name, packed):
     """PID 3 and PID 5 of a deck, through meshio and through gzip."""
     mesh = box(name, (2, 1, 1))
     path = tmp_path / "bar.bdf"
-    tags = np.where(np.arange(len(mesh.elements)) % 2, 5, 3)
-    meshio.write(
-        path, meshio.Mesh(mesh.nodes, [(mesh.element.meshio_name, mesh.elements)], cell_data={"nastran:ref": [tags]})
-    )
+    tags = np.where(np.arange(len(mesh.only.elements)) % 2, 5, 3)
+    cells = [(mesh.only.element.meshio_name, mesh.only.elements)]
+    meshio.write(path, meshio.Mesh(mesh.nodes, cells, cell_data={"nastran:ref": [tags]}))
     if packed:
         path = tmp_path / "bar.bdf.gz"
         path.write_bytes(gzip.compress((tmp_path / "bar.bdf").read_bytes()))
@@ -290,7 +290,7 @@ def test_properties_of_nastran(tmp_path, name, packed):
 def test_local_coordinates_of_nastran(tmp_path):
     path = tmp_path / "bar.bdf"
     meshio.write(
-        path, meshio.Mesh(BAR.nodes, [("hexahedron", BAR.elements)], point_data={"nastran:ref": np.full(16, 4)})
+        path, meshio.Mesh(BAR.nodes, [("hexahedron", BAR.only.elements)], point_data={"nastran:ref": np.full(16, 4)})
     )
     text = path.read_text()
     assert "GRID" in text
@@ -305,7 +305,7 @@ def test_integer_arrays_of_vtu(tmp_path):
     medium = np.array([3, 3, 4])
     raw = meshio.Mesh(
         BAR.nodes,
-        [("hexahedron", BAR.elements)],
+        [("hexahedron", BAR.only.elements)],
         cell_data={"medium": [medium], "stress": [np.array([1.0, 2.0, 3.0])]},
         point_data={
             "side": (BAR.nodes[:, 0] == 3).astype(int),
@@ -327,14 +327,13 @@ def test_integer_arrays_of_vtu(tmp_path):
 def test_families_of_med(tmp_path, name):
     """Groups of elements, faces and nodes; elements numbered inside out, as Salome writes them, are turned."""
     mesh = box(name, (2, 1, 1))
-    faces = mesh.elements[:, mesh.element.faces].reshape(-1, mesh.element.faces.shape[1])
-    ends = faces[np.isin(faces, mesh.node_sets["x1"]).all(axis=1)]
-    shape = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}[faces.shape[1]]
-    inside_out = mesh.elements[:, np.argsort(mesh.element.mirrored_order)]
+    ends = side(mesh, "x1")
+    shape = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}[ends.shape[1]]
+    inside_out = mesh.only.elements[:, np.argsort(mesh.only.element.mirrored_order)]
     raw = meshio.Mesh(
         mesh.nodes,
-        [(mesh.element.meshio_name, inside_out), (shape, ends)],
-        cell_data={"cell_tags": [np.full(len(mesh.elements), -1), np.full(len(ends), -2)]},
+        [(mesh.only.element.meshio_name, inside_out), (shape, ends)],
+        cell_data={"cell_tags": [np.full(len(mesh.only.elements), -1), np.full(len(ends), -2)]},
         point_data={"point_tags": np.where(mesh.nodes[:, 0] == 0, 1, 0)},
     )
     raw.cell_tags = {-1: ["BODY"], -2: ["END", "BOTH"]}
@@ -342,8 +341,8 @@ def test_families_of_med(tmp_path, name):
     path = tmp_path / "bar.med"
     meshio.write(path, raw)
     found = read_mesh(path)
-    np.testing.assert_array_equal(found.elements, mesh.elements)
-    np.testing.assert_array_equal(found.element_sets["BODY"], np.arange(len(mesh.elements)))
+    np.testing.assert_array_equal(found.only.elements, mesh.only.elements)
+    np.testing.assert_array_equal(found.element_sets["BODY"], np.arange(len(mesh.only.elements)))
     for key in ("END", "BOTH"):
         np.testing.assert_array_equal(found.node_sets[key], mesh.node_sets["x1"])
     np.testing.assert_array_equal(found.node_sets["ROOT"], mesh.node_sets["x0"])
@@ -354,7 +353,7 @@ def test_groups_of_gmsh_without_names(tmp_path):
     path = tmp_path / "bar.msh"
     tags = [np.array([7, 7, 8])]
     raw = meshio.Mesh(
-        BAR.nodes, [("hexahedron", BAR.elements)], cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}
+        BAR.nodes, [("hexahedron", BAR.only.elements)], cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}
     )
     meshio.write(path, raw, file_format="gmsh22", binary=False)
     found = read_mesh(path)
@@ -368,7 +367,7 @@ def test_a_group_without_members(tmp_path):
     tags = [np.array([1, 1, 1])]
     raw = meshio.Mesh(
         BAR.nodes,
-        [("hexahedron", BAR.elements)],
+        [("hexahedron", BAR.only.elements)],
         cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
         field_data={"BODY": np.array([1, 3]), "FACE": np.array([2, 2])},
     )
