@@ -36,7 +36,7 @@ FRAME: dict[str, Any] = {
 
 SOLID: dict[str, Any] = {
     "materials": {"m": {"youngs_modulus": 7e10, "poissons_ratio": 0.33, "density": 2700.0}},
-    "solid": {"mesh": "box.inp", "material": "m"},
+    "solid": {"mesh": "box.inp", "material": "m", "mesh_error": 1e3},  # coarse
     "interfaces": [{"name": "hub", "face": "x0"}, {"name": "hand", "face": "x1"}],
 }
 
