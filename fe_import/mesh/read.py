@@ -1,6 +1,7 @@
 """Mesh files: everything that meshio reads -> a checked mesh of solid elements with its named sets.
 
-meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX by `fe_import.mesh.abaqus_files`.
+meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX are read by
+`fe_import.mesh.abaqus_files`, bulk data of Nastran by `fe_import.mesh.nastran_files`.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
 from fe_import.model import IntArray
 
+_NASTRAN = (".bdf", ".fem", ".nas")
 _BY_MESHIO_NAME = {element.meshio_name: name for name, element in MESH_ELEMENTS.items()}
 
 
@@ -87,6 +89,10 @@ def _read(path: Path) -> RawMesh:
             from fe_import.mesh.abaqus_files import read_abaqus
 
             return read_abaqus(plain, str(path))
+        if plain.suffix.lower() in _NASTRAN:
+            from fe_import.mesh.nastran_files import read_nastran
+
+            return read_nastran(plain, str(path))
         from fe_import.mesh.meshio_files import read_with_meshio  # meshio is heavy
 
         return read_with_meshio(plain, str(path))
@@ -94,9 +100,10 @@ def _read(path: Path) -> RawMesh:
 
 def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]:
     """How many of what the link is without; a loss that nobody asked for is refused."""
-    asked = [name.upper() for name in ignore]
+    names_there = {item.name.upper(): item.name for item in raw.left_out}
+    asked = [names_there.get(name.upper(), name) for name in ignore]
     for name in asked:
-        choose(name, sorted({item.name for item in raw.left_out}), f"{where}: what to ignore")
+        choose(name, sorted(names_there.values()), f"{where}: what to ignore")
     losses = [item for item in raw.left_out if item.loss and item.name not in asked]
     if losses:
         names = ", ".join(f'"{name}"' for name in dict.fromkeys([*asked, *(item.name for item in losses)]))

@@ -35,7 +35,6 @@ HEADERS = {
     "negative": ("a.msh", f"{MSH2}$Nodes\n-1\n", "$Nodes"),
     "no number": ("a.msh", f"{MSH2}$Nodes\nmany\n", "$Nodes"),
     "not finite": ("a.msh", f"{MSH2}$Nodes\nnan\n", "$Nodes"),
-    "no end of Nastran": ("a.bdf", "SOL 101\nBEGIN BULK\n", "no GRID after BEGIN BULK"),
     "points of VTU": ("a.vtu", VTU.format(10**12, 1), "NumberOfPoints"),
     "cells of VTU": ("a.vtu", VTU.format(8, 10**12), "NumberOfCells"),
 }

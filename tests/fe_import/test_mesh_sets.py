@@ -294,9 +294,9 @@ def test_local_coordinates_of_nastran(tmp_path):
     )
     text = path.read_text()
     assert "GRID" in text
-    with pytest.raises(FEImportError, match="local coordinate systems") as caught:
+    with pytest.raises(FEImportError, match="coordinate system 4 is not there") as caught:
         read_mesh(path)
-    assert caught.value.cause is Cause.MESH
+    assert caught.value.cause is Cause.BAD_REFERENCE
 
 
 def test_integer_arrays_of_vtu(tmp_path):

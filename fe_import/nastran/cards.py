@@ -58,17 +58,19 @@ class Card:
         return value
 
 
-def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Iterator[Card]:
+def read_cards(lines: Iterable[str], names: frozenset[str] | None, where: str, first: int = 1) -> Iterator[Card]:
     """The cards with given names, in order.
 
     Parameters
     ----------
     lines : iterable of str
         Executive and case control before ``BEGIN BULK`` may be among them, cards behind ``ENDDATA`` are left out.
-    names : frozenset of str
-        In capitals.
+    names : frozenset of str or None
+        In capitals; all cards when None.
     where : str
         Name of the file, for messages.
+    first : int
+        Number of the first line.
 
     Raises
     ------
@@ -77,7 +79,7 @@ def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Itera
         continuation.
     """
     name, fields, start = "", [], 0
-    for number, raw in enumerate(lines, start=1):
+    for number, raw in enumerate(lines, start=first):
         line = raw.partition("$")[0].rstrip().expandtabs(8)
         if not line:
             continue
@@ -93,7 +95,7 @@ def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Itera
                 raise _damaged(f"{where}: line {number}", "neither a card nor the continuation of one", raw)
             yield Card(name, tuple(fields), f"{where}: line {start}")
         name = ""
-        keyword = head.rstrip("*").upper()
+        keyword = head.rstrip("* ").upper()
         if keyword == "ENDDATA":
             return
         if keyword.startswith("INCLUDE"):
@@ -103,7 +105,7 @@ def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Itera
                 where=f"{where}: line {number}",
                 remedy="give one file that holds all cards",
             )
-        if keyword in names:
+        if names is None or keyword in names:
             name, fields, start = keyword, data, number
     if name:
         yield Card(name, tuple(fields), f"{where}: line {start}")
