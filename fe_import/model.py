@@ -182,6 +182,8 @@ class FEModel:
         Where a temperature change is given.
     left_out : dict of int
         What stands in the mesh file and is not part of the link, and how often.
+    second_order_lack : str
+        Why second-order displacements of a solid cannot be computed, where they cannot.
     """
 
     name: str
@@ -204,6 +206,7 @@ class FEModel:
     added_mass: sp.csc_array | None = None
     thermal: ThermalLoad | None = None
     left_out: dict[str, int] = field(default_factory=dict)
+    second_order_lack: str = ""
 
     @property
     def interface_dofs(self) -> IntArray:

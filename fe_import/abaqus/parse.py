@@ -23,6 +23,33 @@ _ENDED = ("STEP", "PART", "ASSEMBLY", "INSTANCE")
 _LARGEST_LABEL = 999_999_999
 
 
+STATEMENTS = ("MASS", "ROTARY INERTIA", "SPRING", "EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING")
+
+
+@dataclass
+class Statement:
+    """A keyword that `fe_import.abaqus.attachments` interprets when all sets are known.
+
+    Attributes
+    ----------
+    name : str
+    options : dict of str
+        Parameters, without blanks in their names.
+    rows : list of lists of str
+        Data lines.
+    following : Statement or None
+        *KINEMATIC or *DISTRIBUTING of a *COUPLING.
+    follows : bool
+        Whether it is one of these.
+    """
+
+    name: str
+    options: dict[str, str]
+    rows: list[list[str]]
+    following: Statement | None = None
+    follows: bool = False
+
+
 @dataclass
 class Deck:
     """What a deck says about its mesh.
@@ -41,6 +68,7 @@ class Deck:
         Name -> whether it is made of nodes, and its data lines.
     solid_sections : list of str
         Element sets of *SOLID SECTION.
+    statements : list of Statement
     keywords : Counter of str
         All keywords, in capitals.
     lines : dict of int
@@ -55,6 +83,7 @@ class Deck:
     element_sets: SetTable = field(default_factory=SetTable)
     surfaces: dict[str, tuple[bool, list[list[str]]]] = field(default_factory=dict)
     solid_sections: list[str] = field(default_factory=list)
+    statements: list[Statement] = field(default_factory=list)
     keywords: Counter[str] = field(default_factory=Counter)
     lines: dict[str, int] = field(default_factory=dict)
 
@@ -100,6 +129,8 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
                     _KEYWORDS[name](reader, reader.known(name, options), deck)
                 except ValueError as problem:
                     raise reader.fault(f"*{name}: {problem}") from None
+            elif name in STATEMENTS:
+                _statement(reader, name, options, deck)
         for name in _ENDED:
             if deck.keywords[name] > deck.keywords[f"END {name}"]:
                 raise reader.fault(f"*{name} without *END {name}: the deck is cut off")
@@ -182,6 +213,16 @@ def _surface(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
 
 def _solid_section(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     deck.solid_sections.append(_named(options, "ELSET"))
+
+
+def _statement(reader: DeckReader, name: str, options: dict[str, str], deck: Deck) -> None:
+    rows = []
+    while (fields := reader.data()) is not None:
+        rows.append(fields)
+    found = Statement(name, options, rows)
+    if name in ("KINEMATIC", "DISTRIBUTING") and deck.statements and deck.statements[-1].name == "COUPLING":
+        deck.statements[-1].following, found.follows = found, True
+    deck.statements.append(found)
 
 
 def _instance(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:

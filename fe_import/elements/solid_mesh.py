@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fe_import.elements.attachments import Attachment
 from fe_import.elements.solid_elements import SOLID_ELEMENTS, SolidElement
 from fe_import.model import Array, IntArray
 
@@ -56,6 +57,10 @@ class SolidMesh:
         Name -> why a set of the file is not among these.
     left_out : dict of int
         What stands in the file and is not part of the link, and how often.
+    further_nodes : (k, 3) array
+        Of no element, which attachments need.
+    attachments : tuple of Attachment
+        Further nodes have negative numbers: those of the mesh and these in one array, counted from its end.
     """
 
     nodes: Array
@@ -65,6 +70,8 @@ class SolidMesh:
     source: str = ""
     lost_sets: dict[str, str] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
+    further_nodes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    attachments: tuple[Attachment, ...] = ()
 
     @staticmethod
     def uniform(nodes: Array, elements: IntArray, element_type: str, **further: Any) -> SolidMesh:

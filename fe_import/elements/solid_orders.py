@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fe_import.elements.attachments import RigidBody
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.elements.solid_mesh import ElementBlock, SolidMesh, boundary_faces
 from fe_import.model import IntArray
@@ -24,7 +25,8 @@ def is_linear(mesh: SolidMesh) -> bool:
 def raised(mesh: SolidMesh) -> SolidMesh:
     """The mesh with a node in the middle of each edge, if it has none; a checked mesh stays sound.
 
-    New nodes come last. They belong to the node sets that hold the corners of a whole face of the surface around them.
+    New nodes come last. They belong to the node sets and rigid bodies that hold the corners of a whole face of the
+    surface around them.
     """
     if not is_linear(mesh):
         return mesh
@@ -43,7 +45,11 @@ def raised(mesh: SolidMesh) -> SolidMesh:
     whole = replace(mesh, nodes=nodes, blocks=tuple(blocks))
     faces = boundary_faces(whole)
     sets = {name: _with_middles(members, faces, len(mesh.nodes)) for name, members in mesh.node_sets.items()}
-    return replace(whole, node_sets=sets)
+    attachments = tuple(
+        replace(item, nodes=_with_middles(item.nodes, faces, len(mesh.nodes))) if isinstance(item, RigidBody) else item
+        for item in mesh.attachments
+    )
+    return replace(whole, node_sets=sets, attachments=attachments)
 
 
 def _with_middles(members: IntArray, faces: list[IntArray], first_new: int) -> IntArray:

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from fe_import.abaqus.attachments import Attached, attachments
 from fe_import.abaqus.keywords import is_read, loss, loss_of_elements
 from fe_import.abaqus.parse import Deck, read_deck
 from fe_import.abaqus.sets import LostSet, indices, surface_nodes
+from fe_import.elements.attachments import renumbered
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 
@@ -46,20 +48,28 @@ def read_abaqus(path: Path, name: str) -> RawMesh:
     _add_element_sets(deck, numbers, mesh)
     _add_node_sets(deck, place, mesh)
     _add_surfaces(deck, place, mesh)
-    mesh.left_out += _left_out(deck)
+    attached = attachments(deck)
+    mesh.left_out += _left_out(deck, attached)
+    mesh.attachments += [renumbered(i, place.__getitem__) for i in attached.items if i.keyword not in attached.reasons]
     return mesh
 
 
-def _left_out(deck: Deck) -> list[LeftOut]:
+def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:
     """Keywords, and elements that are no solids."""
-    found = [
-        LeftOut(name, count, deck.lines[name], loss(name)) for name, count in deck.keywords.items() if not is_read(name)
-    ]
+
+    def entry(name: str, count: int, text: str) -> LeftOut:
+        if name in attached.reasons:
+            text += f" ({attached.reasons[name]})"
+        used = name in attached.whole and name not in attached.reasons
+        return LeftOut(name, count, deck.lines[name], "" if used else text, used)
+
+    found = [entry(name, count, loss(name)) for name, count in deck.keywords.items() if not is_read(name)]
     sectioned = _with_sections(deck)
     for kind, cells in deck.elements.items():
         if (dimension := deck.types[kind].dimension) != 3:
             text = loss_of_elements(kind, dimension, not sectioned.isdisjoint(cells))
-            found.append(LeftOut(kind, len(cells), deck.lines[kind], text))
+            item = entry(kind, len(cells), text)
+            found += [] if item.used else [item]  # its keyword is there
     return sorted(found, key=lambda item: item.line)
 
 

@@ -10,13 +10,16 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from fe_import.elements.attachments import Attachment, nodes_of, renumbered
 from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.text import TextFile
+from fe_import.mesh.nastran_attachments import Unused, attachment
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 from fe_import.model import IntArray
 from fe_import.nastran.cards import Card, read_cards
@@ -109,6 +112,7 @@ def _mesh(cards: list[Card], cases: dict[int, str], name: str) -> RawMesh:
     owners: dict[str, list[int]] = {}
     labels: set[int] = set()
     left_out: list[tuple[str, str, str]] = []
+    attached, reasons = _attachments(cards, place)
     for card in cards:
         kind_of_card = card.name.rstrip("_")  # as meshio writes those of second order
         wanted = SURFACES.get(kind_of_card) or LINES.get(kind_of_card)
@@ -119,7 +123,8 @@ def _mesh(cards: list[Card], cases: dict[int, str], name: str) -> RawMesh:
             shape, nodes = _SHAPES[wanted][0], [card.integer(k) for k in range(3, 3 + wanted)]
             left_out.append((card.name, card.where, ""))
         else:
-            left_out.append((card.name, card.where, loss(card.name)))
+            why = f" ({reasons[card.name]})" if card.name in reasons else ""
+            left_out.append((card.name, card.where, loss(card.name) + why))
             if card.name == "GRID":
                 left_out.pop()
                 left_out += _of_grid(card)
@@ -136,10 +141,30 @@ def _mesh(cards: list[Card], cases: dict[int, str], name: str) -> RawMesh:
     dimensions = {**dict(_SHAPES.values()), **{e.meshio_name: 3 for e in MESH_ELEMENTS.values()}}
     blocks = [Block(shape, dimensions[shape], np.array(rows, dtype=np.int64)) for shape, rows in cells.items()]
     mesh = RawMesh(np.array(list(points.positions.values()), dtype=float).reshape(-1, 3), blocks)
-    mesh.left_out += _counted(left_out)
+    mesh.attachments += [renumbered(item, place.__getitem__) for item in attached if item.keyword not in reasons]
+    used = {item.keyword for item in mesh.attachments}
+    mesh.left_out += [replace(i, loss="", used=True) if i.name in used else i for i in _counted(left_out)]
     _add_properties(mesh, [np.array(owners[shape]) for shape in cells])
     _add_sets(mesh, cards, cases, place)
     return mesh
+
+
+def _attachments(cards: list[Card], place: dict[int, int]) -> tuple[list[Attachment], dict[str, str]]:
+    """What cards attach, and why cards of a name are not used."""
+    found: list[Attachment] = []
+    reasons: dict[str, str] = {}
+    for card in cards:
+        try:
+            item = attachment(card)
+        except Unused as reason:
+            reasons.setdefault(card.name, f"{reason}, {card.where.rpartition(': ')[2]}")
+            continue
+        if item is not None:
+            missing = next((n for n in nodes_of(item) if n not in place), None)
+            if missing is not None:
+                raise card.fault("it needs a grid point that is not there", missing)
+            found.append(item)
+    return found, reasons
 
 
 def _solid(card: Card, linear: str, quadratic: str) -> tuple[str, list[int]]:

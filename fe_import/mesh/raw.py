@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from fe_import.elements.attachments import Attachment
 from fe_import.model import Array, IntArray
 
 
@@ -19,7 +20,7 @@ class Block:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What a file holds besides its mesh and this program does not read.
+    """What a file holds besides its mesh.
 
     Attributes
     ----------
@@ -29,12 +30,15 @@ class LeftOut:
         How many there are, and where the first stands.
     loss : str
         What the link would lack; empty where it cannot matter to a link.
+    used : bool
+        Read after all, as attachments; they may be left out when asked for.
     """
 
     name: str
     count: int
     line: int
     loss: str = ""
+    used: bool = False
 
 
 @dataclass
@@ -52,6 +56,8 @@ class RawMesh:
     lost : dict
         Name -> why a set of the file is not among these.
     left_out : list of LeftOut
+    attachments : list of Attachment
+        With numbers of points.
     mirrored : bool
         Whether the format turns elements inside out, so that all of them may be.
     """
@@ -62,4 +68,5 @@ class RawMesh:
     point_sets: dict[str, Any] = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
     left_out: list[LeftOut] = field(default_factory=list)
+    attachments: list[Attachment] = field(default_factory=list)
     mirrored: bool = False

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from fe_import.elements.attachments import AttachedMass, Attachment, nodes_of, renumbered
 from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.elements.solid_mesh import ElementBlock, SolidMesh
 from fe_import.errors import Cause, FEImportError
@@ -71,7 +72,10 @@ def read_mesh(path: Path, ignore: Sequence[str] = ()) -> SolidMesh:
     dense[used] = np.arange(len(used))
     element_sets, node_sets, lost = _sets(raw, solids, dense)
     blocks = _joined(raw, solids, dense)
-    mesh = SolidMesh(points[used], blocks, element_sets, node_sets, str(path), lost, left_out)
+    further, attachments = _attachments(raw, left_out, dense, str(path))
+    mesh = SolidMesh(
+        points[used], blocks, element_sets, node_sets, str(path), lost, left_out, points[further], attachments
+    )
     if raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
         turned = (replace(block, elements=block.elements[:, block.element.mirrored_order]) for block in mesh.blocks)
         mesh = replace(mesh, blocks=tuple(turned))
@@ -114,9 +118,29 @@ def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]
             remedy=f"give them in the link description or the scene if they matter, then ignore = [{names}] in [solid]",
         )
     counts: Counter[str] = Counter()
-    for item in raw.left_out:
+    for item in (i for i in raw.left_out if not i.used or i.name in asked):
         counts[item.name] += item.count
     return dict(counts)
+
+
+def _attachments(
+    raw: RawMesh, left_out: dict[str, int], dense: IntArray, where: str
+) -> tuple[IntArray, tuple[Attachment, ...]]:
+    """Points of no element that attachments need, and these: elements' nodes, then from -1 backwards the others."""
+    chosen = [item for item in raw.attachments if item.keyword not in left_out]
+    further = sorted({node for item in chosen for node in nodes_of(item) if dense[node] < 0})
+    number = {node: k - len(further) for k, node in enumerate(further)}
+    joined = {node for item in chosen if not isinstance(item, AttachedMass) for node in nodes_of(item)}
+    for item in chosen:
+        if isinstance(item, AttachedMass) and item.node in number and item.node not in joined:
+            raise FEImportError(
+                Cause.DISCONNECTED,
+                f"{item.keyword} on a node that nothing joins to the solid, at {raw.points[item.node].tolist()}",
+                where=where,
+                remedy=f'join it (*RIGID BODY, RBE2 ...), or ignore = ["{item.keyword}"] in [solid]',
+            )
+    items = tuple(renumbered(i, lambda node: number[node] if node in number else int(dense[node])) for i in chosen)
+    return np.array(further, dtype=np.int64), items
 
 
 def _joined(raw: RawMesh, solids: list[int], dense: IntArray) -> tuple[ElementBlock, ...]:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
+import scipy.sparse as sp
 
 from fe_import.description.link import LinkFile
 from fe_import.description.records import LinkDescription, Solid
+from fe_import.elements.attachments import AttachedSpring, needs_rotations
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
 from fe_import.elements.solid_orders import raised, with_incompatible_modes
@@ -16,6 +20,7 @@ from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.mesh.read import read_mesh
 from fe_import.model import FEModel
+from fe_import.models.attached import attached_constraints, attached_matrices, attached_nodes
 
 
 def solid_model(link: LinkFile) -> FEModel:
@@ -49,7 +54,15 @@ def solid_model(link: LinkFile) -> FEModel:
     lame = np.empty((mesh.count, 2))
     for material in materials:
         lame[slice(None) if material.elements is None else material.elements] = material.lame
-    coupled = couple_interfaces(mesh.nodes, _faces(description, mesh, where), where)
+    faces = _faces(description, mesh, where)
+    if mesh.attachments:
+        places = attached_nodes(mesh)
+        added, springs = attached_matrices(mesh, places)
+        mass, stiffness = _sum(mass, added), _sum(stiffness, springs)
+        constraints = attached_constraints(mesh, places)
+        coupled = couple_interfaces(places.nodes, faces, where, places.dof_map, places.rows, constraints)
+    else:
+        coupled = couple_interfaces(mesh.nodes, faces, where)
     return FEModel(
         name=description.name,
         nodes=coupled.nodes,
@@ -65,7 +78,26 @@ def solid_model(link: LinkFile) -> FEModel:
         source=where,
         stress=solid_stress(mesh, lame),
         left_out=mesh.left_out,
+        notes=_attached_notes(mesh),
+        second_order_lack=_second_order_lack(mesh),
     )
+
+
+def _sum(matrix: sp.csc_array, added: sp.csc_array) -> sp.csc_array:
+    """A matrix of the first rows, and one of all."""
+    coo = sp.coo_array(matrix)
+    return (sp.csc_array((coo.data, coo.coords), shape=added.shape) + added).tocsc()
+
+
+def _attached_notes(mesh: SolidMesh) -> dict[str, str]:
+    counts = Counter(item.keyword for item in mesh.attachments)
+    return {"attached": ", ".join(f"{count} {name}" for name, count in counts.items())} if counts else {}
+
+
+def _second_order_lack(mesh: SolidMesh) -> str:
+    """Why there is no second-order field: nodes that turn, and springs, would need theirs."""
+    turning = any(needs_rotations(item) or isinstance(item, AttachedSpring) for item in mesh.attachments)
+    return "the mesh file attaches springs, or nodes that turn, to the solid" if turning else ""
 
 
 def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[SolidMaterial]:

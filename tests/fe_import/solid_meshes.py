@@ -116,3 +116,25 @@ def mixed_box(quadratic: bool = False) -> SolidMesh:
     blocks = [ElementBlock(names[s], e.reshape(a.shape[:2])) for s, e, a in zip(parts, ends, lattices, strict=True)]
     sets = {f"x{k}": np.flatnonzero(keys[:, 0] == 36 * k) for k in (0, 1)}
     return SolidMesh(keys / 12, tuple(blocks), node_sets=sets, source="mixed box")
+
+
+_CARDS = {"tet4": "CTETRA", "pyramid5": "CPYRAM", "wedge6": "CPENTA", "hex8": "CHEXA"}
+BAR = box("hex8", (3, 1, 1))
+
+
+def bulk(mesh: SolidMesh, *more: str, before: str = "", large: bool = False) -> str:
+    """Grid point k has number 10 k + 7, element k number k + 1 and property 2; free fields, or large ones."""
+    lines = [before + "BEGIN BULK"]
+    for k, (x, y, z) in enumerate(mesh.nodes.tolist()):
+        if large:
+            lines += [f"{'GRID   *':8s}{10 * k + 7:16d}{'':16s}{x:16.9E}{y:16.9E}", f"{'*':8s}{z:16.9E}"]
+        else:
+            lines.append(f"GRID,{10 * k + 7},,{x!r},{y!r},{z!r}")
+    label = 0
+    for block in mesh.blocks:
+        for nodes in block.elements:
+            label += 1
+            fields = [str(label), "2", *(str(10 * n + 7) for n in nodes)]
+            parts = [",".join(fields[i : i + 8]) for i in range(0, len(fields), 8)]
+            lines += [f"{name},{part}" for name, part in zip([_CARDS[block.type], "", ""], parts, strict=False)]
+    return "\n".join([*lines, "PSOLID,2,1", "MAT1,1,7.+10,,.33,2700.", *more, "ENDDATA", ""])

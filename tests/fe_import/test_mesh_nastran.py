@@ -6,32 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from solid_meshes import box, mixed_box
+from solid_meshes import BAR, bulk, mixed_box
 
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.read import read_mesh
-
-CARDS = {"tet4": "CTETRA", "pyramid5": "CPYRAM", "wedge6": "CPENTA", "hex8": "CHEXA"}
-BAR = box("hex8", (3, 1, 1))
-
-
-def bulk(mesh: SolidMesh, *more: str, before: str = "", large: bool = False) -> str:
-    """Grid point k has number 10 k + 7, element k number k + 1 and property 2; free fields, or large ones."""
-    lines = [before + "BEGIN BULK"]
-    for k, (x, y, z) in enumerate(mesh.nodes.tolist()):
-        if large:
-            lines += [f"{'GRID   *':8s}{10 * k + 7:16d}{'':16s}{x:16.9E}{y:16.9E}", f"{'*':8s}{z:16.9E}"]
-        else:
-            lines.append(f"GRID,{10 * k + 7},,{x!r},{y!r},{z!r}")
-    label = 0
-    for block in mesh.blocks:
-        for nodes in block.elements:
-            label += 1
-            fields = [str(label), "2", *(str(10 * n + 7) for n in nodes)]
-            parts = [",".join(fields[i : i + 8]) for i in range(0, len(fields), 8)]
-            lines += [f"{name},{part}" for name, part in zip([CARDS[block.type], "", ""], parts, strict=False)]
-    return "\n".join([*lines, "PSOLID,2,1", "MAT1,1,7.+10,,.33,2700.", *more, "ENDDATA", ""])
 
 
 def read(folder: Path, text: str, *ignore: str) -> SolidMesh:
@@ -98,9 +77,11 @@ def test_coordinate_systems(tmp_path, frame, given):
 
 
 LOSSES = {  # cards, what the message says, names to ignore
-    "masses": (["CONM2,90,7,,1.5"], "point masses: 1 CONM2 from line 26", ["CONM2"]),
-    "rigid": (["RBE2,90,7,123456,17,27"], "constraints between nodes: 1 RBE2", ["RBE2"]),
-    "averaged": (["RBE3,90,,7,123,1.,123,17,27"], "constraints between nodes: 1 RBE3", ["RBE3"]),
+    "masses": (["CMASS2,90,1.5,7,1"], "point masses: 1 CMASS2 from line 26", ["CMASS2"]),
+    "turned mass": (["CONM2,90,7,3,1.5"], "point masses (a CONM2 in a coordinate system of its own", ["CONM2"]),
+    "rigid in part": (["RBE2,90,7,13,17,27"], "(an RBE2 that leaves displacements free, line 26)", ["RBE2"]),
+    "two averaged": (["RBE3,90,,7,123,1.,123,17,27"], "fewer than three grid points", ["RBE3"]),
+    "bar": (["RBAR,90,7,17,123456"], "constraints between nodes: 1 RBAR", ["RBAR"]),
     "springs": (["CELAS2,90,1.+5,7,1", "CBUSH,91,5,7,17"], "1 CELAS2", ["CELAS2", "CBUSH"]),
     "supports": (["SPC1,1,123,7"], "supports (a link is free", ["SPC1"]),
     "beams": (["CBAR,90,3,7,17,0.,0.,1.", "PBAR,3,1,.1,.1,.1,.1"], "beams or bars: 1 CBAR", ["CBAR"]),
