@@ -7,12 +7,14 @@ the matrices. Upper and lower case make no difference, as in these programs.
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from fe_import.abaqus.elements import ElementType, element_type, in_mesh_order
+from fe_import.abaqus.keywords import canonical
 from fe_import.abaqus.lines import DeckReader
 from fe_import.abaqus.sets import Item, NodesOf, SetTable, set_items
 from fe_import.errors import Cause, shortened
@@ -71,7 +73,7 @@ class Deck:
     statements : list of Statement
     keywords : Counter of str
         All keywords, in capitals.
-    lines : dict of int
+    places : dict of str
         Where keywords and types of elements stand first.
     """
 
@@ -85,7 +87,7 @@ class Deck:
     solid_sections: list[str] = field(default_factory=list)
     statements: list[Statement] = field(default_factory=list)
     keywords: Counter[str] = field(default_factory=Counter)
-    lines: dict[str, int] = field(default_factory=dict)
+    places: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.node_sets.nodes_of = self.nodes_of
@@ -103,7 +105,7 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
     ----------
     path : Path
     where : str
-        To name in messages.
+        To name in messages; the names of included files start at its folder.
     cause : Cause
         Of a faulty deck.
 
@@ -114,14 +116,11 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
         there, parameters that are not known, an end that is missing, what would have to be looked up elsewhere.
     """
     deck = Deck()
-    with TextFile(path, where, cause) as file:
-        reader = DeckReader(file)
+    with TextFile(path, where, cause) as file, contextlib.closing(DeckReader(file, Path(where))) as reader:
         while (keyword := reader.keyword()) is not None:
-            name, options = keyword
+            name, options = canonical(keyword[0]), keyword[1]
             deck.keywords[name] += 1
-            deck.lines.setdefault(name, reader.number)
-            if name == "INCLUDE":
-                raise reader.fault("*INCLUDE is not followed", remedy="join the files into one")
+            deck.places.setdefault(name, reader.place)
             if name in _ELSEWHERE:
                 raise reader.fault(f"*{name} is not followed", remedy="write all nodes and elements out")
             if name in _KEYWORDS:
@@ -165,7 +164,7 @@ def _nodes(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
 def _elements(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     kind = _named(options, "TYPE").upper()
     deck.types[kind] = known = element_type(kind)
-    deck.lines.setdefault(kind, reader.number)
+    deck.places.setdefault(kind, reader.place)
     cells = deck.elements.setdefault(kind, {})
     labels: list[int] = []
     while (fields := reader.data()) is not None:

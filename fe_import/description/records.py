@@ -134,7 +134,8 @@ class Solid(_Record, frozen=True):
     Attributes
     ----------
     mesh : str
-        Any file that meshio reads, also packed as ``.gz``; the path starts at the description.
+        An input deck, bulk data, or any file that meshio reads, also packed as ``.gz``; the path starts at the
+        description.
     material : str
         A name from ``[materials]``, for the whole mesh.
     regions : list of Region

@@ -61,7 +61,7 @@ def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:
         if name in attached.reasons:
             text += f" ({attached.reasons[name]})"
         used = name in attached.whole and name not in attached.reasons
-        return LeftOut(name, count, deck.lines[name], "" if used else text, used)
+        return LeftOut(name, count, deck.places[name], "" if used else text, used)
 
     found = [entry(name, count, loss(name)) for name, count in deck.keywords.items() if not is_read(name)]
     sectioned = _with_sections(deck)
@@ -70,7 +70,8 @@ def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:
             text = loss_of_elements(kind, dimension, not sectioned.isdisjoint(cells))
             item = entry(kind, len(cells), text)
             found += [] if item.used else [item]  # its keyword is there
-    return sorted(found, key=lambda item: item.line)
+    order = list(deck.places)
+    return sorted(found, key=lambda item: order.index(item.name))
 
 
 def _with_sections(deck: Deck) -> set[int]:

@@ -18,6 +18,7 @@ import numpy as np
 from fe_import.elements.attachments import Attachment, nodes_of, renumbered
 from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.errors import Cause, FEImportError
+from fe_import.files.includes import included_name, resolved
 from fe_import.files.text import TextFile
 from fe_import.mesh.nastran_attachments import Unused, attachment
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
@@ -41,6 +42,7 @@ _SHAPES = {2: ("line", 1), 3: ("triangle", 2), 4: ("quad", 2), 6: ("triangle6", 
 _PROPERTIES = re.compile(r"(PSHELL|PCOMP|PSHEAR|PBAR|PBEAM|PROD|PTUBE|PBEND)")
 _BEGIN = re.compile(r"\s*BEGIN\b(?:\s+BULK)?\s*(?P<more>.*)", re.IGNORECASE)
 _CASE_SET = re.compile(r"\s*SET\s+(\d{1,9})\s*=(.*)", re.IGNORECASE)
+MOST_DEEP = 20  # files that include each other
 _MOST_OF_RANGE = 10_000_000
 
 
@@ -56,39 +58,55 @@ def read_nastran(path: Path, name: str) -> RawMesh:
     Raises
     ------
     FEImportError
-        ``NOT_READABLE``: faulty cards, INCLUDE, superelements; ``BAD_REFERENCE``: a coordinate system that is not
+        ``NOT_READABLE``: faulty cards, superelements, included files that are not there; ``BAD_REFERENCE``: a coordinate system that is not
         there.
     """
-    with TextFile(path, name, Cause.NOT_READABLE) as file:
-        lines = []
-        while (line := file.line()) is not None:
-            lines.append(line)
+    lines: list[tuple[str, str]] = []
+    _read(path, name, Path(name), lines, [])
     try:
-        first, cases = _case_control(lines, name)
-        return _mesh(list(read_cards(lines[first:], None, name, first + 1)), cases, name)
+        first, cases = _case_control(lines)
+        bulk = lines[first:]
+        return _mesh(list(read_cards((text for text, _ in bulk), None, lambda k: bulk[k - 1][1])), cases)
     except FEImportError as problem:
         if problem.cause is Cause.EXPORT:
             problem.cause, problem.message = Cause.NOT_READABLE, f"cannot be read as a mesh: {problem.message}"
         raise
 
 
-def _case_control(lines: list[str], name: str) -> tuple[int, dict[int, str]]:
+def _read(path: Path, name: str, first: Path, lines: list[tuple[str, str]], within: list[Path]) -> None:
+    """Lines of a file and of those that it includes, each with its place."""
+    with TextFile(path, name, Cause.NOT_READABLE) as file:
+        while (line := file.line()) is not None:
+            place = f"{name}: line {file.number}"
+            included = included_name(line.partition("$")[0]) if line[:1] not in " *" else None
+            if included is None:
+                lines.append((line, place))
+                continue
+            target = resolved(included, Path(name), first)
+            known = [path, *within]
+            if target is None or len(known) > MOST_DEEP or any(target.samefile(other) for other in known):
+                why = "there is no such file, or this one is packed" if target is None else "it includes itself"
+                message, remedy = f"INCLUDE cannot be followed: {why}", "give one file that holds all cards"
+                raise file.failure(message, line=file.number, value=included, remedy=remedy)
+            _read(target, str(target), first, lines, known)
+
+
+def _case_control(lines: list[tuple[str, str]]) -> tuple[int, dict[int, str]]:
     """Number of lines before the bulk data, and the sets that stand there."""
-    begins = [k for k, line in enumerate(lines) if _BEGIN.match(line)]
+    begins = [k for k, (line, _) in enumerate(lines) if _BEGIN.match(line)]
     for k in begins:
-        match = _BEGIN.match(lines[k])
+        match = _BEGIN.match(lines[k][0])
         if match and match["more"].strip().upper().startswith("SUPER"):
-            raise _fault(name, k, "BEGIN SUPER: superelements are not read", "write the parts as one bulk data file")
+            message, remedy = "BEGIN SUPER: superelements are not read", "write the parts as one bulk data file"
+            raise _fault(lines[k][1], message, remedy)
     if len(begins) > 1:
-        raise _fault(name, begins[1], "bulk data begin twice", "write one bulk data file")
+        raise _fault(lines[begins[1]][1], "bulk data begin twice", "write one bulk data file")
     if not begins:
         return 0, {}
     sets: dict[int, str] = {}
     number, text = 0, ""
-    for line in lines[: begins[0]]:
+    for line, _ in lines[: begins[0]]:
         stripped = line.partition("$")[0].strip()
-        if stripped.upper().startswith("INCLUDE"):
-            raise _fault(name, 0, "INCLUDE is not followed", "give one file that holds all cards")
         match = _CASE_SET.match(stripped)
         if match:
             number, text = int(match[1]), match[2]
@@ -100,11 +118,11 @@ def _case_control(lines: list[str], name: str) -> tuple[int, dict[int, str]]:
     return begins[0] + 1, sets
 
 
-def _fault(name: str, line: int, message: str, remedy: str) -> FEImportError:
-    return FEImportError(Cause.NOT_READABLE, message, where=f"{name}: line {line + 1}", remedy=remedy)
+def _fault(where: str, message: str, remedy: str) -> FEImportError:
+    return FEImportError(Cause.NOT_READABLE, message, where=where, remedy=remedy)
 
 
-def _mesh(cards: list[Card], cases: dict[int, str], name: str) -> RawMesh:
+def _mesh(cards: list[Card], cases: dict[int, str]) -> RawMesh:
     points = grid_points(card for card in cards if card.name in CARDS)
     place = {label: k for k, label in enumerate(points.positions)}
     properties = {card.integer(1) for card in cards if _PROPERTIES.match(card.name)}
@@ -194,7 +212,7 @@ def _counted(found: list[tuple[str, str, str]]) -> list[LeftOut]:
         if text and not known[1]:
             first[name] = (where, text)
     return [
-        LeftOut(name, counts[name], int(where.rpartition(" ")[2]), text) for name, (where, text) in first.items()
+        LeftOut(name, counts[name], Path(where).name.rpartition(": ")[2], text) for name, (where, text) in first.items()
     ]
 
 

@@ -26,8 +26,9 @@ class LeftOut:
     ----------
     name : str
         Keyword, card or type of elements.
-    count, line : int
-        How many there are, and where the first stands.
+    count : int
+    where : str
+        Place of the first.
     loss : str
         What the link would lack; empty where it cannot matter to a link.
     used : bool
@@ -36,7 +37,7 @@ class LeftOut:
 
     name: str
     count: int
-    line: int
+    where: str
     loss: str = ""
     used: bool = False
 

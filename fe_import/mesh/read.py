@@ -113,7 +113,7 @@ def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]
         names = ", ".join(f'"{name}"' for name in dict.fromkeys([*asked, *(item.name for item in losses)]))
         raise FEImportError(
             Cause.NOT_USED,
-            "the link would lack " + "; ".join(f"{i.loss}: {i.count} {i.name} from line {i.line}" for i in losses),
+            "the link would lack " + "; ".join(f"{i.loss}: {i.count} {i.name} from {i.where}" for i in losses),
             where=where,
             remedy=f"give them in the link description or the scene if they matter, then ignore = [{names}] in [solid]",
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from fe_import.errors import Cause, FEImportError
@@ -58,7 +58,9 @@ class Card:
         return value
 
 
-def read_cards(lines: Iterable[str], names: frozenset[str] | None, where: str, first: int = 1) -> Iterator[Card]:
+def read_cards(
+    lines: Iterable[str], names: frozenset[str] | None, where: str | Callable[[int], str]
+) -> Iterator[Card]:
     """The cards with given names, in order.
 
     Parameters
@@ -67,10 +69,8 @@ def read_cards(lines: Iterable[str], names: frozenset[str] | None, where: str, f
         Executive and case control before ``BEGIN BULK`` may be among them, cards behind ``ENDDATA`` are left out.
     names : frozenset of str or None
         In capitals; all cards when None.
-    where : str
-        Name of the file, for messages.
-    first : int
-        Number of the first line.
+    where : str or callable
+        Name of the file, for messages; or the place of a line by its number, from 1.
 
     Raises
     ------
@@ -78,22 +78,23 @@ def read_cards(lines: Iterable[str], names: frozenset[str] | None, where: str, f
         ``EXPORT``: an INCLUDE that would have to be followed; a line behind a card that is neither a card nor its
         continuation.
     """
+    place = where if callable(where) else f"{where}: line {{}}".format
     name, fields, start = "", [], 0
-    for number, raw in enumerate(lines, start=first):
+    for number, raw in enumerate(lines, start=1):
         line = raw.partition("$")[0].rstrip().expandtabs(8)
         if not line:
             continue
         head, data = _split(line)
         if name and _COMMENT_IN_WORD.search(raw):
-            raise _damaged(f"{where}: line {number}", "a comment begins within a field", raw)
+            raise _damaged(place(number), "a comment begins within a field", raw)
         if not head or head[0] in "+*":
             if name:
                 fields += data
             continue
         if name:
             if not head[0].isalpha():
-                raise _damaged(f"{where}: line {number}", "neither a card nor the continuation of one", raw)
-            yield Card(name, tuple(fields), f"{where}: line {start}")
+                raise _damaged(place(number), "neither a card nor the continuation of one", raw)
+            yield Card(name, tuple(fields), place(start))
         name = ""
         keyword = head.rstrip("* ").upper()
         if keyword == "ENDDATA":
@@ -102,13 +103,13 @@ def read_cards(lines: Iterable[str], names: frozenset[str] | None, where: str, f
             raise FEImportError(
                 Cause.EXPORT,
                 "INCLUDE is not followed",
-                where=f"{where}: line {number}",
+                where=place(number),
                 remedy="give one file that holds all cards",
             )
         if names is None or keyword in names:
             name, fields, start = keyword, data, number
     if name:
-        yield Card(name, tuple(fields), f"{where}: line {start}")
+        yield Card(name, tuple(fields), place(start))
 
 
 def _damaged(where: str, message: str, line: str) -> FEImportError:

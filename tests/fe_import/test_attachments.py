@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg as la
-from link_files import SOLID, merged, solid_link, write_toml
+from link_files import SOLID, merged, solid_link, write_box, write_toml
 from solid_meshes import BAR, bulk
 
 from fe_import.description.link import LinkFile, load_link
@@ -162,11 +162,16 @@ def test_what_cannot_be_attached(tmp_path, name):
 
 
 def test_raised_order_keeps_bodies(tmp_path):
-    """The mid-side nodes of a rigid face follow too."""
-    _, centre = end_and_centre(tmp_path)
-    lines = ["*NODE", "9000, " + ", ".join(map(repr, centre.tolist())), "*RIGID BODY, NSET=x1, REF NODE=9000"]
-    model = build_model(with_cards(tmp_path, *lines, solid={"raise_order": True}))
-    expected = build_model(solid_link(tmp_path, solid={"raise_order": True}))
+    """The mid-side nodes of a rigid face follow too: as an interface there, which the raised set gives."""
+    both = solid_link(tmp_path, solid={"raise_order": True})
+    mesh = write_box(tmp_path / "box.inp", kind="hex8")
+    expected = build_model(both)
+    one = with_cards(tmp_path, solid={"raise_order": True})
+    write_box(mesh, kind="hex8")
+    lines = ["*NODE", "9000, 0.3, 0.01, 0.015", "*RIGID BODY, NSET=x1, REF NODE=9000", ""]
+    mesh.write_text(mesh.read_text() + "\n".join(lines))
+    model = build_model(one)
+    assert model.stress.mesh.only.type == "hex20"
     np.testing.assert_allclose(frequencies(model), frequencies(expected), rtol=1e-8)
 
 

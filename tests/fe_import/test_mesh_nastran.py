@@ -105,8 +105,10 @@ def test_nothing_is_dropped(tmp_path, name):
 
 FAULTS = {
     "superelement": (bulk(BAR, "BEGIN SUPER=1", "GRID,1,,0.,0.,0."), "BEGIN SUPER: superelements are not read"),
-    "include": (bulk(BAR, "INCLUDE 'more.bdf'"), "INCLUDE is not followed"),
-    "include before the bulk": (bulk(BAR, before="INCLUDE 'more.bdf'\n"), "INCLUDE is not followed"),
+    "include": (bulk(BAR, "INCLUDE 'more.bdf'"), "there is no such file, or"),
+    "include before the bulk": (bulk(BAR, before="INCLUDE 'more.bdf'\n"), "there is no such file, or"),
+    "includes itself": (bulk(BAR, "INCLUDE 'bar.bdf'"), "it includes itself"),
+    "half a name": (bulk(BAR, "INCLUDE 'bar"), "there is no such file, or"),
     "half an element": (bulk(BAR, "CHEXA,90,2,7,17,27,37,47,57"), "another number of grid points"),
     "mid-side nodes missing": (bulk(BAR, "CTETRA,90,2,7,17,27,37,47,"), "another number of grid points"),
     "unknown grid point": (bulk(BAR, "CTETRA,90,2,7,17,27,8"), "needs a grid point that is not there"),
