@@ -58,7 +58,9 @@ class DeckReader:
         target = resolved(name, here, self._first)
         self._included += 1
         if target is None or self._included > MOST_INCLUDED or any(f.path.samefile(target) for f in self._files):
-            why = "there is no such file, or this one is packed" if target is None else "it includes itself, or too many files are included"
+            why = "it includes itself, or too many files are included"
+            if target is None:
+                why = "there is no such file, or this one is packed"
             message, remedy = f"*INCLUDE cannot be followed: {why}", "join the files into one"
             raise file.failure(message, line=file.number, value=shortened(name), remedy=remedy)
         self._files.append(TextFile(target, str(target), file.cause))

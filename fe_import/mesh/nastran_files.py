@@ -58,8 +58,8 @@ def read_nastran(path: Path, name: str) -> RawMesh:
     Raises
     ------
     FEImportError
-        ``NOT_READABLE``: faulty cards, superelements, included files that are not there; ``BAD_REFERENCE``: a coordinate system that is not
-        there.
+        ``NOT_READABLE``: faulty cards, superelements, included files that are not there; ``BAD_REFERENCE``: a
+        coordinate system that is not there.
     """
     lines: list[tuple[str, str]] = []
     _read(path, name, Path(name), lines, [])

@@ -15,7 +15,7 @@ from fe_import.errors import Cause, FEImportError
 
 _INTEGER = re.compile(r"[+-]?\d{1,18}")
 _REAL = re.compile(r"([+-]?(?:\d+\.\d*|\.\d+|\d+(?=[EDed])))(?:[EDed]?([+-]\d{1,4})|[EDed](\d{1,4}))?")
-_COMMENT_IN_WORD = re.compile(r"[^\s,]\$")
+_COMMENT_IN_WORD = re.compile(r"[^\s,]\$\w")
 _DATA_COLUMNS = 72  # the rest of a line names its continuation
 _FREE_FORMAT = 10  # a comma among the first ten columns
 
