@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from fe_import.elements.reference_cells import HEXAHEDRON
 from fe_import.elements.solid_elements import MESH_ELEMENTS, SolidElement
 
 _SOLIDS = {element.size: element for element in MESH_ELEMENTS.values()}
@@ -63,13 +64,10 @@ def solid_type(kind: str) -> SolidElement | None:
     return _SOLIDS.get(int(found[2])) if found and found[1] == "C3D" else None
 
 
-def in_mesh_order(kind: str, nodes: list[int]) -> list[int]:
-    """Nodes of an element in meshio's order; decks begin the further nodes of C3D27 with the centre, and S1, S2 ..."""
-    solid = solid_type(kind)
-    if solid is None or solid.size != 27:
-        return nodes
-    faces = [nodes[21 + solid.cell.deck_faces.index(face)] for face in range(6)]
-    return [*nodes[:20], *faces, nodes[20]]
+def in_mesh_order(nodes: list[int]) -> list[int]:
+    """Nodes of a C3D27 in meshio's order; decks begin the further ones with the centre, then those of S1, S2 ..."""
+    places = [21 + HEXAHEDRON.deck_faces.index(face) for face in range(6)]
+    return [*nodes[:20], *(nodes[k] for k in places), nodes[20]]
 
 
 def face_nodes(kind: str, number: int) -> list[int]:

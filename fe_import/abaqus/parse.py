@@ -177,7 +177,9 @@ def _elements(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
         if not fields:
             continue
         label, *nodes = map(reader.integer, fields)
-        nodes = in_mesh_order(kind, nodes[: known.nodes])
+        nodes = nodes[: known.nodes]
+        if known.nodes == 27:
+            nodes = in_mesh_order(nodes)
         if deck.kinds.setdefault(label, kind) != kind or cells.setdefault(label, nodes) != nodes:
             raise reader.fault(f"element {label} stands twice, with different nodes or types")
         labels.append(label)

@@ -239,7 +239,7 @@ FAULTS = [
     fault("negative mass", relined("k.mas", negative), Cause.NOT_DEFINITE, "negative"),
     fault("a stretched mesh", lambda: {"k.inp": stretched()}, GROUNDED, "not where the matrices have them"),
     fault("a mixed-up node", lambda: {"k.dof": renumbered()}, GROUNDED, "not where the matrices have them"),
-    fault("an include", swapped("k.inp", "*NODE", "*INCLUDE, INPUT=mesh.inp\n*NODE"), BAD, "*INCLUDE is not followed"),
+    fault("an include", swapped("k.inp", "*NODE", "*INCLUDE, INPUT=mesh.inp\n*NODE"), BAD, "there is no such file"),
     fault("parts", swapped("k.inp", "*NODE", "*PART, NAME=P\n*NODE"), BAD, "flat deck"),
     fault("a node twice", swapped("k.inp", "*ELEMENT", "10, 1.0\n*ELEMENT"), BAD, "stands twice"),
     fault("a bad coordinate", swapped("k.inp", "0.0", "0..0"), BAD, "expected a finite number"),

@@ -16,7 +16,7 @@ from skfem.mapping import MappingIsoparametric
 from solid_meshes import box, mixed_box, quarter_ring
 
 from fe_import.elements.solid import SolidMaterial, assemble_solid
-from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_elements import MESH_ELEMENTS, SOLID_ELEMENTS
 from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
@@ -25,7 +25,7 @@ from fe_import.modal.inertia import mass_properties
 
 STEEL = SolidMaterial(2.1e11, 0.3, 7850.0)
 TYPES = sorted(SOLID_ELEMENTS)
-OF_SKFEM = [name for name in TYPES if isinstance(SOLID_ELEMENTS[name].shape, str)]
+OF_SKFEM = [name for name, e in sorted(MESH_ELEMENTS.items()) if isinstance(e.shape, str)]
 TOPOLOGY = {
     "tetrahedron": skfem.MeshTet1,
     "wedge": skfem.MeshWedge1,
