@@ -184,6 +184,8 @@ class FEModel:
         What stands in the mesh file and is not part of the link, and how often.
     second_order_lack : str
         Why second-order displacements of a solid cannot be computed, where they cannot.
+    materials : dict
+        Those that the mesh file brings, where they are used, in its units: Young's modulus, Poisson's ratio, density.
     """
 
     name: str
@@ -207,6 +209,7 @@ class FEModel:
     thermal: ThermalLoad | None = None
     left_out: dict[str, int] = field(default_factory=dict)
     second_order_lack: str = ""
+    materials: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @property
     def interface_dofs(self) -> IntArray:

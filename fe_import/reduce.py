@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from fe_import.description.link import LinkFile, load_link
+from fe_import.description.records import Material
 from fe_import.files.toml import choose
 from fe_import.files.versions import package_version
 from fe_import.health.plausibility import plausible_link, plausible_materials
@@ -71,7 +72,8 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     where, options, wanted = str(link.path), link.description.reduction, link.description.recovery
     choose(options.method, REDUCTIONS, f"{where}: reduction.method")
     units = unit_factors(link.description, where)
-    checks = plausible_materials(link.description.materials, *units, where) + check_model(model, where)
+    materials = {**link.description.materials, **{name: Material(*m) for name, m in model.materials.items()}}
+    checks = plausible_materials(materials, *units, where) + check_model(model, where)
     _unit_checks(model, np.zeros(0), where)  # a slipped unit is named before the work is done
     basis = with_thermal_shape(model, REDUCTIONS[options.method](model, options, where))
     mass, stiffness = reduced_matrices(model, basis)

@@ -40,7 +40,8 @@ def attachments(deck: Deck) -> Attached:
     """Interpret the statements of a deck; sets may stand behind them."""
     result = Attached()
     served: set[int] = set()
-    for statement in deck.statements:
+    statements = [statement for statement in deck.statements if statement.name in _READERS]
+    for statement in statements:
         try:
             for item in _READERS[statement.name](deck, statement, served):
                 if any(node not in deck.points for node in nodes_of(item)):
@@ -48,7 +49,7 @@ def attachments(deck: Deck) -> Attached:
                 result.items.append(item)
         except (Unused, LostSet, ValueError, IndexError) as reason:
             result.reasons.setdefault(statement.name, str(reason) or "not understood")
-    for name in {statement.name for statement in deck.statements} - result.reasons.keys():
+    for name in {statement.name for statement in statements} - result.reasons.keys():
         result.whole.add(name)
     for kind, cells in deck.elements.items():
         if kind.startswith(("MASS", "ROTARYI", "SPRING")):

@@ -25,12 +25,15 @@ _ENDED = ("STEP", "PART", "ASSEMBLY", "INSTANCE")
 _LARGEST_LABEL = 999_999_999
 
 
-STATEMENTS = ("MASS", "ROTARY INERTIA", "SPRING", "EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING")
+STATEMENTS = (
+    *("MATERIAL", "ELASTIC", "DENSITY", "MASS", "ROTARY INERTIA", "SPRING"),
+    *("EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING"),
+)
 
 
 @dataclass
 class Statement:
-    """A keyword that `fe_import.abaqus.attachments` interprets when all sets are known.
+    """A keyword that `fe_import.abaqus.attachments` or `fe_import.abaqus.materials` interprets at the end of the deck.
 
     Attributes
     ----------
@@ -68,8 +71,8 @@ class Deck:
     node_sets, element_sets : SetTable
     surfaces : dict
         Name -> whether it is made of nodes, and its data lines.
-    solid_sections : list of str
-        Element sets of *SOLID SECTION.
+    solid_sections : list of dict
+        Parameters of each *SOLID SECTION.
     statements : list of Statement
     keywords : Counter of str
         All keywords, in capitals.
@@ -84,7 +87,7 @@ class Deck:
     node_sets: SetTable = field(default_factory=SetTable)
     element_sets: SetTable = field(default_factory=SetTable)
     surfaces: dict[str, tuple[bool, list[list[str]]]] = field(default_factory=dict)
-    solid_sections: list[str] = field(default_factory=list)
+    solid_sections: list[dict[str, str]] = field(default_factory=list)
     statements: list[Statement] = field(default_factory=list)
     keywords: Counter[str] = field(default_factory=Counter)
     places: dict[str, str] = field(default_factory=dict)
@@ -213,7 +216,8 @@ def _surface(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
 
 
 def _solid_section(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
-    deck.solid_sections.append(_named(options, "ELSET"))
+    _named(options, "ELSET")
+    deck.solid_sections.append(options)
 
 
 def _statement(reader: DeckReader, name: str, options: dict[str, str], deck: Deck) -> None:

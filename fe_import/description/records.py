@@ -137,7 +137,7 @@ class Solid(_Record, frozen=True):
         An input deck, bulk data, or any file that meshio reads, also packed as ``.gz``; the path starts at the
         description.
     material : str
-        A name from ``[materials]``, for the whole mesh.
+        A name from ``[materials]``, for the whole mesh; without it and ``regions`` an input deck brings its materials.
     regions : list of Region
         Instead of ``material``: one for each set of elements, ``[[solid.regions]]``.
     nodes : dict of (3,) floats

@@ -38,6 +38,28 @@ class ElementBlock:
 
 
 @dataclass(frozen=True)
+class MeshMaterials:
+    """Materials that a mesh file brings.
+
+    Attributes
+    ----------
+    constants : dict
+        Name -> Young's modulus, Poisson's ratio, density, in the units of the file.
+    sections : tuple of pairs
+        Element set and material.
+    lack : str
+        Why they cannot be used; empty when they can.
+    names : tuple of str
+        What of the file they are made of.
+    """
+
+    constants: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    sections: tuple[tuple[str, str], ...] = ()
+    lack: str = "it is none that brings materials"
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class SolidMesh:
     """Nodes, elements and named sets of a solid link.
 
@@ -61,6 +83,7 @@ class SolidMesh:
         Of no element, which attachments need.
     attachments : tuple of Attachment
         Further nodes have negative numbers: those of the mesh and these in one array, counted from its end.
+    materials : MeshMaterials
     """
 
     nodes: Array
@@ -72,6 +95,7 @@ class SolidMesh:
     left_out: dict[str, int] = field(default_factory=dict)
     further_nodes: Array = field(default_factory=lambda: np.zeros((0, 3)))
     attachments: tuple[Attachment, ...] = ()
+    materials: MeshMaterials = field(default_factory=MeshMaterials)
 
     @staticmethod
     def uniform(nodes: Array, elements: IntArray, element_type: str, **further: Any) -> SolidMesh:

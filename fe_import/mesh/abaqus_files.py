@@ -9,9 +9,11 @@ import numpy as np
 
 from fe_import.abaqus.attachments import Attached, attachments
 from fe_import.abaqus.keywords import is_read, loss, loss_of_elements
+from fe_import.abaqus.materials import USED, deck_materials
 from fe_import.abaqus.parse import Deck, read_deck
 from fe_import.abaqus.sets import LostSet, indices, surface_nodes
 from fe_import.elements.attachments import renumbered
+from fe_import.elements.solid_mesh import MeshMaterials
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 
@@ -48,10 +50,18 @@ def read_abaqus(path: Path, name: str) -> RawMesh:
     _add_element_sets(deck, numbers, mesh)
     _add_node_sets(deck, place, mesh)
     _add_surfaces(deck, place, mesh)
+    mesh.materials = _materials(deck)
     attached = attachments(deck)
     mesh.left_out += _left_out(deck, attached)
     mesh.attachments += [renumbered(i, place.__getitem__) for i in attached.items if i.keyword not in attached.reasons]
     return mesh
+
+
+def _materials(deck: Deck) -> MeshMaterials:
+    found = deck_materials(deck)
+    shown = deck.element_sets.names
+    sections = tuple((shown.get(name, name), material) for name, material in found.sections)
+    return MeshMaterials(found.constants, sections, found.lack, USED)
 
 
 def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:
@@ -77,9 +87,9 @@ def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:
 def _with_sections(deck: Deck) -> set[int]:
     """Elements of solid sections; what is lost of their sets is told where a set is asked for."""
     found: set[int] = set()
-    for name in deck.solid_sections:
+    for options in deck.solid_sections:
         with contextlib.suppress(LostSet):
-            found |= deck.element_sets.members(name)
+            found |= deck.element_sets.members(options["ELSET"])
     return found
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fe_import.elements.attachments import Attachment
+from fe_import.elements.solid_mesh import MeshMaterials
 from fe_import.model import Array, IntArray
 
 
@@ -59,6 +60,7 @@ class RawMesh:
     left_out : list of LeftOut
     attachments : list of Attachment
         With numbers of points.
+    materials : MeshMaterials
     mirrored : bool
         Whether the format turns elements inside out, so that all of them may be.
     """
@@ -70,4 +72,5 @@ class RawMesh:
     lost: dict[str, str] = field(default_factory=dict)
     left_out: list[LeftOut] = field(default_factory=list)
     attachments: list[Attachment] = field(default_factory=list)
+    materials: MeshMaterials = field(default_factory=MeshMaterials)
     mirrored: bool = False

@@ -74,8 +74,9 @@ def read_mesh(path: Path, ignore: Sequence[str] = ()) -> SolidMesh:
     blocks = _joined(raw, solids, dense)
     further, attachments = _attachments(raw, left_out, dense, str(path))
     mesh = SolidMesh(
-        points[used], blocks, element_sets, node_sets, str(path), lost, left_out, points[further], attachments
-    )
+        points[used], blocks, element_sets, node_sets, str(path), lost, left_out, points[further], attachments,
+        raw.materials,
+    )  # fmt: skip
     if raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
         turned = (replace(block, elements=block.elements[:, block.element.mirrored_order]) for block in mesh.blocks)
         mesh = replace(mesh, blocks=tuple(turned))

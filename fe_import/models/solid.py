@@ -49,7 +49,7 @@ def solid_model(link: LinkFile) -> FEModel:
         mesh = raised(mesh)
     if solid.hex8 == "incompatible-modes":
         mesh = with_incompatible_modes(mesh)
-    materials = _materials(description, solid, mesh, where)
+    materials, own = _materials(description, solid, mesh, where), not (solid.material or solid.regions)
     mass, stiffness = assemble_solid(mesh, materials)
     lame = np.empty((mesh.count, 2))
     for material in materials:
@@ -77,7 +77,8 @@ def solid_model(link: LinkFile) -> FEModel:
         kind="solid",
         source=where,
         stress=solid_stress(mesh, lame),
-        left_out=mesh.left_out,
+        left_out={name: n for name, n in mesh.left_out.items() if not own or name not in mesh.materials.names},
+        materials=mesh.materials.constants if own else {},
         notes=_attached_notes(mesh),
         second_order_lack=_second_order_lack(mesh),
     )
@@ -101,10 +102,12 @@ def _second_order_lack(mesh: SolidMesh) -> str:
 
 
 def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[SolidMaterial]:
-    if bool(solid.material) == bool(solid.regions):
+    if not solid.material and not solid.regions:
+        return _materials_of_mesh(mesh, where)
+    if solid.material and solid.regions:
         raise FEImportError(
             Cause.BAD_FIELD,
-            "give exactly one of 'material' and 'regions'",
+            "give one of 'material' and 'regions'",
             where=f"{where}: solid",
             remedy="one material for the whole mesh, or one per element set",
         )
@@ -127,6 +130,20 @@ def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str)
         elements = mesh.element_sets[region.set]
         result.append(SolidMaterial(m.youngs_modulus, m.poissons_ratio, m.density, elements))
     return result
+
+
+def _materials_of_mesh(mesh: SolidMesh, where: str) -> list[SolidMaterial]:
+    found = mesh.materials
+    lost = next((name for name, _ in found.sections if name not in mesh.element_sets), None)
+    if found.lack or lost is not None:
+        reason = found.lack or f"its set {lost!r} holds no solid elements that could be followed"
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            f"no 'material' and no 'regions', and the materials of the mesh file cannot be used: {reason}",
+            where=f"{where}: solid",
+            remedy="give material = NAME for the whole mesh, or [[solid.regions]] for its element sets",
+        )
+    return [SolidMaterial(*found.constants[name], mesh.element_sets[key]) for key, name in found.sections]
 
 
 def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[InterfaceFace]:

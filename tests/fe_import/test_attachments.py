@@ -1,4 +1,4 @@
-"""Masses, springs and constraints of mesh files, beside the same links described otherwise and closed forms."""
+"""Masses, springs, constraints, materials of mesh files, beside links described otherwise and closed forms."""
 
 from __future__ import annotations
 
@@ -201,3 +201,38 @@ def test_cards_of_nastran(tmp_path):
     centre = (solid * np.array([0.5, 0.5, 0.5]) + 1.5 * np.array([1.1, 0.7, 0.8])) / (solid + 1.5)
     np.testing.assert_allclose(found.centre_of_mass, centre, rtol=1e-12)
     np.testing.assert_allclose(model.coupling @ rigid[model.independent], rigid, atol=1e-12)
+
+
+MATERIALS = ["*MATERIAL, NAME=Alu", "*ELASTIC", "7e10, .33", "*DENSITY", "2700.,"]
+MATERIALS += ["*SOLID SECTION, ELSET=all, MATERIAL=alu"]
+
+
+def test_materials_of_a_deck(tmp_path):
+    """The same model as with the material in the description; judged like that one, and not listed as left out."""
+    own = with_cards(tmp_path, *MATERIALS, solid={"material": ""}, materials={})
+    model, modal = build_model(own), reduce_link(own)
+    expected = build_model(with_cards(tmp_path))
+    assert abs(model.stiffness - expected.stiffness).max() == 0
+    assert abs(model.mass - expected.mass).max() == 0
+    assert model.materials == {"ALU": (7e10, 0.33, 2700.0)}
+    assert "left out" not in modal.provenance
+    assert any("density" in check.name for check in modal.health)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("*ELASTIC", "*ELASTIC, TYPE=ORTHO"), "elastic of type ORTHO"),
+        (("7e10, .33", "7e10, .33\n6e10, .33, 100."), "changes with temperature"),
+        (("*DENSITY\n2700.,", ""), "lacks *ELASTIC or *DENSITY"),
+        (("MATERIAL=alu", "MATERIAL=alu, ORIENTATION=O"), "orientation"),
+        (("ELSET=all", "ELSET=none"), "'none' holds no solid elements".replace("'none'", "'NONE'")),
+        (("*SOLID SECTION, ELSET=all, MATERIAL=alu", ""), "no *SOLID SECTION"),
+    ],
+)
+def test_materials_that_cannot_be_used(tmp_path, change, words):
+    lines = "\n".join(MATERIALS).replace(*change)
+    with pytest.raises(FEImportError) as caught:
+        build_model(with_cards(tmp_path, lines, solid={"material": ""}))
+    assert caught.value.cause is Cause.BAD_FIELD
+    assert words in str(caught.value)
