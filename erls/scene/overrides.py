@@ -20,14 +20,34 @@ def apply_override(data: dict[str, Any], text: str) -> None:
     """
     key, equals, value = text.partition("=")
     where = f"--set {text}"
-    steps = _SHORT.get(key.strip(), key.strip()).split(".")
-    if not equals or not all(steps):
+    if not equals or not all(key.strip().split(".")):
         raise SceneError(Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4")
     try:
         found = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
         found = {}
-    parsed = found["value"] if len(found) == 1 else value.strip()  # a bare word is a string
+    at, place = place_of(data, key, where)
+    at[place] = found["value"] if len(found) == 1 else value.strip()  # a bare word is a string
+
+
+def place_of(data: dict[str, Any], key: str, where: str) -> tuple[Any, Any]:
+    """The table or list that holds what a dotted key names, and its key or number there; tables on the way are made.
+
+    Parameters
+    ----------
+    data : dict
+        Parsed TOML.
+    key : str
+        Members of lists go by name or number.
+    where : str
+        For messages.
+
+    Raises
+    ------
+    SceneError
+        No such place.
+    """
+    steps = _SHORT.get(key.strip(), key.strip()).split(".")
     at: Any = data
     for step, following in zip(steps, [*steps[1:], None], strict=True):
         if isinstance(at, list):
@@ -51,6 +71,6 @@ def apply_override(data: dict[str, Any], text: str) -> None:
         else:
             raise SceneError(Cause.BAD_FIELD, f"{step!r} is not inside a table", where=where, remedy="check the key")
         if following is None:
-            at[place] = parsed
-        else:
-            at = at[place]
+            return at, place
+        at = at[place]
+    raise AssertionError("a key has steps")

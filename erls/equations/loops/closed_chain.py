@@ -21,9 +21,9 @@ from erls.equations.linearization import Linearization, derivatives, difference_
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.rows import Closure, applied
 from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
-from erls.equations.loops.static import closed_equilibrium
+from erls.equations.loops.static import held_loops
 from erls.equations.loops.tied import OPEN, Tied
-from erls.equations.serial.equilibrium import elastic_on_diagonal
+from erls.equations.serial.equilibrium import Held, elastic_on_diagonal, equilibrium
 from erls.equations.serial.state_series import (
     ReactionSeries,
     StateSeries,
@@ -206,7 +206,12 @@ class ClosedChain(Tied):
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
         """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness."""
-        return closed_equilibrium(self, self.exact, self._closed_start, self.start.held)
+        return equilibrium(self.held, self._closed_start)
+
+    @property
+    def held(self) -> Held:
+        """The closed chain at rest with the joints held that the loops leave free."""
+        return held_loops(self, self.exact, self._closed_start, self.start.held)
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
         """Small motions about a closed state on the ways that the loops leave, with their forces as they are there."""

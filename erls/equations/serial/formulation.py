@@ -16,7 +16,13 @@ import scipy.linalg as la
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization, derivatives, difference_steps
-from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
+from erls.equations.serial.equilibrium import (
+    Held,
+    elastic_on_diagonal,
+    equilibrium,
+    held_tree,
+    size_of,
+)
 from erls.equations.serial.loads import load_powers
 from erls.equations.serial.records import Serial
 from erls.equations.serial.singular import singular_mass
@@ -158,7 +164,12 @@ class SerialFormulation(TreeFormulation):
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
         """Static equilibrium with the joints held, and what loads leave of the stiffness."""
-        return held_equilibrium(self, self.undeformed_start()[0], self.free_joints)
+        return equilibrium(self.held, self.undeformed_start()[0])
+
+    @property
+    def held(self) -> Held:
+        """The mechanism at rest with its joints held."""
+        return held_tree(self, self.undeformed_start()[0], self.free_joints)
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
         """Small motions about a state, with the accelerations of the equations of motion."""
