@@ -9,7 +9,9 @@ from pathlib import Path
 from erls.equations.registry import system_of
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
+from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
 from erls.scene.read import load_chain
@@ -19,6 +21,15 @@ from erls.sensitivity.parameters import parameters_of
 from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
 from erls.sensitivity.variants import differences
 from erls.simulation.simulate import simulate
+
+
+_UNKNOWN = {
+    "nodal": "the nodal formulation",
+    "pieces": "links in substructures",
+    "quasi-static": "modes that follow statically",
+    "absolute": "absolute coordinates",
+}
+"""Kinds of systems that are not differentiated yet."""
 
 
 @dataclass(frozen=True)
@@ -90,15 +101,13 @@ def sensitivities(
     >>> bool(found.derivatives["height"]["gravity.2"] > 0)
     True
     """
-    run = scene if isinstance(scene, ChainRun) else None
-    loaded = load_chain(scene) if isinstance(scene, (Path, str)) else scene
-    if run is None:
-        assert isinstance(loaded, Scene)
-        _scheme_asked(loaded)
+    if isinstance(scene, ChainRun):
+        run, keys = scene, parameters_of(scene.scene, parameters)
+    else:
+        loaded = load_chain(scene) if isinstance(scene, (Path, str)) else scene
+        refuse(loaded, build_mechanism(loaded, tell).mechanism)
         keys = parameters_of(loaded, parameters)
         run = simulate(loaded, tell=tell, verdict=False)
-    else:
-        keys = parameters_of(run.scene, parameters)
     scheme = scheme_of(run)
     values = {name: value_of(output, run, name) for name, output in outputs.items()}
     found = differences(run, keys)
@@ -112,16 +121,6 @@ def sensitivities(
     return Sensitivities(run, {one.key: one.value for one in keys}, values, derivatives)
 
 
-def _scheme_asked(scene: Scene) -> None:
-    """Refuse before a run what its scene says of it."""
-    settings = scene.record.simulation
-    where = f"{scene.path}: simulation"
-    if settings.output_step is not None:
-        raise _refusal("a run that keeps only some of its steps", f"{where}.output_step", "keep all steps")
-    if settings.integrator not in (FIXED_STEP, "lobatto", "auto"):
-        raise _refusal(f"steps of {settings.integrator}", f"{where}.integrator", "use auto, lobatto or a step")
-
-
 def scheme_of(run: ChainRun) -> Scheme:
     """What made a run, as maps of small changes.
 
@@ -130,30 +129,36 @@ def scheme_of(run: ChainRun) -> Scheme:
     SceneError
         BAD_FIELD: this cannot be differentiated yet; names what.
     """
-    settings, mechanism, where = run.scene.record.simulation, run.formulation.mechanism, str(run.scene.path)
-    _scheme_asked(run.scene)
-    kind = system_of(mechanism, settings)
-    if kind not in ("tree", "loops"):
-        words = {
-            "nodal": "the nodal formulation",
-            "pieces": "links in substructures",
-            "quasi-static": "modes that follow statically",
-            "absolute": "absolute coordinates",
-        }
-        raise _refusal(words[kind], f"{where}: simulation", "use erls or ffr with links in one piece")
-    if getattr(run.formulation, "compiled", None) is None:
-        raise _refusal("equations that are not compiled", f"{where}: simulation.gauge", "use the joint-angle gauge")
-    if mechanism.rotation_vectors:
-        raise _refusal("joints whose coordinates are rotation vectors", f"{where}: joints", "use universal joints")
+    settings = run.scene.record.simulation
+    refuse(run.scene, run.formulation.mechanism)
     if run.failure is not None:
-        raise _refusal("a run that did not come to its end", where, "shorten it, or mend what it failed of")
-    fixed = settings.integrator == FIXED_STEP
-    if kind == "loops" and fixed:
+        raise _refusal("a run that did not come to its end", str(run.scene.path), "shorten it, or mend why it failed")
+    return generalized_alpha(settings.spectral_radius) if settings.integrator == FIXED_STEP else lobatto()
+
+
+def refuse(scene: Scene, mechanism: Mechanism) -> None:
+    """Refuse what cannot be differentiated yet.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: names what.
+    """
+    settings, where = scene.record.simulation, f"{scene.path}: simulation"
+    if settings.output_step is not None:
+        raise _refusal("a run that keeps only some of its steps", f"{where}.output_step", "keep all steps")
+    if settings.integrator not in (FIXED_STEP, "lobatto", "auto"):
+        raise _refusal(f"steps of {settings.integrator}", f"{where}.integrator", "use auto, lobatto or a step")
+    kind = system_of(mechanism, settings)
+    if kind in _UNKNOWN:
+        raise _refusal(_UNKNOWN[kind], where, "use erls or ffr with independent coordinates and links in one piece")
+    if settings.gauge == "minimum-norm":
+        raise _refusal("the minimum-norm gauge", f"{where}.gauge", "use the joint-angle gauge")
+    if mechanism.rotation_vectors:
+        raise _refusal("coordinates that are rotation vectors", f"{scene.path}: joints", "use universal joints")
+    if kind == "loops" and settings.integrator == FIXED_STEP:
         remedy = "use integrator auto or lobatto, whose equations hold the forces of loops"
-        raise _refusal("generalized-alpha with loops", f"{where}: simulation.integrator", remedy)
-    if not fixed and run.solution.nodes_per_step != len(lobatto().nodes):
-        raise _refusal("the steps that auto chose", f"{where}: simulation.integrator", "use integrator lobatto")
-    return generalized_alpha(settings.spectral_radius) if fixed else lobatto()
+        raise _refusal("generalized-alpha with loops", f"{where}.integrator", remedy)
 
 
 def _refusal(what: str, where: str, remedy: str) -> SceneError:

@@ -1,7 +1,7 @@
 """The equations of motion at other values of a parameter, and derivatives by it as differences of these.
 
 What equations depend on (lengths, masses, gains, reduced matrices) is smooth algebra of a parameter, without the
-iterations and choices of a run: differences of it are right to 1e-10 where those of runs are right to 1e-5.
+iterations and choices of a run: differences of it are right to 1e-11 where those of runs are right to 1e-5.
 
 A link whose description changes has other modes. Its coordinates stay what they are, with the shapes Φ(p) T(p) that
 come nearest to Φ(p₀) among those which the modes of both span: T is what follows from the space that they span, so that
@@ -34,21 +34,14 @@ from fe_import.modal.model import ModalModel
 Stencil = tuple[tuple[int, float], ...]
 """Steps and weights of a difference."""
 
-_SECOND: tuple[Stencil, ...] = (
-    ((-1, -1 / 2), (1, 1 / 2)),
-    ((0, -3 / 2), (1, 2.0), (2, -1 / 2)),
-    ((0, 3 / 2), (-1, -2.0), (-2, 1 / 2)),
-)
-"""Of second order: central, and to one side where the other is refused (a negative mass)."""
-
-_FOURTH: tuple[Stencil, ...] = (
+_STENCILS: tuple[Stencil, ...] = (
     ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)),
     ((0, -25 / 12), (1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4)),
     ((0, 25 / 12), (-1, -4.0), (-2, 3.0), (-3, -4 / 3), (-4, 1 / 4)),
 )
-"""Of fourth order, for reductions: eigenvectors are right to some 1e-13, and want larger steps."""
+"""Of fourth order: central, and to one side where the other is refused (a negative mass)."""
 
-_STEP, _REDUCED_STEP = 1e-5, 1e-3  # of the size of a parameter
+_STEP = 1e-3  # of the size of a parameter: rounding takes 1e-13 of forces, the fifth derivative 1e-13 of itself
 
 
 @dataclass(frozen=True)
@@ -116,10 +109,8 @@ def differences(run: ChainRun, parameters: Sequence[Parameter]) -> list[Differen
 
 
 def _difference(run: ChainRun, parameter: Parameter) -> Difference:
-    reduced = bool(parameter.within)
-    step = (_REDUCED_STEP if reduced else _STEP) * parameter.size
-    problems = []
-    for stencil in _FOURTH if reduced else _SECOND:
+    step, problems = _STEP * parameter.size, []
+    for stencil in _STENCILS:
         try:
             return Difference(parameter, tuple(_variants(run, parameter, stencil, step)))
         except ReportedError as problem:

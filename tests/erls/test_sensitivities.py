@@ -1,0 +1,258 @@
+"""Derivatives of runs: against complex steps through the schemes, differences of tightened runs, laws of scale, closed
+forms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import complex_runs
+import numpy as np
+import pytest
+
+import erls
+from erls.equations.registry import formulate
+from erls.errors import SceneError
+from erls.integrate.choice import integrator, options_of
+from erls.run.chain.run import ChainRun
+from erls.sensitivity.forward import differentiated
+from erls.sensitivity.parameters import description_with, parameters_of
+from erls.sensitivity.sensitivities import scheme_of
+from erls.sensitivity.variants import differences, nearest_shapes
+from erls.simulation.chains import models_of
+from fe_import.errors import FEImportError, ReportedError
+from fe_import.reduce import reduce_link
+
+DATA = Path(__file__).parents[2] / "data"
+L, ROBOT = DATA / "l_shape" / "steel_tall.toml", DATA / "robot" / "two_link.toml"
+FOUR_BAR = DATA / "four_bar"
+
+POLYNOMIAL = 'motion={shape="polynomial", from_deg=0.0, to_deg=60.0, duration=0.03, degree=7}'
+DRIVEN = [
+    "simulation.duration=0.01",
+    'payloads=[{point="end2", mass=0.2, inertia=[1e-4, 1e-4, 2e-4], offset=[0.0, 0.01, 0.0]}]',
+    'loads=[{point="end1", force=[0.0, 1.0, 2.0], factor=[{shape="step", start=0.004, value=1.0}]}]',
+    f'joints.0.drive={{type="pd", {POLYNOMIAL}, proportional_gain=200.0, derivative_gain=10.0}}',
+    "joints.0.initial={position_deg=-2.0, rate=0.5}",
+    "joints.0.stiffness=3.0",
+    "joints.0.rest_deg=5.0",
+    "joints.0.damping=0.2",
+    "joints.0.friction={force=0.3, transition_rate=0.3}",
+    "joints.0.motor={rotor_inertia=1e-4, gear_ratio=30.0}",
+    "joints.1.motor={mass=0.3}",
+    f"joints.1.drive.{POLYNOMIAL}",
+]
+OF_MECHANISM = [
+    "gravity.2",
+    "base.position.0",
+    "joints.0.dh.a",
+    "joints.0.dh.alpha_deg",
+    "joints.0.drive.proportional_gain",
+    "joints.0.drive.derivative_gain",
+    "joints.0.drive.motion.to_deg",
+    "joints.0.stiffness",
+    "joints.0.rest_deg",
+    "joints.0.damping",
+    "joints.0.friction.force",
+    "joints.0.friction.transition_rate",
+    "joints.0.motor.rotor_inertia",
+    "joints.0.motor.gear_ratio",
+    "joints.0.initial.position_deg",
+    "joints.0.initial.rate",
+    "joints.1.drive.motion.to_deg",
+    "joints.1.motor.mass",
+    "payloads.0.mass",
+    "payloads.0.offset.1",
+    "payloads.0.inertia.2",
+    "loads.0.force.2",
+]
+EXACT = 1e-8  # what issue 15 asks for; measured 4e-11 of coordinates, 2e-9 of rates
+NOTHING = 1e-12  # of the motion per size of a parameter: one on which it does not depend
+
+
+def _run(path: Path, overrides: list[str]) -> ChainRun:
+    scene: Any = erls.load_scene(path, overrides)
+    return erls.simulate(scene, verdict=False)
+
+
+@pytest.mark.parametrize(
+    ("method", "keys"), [("step=2e-3", OF_MECHANISM), ('integrator="lobatto"', OF_MECHANISM[1::6])]
+)
+def test_parameters_of_mechanisms(method: str, keys: list[str]) -> None:
+    """Two-link robot, one joint controlled, one prescribed, loads that jump: a complex step through the scheme."""
+    run = _run(ROBOT, [*DRIVEN, f"simulation.{method}"])
+    given = parameters_of(run.scene, keys)
+    found = differentiated(run, differences(run, given), scheme_of(run))
+    radius = run.scene.record.simulation.spectral_radius if method.startswith("step") else None
+    for k, parameter in enumerate(given):
+        by = complex_runs.given(run, parameter, 1e-3 * parameter.size)
+        expected = complex_runs.differentiated(run, by, radius)
+        for of in (0, 1):
+            limit = EXACT * np.abs(expected[:, of]).max() + NOTHING / parameter.size
+            assert np.abs(found[:, of, :, k] - expected[:, of]).max() <= limit, (parameter.key, of)
+
+
+def _tight(run: ChainRun, formulation: Any) -> ChainRun:
+    """The run of equations with fixed steps whose iterations end at rounding."""
+    settings = run.scene.record.simulation
+    options = replace(options_of(settings), newton_tolerance=0.0)
+    start = formulation.initial_state()
+    solution = integrator(formulation.mechanism, settings)(
+        formulation, (0.0, settings.duration), *start, options, None
+    )
+    assert solution.failure is None
+    return replace(run, formulation=formulation, solution=solution)
+
+
+@pytest.mark.parametrize("key", ["links.forearm.model.sections.bar.width", "joints.0.initial.position_deg"])
+def test_differences_of_tightened_runs(key: str) -> None:
+    """From a static start, links of square section, of which one side grows: a pair of equal frequencies parts.
+
+    Central differences of fourth order have a floor of 2e-6 here; with the static start's own tolerance 1e-7.
+    """
+    overrides = ["simulation.step=2e-3", "simulation.duration=0.04", "initial.deformation=static"]
+    overrides += ["joints.0.drive.type=free", "joints.0.initial.position_deg=-30"]
+    first = _run(ROBOT, [o.replace("joints.0.drive.type=free", 'joints.0.drive={type="free"}') for o in overrides])
+    run = _tight(first, first.formulation)
+    outputs: dict[str, Callable[[ChainRun], Any]] = {
+        "end": lambda run: run.position("end2", [0.02, 0.04]),
+        "effort": lambda run: run.joint_effort("elbow_joint", 0.04),
+    }
+    found = erls.sensitivities(run, outputs, [key])
+    (difference,) = differences(run, parameters_of(run.scene, [key]))
+    tight = {variant: _tight(run, variant.formulation) for variant in difference.variants}
+    for name, output in outputs.items():
+        expected = difference.of(lambda variant, output=output: np.asarray(output(tight[variant])))
+        assert np.abs(found.derivatives[name][key] - expected).max() <= 2e-6 * np.abs(expected).max(), name
+
+
+SCALES = ["youngs_modulus", "density"]
+
+
+@pytest.mark.parametrize(
+    ("path", "overrides", "links", "point"),
+    [
+        (L, ["simulation.step=1e-3", "simulation.duration=0.02"], {"l": "steel"}, "tip"),
+        (L, ['simulation.formulation="ffr"', "simulation.step=1e-3", "simulation.duration=0.02"], {"l": "steel"}, "tip"),
+        (
+            FOUR_BAR / "flexible.toml",
+            ['simulation.integrator="lobatto"', "simulation.duration=0.05"],
+            {"crank": "steel", "coupler": "steel", "rocker": "steel"},
+            "coupler_middle",
+        ),
+    ],
+    ids=["ERLS", "FFR", "loop"],
+)
+def test_stiffness_and_mass_scale_out(path: Path, overrides: list[str], links: dict[str, str], point: str) -> None:
+    """Under weight and prescribed motions, stiffness and mass that grow alike change nothing: E ∂/∂E + ρ ∂/∂ρ = 0.
+
+    To 1e-7 of the parts, as reductions are right to 1e-10 and their differences take steps of 1e-3.
+    """
+    keys = [f"links.{name}.model.materials.{material}.{of}" for name, material in links.items() for of in SCALES]
+    end = float(overrides[-1].partition("=")[2])
+    found = erls.sensitivities(
+        _run(path, overrides), {"place": lambda run: run.position(point, [end / 2, end])}, keys
+    )
+    parts = [found.parameters[key] * found.derivatives["place"][key] for key in keys]
+    assert np.abs(sum(parts)).max() <= 1e-7 * np.abs(parts).max()
+
+
+def test_four_bar_of_rigid_links() -> None:
+    """The coupler's far end by the coupler's length: the triangle of coupler, rocker and pivot, in closed form.
+
+    To 1e-6: the run is right to its tolerance of 1e-7 m, and keeps its loops closed to that.
+    """
+    run = _run(FOUR_BAR / "rigid.toml", ["simulation.duration=0.2", "simulation.tolerance=1e-6"])
+    key, times = "links.coupler.rigid.points.tip.0", np.array([0.0, 0.1, 0.2])
+    own = {"end": lambda run: run.position("rocker_pin", times)}
+    found = erls.sensitivities(run, own, [key, "joints.1.dh.a"]).derivatives["end"]
+    end, pin = run.position("rocker_pin", times), run.position("pin", times)
+    pivot = np.array([0.5, 0.0, 0.0])
+    for k in range(3):
+        along, back = end[k] - pin[k], end[k] - pivot
+        length = np.linalg.norm(along)
+        expected = np.linalg.solve(np.array([along, back])[:, [0, 2]], [length, 0.0])
+        moved = sum(found.values())[k]  # the joint of the rocker goes with the point
+        np.testing.assert_allclose(moved[[0, 2]], expected, rtol=0, atol=1e-6)
+
+
+def test_mass_of_a_link() -> None:
+    """m = ρ V: an output that no motion takes part in, from a reduction and from one to one side of a bound."""
+    run = _run(L, ["simulation.duration=1e-3", "payloads=[{point='tip'}]"])
+    keys = ["links.l.model.materials.steel.density", "payloads.0.mass", "joints.0.damping"]
+    found = erls.sensitivities(run, {"mass": _mass}, keys).derivatives["mass"]
+    density = 7800.0
+    np.testing.assert_allclose(found[keys[0]], _mass(run) / density, rtol=1e-9)
+    np.testing.assert_allclose(found[keys[1]], 1.0, rtol=1e-9)
+    assert abs(found[keys[2]]) <= 1e-9 * _mass(run)
+
+
+def _mass(run: ChainRun) -> float:
+    return sum(float(link.invariants.rigid_mass_matrix[0, 0]) for link in run.formulation.mechanism.links)
+
+
+@pytest.mark.parametrize("of", SCALES)
+def test_shapes_are_held(of: str) -> None:
+    """In the coordinates of a link, material scales reduced matrices alone: pairs of equal frequency included.
+
+    Modes are those of unit mass, so that T = (ρ/ρ₀)^½; to 1e-9, as the eigenvectors.
+    """
+    run = _run(ROBOT, ["simulation.duration=1e-3"])
+    (parameter,) = parameters_of(run.scene, [f"links.forearm.model.materials.aluminium.{of}"])
+    base, ratio = models_of(run)[0][1], 1.02
+    other = reduce_link(description_with(run.scene, parameter, ratio * parameter.value))
+    turn = nearest_shapes(other, base)
+    mass, stiffness = turn.T @ turn, turn.T @ (other.stiffness[6:, 6:] @ turn)
+    by_mass, by_stiffness = (ratio, 1.0) if of == "density" else (1.0, ratio)
+    np.testing.assert_allclose(mass, by_mass * np.eye(len(mass)), rtol=0, atol=1e-9)
+    expected = by_stiffness * base.stiffness[6:, 6:]
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(stiffness / scale, expected / scale, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "keys", "told"),
+    [
+        ([], ["payloads.0.mass"], "no member '0'"),
+        ([], ["joints.shoulder.nothing"], "not given"),
+        ([], ["joints.shoulder.name"], "not a number"),
+        ([], ["joints..a"], "not a dotted key"),
+        ([], ["simulation.duration"], "how a motion is computed"),
+        ([], ["links.l.model.reduction.elastic_modes"], "chooses modes"),
+        ([], ["links.l.model.frame.members.0.elements"], "whole number"),
+        ([], ["links.l.elastic_modes"], "not given"),
+        ([], "gravity.2", "a list of keys"),
+        ([], {"gravity.2": 0.0}, "must be positive"),
+        (["simulation.integrator='rk45'"], ["gravity.2"], "steps of rk45"),
+        (["simulation.output_step=0.01"], ["gravity.2"], "only some of its steps"),
+        (["simulation.formulation='nodal'"], ["gravity.2"], "the nodal formulation"),
+        (["simulation.gauge='minimum-norm'"], ["gravity.2"], "minimum-norm gauge"),
+        (["joints.0.type='spherical'"], ["gravity.2"], "rotation vectors"),
+    ],
+)
+def test_refusals(overrides: list[str], keys: Any, told: str) -> None:
+    scene: Any = erls.load_scene(L, ["simulation.duration=1e-3", *overrides])
+    with pytest.raises(ReportedError, match=told):
+        erls.sensitivities(scene, {"tip": lambda run: run.position("tip", 0.0)}, keys)
+
+
+def test_times_of_jumps_are_refused() -> None:
+    scene: Any = erls.load_scene(ROBOT, ["simulation.duration=0.01"])
+    with pytest.raises(SceneError, match="forces jump depend on this parameter"):
+        erls.sensitivities(scene, {"end": lambda run: run.position("end2", 0.0)}, ["joints.0.drive.motion.duration"])
+
+
+def test_outputs_that_are_no_numbers() -> None:
+    run = _run(L, ["simulation.duration=1e-3"])
+    for output, told in ((lambda run: "tip", "not a number"), (lambda run: np.nan, "not finite")):
+        with pytest.raises(SceneError, match=told):
+            erls.sensitivities(run, {"tip": output}, ["gravity.2"])
+
+
+def test_faulty_descriptions_are_refused() -> None:
+    scene: Any = erls.load_scene(L, ["simulation.duration=1e-3"])
+    with pytest.raises((SceneError, FEImportError), match="nothing"):
+        erls.sensitivities(scene, {"tip": lambda run: 0.0}, ["links.l.model.sections.leg.nothing"])
