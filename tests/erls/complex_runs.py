@@ -45,7 +45,8 @@ def given(run: ChainRun, parameter: Parameter, step: float) -> Given:
         )
         system = chain.compiled
         np.testing.assert_array_equal(system.integers, run.formulation.compiled.integers)  # type: ignore[attr-defined]
-        parts.append([weight / step * part for part in (system.reals, *chain.initial_state())])
+        limitless = np.where(np.isfinite(system.reals), system.reals, 0.0)  # a torque without limit, say
+        parts.append([weight / step * part for part in (limitless, *chain.initial_state())])
     return Given(*(np.asarray(sum(part)) for part in zip(*parts, strict=True)))
 
 
