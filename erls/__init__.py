@@ -11,7 +11,16 @@ The command line in three lines::
 
 from typing import Any
 
-__all__ = ["load_run", "load_scene", "save_run", "section_forces", "sensitivities", "simulate", "simulate_many", "stress"]
+__all__ = [
+    "load_run",
+    "load_scene",
+    "save_run",
+    "section_forces",
+    "sensitivities",
+    "simulate",
+    "simulate_many",
+    "stress",
+]
 
 _HOME = {
     "load_scene": ("erls.scene.read", "load_scene"),

@@ -22,7 +22,6 @@ from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
 from erls.sensitivity.variants import differences
 from erls.simulation.simulate import simulate
 
-
 _UNKNOWN = {
     "nodal": "the nodal formulation",
     "pieces": "links in substructures",

@@ -3,15 +3,13 @@
 What equations depend on (lengths, masses, gains, reduced matrices) is smooth algebra of a parameter, without the
 iterations and choices of a run: differences of it are right to 1e-11 where those of runs are right to 1e-5.
 
-A link whose description changes has other modes. Its coordinates stay what they are, with the shapes Φ(p) T(p) that
-come nearest to Φ(p₀) among those which the modes of both span: T is what follows from the space that they span, so that
-modes which turn within it, like the pairs of a round section, make no trouble. In the coordinates x of the link at p₀
-the forces at p are Tᵀ R(T x).
+A link whose description changes has other modes. Its coordinates x stay what they are, with shapes that are held
+(`fe_import.modal.held_shapes`): the forces at p are Tᵀ R(T x).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,20 +26,8 @@ from erls.scene.build import build_mechanism, link_model
 from erls.sensitivity.parameters import Parameter, description_with, scene_with
 from erls.sensitivity.tangents import Knots
 from erls.simulation.chains import models_of
+from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
-from fe_import.modal.model import ModalModel
-
-Stencil = tuple[tuple[int, float], ...]
-"""Steps and weights of a difference."""
-
-_STENCILS: tuple[Stencil, ...] = (
-    ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)),
-    ((0, -25 / 12), (1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4)),
-    ((0, 25 / 12), (-1, -4.0), (-2, 3.0), (-3, -4 / 3), (-4, 1 / 4)),
-)
-"""Of fourth order: central, and to one side where the other is refused (a negative mass)."""
-
-_STEP = 1e-3  # of the size of a parameter: rounding takes 1e-13 of forces, the fifth derivative 1e-13 of itself
 
 
 @dataclass(frozen=True)
@@ -109,8 +95,8 @@ def differences(run: ChainRun, parameters: Sequence[Parameter]) -> list[Differen
 
 
 def _difference(run: ChainRun, parameter: Parameter) -> Difference:
-    step, problems = _STEP * parameter.size, []
-    for stencil in _STENCILS:
+    step, problems = STEP * parameter.size, []
+    for stencil in STENCILS:
         try:
             return Difference(parameter, tuple(_variants(run, parameter, stencil, step)))
         except ReportedError as problem:
@@ -118,16 +104,20 @@ def _difference(run: ChainRun, parameter: Parameter) -> Difference:
     raise problems[0]
 
 
-def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float) -> Iterator[Variant]:
+def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float) -> list[Variant]:
+    """At the values of a stencil."""
     base: Any = run.formulation
-    for at, weight in stencil:
-        if not at:
-            yield Variant(weight / step, base)
-            continue
-        value = parameter.value + at * step
-        mechanism = _mechanism(run, parameter, value)
-        found: Any = formulate(mechanism, run.scene.record.simulation)
-        if found.breakpoints != base.breakpoints:
+    mechanisms = [_mechanism(run, parameter, parameter.value + at * step) for at, _ in stencil]
+    turns: list[Array | None] = [None] * len(stencil)
+    if parameter.within and parameter.link is not None:
+        number = base.mechanism.bodies[parameter.link]
+        models = [mechanism.links[number].model for mechanism in mechanisms]
+        found = held(models, base.mechanism.links[number].model, f"parameter {parameter.key}")
+        turns = [_of_all(base, number, turn[6:, 6:]) for turn in found]
+    result = []
+    for (_, weight), mechanism, turn in zip(stencil, mechanisms, turns, strict=True):
+        formulation: Any = formulate(mechanism, run.scene.record.simulation)
+        if formulation.breakpoints != base.breakpoints:
             raise SceneError(
                 Cause.BAD_FIELD,
                 "times at which forces jump depend on this parameter: derivatives through them are not known yet",
@@ -135,7 +125,8 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float
                 value=parameter.value,
                 remedy="name another field, or smooth the profile that it belongs to",
             )
-        yield Variant(weight / step, found, _turn(run, parameter, mechanism))
+        result.append(Variant(weight / step, formulation, turn))
+    return result
 
 
 def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
@@ -149,46 +140,13 @@ def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
         scene = scene_with(scene, parameter, value)
     if k is not None:
         models[k] = link_model(scene, k, lambda text: None, described)
-        modes = models_of(run)[0][k].modes
-        if models[k].modes != modes:
-            raise SceneError(
-                Cause.BAD_FIELD,
-                "the link has another number of modes beside this value: the number must hold",
-                where=f"parameter {parameter.key}",
-                value=models[k].modes - 6,
-                limit=f"{modes - 6} elastic modes",
-                remedy="ask for a number of elastic modes that parts none of equal frequency",
-            )
     return build_mechanism(scene, lambda text: None, models, descriptions, pieces).mechanism
 
 
-def _turn(run: ChainRun, parameter: Parameter, mechanism: Mechanism) -> Array | None:
-    """T of all coordinates."""
-    base: Any = run.formulation
-    if not parameter.within or parameter.link is None:
-        return None
-    number = base.mechanism.bodies[parameter.link]
+def _of_all(base: Any, number: int, turn: Array) -> Array:
+    """(n, n) T of all coordinates, from that (e, e) of the elastic ones of a link."""
     modes = [link.elastic_modes for link in base.mechanism.links]
     first = base.size - sum(modes[number:])
     result = np.eye(base.size)
-    rows = slice(first, first + modes[number])
-    result[rows, rows] = nearest_shapes(mechanism.links[number].model, base.mechanism.links[number].model)
+    result[first : first + len(turn), first : first + len(turn)] = turn
     return result
-
-
-def nearest_shapes(model: ModalModel, base: ModalModel) -> Array:
-    """(e, e) T: elastic coordinates of a model whose shapes come nearest to the elastic modes of another one, up to
-    rigid-body motion.
-
-    Parameters
-    ----------
-    model, base : ModalModel
-        Of the same nodes and number of modes.
-    """
-    size = max(float(np.linalg.norm(np.ptp(base.nodes, axis=0))), 1e-300)
-
-    def shapes(of: ModalModel) -> Array:
-        turns = size * of.rotation_shapes
-        return np.concatenate([of.translation_shapes.reshape(-1, of.modes), turns.reshape(-1, of.modes)])
-
-    return np.asarray(np.linalg.lstsq(shapes(model), shapes(base)[:, 6:], rcond=None)[0][6:])
