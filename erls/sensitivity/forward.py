@@ -57,10 +57,12 @@ class Equations:
 
     def __init__(self, run: ChainRun, differences: Sequence[Difference]) -> None:
         self.solution, self.differences = run.solution, differences
-        self.system: Any = run.formulation
-        tree = getattr(self.system, "bare", self.system)
+        system: Any = run.formulation
+        tree: Any = getattr(system, "bare", system)  # under the loops
         stiffness, _ = elastic_on_diagonal(tree)
-        self.steps = steps_of(metre_scales(self.system), size_of(self.system.mechanism), stiffness)
+        self.steps = steps_of(metre_scales(system), size_of(system.mechanism), stiffness)
+        self.system = system
+        self.acting = [difference.acts for difference in differences]
 
     def walks(self) -> list[Walk]:
         """Legs that were walked over."""
@@ -74,12 +76,13 @@ class Equations:
         s = self.solution
         at = np.clip(s.t[first:end], walk.leg.first, walk.leg.last)
         knots = Knots(at, *(np.ascontiguousarray(x[first:end]) for x in (s.y, s.v, s.a)))
-        forces = [difference.of(lambda variant: variant.forces(knots)) for difference in self.differences]
+        every, none = zip(self.differences, self.acting, strict=True), np.zeros_like(knots.y)
+        forces = [one.of(lambda variant: variant.forces(knots)) if acts else none for one, acts in every]
         return Linear(tangents(self.system.compiled, knots, self.steps), np.stack(forces, axis=2))
 
     def chunk(self, nodes: int) -> int:
         """Knots to linearize at a time: whole steps of so many nodes."""
-        n = self.system.size
+        n = int(self.system.size)
         return max(1, _ROOM // (3 * n * n + 1) // nodes) * nodes
 
 

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from erls.equations.compiled_system import CompiledSystem
 from erls.equations.registry import formulate
 from erls.equations.series import residual_series
 from erls.errors import Cause, SceneError
-from erls.integrate.base import Solution
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
@@ -66,7 +66,7 @@ class Variant:
     def run(self, run: ChainRun) -> ChainRun:
         """The same motion of the variant."""
         s = run.solution
-        moved: Solution = s if self.turn is None else replace(s, **{x: self.placed(getattr(s, x)) for x in "yva"})
+        moved = replace(s, y=self.placed(s.y), v=self.placed(s.v), a=self.placed(s.a))
         return replace(run, formulation=self.formulation, solution=moved)
 
 
@@ -77,9 +77,21 @@ class Difference:
     parameter: Parameter
     variants: tuple[Variant, ...]
 
+    @property
+    def acts(self) -> bool:
+        """Whether the equations of motion depend on it: a start alone may."""
+        first, *others = (variant.formulation.compiled for variant in self.variants)
+        turned = any(variant.turn is not None for variant in self.variants)
+        return turned or not all(_alike(first, other) for other in others)
+
     def of(self, what: Callable[[Variant], Array]) -> Array:
         """The derivative of what an array depends on."""
         return np.asarray(sum(variant.weight * what(variant) for variant in self.variants))
+
+
+def _alike(one: CompiledSystem, other: CompiledSystem) -> bool:
+    """Whether two systems of the same kind have the same constants."""
+    return np.array_equal(one.integers, other.integers) and np.array_equal(one.reals, other.reals, equal_nan=True)
 
 
 def differences(run: ChainRun, parameters: Sequence[Parameter]) -> list[Difference]:

@@ -64,7 +64,7 @@ def arrays_in(model: ModalModel, turn: Array) -> dict[str, Array]:
         "invariants.m": both(one.m),
         "invariants.X": both(one.X),
         "invariants.Z": both(one.Z),
-        "invariants.rigid": np.linalg.solve(turn, one.rigid),
+        "invariants.rigid": np.asarray(np.linalg.solve(turn, one.rigid)),
         "translation_shapes": model.translation_shapes @ turn,
         "rotation_shapes": model.rotation_shapes @ turn,
     }
