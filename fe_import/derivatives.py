@@ -82,7 +82,7 @@ def modal_derivatives(link: LinkFile | Path | str, key: str, size: float | None 
 
     Examples
     --------
-    >>> from fe_import.derivatives import modal_derivatives
+    >>> from fe_import import modal_derivatives
     >>> found = modal_derivatives("data/l_shape/links/steel_tall.toml", "materials.steel.youngs_modulus")
     >>> stiffness = found.model.stiffness[6:, 6:]
     >>> bool(abs(2e11 * found.arrays["stiffness"][6:, 6:] - stiffness).max() < 1e-9 * stiffness.max())

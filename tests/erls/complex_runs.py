@@ -22,7 +22,7 @@ from erls.sensitivity.parameters import Parameter, scene_with
 from erls.simulation.chains import models_of
 
 STEP = 1e-30
-ENOUGH = 15  # iterations: each leaves a hundredth
+ENOUGH = 12  # iterations: each leaves a tenth or less
 _RICHARDSON = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 
 

@@ -22,8 +22,12 @@ RICHARDSON = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 
 
 def _free_modes(count: int) -> LinkFile:
-    """The square arm with its lowest modes, free; eight elements."""
-    link = load_link(ARM, {"method": "mode-displacement", "elastic_modes": count})
+    """The square arm with its lowest modes, free."""
+    return _coarse(load_link(ARM, {"method": "mode-displacement", "elastic_modes": count}))
+
+
+def _coarse(link: LinkFile) -> LinkFile:
+    """Of eight elements."""
     assert link.description.frame is not None
     members = [msgspec.structs.replace(link.description.frame.members[0], elements=8)]
     frame = msgspec.structs.replace(link.description.frame, members=members)
@@ -36,7 +40,7 @@ def _slope(models: Sequence[FEModel], of: str, step: float) -> np.ndarray:
     return np.asarray(sum(parts))
 
 
-@pytest.mark.parametrize("key", [WIDTH, "materials.aluminium.density", "frame.nodes.tip.0"])
+@pytest.mark.parametrize("key", [WIDTH, "frame.nodes.tip.0"])
 def test_space_of_modes_in_closed_form(key: str) -> None:
     """Two pairs of equal frequencies, which the width parts: φ_k' = Σ_o φ_o φ_oᵀ(K' - λ_k M')φ_k / (λ_k - λ_o) + Φ G.
 
@@ -84,7 +88,7 @@ def test_material_scales_matrices_alone(of: str) -> None:
 
     Damping 2 ζ Ω, given by a ratio, goes with the root of either.
     """
-    link = load_link(ARM)
+    link = _coarse(load_link(ARM))
     damped = msgspec.structs.replace(link.description.damping, ratio=0.01)
     link = LinkFile(link.path, msgspec.structs.replace(link.description, damping=damped))
     found = modal_derivatives(link, f"materials.aluminium.{of}")
