@@ -39,7 +39,8 @@ STENCILS: tuple[Stencil, ...] = (
 STEP = 1e-3
 """Of the size of a parameter: rounding takes 1e-13 of what is differenced, the fifth derivative 1e-13 of itself."""
 
-_SMOOTH = 1e-3  # of stiffness and mass: by more than that, differences of half the step do not part what is smooth
+_SMOOTH = 1e-3  # of stiffness per size of the parameter: what differences of steps in the ratio two may be apart by
+_TURNED = 0.01  # by which shapes may lose of their size: the space of modes turns by less than a seventh
 _CHOOSES = "it chooses modes, which change by jumps"
 
 
@@ -119,7 +120,7 @@ def held(models: Sequence[ModalModel], base: ModalModel, where: str) -> list[Arr
     ------
     FEImportError
         MODE_COUNT: other numbers of modes, or modes that do not change smoothly: they are cut between neighbours whose
-        frequencies change places. Names these.
+        frequencies change places. Names these. BAD_FIELD: the steps of differences are no small changes.
     """
     named = base.provenance.get(KEPT_WHOLE, "") or f"the last one kept has {base.frequencies_hz[-1]:.6g} Hz"
     remedy = "ask for a number of elastic modes that leaves a gap of frequency behind the last one"
@@ -134,6 +135,17 @@ def held(models: Sequence[ModalModel], base: ModalModel, where: str) -> list[Arr
                 remedy=remedy,
             )
     turns = [nearest_shapes(model, base) for model in models]
+    lost = [float(np.abs(np.linalg.svd(turn, compute_uv=False) - 1).max()) for turn in turns]
+    if not max(lost) <= _TURNED:
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            "modes beside this value are those of another link: the steps of differences are too large",
+            where=where,
+            value=f"shapes lose {max(lost):.2g} of their size",
+            limit=_TURNED,
+            remedy="tell about how large a change of the parameter is large, if its value is zero; "
+            "or ask for a number of elastic modes that leaves a gap of frequency behind the last one",
+        )
     if len(models) == len(STENCILS[0]) and base.elastic_modes:
         near = [(turn.T @ model.stiffness @ turn)[6:, 6:] for model, turn in zip(models, turns, strict=True)]
         fine, coarse = near[2] - near[1], (near[3] - near[0]) / 2

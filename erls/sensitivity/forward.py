@@ -25,9 +25,12 @@ from erls.sensitivity.schemes import Scheme
 from erls.sensitivity.start import start_derivatives
 from erls.sensitivity.tangents import Knots, Tangents, steps_of, tangents
 from erls.sensitivity.variants import Difference
+from fe_import.model import IntArray
 
 _ROOM = 4_000_000
 """Numbers of tangents that are held at a time."""
+
+_SAMPLE = 12  # knots at which forces show whether they are linear in a parameter
 
 
 class Walk(NamedTuple):
@@ -56,13 +59,14 @@ class Equations:
     """
 
     def __init__(self, run: ChainRun, differences: Sequence[Difference]) -> None:
-        self.solution, self.differences = run.solution, differences
+        self.solution = run.solution
         system: Any = run.formulation
         tree: Any = getattr(system, "bare", system)  # under the loops
         stiffness, _ = elastic_on_diagonal(tree)
         self.steps = steps_of(metre_scales(system), size_of(system.mechanism), stiffness)
         self.system = system
-        self.acting = [difference.acts for difference in differences]
+        sample = self._sample()
+        self.differences = [difference.along(sample) if difference.acts else None for difference in differences]
 
     def walks(self) -> list[Walk]:
         """Legs that were walked over."""
@@ -73,12 +77,22 @@ class Equations:
 
     def at(self, walk: Walk, first: int, end: int) -> Linear:
         """Of some knots of a leg."""
-        s = self.solution
-        at = np.clip(s.t[first:end], walk.leg.first, walk.leg.last)
-        knots = Knots(at, *(np.ascontiguousarray(x[first:end]) for x in (s.y, s.v, s.a)))
-        every, none = zip(self.differences, self.acting, strict=True), np.zeros_like(knots.y)
-        forces = [one.of(lambda variant: variant.forces(knots)) if acts else none for one, acts in every]
+        knots, none = self._knots(walk, np.arange(first, end)), np.zeros((end - first, self.system.size))
+        forces = [none if one is None else one.of(lambda variant: variant.forces(knots)) for one in self.differences]
         return Linear(tangents(self.system.compiled, knots, self.steps), np.stack(forces, axis=2))
+
+    def _knots(self, walk: Walk, rows: IntArray) -> Knots:
+        """Some of a leg, at the times at which forces were asked for."""
+        s = self.solution
+        return Knots(np.clip(s.t[rows], walk.leg.first, walk.leg.last), s.y[rows], s.v[rows], s.a[rows])
+
+    def _sample(self) -> Knots:
+        """Some of every leg."""
+        walks = self.walks()
+        each = max(3, _SAMPLE // len(walks))
+        rows = [np.unique(np.linspace(walk.first, walk.end - 1, each).astype(int)) for walk in walks]
+        parts = [self._knots(walk, some) for walk, some in zip(walks, rows, strict=True)]
+        return Knots(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
     def chunk(self, nodes: int) -> int:
         """Knots to linearize at a time: whole steps of so many nodes."""
@@ -108,9 +122,12 @@ def differentiated(run: ChainRun, differences: Sequence[Difference], scheme: Sch
     scheme : Scheme
         Of the method that made the run.
     """
-    equations, s = Equations(run, differences), run.solution
+    s = run.solution
     n, count = s.y.shape[1], len(differences)
     result = np.zeros((len(s.t), 3, n, count))
+    if not n:  # every motion is prescribed, and no link deforms
+        return result
+    equations = Equations(run, differences)
     state = np.zeros((4, n, count))  # of y, v, a and α
     state[:2] = start_derivatives(run, differences)
     for walk in equations.walks():

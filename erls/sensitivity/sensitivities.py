@@ -5,22 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from erls.equations.registry import system_of
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
+from erls.run.record import Run
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
-from erls.scene.read import load_chain
+from erls.scene.read import AnyScene, chain_alone, load_chain
 from erls.sensitivity.forward import differentiated
 from erls.sensitivity.outputs import Output, derivative_of, value_of
 from erls.sensitivity.parameters import parameters_of
 from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
 from erls.sensitivity.variants import differences
 from erls.simulation.simulate import simulate
+
+_ROOM = 50_000_000
+"""Numbers of derivatives of a motion that are held at a time, 400 MB: more parameters go one group after the other."""
 
 _UNKNOWN = {
     "nodal": "the nodal formulation",
@@ -53,7 +58,7 @@ class Sensitivities:
 
 
 def sensitivities(
-    scene: Scene | ChainRun | Path | str,
+    scene: AnyScene | Run | Path | str,
     outputs: Mapping[str, Output],
     parameters: Sequence[str] | Mapping[str, float],
     *,
@@ -103,20 +108,22 @@ def sensitivities(
     if isinstance(scene, ChainRun):
         run, keys = scene, parameters_of(scene.scene, parameters)
     else:
-        loaded = load_chain(scene) if isinstance(scene, (Path, str)) else scene
+        given: Any = scene.scene if isinstance(scene, Run) else scene
+        loaded = load_chain(given) if isinstance(given, (Path, str)) else chain_alone(given)
         refuse(loaded, build_mechanism(loaded, tell).mechanism)
         keys = parameters_of(loaded, parameters)
         run = simulate(loaded, tell=tell, verdict=False)
     scheme = scheme_of(run)
     values = {name: value_of(output, run, name) for name, output in outputs.items()}
-    found = differences(run, keys)
-    motion = differentiated(run, found, scheme)
-    derivatives = {
-        name: {
-            one.parameter.key: derivative_of(output, name, run, one, motion[..., k]) for k, one in enumerate(found)
-        }
-        for name, output in outputs.items()
-    }
+    derivatives: dict[str, dict[str, Array]] = {name: {} for name in outputs}
+    some = max(1, _ROOM // max(1, 3 * run.solution.y.size))
+    for first in range(0, len(keys), some):
+        found = differences(run, keys[first : first + some])
+        motion = differentiated(run, found, scheme)
+        for k, one in enumerate(found):
+            for name, output in outputs.items():
+                key = one.parameter.key
+                derivatives[name][key] = derivative_of(output, name, run, one, motion[..., k])
     return Sensitivities(run, {one.key: one.value for one in keys}, values, derivatives)
 
 

@@ -208,6 +208,15 @@ def _mass(run: ChainRun) -> float:
     return sum(_link_mass(run, name) for name in run.link_names)
 
 
+def test_motions_without_coordinates() -> None:
+    """Rigid links that all follow motors: what is left is the place of a point, straight out along the second link."""
+    rigid = ["links.0.flexible=false", "links.1.flexible=false", "simulation.duration=0.01"]
+    run = _run(ROBOT, rigid)
+    key = "joints.0.dh.a"
+    found = erls.sensitivities(run, {"end": lambda run: run.position("end2", 0.0)}, [key])
+    np.testing.assert_allclose(found.derivatives["end"][key], [1.0, 0.0, 0.0], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("overrides", "keys", "told"),
     [
@@ -232,6 +241,11 @@ def test_refusals(overrides: list[str], keys: Any, told: str) -> None:
     scene: Any = erls.load_scene(L, ["simulation.duration=1e-3", *overrides])
     with pytest.raises(ReportedError, match=told):
         erls.sensitivities(scene, {"tip": lambda run: run.position("tip", 0.0)}, keys)
+
+
+def test_bodies_are_refused() -> None:
+    with pytest.raises(SceneError, match="no chain of joints and links"):
+        erls.sensitivities(erls.load_scene(DATA / "heavy_top" / "slow.toml"), {}, ["gravity.2"])
 
 
 def test_times_of_jumps_are_refused() -> None:

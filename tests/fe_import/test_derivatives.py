@@ -127,6 +127,14 @@ def test_cuts_between_equal_frequencies_are_refused() -> None:
     assert caught.value.cause == Cause.MODE_COUNT
 
 
+def test_steps_that_are_no_small_changes_are_refused() -> None:
+    """A thermal expansion of zero does not tell that one per kelvin is enormous; with that told, forces are linear."""
+    link, key = ARM.parents[2] / "thermal" / "links" / "bimetal.toml", "materials.stiff.thermal_expansion"
+    with pytest.raises(FEImportError, match="steps of differences are too large"):
+        modal_derivatives(link, key)
+    assert modal_derivatives(link, key, 1e-5).arrays["thermal.force"].any()
+
+
 @pytest.mark.parametrize(
     ("key", "told"),
     [
