@@ -84,9 +84,9 @@ def modal_derivatives(link: LinkFile | Path | str, key: str, size: float | None 
     Examples
     --------
     >>> from fe_import import modal_derivatives
-    >>> found = modal_derivatives("data/l_shape/links/steel_tall.toml", "materials.steel.youngs_modulus")
+    >>> found = modal_derivatives("data/robot/links/arm.toml", "materials.aluminium.youngs_modulus")
     >>> stiffness = found.model.stiffness[6:, 6:]
-    >>> bool(abs(2e11 * found.arrays["stiffness"][6:, 6:] - stiffness).max() < 1e-9 * stiffness.max())
+    >>> bool(abs(7e10 * found.arrays["stiffness"][6:, 6:] - stiffness).max() < 1e-9 * stiffness.max())
     True
     """
     given = link if isinstance(link, LinkFile) else load_link(link)

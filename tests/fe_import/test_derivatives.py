@@ -45,7 +45,7 @@ def test_space_of_modes_in_closed_form(key: str) -> None:
     """Two pairs of equal frequencies, which the width parts: φ_k' = Σ_o φ_o φ_oᵀ(K' - λ_k M')φ_k / (λ_k - λ_o) + Φ G.
 
     o runs over the modes left out, G over shapes that are held: of what least squares leave of Φ' in the space of the
-    modes. Only matrices are differenced here, by steps of their own. To 1e-7, as issue 15 asks.
+    modes. Only matrices are differenced here, by steps of their own. To 1e-7, of which the differences make most.
     """
     link = _free_modes(4)
     found = modal_derivatives(link, key)
