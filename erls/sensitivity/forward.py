@@ -66,7 +66,7 @@ class Equations:
         self.steps = steps_of(metre_scales(system), size_of(system.mechanism), stiffness)
         self.system = system
         sample = self._sample()
-        self.differences = [difference.along(sample) if difference.acts else None for difference in differences]
+        self.differences = [difference.thinned(sample) if difference.acts else None for difference in differences]
 
     def walks(self) -> list[Walk]:
         """Legs that were walked over."""
@@ -132,7 +132,7 @@ def differentiated(run: ChainRun, differences: Sequence[Difference], scheme: Sch
     state[:2] = start_derivatives(run, differences)
     for walk in equations.walks():
         begun = equations.at(walk, walk.first, walk.first + 1)
-        state[2] = accelerations(begun, state)
+        state[2] = _accelerations(begun, state)
         state[3] = state[2]
         result[walk.first] = state[:3]
         before: float | None = None
@@ -150,7 +150,7 @@ def differentiated(run: ChainRun, differences: Sequence[Difference], scheme: Sch
     return result
 
 
-def accelerations(begun: Linear, state: Array) -> Array:
+def _accelerations(begun: Linear, state: Array) -> Array:
     """(n, p) derivatives of accelerations where a leg begins."""
     mass, damping, stiffness = (x[0] for x in begun.tangents)
     return np.asarray(-np.linalg.solve(mass, begun.forces[0] + damping @ state[1] + stiffness @ state[0]))

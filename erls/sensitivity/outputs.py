@@ -37,8 +37,9 @@ def value_of(output: Output, run: ChainRun, name: str) -> Array:
     SceneError
         BAD_FIELD: no finite number or array of numbers.
     """
+    given = output(run)
     try:
-        found = np.asarray(output(run), dtype=float)
+        found = np.asarray(given, dtype=float)
     except (TypeError, ValueError) as problem:
         message, remedy = f"not a number or an array of numbers: {problem}", "give a function of a run"
         raise SceneError(Cause.BAD_FIELD, message, where=f"output {name}", remedy=remedy) from None

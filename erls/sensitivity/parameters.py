@@ -66,7 +66,7 @@ def parameters_of(scene: Scene, given: Sequence[str] | Mapping[str, float]) -> l
     SceneError, FEImportError
         No such field, one that is no number or is not given, or one on which motions do not depend smoothly.
     """
-    if isinstance(given, str) or not len(given):
+    if isinstance(given, str) or not len(given) or not all(isinstance(key, str) for key in given):
         message, remedy = "parameters come as a list of keys", 'e.g. ["payloads.0.mass"]'
         raise SceneError(Cause.BAD_FIELD, message, where="parameters", value=given, remedy=remedy)
     sizes = dict(given) if isinstance(given, Mapping) else dict.fromkeys(given, None)
@@ -120,8 +120,8 @@ def _parameter(scene: Scene, key: str, size: float | None) -> Parameter:
         value = number_at(link_description(scene, scene.record.links[link]), within)
     else:
         value = number_in(data, key, where, SceneError)
-    large = abs(value) or 1.0 if size is None else float(size)
-    if not (math.isfinite(large) and large > 0):
+    large = abs(value) or 1.0 if size is None else size
+    if isinstance(large, bool) or not isinstance(large, (int, float)) or not (math.isfinite(large) and large > 0):
         message, remedy = "the size of a change must be positive", "give about the change that would be large"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value=size, remedy=remedy)
-    return Parameter(key, value, large, link, within)
+    return Parameter(key, value, float(large), link, within)

@@ -87,7 +87,7 @@ class Difference:
         turned = any(variant.turn is not None for variant in self.variants)
         return turned or not all(_alike(first, other) for other in others)
 
-    def along(self, sample: Knots) -> Difference:
+    def thinned(self, sample: Knots) -> Difference:
         """The same with fewer variants where forces depend linearly on the parameter, as some knots show."""
         if len(self.variants) != len(STENCILS[0]):
             return self

@@ -19,6 +19,7 @@ from erls.integrate.choice import integrator, options_of
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.forward import differentiated
 from erls.sensitivity.parameters import parameters_of
+from erls.sensitivity.schemes import generalized_alpha, lobatto
 from erls.sensitivity.sensitivities import scheme_of
 from erls.sensitivity.variants import differences
 from fe_import.errors import FEImportError, ReportedError
@@ -229,7 +230,9 @@ def test_motions_without_coordinates() -> None:
         ([], ["links.l.model.frame.members.0.elements"], "whole number"),
         ([], ["links.l.elastic_modes"], "not given"),
         ([], "gravity.2", "a list of keys"),
+        ([], [2], "a list of keys"),
         ([], {"gravity.2": 0.0}, "must be positive"),
+        ([], {"gravity.2": "large"}, "must be positive"),
         (["simulation.integrator='rk45'"], ["gravity.2"], "steps of rk45"),
         (["simulation.output_step=0.01"], ["gravity.2"], "only some of its steps"),
         (["simulation.formulation='nodal'"], ["gravity.2"], "the nodal formulation"),
@@ -241,6 +244,15 @@ def test_refusals(overrides: list[str], keys: Any, told: str) -> None:
     scene: Any = erls.load_scene(L, ["simulation.duration=1e-3", *overrides])
     with pytest.raises(ReportedError, match=told):
         erls.sensitivities(scene, {"tip": lambda run: run.position("tip", 0.0)}, keys)
+
+
+def test_halved_steps() -> None:
+    """The algorithmic acceleration moves along as `erls.integrate.alpha_steps.Steps.set_step` moves it."""
+    y, v, a, algorithmic = np.random.default_rng(1).normal(size=4)
+    expected = [y, v, a, a + (algorithmic - a) * 0.5]
+    np.testing.assert_allclose(generalized_alpha(0.8).rescaled(1e-3, 2e-3) @ [y, v, a, algorithmic], expected)
+    for scheme, before in ((generalized_alpha(0.8), None), (generalized_alpha(0.8), 1e-3), (lobatto(), 2e-3)):
+        np.testing.assert_array_equal(scheme.rescaled(1e-3, before), np.eye(4))
 
 
 def test_bodies_are_refused() -> None:
