@@ -22,9 +22,10 @@ from erls.equations.loops.failures import assembled_warning, comes_apart, locks,
 from erls.equations.loops.neighbours import LoopNeighbours
 from erls.equations.loops.rows import Closure, applied
 from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
-from erls.equations.loops.static import closed_equilibrium
+from erls.equations.loops.static import held_loops
 from erls.equations.loops.tied import OPEN, Tied
 from erls.equations.neighbours import small_motions
+from erls.equations.serial.equilibrium import Held, equilibrium
 from erls.equations.serial.motion_series import MotionSeries, motion_series
 from erls.equations.serial.neighbours import TreeNeighbours
 from erls.equations.serial.state_series import (
@@ -214,7 +215,12 @@ class ClosedChain(Tied):
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
         """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness."""
-        return closed_equilibrium(self, self.exact, self._closed_start, self.start.held)
+        return equilibrium(self.held, self._closed_start)
+
+    @property
+    def held(self) -> Held:
+        """The closed chain at rest with the joints held that the loops leave free."""
+        return held_loops(self, self.exact, self._closed_start, self.start.held)
 
     def neighbours(self, t: float, y: Array, v: Array) -> LoopNeighbours:
         """States beside a closed one, with the forces of the loops as they are there."""

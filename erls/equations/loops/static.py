@@ -1,4 +1,4 @@
-"""Static equilibrium of a chain with loops: links deform, joints follow; those that the loops leave free are held."""
+"""A chain with loops at rest: links deform, joints follow; those that the loops leave free are held."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from erls.equations.loops.tied import Tied
-from erls.equations.serial.equilibrium import Angles, Held, elastic_on_diagonal, equilibrium
-from erls.equations.stability import Bearing
+from erls.equations.serial.equilibrium import Angles, Held, elastic_on_diagonal
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -16,8 +15,8 @@ if TYPE_CHECKING:
     from erls.equations.loops.compiled import CompiledLoops
 
 
-def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray) -> tuple[Array, Bearing]:
-    """(n,) equilibrium under gravity, springs and drives, and what loads leave of the stiffness.
+def held_loops(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray) -> Held:
+    """The chain under gravity, springs and drives.
 
     Parameters
     ----------
@@ -28,11 +27,6 @@ def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArr
         Loops closed, links undeformed.
     held : int array
         Free joints, by their place in y, whose physical angles keep their values.
-
-    Raises
-    ------
-    SimulationError
-        As `erls.equations.serial.equilibrium.equilibrium`.
     """
     kept, free, still = loops.given.kept, chain.bare.free, np.zeros(chain.size)
     angles = Angles(chain.bare, chain.bare.free_joints[held], y, chain.metres, chain.reach)
@@ -47,4 +41,4 @@ def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArr
         return np.concatenate(both), np.concatenate([found.rows[kept][:, free], rows])
 
     given = chain.mechanism, forces, conditions, len(kept), *elastic_on_diagonal(chain.bare)
-    return equilibrium(Held(*given, chain.metres, chain.reach, "no static equilibrium of the closed chain"), y)
+    return Held(*given, chain.metres, chain.reach, "no static equilibrium of the closed chain")
