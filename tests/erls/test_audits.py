@@ -189,8 +189,8 @@ def _ended(path: Path) -> ChainRun:
 
 
 def test_a_parallelogram_at_its_change_point(tmp_path: Path) -> None:
-    """All links in line: conditions of the loop lose rank, and their forces, which grow without bound, feed energy or
-    take it. That is told, and so is half of the energy that is lost there in a run that says to be 2 mm off.
+    """All links in line: conditions of the loop lose rank. Energy that is won or lost there is told, and so is half of
+    it in a run that says to be 2 mm off.
     """
     run = _ended(scenes.write_toml(tmp_path / "scene.toml", PARALLELOGRAM))
     energy = run.energy(run.times)
