@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from erls.equations.loops.branching import Kind, Singular
 from erls.equations.loops.start import Start
 from erls.errors import Cause, SimulationError
@@ -64,10 +66,15 @@ def branches_warning(loop: str, where: str, times: list[float]) -> str:
     )
 
 
-def assembled_warning(start: Start, limit: float) -> tuple[str, ...]:
-    """What the user should know about loops that rigid links do not close to rounding."""
+def assembled_warning(start: Start, limit: float, force: Callable[[], float]) -> tuple[str, ...]:
+    """What the user should know about loops that rigid links do not close to rounding, and what force [N] does."""
     if not start.where:
         return ()
+    if start.gap > limit:
+        return (
+            f"{start.where}: undeformed links leave {start.gap:.3g} m open; they are bent into place and start "
+            f"prestressed, with up to {force():.4g} N in a closing joint",
+        )
     return (
         f"{start.where}: rigid links leave {start.gap:.3g} m open, within the assembly tolerance of {limit:.3g} m",
     )
