@@ -162,20 +162,7 @@ def test_power_of_a_load_that_is_forgotten_is_told(monkeypatch: pytest.MonkeyPat
     assert breaches(run) == {"energy"}
 
 
-PARALLELOGRAM: dict[str, Any] = {
-    "simulation": {"duration": 2.0},
-    "joints": [
-        loop_scenes.joint(f"j{k}", length, angle)
-        for k, (length, angle) in enumerate(((0.2, 60.0), (0.5, -60.0), (0.2, -120.0)))
-    ],
-    "links": [
-        {"name": name, "rigid": loop_scenes.bar(length, mass), "mesh_pose": {"frame": "joint"}}
-        for name, length, mass in (("crank", 0.2, 0.3), ("coupler", 0.5, 0.9), ("rocker", 0.2, 0.3))
-    ],
-    "base": {"rotation_deg": [90.0, 0.0, 0.0]},
-    "loops": [{"name": "closing", "link": "rocker", "node": "tip", "position": [0.5, 0.0, 0.0]}],
-    "points": [{"name": "end", "link": "coupler", "node": "tip"}],
-}
+PARALLELOGRAM = {**loop_scenes.parallelogram(), "simulation": {"duration": 2.0}}
 
 
 def _ended(path: Path) -> ChainRun:

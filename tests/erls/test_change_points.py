@@ -12,31 +12,18 @@ import loop_scenes
 import numpy as np
 import pytest
 import scenes
+from loop_scenes import parallelogram
 from scipy.integrate import solve_ivp
 
 from erls.equations.loops.branching import Kind, singular_at
 from erls.errors import Cause, SimulationError
 from erls.run.chain.run import ChainRun
 
-CRANK, COUPLER = 0.2, 0.5
-MASS, COUPLER_MASS = 0.3, 0.9
+CRANK, COUPLER, _ = loop_scenes.PARALLELOGRAM
+MASS, COUPLER_MASS, _ = loop_scenes.PARALLELOGRAM_MASSES
 INERTIA = 2 * MASS * CRANK**2 / 3 + COUPLER_MASS * CRANK**2
 STATIC = (MASS + COUPLER_MASS) * CRANK
 DURATION = 0.8  # two change points
-
-
-def parallelogram(**changes: Any) -> dict[str, Any]:
-    """Rigid, released at 60 deg."""
-    links = (("crank", CRANK, MASS, 60.0), ("coupler", COUPLER, COUPLER_MASS, -60.0), ("rocker", CRANK, MASS, -120.0))
-    data = loop_scenes.four_bar()
-    data["joints"] = [loop_scenes.joint(f"j{k}", length, angle) for k, (_, length, _, angle) in enumerate(links)]
-    data["links"] = [
-        {"name": name, "rigid": loop_scenes.bar(length, mass), "mesh_pose": {"frame": "joint"}}
-        for name, length, mass, _ in links
-    ]
-    data["loops"] = [{"name": "closing", "link": "rocker", "node": "tip", "position": [COUPLER, 0.0, 0.0]}]
-    data["points"] = [{"name": "end", "link": "coupler", "node": "tip"}]
-    return scenes.merged(data, changes)
 
 
 def closed_form() -> tuple[float, list[float]]:
