@@ -228,6 +228,7 @@ class Watch:
         self.turned = False
         """Whether the stretch ends there."""
         self._near, self._before = near, before
+        self._flexible = chain.size > len(chain.bare.free_joints)
 
     def __call__(self, t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:
         found = knots()
@@ -255,7 +256,7 @@ class Watch:
         closure = chain.closure(t, y, found.v[k])
         chain.refuse_open(t, closure)
         value, start = chain.stiffest(closure)[0], chain.stiffest_at_start
-        if value < AT * start and (at := singular_at(chain, t, y)).kind == Kind.STIFF:
+        if self._flexible and value < AT * start and (at := singular_at(chain, t, y)).kind == Kind.STIFF:
             raise ends_singular(t, at, value, start)
 
     def _suspects(self, found: Solution) -> list[tuple[int, bool]]:
@@ -265,7 +266,9 @@ class Watch:
         gaps, stiffest = chain.loops.watched(found.t[first:], found.y[first:])
         share = stiffest / chain.stiffest_at_start
         turns = share > PAST if self._near else share < CLOSE
-        suspect = (gaps > OPEN * chain.reach) | (share < AT) | turns
+        suspect = (gaps > OPEN * chain.reach) | turns
+        if self._flexible:
+            suspect |= share < AT
         return [(first + int(k), bool(turns[k])) for k in np.flatnonzero(suspect)]
 
 

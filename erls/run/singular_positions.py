@@ -15,8 +15,8 @@ from erls.errors import SimulationError
 from erls.integrate.base import Solution, hermite
 from erls.maths.so3 import Array
 
-_LOOK = 0.5  # of the smallest singular value at the start: least ones between steps are looked for below
-_MET = 1e-3  # of the same: a change point is met, not only passed at a distance
+_REACH = 3.0  # of what singular values rise by from the least one of steps: how far below it a tip may lie between them
+_MET = 1e-3  # of the smallest singular value at the start: a change point is met, not only passed at a distance
 _AT_ONCE = 4096  # knots
 _SEARCH = 60  # golden sections: to rounding
 
@@ -48,27 +48,15 @@ def singular_positions_met(chain: Formulation, solution: Solution) -> Met:
     for at in _singular_positions(chain, solution):
         if at.found.kind == Kind.STIFF:
             start = chain.stiffest_at_start
-            problem = ends_singular(at.t, at.found, at.value, start, _where(chain, at))
-            return Met(_told(chain, passed), problem, at.t)
+            problem = ends_singular(at.t, at.found, at.value, start)
+            return Met(_told(passed), problem, at.t)
         if at.found.kind == Kind.BRANCHES:
             passed.setdefault(at.found.loop, []).append(at)
-    return Met(_told(chain, passed))
+    return Met(_told(passed))
 
 
-def _told(chain: ClosedChain, passed: dict[str, list[_Passed]]) -> list[str]:
-    return [branches_warning(loop, _where(chain, many[0]), [at.t for at in many]) for loop, many in passed.items()]
-
-
-def _where(chain: ClosedChain, at: _Passed) -> str:
-    """Joint coordinates there."""
-    state = chain.bare.state(at.t, at.y, np.zeros(chain.size))
-    joints = zip(chain.mechanism.joints, state.angles.tolist(), strict=True)
-    found = (f"{j.name} {_tidy(np.degrees(x))} deg" if j.freedom.turns else f"{j.name} {_tidy(x)} m" for j, x in joints)
-    return f" ({', '.join(found)})"
-
-
-def _tidy(value: float) -> str:
-    return f"{round(value, 6) + 0.0:.6g}"
+def _told(passed: dict[str, list[_Passed]]) -> list[str]:
+    return [branches_warning(many[0].found, [at.t for at in many]) for many in passed.values()]
 
 
 def _singular_positions(chain: ClosedChain, solution: Solution) -> list[_Passed]:
@@ -80,8 +68,9 @@ def _singular_positions(chain: ClosedChain, solution: Solution) -> list[_Passed]
     parts = range(0, len(t), _AT_ONCE)
     share = np.concatenate([chain.loops.watched(t[k : k + _AT_ONCE], y[k : k + _AT_ONCE])[1] for k in parts])
     share /= chain.stiffest_at_start
-    inner = share[1:-1]
-    least = np.flatnonzero((inner <= share[:-2]) & (inner <= share[2:]) & (inner < _LOOK)) + 1
+    inner, rise = share[1:-1], np.maximum(share[:-2], share[2:]) - share[1:-1]
+    low = (inner <= share[:-2]) & (inner <= share[2:])
+    least = np.flatnonzero(low & ((inner < AT) | (inner < _REACH * rise))) + 1
     result: list[_Passed] = []
     for k in least.tolist():
         beside = slice(max(k - 2, 0), k + 3)

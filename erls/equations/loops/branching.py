@@ -4,7 +4,7 @@ With u the direction in which the rows Φ_y say nothing, uᵀΦ_y = 0, and N the
 elsewhere, what is left of uᵀΦ on N is the quadratic form Q = Nᵀ (uᵀΦ_yy) N. Where Q is indefinite, two motions cross (a
 change point: a parallelogram in line); where it is definite, none goes on (a dead point of a drive). Time is a
 coordinate like the others where drives move joints. (J. M. McCarthy, G. S. Soh, Geometric Design of Linkages, 2011;
-A. Müller, J. Mechanisms Robotics 11 (2019) 041011.)
+A. Müller, J. Mechanisms Robotics 8 (2016) 041013.)
 """
 
 from __future__ import annotations
@@ -44,11 +44,14 @@ class Singular(NamedTuple):
         Its name.
     links : tuple of str
         Flexible links within it.
+    where : str
+        Joint coordinates there, in words.
     """
 
     kind: Kind
     loop: str
     links: tuple[str, ...]
+    where: str
 
 
 def singular_at(chain: ClosedChain, t: float, y: Array) -> Singular:
@@ -57,9 +60,10 @@ def singular_at(chain: ClosedChain, t: float, y: Array) -> Singular:
     left = la.svd(rows[:, :-1])[0]
     weak, drift = left[:, -1], np.linalg.norm(rows[:, -1])
     number = int(chain.rows.owner[chain.kept[np.abs(weak).argmax()]])
-    name, flexible = chain.mechanism.loops[number].name, _flexible(chain, rows, number)
+    flexible = _flexible(chain, rows, number)
+    known = chain.mechanism.loops[number].name, flexible, _where(chain, t, y)
     if abs(weak @ rows[:, -1]) > _DRIVEN * drift:
-        return Singular(Kind.LOCKS, name, flexible)
+        return Singular(Kind.LOCKS, *known)
     strong = left[:, :-1].T @ rows
     ways = la.svd(np.vstack([strong, np.zeros(len(rows[0]))]))[2][len(strong) :]
     slopes = np.array([_slope(chain, t, y, way) for way in ways])
@@ -67,7 +71,7 @@ def singular_at(chain: ClosedChain, t: float, y: Array) -> Singular:
     found = np.linalg.eigvalsh((form + form.T) / 2)
     flat = _FLAT * float(np.abs(found).max(initial=0.0))
     crossing = bool(found.min(initial=0.0) < -flat and found.max(initial=0.0) > flat)
-    return Singular(Kind.LOCKS if not crossing else Kind.STIFF if flexible else Kind.BRANCHES, name, flexible)
+    return Singular(Kind.LOCKS if not crossing else Kind.STIFF if flexible else Kind.BRANCHES, *known)
 
 
 def _rows(chain: ClosedChain, t: float, y: Array) -> Array:
@@ -83,6 +87,14 @@ def _slope(chain: ClosedChain, t: float, y: Array, way: Array) -> Array:
     change, later = step * way[:-1] / chain.metres, step * float(way[-1])
     ahead, behind = (_rows(chain, t + sign * later, y + sign * change) for sign in (1.0, -1.0))
     return np.asarray((ahead - behind) / (2 * step))
+
+
+def _where(chain: ClosedChain, t: float, y: Array) -> str:
+    """Joint coordinates."""
+    state = chain.bare.state(t, y, np.zeros(chain.size))
+    joints = zip(chain.mechanism.joints, state.angles.tolist(), strict=True)
+    found = [(j.name, np.degrees(x), "deg") if j.freedom.turns else (j.name, x, "m") for j, x in joints]
+    return ", ".join(f"{name} {round(x, 6) + 0.0:.6g} {unit}" for name, x, unit in found)
 
 
 def _flexible(chain: ClosedChain, rows: Array, loop: int) -> tuple[str, ...]:

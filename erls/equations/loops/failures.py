@@ -36,11 +36,11 @@ def locks(t: float, loop: str, value: float, start: float) -> SimulationError:
     )
 
 
-def ends_singular(t: float, found: Singular, value: float, start: float, where: str = "") -> SimulationError:
-    """A run that ends at a singular position (``where`` in coordinates), by what the loop does there."""
+def ends_singular(t: float, found: Singular, value: float, start: float) -> SimulationError:
+    """A run that ends at a singular position, by what the loop does there."""
     if found.kind == Kind.LOCKS:
         return locks(t, found.loop, value, start)
-    what = f"loop {found.loop!r} comes to a change point{where}, where links in line may go on in two ways"
+    what = f"loop {found.loop!r} comes to a change point ({found.where}), where links in line may go on in two ways"
     remedy = "add a guide or a spring that decides, start elsewhere, or end the run before"
     if found.kind == Kind.STIFF:
         names = ", ".join(repr(name) for name in found.links)
@@ -56,13 +56,13 @@ def ends_singular(t: float, found: Singular, value: float, start: float, where: 
     )
 
 
-def branches_warning(loop: str, where: str, times: list[float]) -> str:
+def branches_warning(found: Singular, times: list[float]) -> str:
     """What the user should know about a loop that passed change points, the first one in this position."""
     often = f", and at {len(times) - 1} more" if len(times) > 1 else ""
     return (
-        f"loop {loop!r} passes a change point at t = {times[0]:.6g} s{where}{often}: links in line may go on in two "
-        "ways there, and the run keeps to that which it came; in a real linkage play and friction decide, unless a "
-        "guide or a spring does"
+        f"loop {found.loop!r} passes a change point at t = {times[0]:.6g} s ({found.where}){often}: links in line may "
+        "go on in two ways there, and the run keeps to the motion on which it came; in a real linkage play and "
+        "friction decide, unless a guide or a spring does"
     )
 
 
