@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from erls.equations.loops.compiled import CompiledLoops
 
 
-def held_loops(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray) -> Held:
+def held_loops(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray, gap: float) -> Held:
     """The chain under gravity, springs and drives.
 
     Parameters
@@ -27,6 +27,8 @@ def held_loops(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray) -> H
         Loops closed, links undeformed.
     held : int array
         Free joints, by their place in y, whose physical angles keep their values.
+    gap : float
+        What undeformed links leave open [m], for messages; 0 where that is nothing to speak of.
     """
     kept, free, still = loops.given.kept, chain.bare.free, np.zeros(chain.size)
     angles = Angles(chain.bare, chain.bare.free_joints[held], y, chain.metres, chain.reach)
@@ -40,5 +42,7 @@ def held_loops(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray) -> H
         both = found.violation[kept], turned
         return np.concatenate(both), np.concatenate([found.rows[kept][:, free], rows])
 
+    what = "no static equilibrium of the closed chain"
+    what += f", which undeformed links leave {gap:.3g} m open," if gap else ""
     given = chain.mechanism, forces, conditions, len(kept), *elastic_on_diagonal(chain.bare)
-    return Held(*given, chain.metres, chain.reach, "no static equilibrium of the closed chain")
+    return Held(*given, chain.metres, chain.reach, what)
