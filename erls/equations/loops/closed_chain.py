@@ -21,10 +21,11 @@ from erls.equations.linearization import Linearization
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.neighbours import LoopNeighbours
 from erls.equations.loops.rows import Closure, applied
-from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
-from erls.equations.loops.static import closed_equilibrium
+from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity, stays_open
+from erls.equations.loops.static import held_loops
 from erls.equations.loops.tied import OPEN, Tied
 from erls.equations.neighbours import small_motions
+from erls.equations.serial.equilibrium import Held, equilibrium
 from erls.equations.serial.motion_series import MotionSeries, motion_series
 from erls.equations.serial.neighbours import TreeNeighbours
 from erls.equations.serial.state_series import (
@@ -104,7 +105,12 @@ class ClosedChain(Tied):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know about the loops."""
-        return (*warnings_of(self.redundant), *assembled_warning(self.start, ASSEMBLED * self.reach))
+        assembled = assembled_warning(self.start, ASSEMBLED * self.reach, self._force_at_start)
+        return (*warnings_of(self.redundant), *assembled)
+
+    def _force_at_start(self) -> float:
+        """Largest force of a closing joint there [N]."""
+        return max(float(np.linalg.norm(found.force)) for found in self.loop_forces(0.0, *self.initial_state()))
 
     def refuse_open(self, t: float, found: Closure) -> None:
         """Raise when a loop has come apart.
@@ -213,8 +219,31 @@ class ClosedChain(Tied):
 
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
-        """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness."""
-        return closed_equilibrium(self, self.exact, self._closed_start, self.start.held)
+        """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness.
+
+        Raises
+        ------
+        SimulationError
+            LOOP_OPEN where no link gives way in a direction that undeformed links leave open, beside what
+            `erls.equations.serial.equilibrium.equilibrium` raises.
+        """
+        y, bearing = equilibrium(self.held, self._closed_start)
+        if self._gap:
+            gaps = np.abs(self.openings(self.closure(0.0, y, np.zeros(self.size))))
+            worst = int(np.argmax(gaps))
+            if gaps[worst] > ASSEMBLED * self.reach:
+                raise stays_open(self, f"no link gives way: {self.rows.names[worst]} stays open", float(gaps[worst]))
+        return y, bearing
+
+    @property
+    def held(self) -> Held:
+        """The closed chain at rest with the joints held that the loops leave free."""
+        return held_loops(self, self.exact, self._closed_start, self.start.held, self._gap)
+
+    @property
+    def _gap(self) -> float:
+        """What undeformed links leave open [m]; 0 where that is nothing to speak of."""
+        return self.start.gap if self.start.gap > ASSEMBLED * self.reach else 0.0
 
     def neighbours(self, t: float, y: Array, v: Array) -> LoopNeighbours:
         """States beside a closed one, with the forces of the loops as they are there."""

@@ -18,7 +18,7 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization
 from erls.equations.neighbours import small_motions
-from erls.equations.serial.equilibrium import held_equilibrium, size_of
+from erls.equations.serial.equilibrium import Held, equilibrium, held_tree, size_of
 from erls.equations.serial.loads import load_powers
 from erls.equations.serial.neighbours import TreeNeighbours
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
@@ -161,7 +161,12 @@ class SerialFormulation(TreeFormulation):
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
         """Static equilibrium with the joints held, and what loads leave of the stiffness."""
-        return held_equilibrium(self, self.undeformed_start()[0], self.free_joints)
+        return equilibrium(self.held, self.undeformed_start()[0])
+
+    @property
+    def held(self) -> Held:
+        """The mechanism at rest with its joints held."""
+        return held_tree(self, self.undeformed_start()[0], self.free_joints)
 
     def neighbours(self, t: float, y: Array, v: Array) -> TreeNeighbours:
         """States beside one, with the accelerations of the equations of motion."""
