@@ -19,6 +19,7 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
+ASSEMBLIES = ("rigid", "elastic")
 AXES = ("world", "link")  # of loads
 # on one coordinate
 _ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
@@ -41,6 +42,9 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     check_tables(scene, file)
     check_settings(scene.simulation, f"{file}: simulation")
     choose(scene.initial.deformation, DEFORMATIONS, f"{file}: initial.deformation", SceneError)
+    choose(scene.initial.assemble, ASSEMBLIES, f"{file}: initial.assemble", SceneError)
+    if scene.initial.assemble == "elastic":
+        _check_assembly(scene, f"{file}: initial.assemble")
     if not scene.joints:
         raise bad(f"{file}: joints", "a scene needs at least one joint", None, "add [[joints]]")
     if len(scene.joints) != len(scene.links):
@@ -93,6 +97,16 @@ def _check_sensors(scene: SceneRecord, file: str) -> None:
     moving += [loop.name for loop in scene.loops if JOINT_TYPES[loop.type].one is not None]
     taken = {*points, *(joint.name for joint in scene.joints), *(loop.name for loop in scene.loops), "t", "energy"}
     check_sensors(scene.sensors, file, {"point": points, "joint": moving}, taken)
+
+
+def _check_assembly(scene: SceneRecord, place: str) -> None:
+    message = remedy = ""
+    if not scene.loops:
+        message, remedy = "there is no loop to close", "remove it, or add [[loops]]"
+    elif scene.simulation.formulation == "nodal":
+        message, remedy = "'nodal' assembles rigid links", "use formulation = 'erls' or 'ffr', or remove it"
+    if message:
+        raise bad(place, message, scene.initial.assemble, remedy)
 
 
 _BORNE = {"point": ("force", "moment"), "link": ("force_per_length", "force_per_mass"), "mass": ("force_per_mass",)}

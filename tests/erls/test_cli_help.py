@@ -23,6 +23,8 @@ OPTIONS = {
                    "--points", "--norm", "--reference", "--budget", "--apply", "--set", "--workers", "--force",
                    "--json"],
     "effects": ["--set", "--json"],
+    "linearize": ["--output", "-o", "--at", "--equilibrium", "--inputs", "--outputs", "--campbell", "--locus", "--mode",
+                  "--set", "--force", "--json"],
     "info": ["--json"],
     "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--overlay", "--force", "--json"],
 }

@@ -16,9 +16,11 @@ import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
-from erls.equations.linearization import Linearization, derivatives, difference_steps
-from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
+from erls.equations.linearization import Linearization
+from erls.equations.neighbours import small_motions
+from erls.equations.serial.equilibrium import Held, equilibrium, held_tree, size_of
 from erls.equations.serial.loads import load_powers
+from erls.equations.serial.neighbours import TreeNeighbours
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
@@ -159,20 +161,20 @@ class SerialFormulation(TreeFormulation):
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
         """Static equilibrium with the joints held, and what loads leave of the stiffness."""
-        return held_equilibrium(self, self.undeformed_start()[0], self.free_joints)
+        return equilibrium(self.held, self.undeformed_start()[0])
+
+    @property
+    def held(self) -> Held:
+        """The mechanism at rest with its joints held."""
+        return held_tree(self, self.undeformed_start()[0], self.free_joints)
+
+    def neighbours(self, t: float, y: Array, v: Array) -> TreeNeighbours:
+        """States beside one, with the accelerations of the equations of motion."""
+        return TreeNeighbours(self, t, y, v, self.acceleration(t, y, v))
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
         """Small motions about a state, with the accelerations of the equations of motion."""
-        a = self.acceleration(t, y, v)
-        stiffness, _ = elastic_on_diagonal(self)
-        steps = difference_steps(metre_scales(self), size_of(self.mechanism), stiffness)
-
-        def forces(y: Array, v: Array) -> Array:
-            return residual_series(self.compiled, np.full(len(y), t), y, v, np.tile(a, (len(y), 1)))
-
-        slope = derivatives(lambda many: forces(many, np.tile(v, (len(many), 1))), y, steps)
-        damping = derivatives(lambda many: forces(np.tile(y, (len(many), 1)), many), v, steps)
-        return Linearization(self.mass_matrix(t, y), damping, slope, np.eye(self.size))
+        return small_motions(self.neighbours(t, y, v))
 
     @cached_property
     def stability(self) -> Stability:

@@ -146,6 +146,10 @@ class ChainMotion(Run):
         y, v = hermite(s.t, s.y, s.v, s.a, np.clip(flat, s.t[0], self.end))
         return np.shape(t), flat, y, v
 
+    def coordinates(self, t: ArrayLike) -> tuple[Array, Array]:
+        """(k, n) coordinates of the equations and their rates at times (k,)."""
+        return self._interpolated(t)[2:]
+
     def states(self, t: ArrayLike) -> list[State]:
         """The mechanism at each time."""
         return self.series(t).states()
