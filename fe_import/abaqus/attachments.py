@@ -183,7 +183,7 @@ def _coupling(deck: Deck, statement: Statement, served: set[int]) -> Iterator[At
     held: set[int] = set()
     for row in kind.rows or [["1", "6"]]:
         first, last = int(row[0]), int(row[1] if len(row) > 1 and row[1] else row[0])
-        held |= set(range(first, last + 1))
+        held |= {component for component in range(1, 7) if first <= component <= last}
     if not {1, 2, 3} <= held:
         raise Unused("couplings are used that hold all displacements")
     surface = _option(statement, "SURFACE").upper()

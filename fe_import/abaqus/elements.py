@@ -28,7 +28,7 @@ class ElementType:
         meshio's name; that of the type for solids of another shape, empty where there is nothing to show.
     dimension : int
     spare : int
-        Nodes that may follow (the orientation node of a beam).
+        Nodes that may follow (the orientation node of a beam), of no meaning here.
     """
 
     nodes: int
@@ -47,7 +47,8 @@ def element_type(kind: str) -> ElementType:
     family, number = found[1], int(found[2])
     if family == "C3D":
         solid = _SOLIDS.get(number)
-        return ElementType(0, kind, 3) if solid is None else ElementType(number, solid.meshio_name, 3)
+        spare = 3 if kind.startswith("C3D8I") else 0  # CalculiX's nodes of its incompatible modes
+        return ElementType(0, kind, 3) if solid is None else ElementType(number, solid.meshio_name, 3, spare)
     if family in ("SC", "CSS"):
         return ElementType(number, kind, 3)
     if family == "B3":

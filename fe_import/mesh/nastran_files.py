@@ -43,7 +43,7 @@ _PROPERTIES = re.compile(r"(PSHELL|PCOMP|PSHEAR|PBAR|PBEAM|PROD|PTUBE|PBEND)")
 _BEGIN = re.compile(r"\s*BEGIN\b(?:\s+BULK)?\s*(?P<more>.*)", re.IGNORECASE)
 _CASE_SET = re.compile(r"\s*SET\s+(\d{1,9})\s*=(.*)", re.IGNORECASE)
 MOST_DEEP = 20  # files that include each other
-_MOST_OF_RANGE = 10_000_000
+_MOST_MEMBERS = 10_000_000  # of a set
 
 
 def read_nastran(path: Path, name: str) -> RawMesh:
@@ -247,7 +247,7 @@ def _members(words: list[str]) -> list[int] | None:
             if not (len(words) > k + 2 and words[k + 2].isdigit() and len(words[k + 2]) <= 9):
                 return None
             high, k = int(words[k + 2]), k + 2
-        if high - low > _MOST_OF_RANGE:
+        if high - low + len(found) > _MOST_MEMBERS:
             return None
         found += range(low, high + 1)
         k += 1

@@ -218,6 +218,15 @@ def test_sets_of_mixed_elements(tmp_path):
     np.testing.assert_array_equal(found.nodes[found.node_sets["END"]][:, 0], np.full(4, 3.0))
 
 
+def test_nodes_of_incompatible_modes(tmp_path):
+    """CalculiX's C3D8I may name three nodes more, of its incompatible modes; they are no part of the mesh."""
+    mesh = box("hex8", (1, 1, 1))
+    lines = ["*NODE", *(f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(mesh.nodes.tolist(), start=1))]
+    lines += ["*ELEMENT, TYPE=C3D8I", ", ".join(map(str, [1, *(mesh.only.elements[0] + 1), 90, 91, 92]))]
+    (tmp_path / "hex8i.inp").write_text("\n".join(lines))
+    np.testing.assert_array_equal(read_mesh(tmp_path / "hex8i.inp").only.elements, mesh.only.elements)
+
+
 def test_hexahedra_of_27_nodes_in_decks(tmp_path):
     """Abaqus begins the further nodes of C3D27 with the centre, then those of S1 to S6 (its element library)."""
     mesh = box("hex27", (2, 1, 1), (1.0, 2.0, 3.0))
