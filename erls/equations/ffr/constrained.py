@@ -218,7 +218,7 @@ class ConstrainedFfr:
         for world, (mass, moment) in zip(q.poses, body_moments(self.tied, self.links), strict=True):
             gravity -= float(self.mechanism.gravity @ (mass * world[:3, 3] + world[:3, :3] @ moment))
         springs = sum(
-            joint.forces.stiffness * float(angle - joint.forces.rest) ** 2 / 2
+            joint.forces.energy(float(angle))
             for joint, angle in zip(self.mechanism.joints, q.angles, strict=True)
         )
         return Energy(kinetic, self.reduced.elastic_energy(q.eta), gravity, float(springs))

@@ -16,6 +16,7 @@ import scipy.linalg as la
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization, derivatives, difference_steps
+from erls.equations.serial.contacts import ENERGY, contact_views
 from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
 from erls.equations.serial.loads import load_powers
 from erls.equations.serial.records import Serial
@@ -129,15 +130,29 @@ class SerialFormulation(TreeFormulation):
         return np.asarray(np.linalg.solve(lower.swapaxes(1, 2), half)[..., 0])
 
     def load_power(self, t: Array, y: Array, v: Array) -> Array:
-        """(k,) power of loads at times (k,) [W]."""
+        """(k,) power of loads, and what contacts lose, at times (k,) [W]."""
         system, result = self.compiled, np.zeros(len(t))
-        if not self.mechanism.loads:
+        if not self.mechanism.acted_on:
             return result
         powers = load_powers(system, _see_serial(system.reals, system.integers, int(system.integers[0])))
         for k, at in enumerate(t.tolist()):
             residual(system, at, y[k], v[k], np.zeros(0))
             result[k] = sum(float(power[0]) for power in powers)
         return result
+
+    def contact_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, c, 6) gap and its rate, normal force, friction along two axes, elastic energy of contacts; times (k,)."""
+        system, result = self.compiled, np.zeros((len(t), len(self.mechanism.contacts), 6))
+        if result.size:
+            known = contact_views(system, _see_serial(system.reals, system.integers, int(system.integers[0])))
+            for k, at in enumerate(t.tolist()):
+                residual(system, at, y[k], v[k], np.zeros(0))
+                result[k] = known
+        return result
+
+    def contact_energy(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) elastic energy of all contacts [J]."""
+        return np.asarray(self.contact_series(t, y, v)[:, :, ENERGY].sum(axis=1))
 
     def elastic_name(self, place: int) -> str:
         """What messages call an elastic coordinate, by its place among them."""
