@@ -4,16 +4,17 @@ A depth δ, grown at the speed δ̇, gives the force
 
     F = k δⁿ (1 + d σ(δ̇ / w)),    σ(x) = x (15 - 10 x² + 3 x⁴) / 8 for |x| < 1, beyond ±1,
 
-which never pulls as 0 ≤ d ≤ 1. It is the product of elasticity and damping of K. Hunt and F. Crossley (J. Appl. Mech. 42
-(1975) 440-445), n = 3/2 after Hertz, with a factor that levels off instead of growing with speed: with theirs a body
-rebounds the better the slower it comes. For a free body of effective mass m, with v = δ̇, m v dv = -k δⁿ g(v) dδ has the
-same integral over δ on the way in and out, whatever m, k, n, so that the speeds before and after, v₀ and e v₀, fulfil
+which never pulls, as 0 ≤ d ≤ 1. It multiplies elasticity and damping as K. Hunt and F. Crossley do (J. Appl. Mech. 42
+(1975) 440-445; n = 3/2 after Hertz), with a factor that levels off instead of growing with speed: with theirs a body
+rebounds the better the slower it comes. The motion of a free body of mass m, m v dv = -k δⁿ g(v) dδ with v = δ̇,
+spends the same ∫ δⁿ dδ on its way in and out, whatever m, k and n, so that the speeds before and after, v₀ and e v₀,
+fulfil
 
-    ∫₀^v₀ v dv / g(v) = ∫₀^(e v₀) v dv / g(-v),
+    ∫₀^v₀ v dv / g(v) = ∫₀^(e v₀) v dv / g(-v).
 
-and where g is 1 ± d but for speeds below w, d = (1 - e²) / (1 + e²) makes it rebound with e, exactly but for terms of
-(w / v₀)²; with e = 0 it leaves with less than w. What is damped at rest is linear in the speed, c = 15 d k δⁿ / (8 w), so
-that bodies come to rest after a finite number of rebounds. The energy k δⁿ⁺¹ / (n + 1) is elastic; the rest is lost.
+g being 1 + d and 1 - d but for speeds below w, d = (1 - e²) / (1 + e²) makes it rebound with e, but for terms of
+(w / v₀)²; with e = 0 it leaves with less than w. At rest damping is linear in the speed, c = 15 d k δⁿ / (8 w), so that
+bodies come to rest after some rebounds. The energy k δⁿ⁺¹ / (n + 1) is elastic; the rest is lost.
 
 Friction is Coulomb's, made smooth: µ F tanh(|s| / r) against the speed s along the plane.
 """

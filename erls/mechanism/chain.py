@@ -87,6 +87,13 @@ class Mechanism:
         """Whether anything but joints and gravity acts on nodes."""
         return bool(self.loads or self.contacts)
 
+    @property
+    def touches(self) -> bool:
+        """Whether contacts, or stops of joints, act from one moment on."""
+        forces = [joint.forces for joint in self.joints]
+        forces += [loop.freedom.forces for loop in self.loops if loop.freedom is not None]
+        return bool(self.contacts) or any(each.stops for each in forces)
+
     def carried(self, number: int) -> list[int]:
         """A link and all that it bears, by their numbers."""
         found = [number]

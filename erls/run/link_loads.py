@@ -10,10 +10,11 @@ import numpy as np
 
 from erls.equations.formulation import State
 from erls.equations.serial.state_series import StateSeries
+from erls.integrate.base import hermite
 from erls.maths.so3 import Array, cross, skew
 from erls.mechanism.links import node_shape6
 from erls.mechanism.loops import LoopEnd
-from erls.run.chain.loads import pull, wrenches
+from erls.run.chain.loads import pull, pushes, wrenches
 from erls.run.chain.run import ChainRun
 
 _STEP = 1e-5  # s, of central differences: 1e-6 m/s² of rounding, and below 1 kHz 3e-4 of the acceleration
@@ -108,7 +109,7 @@ def _joint_loads(run: ChainRun, number: int, times: Array, states: list[State]) 
 
 
 def _given_loads(run: ChainRun, number: int, series: StateSeries) -> Array:
-    """(k, i, 6) what the loads of the scene do to the interfaces of a link."""
+    """(k, i, 6) what loads and contacts of the scene do to the interfaces of a link."""
     mechanism = run.formulation.mechanism
     nodes = [i.node for i in mechanism.links[number].model.interface_nodes]
     result = np.zeros((len(series.times), len(nodes), 6))
@@ -116,6 +117,12 @@ def _given_loads(run: ChainRun, number: int, series: StateSeries) -> Array:
         if load.link == number and load.node in nodes:
             found = wrenches(mechanism, load, series) @ series.poses[number][:, :3, :3]
             result[:, nodes.index(load.node)] += found.reshape(-1, 6)
+    solution, t = run.solution, series.times
+    at = hermite(solution.t, solution.y, solution.v, solution.a, t)
+    for link, node, force, moment, _ in pushes(mechanism, run.formulation.contact_series(t, *at), series):
+        if link == number and node in nodes:
+            found = np.stack([force, moment], axis=1) @ series.poses[number][:, :3, :3]
+            result[:, nodes.index(node)] += found.reshape(-1, 6)
     return result
 
 

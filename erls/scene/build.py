@@ -21,8 +21,8 @@ from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model,
 from erls.mechanism.place import Place
 from erls.mechanism.thermal import at_temperature, unwarmed
 from erls.mechanism.without_effects import without
-from erls.scene.build_joints import build_joints, stands_on
 from erls.scene.build_contacts import build_contacts
+from erls.scene.build_joints import build_joints, stands_on
 from erls.scene.build_loads import build_loads
 from erls.scene.build_loops import build_loops
 from erls.scene.build_substructures import piece_links, piece_models, piece_warnings

@@ -70,8 +70,8 @@ class ContactFriction(Record, frozen=True):
 
 
 class Contact(Record, frozen=True, kw_only=True):
-    """A named point that a plane keeps on its side, with the force k δⁿ at a depth δ, more on the way in and less on the
-    way out.
+    """A named point that a plane keeps on its side: by the force k δⁿ at a depth δ, more on the way in, less on the way
+    out.
 
     Attributes
     ----------

@@ -11,9 +11,9 @@ from erls.equations.compiled_system import CompiledSystem, Factoring, function_i
 from erls.equations.erls import records as own
 from erls.equations.serial import pack, segments
 from erls.equations.serial.condensed import condensed as elimination_memory
+from erls.equations.serial.contacts import put_contacts
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.ends import end_state
-from erls.equations.serial.contacts import put_contacts
 from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.modal_inertia_kernels import warp_record, warp_state

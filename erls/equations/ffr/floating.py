@@ -32,7 +32,14 @@ from erls.equations.serial.nodes import (
     read_node_state,
     to_node_axes,
 )
-from erls.equations.serial.records import MODES, Serial, call_feed_forward, read_modes, read_serial
+from erls.equations.serial.records import (
+    MODES,
+    Serial,
+    call_contact_gains,
+    call_feed_forward,
+    read_modes,
+    read_serial,
+)
 from erls.equations.serial.segments import SEGMENT, read_segment
 from erls.maths.jit import kernel, part
 from erls.maths.products import clear

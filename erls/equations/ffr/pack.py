@@ -14,8 +14,8 @@ from erls.equations.ffr.records import BentBody, Body, End, EndRoom, Frames, Roo
 from erls.equations.ffr.standard_data import StandardData
 from erls.equations.serial import pack
 from erls.equations.serial.condensed import condensed
-from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.contacts import put_contacts
+from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import modal_inertia
 from erls.equations.serial.modal_inertia_kernels import Warp, warp_record, warp_state

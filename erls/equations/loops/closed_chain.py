@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.linalg as la
 
-from erls.equations.formulation import Energy, LoopForce, Reaction, State
+from erls.equations.formulation import ContactSeries, Energy, LoopForce, Reaction, State
 from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.rows import Closure, applied
@@ -266,6 +266,10 @@ class ClosedChain(Tied):
                 result[i, 0] += 0.5 * found.rotor_inertia * efforts[k].rate ** 2
                 result[i, 3] += found.forces.energy(efforts[k].coordinate)
         return result
+
+    def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
+        """That of the tree."""
+        return self.bare.contact_series(t, y, v)
 
     def load_power(self, t: Array, y: Array, v: Array) -> Array:
         """(k,) that of the tree."""

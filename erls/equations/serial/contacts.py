@@ -135,10 +135,10 @@ def put_contacts(
     }
 
 
-def contact_views(system: contract.CompiledSystem, serial: Serial) -> list[Array]:
-    """Views of what a residual leaves in `ContactState.known` of every contact."""
+def contact_states(system: contract.CompiledSystem, serial: Serial) -> list[ContactState]:
+    """Views of what a residual leaves of every contact."""
     places = (serial.contact_states + k * CONTACT_STATE for k in range(serial.contact_count))
-    return [_see_state(system.scratch, system.integers, at).known for at in places]
+    return [_see_state(system.scratch, system.integers, at) for at in places]
 
 
 @part

@@ -14,9 +14,9 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
+from erls.equations.formulation import ContactSeries, FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization, derivatives, difference_steps
-from erls.equations.serial.contacts import ENERGY, contact_views
+from erls.equations.serial.contacts import ENERGY, contact_states
 from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
 from erls.equations.serial.loads import load_powers
 from erls.equations.serial.records import Serial
@@ -140,19 +140,19 @@ class SerialFormulation(TreeFormulation):
             result[k] = sum(float(power[0]) for power in powers)
         return result
 
-    def contact_series(self, t: Array, y: Array, v: Array) -> Array:
-        """(k, c, 6) gap and its rate, normal force, friction along two axes, elastic energy of contacts; times (k,)."""
-        system, result = self.compiled, np.zeros((len(t), len(self.mechanism.contacts), 6))
-        if result.size:
-            known = contact_views(system, _see_serial(system.reals, system.integers, int(system.integers[0])))
+    def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
+        """Contacts at times (k,)."""
+        system, known = self.compiled, np.zeros((len(t), len(self.mechanism.contacts), 10))
+        if known.size:
+            states = contact_states(system, _see_serial(system.reals, system.integers, int(system.integers[0])))
             for k, at in enumerate(t.tolist()):
                 residual(system, at, y[k], v[k], np.zeros(0))
-                result[k] = known
-        return result
+                known[k] = [[*x.known[:3], *x.force, *x.point[9:], x.known[ENERGY]] for x in states]
+        return ContactSeries.of(known)
 
     def contact_energy(self, t: Array, y: Array, v: Array) -> Array:
         """(k,) elastic energy of all contacts [J]."""
-        return np.asarray(self.contact_series(t, y, v)[:, :, ENERGY].sum(axis=1))
+        return np.asarray(self.contact_series(t, y, v).energy.sum(axis=1))
 
     def elastic_name(self, place: int) -> str:
         """What messages call an elastic coordinate, by its place among them."""

@@ -41,8 +41,8 @@ from erls.maths.records import Memory, Vector, python_reader, reader, room, tabl
 from erls.maths.so3 import Array
 from erls.maths.spatial import dot6, rotate, rotate_back, transform_force_back, transform_motion
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.links import Link
 from erls.mechanism.contacts import PointContact
+from erls.mechanism.links import Link
 from erls.mechanism.loads import CENTRE, PointLoad
 from fe_import.model import IntArray
 

@@ -1,4 +1,4 @@
-"""Stiffness and damping of links on joints: modes, springs, dampers, friction, controllers on the diagonals; contacts."""
+"""Stiffness and damping of links on joints: modes, springs, dampers, friction, controllers, on diagonals; contacts."""
 
 from __future__ import annotations
 

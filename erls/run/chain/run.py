@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from erls.equations.formulation import Energy, LoopFormulation
+from erls.equations.formulation import ContactSeries, Energy, LoopFormulation
 from erls.equations.serial.state_series import ReactionSeries, energy_series, reaction_series
 from erls.equations.stability import Stability, start_stability
 from erls.equations.substructures import solved
@@ -140,6 +140,19 @@ class ChainRun(ChainMotion):
         found = [what(chain, *at, number) for at in zip(flat.tolist(), y, v, strict=True)]
         return np.array(found).reshape(np.shape(t))
 
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Contacts of the scene."""
+        return tuple(contact.name for contact in self.formulation.mechanism.contacts)
+
+    def contact(self, name: str, t: ArrayLike) -> ContactSeries:
+        """Gap [m] and its rate, normal force [N], force on the point (..., 3) and where it acts, energy [J]."""
+        choose(name, self.contact_names, "contact", SceneError)
+        number, (shape, *at) = self.contact_names.index(name), self._interpolated(t)
+        found = self.formulation.contact_series(*at)
+        parts = (np.array(getattr(found, field.name))[:, number] for field in fields(ContactSeries))
+        return ContactSeries(*(part.reshape(*shape, *part.shape[1:]) for part in parts))
+
     @cached_property
     def stability(self) -> Stability | None:
         """Of a static start of links that are linear in their own frames; None of other starts."""
@@ -147,13 +160,21 @@ class ChainRun(ChainMotion):
 
     @property
     def conservative(self) -> bool:
-        """Whether total energy should stay constant: no drives, loads, damping or friction."""
+        """Whether total energy should stay constant: no drives, loads, damping, friction or inelastic contacts."""
         mechanism = self.formulation.mechanism
         joints: list[Joint | LoopFreedom] = [*mechanism.joints]
         joints += [x.freedom for x in mechanism.loops if x.freedom is not None]
         passive = all(_passive(j) for j in joints)
         damped = any(link.damping.any() for link in mechanism.links)
-        return passive and not damped and not mechanism.loads and conserves_energy(mechanism.effects)
+        lossy = any(c.friction or c.law.loss for c in mechanism.contacts)
+        return passive and not (damped or lossy or mechanism.loads) and conserves_energy(mechanism.effects)
+
+    def _pressed(self) -> dict[str, dict[str, float]]:
+        """Least gap [m] and largest normal force [N] of each contact, at the knots of the run."""
+        found = self.formulation.contact_series(self.solution.t, self.solution.y, self.solution.v)
+        gaps, forces = found.gap.min(axis=0).tolist(), found.normal_force.max(axis=0).tolist()
+        each = zip(self.contact_names, gaps, forces, strict=True)
+        return {name: {"least_gap": gap, "largest_normal_force": force} for name, gap, force in each}
 
     def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
         """Joints and points at given times, as in the JSON of ``erls simulate``."""
@@ -173,7 +194,7 @@ class ChainRun(ChainMotion):
 
     def columns(self, times: Array) -> dict[str, Array]:
         """Of each point x, y, z; of each joint coordinate, physical angle, its rate, effort, reaction force and moment
-        on the outer link (world axes); energies.
+        on the outer link (world axes); of each contact gap, normal force and force on its point; energies.
         """
         states, reactions = self.series(times), self._reactions(times)
         columns = {"t [s]": times}
@@ -187,13 +208,18 @@ class ChainRun(ChainMotion):
             columns[f"{name}.effort [{effort}]"] = reactions.effort[:, k]
             vector(columns, f"{name}.force", "N", reactions.force[:, k])
             vector(columns, f"{name}.moment", "N m", reactions.moment[:, k])
+        for name in self.contact_names:
+            contact = self.contact(name, times)
+            columns[f"{plain(name)}.gap [m]"] = contact.gap
+            columns[f"{plain(name)}.normal_force [N]"] = contact.normal_force
+            vector(columns, f"{plain(name)}.force", "N", contact.force)
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):
             columns[f"energy.{kind} [J]"] = np.asarray(getattr(energy, kind))
         return columns
 
     def curves(self, times: Array) -> dict[str, Curve]:
-        """Points, joints, energies."""
+        """Points, joints, contacts, energies."""
         states, found = self.series(times), dict[str, Curve]()
         for k, name in enumerate(self.point_names):
             found[f"points/{name}"] = Curve(self.point_position(states, k), "m", "world position; time, axis")
@@ -201,6 +227,10 @@ class ChainRun(ChainMotion):
             for what in ("coordinates", "angles", "rates"):
                 values = np.array(getattr(states, what)[:, k])
                 found[f"joints/{name}/{what}"] = Curve(values, "rad or m, per s", "joint motion")
+        for name in self.contact_names:
+            contact = self.contact(name, times)
+            found[f"contacts/{name}/gap"] = Curve(contact.gap, "m", "height of the point above the plane")
+            found[f"contacts/{name}/force"] = Curve(contact.force, "N", "on the point, world axes; time, axis")
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):
             found[f"energy/{kind}"] = Curve(np.asarray(getattr(energy, kind)), "J", f"{kind} energy")
@@ -229,6 +259,7 @@ class ChainRun(ChainMotion):
             },
             **({} if self.stability is None else {"stability": self.stability.summary()}),
             **self.stated(),
+            **({"contacts": self._pressed()} if self.contact_names else {}),
             "samples": self.samples(times),
             **({"events": [asdict(happening) for happening in self.events]} if self.scene.record.events else {}),
             "warnings": list(self.warnings),
@@ -238,4 +269,5 @@ class ChainRun(ChainMotion):
 def _passive(joint: Joint | LoopFreedom) -> bool:
     """Whether nothing in a joint does work but springs."""
     still = joint.drive.kind == "free" or (isinstance(joint, Joint) and joint.fixed)
-    return still and not joint.forces.damping and not joint.forces.friction
+    stops = joint.forces.stops
+    return still and not (joint.forces.damping or joint.forces.friction or (stops and stops.law.loss))

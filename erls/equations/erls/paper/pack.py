@@ -23,8 +23,8 @@ from erls.equations.erls.paper.records import (
     call_extra_rows,
     call_loads,
 )
-from erls.equations.serial.ends import end_state
 from erls.equations.serial.contacts import put_contacts
+from erls.equations.serial.ends import end_state
 from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.pack import (
