@@ -30,7 +30,7 @@ TIED_STEPS = "erls.integrate.stepping.generalized_alpha"
 INTEGRATION_SHARE = 0.1
 """Of the error that a run is wanted to keep in all, what integration aims at."""
 
-IMPACT_SHARE = 1e-2
+IMPACT_SHARE = 1e-3
 """Of what it aims at elsewhere, where contacts or stops act: an error of the place within an impact is one of the speed
 after it. Measured on a bouncing ball: `docs/trust.md`."""
 

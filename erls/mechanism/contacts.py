@@ -9,6 +9,8 @@ import numpy as np
 
 from erls.maths.so3 import Array
 
+_FAR = 1e300
+
 
 @dataclass(frozen=True)
 class ContactLaw:
@@ -60,8 +62,8 @@ class Stops:
 
     @property
     def numbers(self) -> Array:
-        """(6,) as in `erls.maths.contact_law`."""
-        return np.concatenate([[self.lower, self.upper], self.law.numbers])
+        """(6,) as in `erls.maths.contact_law`; one that is not there is far away, as 0 · ∞ is no number."""
+        return np.concatenate([np.clip([self.lower, self.upper], -_FAR, _FAR), self.law.numbers])
 
     def force(self, angle: float, rate: float) -> tuple[float, float]:
         """Force on the coordinate, and what of it is elastic."""
@@ -77,10 +79,6 @@ class Stops:
         from erls.maths.jit import plain
 
         return float(plain(stop_energy)(self.numbers, angle))
-
-    def depth(self, angle: float) -> float:
-        """How far a coordinate is beyond the nearer of them; negative within the range."""
-        return max(self.lower - angle, angle - self.upper)
 
 
 @dataclass(frozen=True)

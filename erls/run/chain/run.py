@@ -24,6 +24,7 @@ from erls.run.events import Happening, happenings
 from erls.run.record import Curve, plain, vector
 from fe_import.files.toml import choose
 
+_MOST_KNOTS = 4000
 _ENERGIES = ("kinetic", "elastic", "gravity", "springs")
 
 
@@ -151,7 +152,7 @@ class ChainRun(ChainMotion):
         number, (shape, *at) = self.contact_names.index(name), self._interpolated(t)
         found = self.formulation.contact_series(*at)
         parts = (np.array(getattr(found, field.name))[:, number] for field in fields(ContactSeries))
-        return ContactSeries(*(part.reshape(*shape, *part.shape[1:]) for part in parts))
+        return ContactSeries(*(part.reshape((*shape, *part.shape[1:])) for part in parts))
 
     @cached_property
     def stability(self) -> Stability | None:
@@ -170,8 +171,10 @@ class ChainRun(ChainMotion):
         return passive and not (damped or lossy or mechanism.loads) and conserves_energy(mechanism.effects)
 
     def _pressed(self) -> dict[str, dict[str, float]]:
-        """Least gap [m] and largest normal force [N] of each contact, at the knots of the run."""
-        found = self.formulation.contact_series(self.solution.t, self.solution.y, self.solution.v)
+        """Least gap [m] and largest normal force [N] of each contact, at the knots of the run; of many, at some."""
+        s = self.solution
+        at = slice(None, None, 1 + len(s.t) // _MOST_KNOTS)
+        found = self.formulation.contact_series(s.t[at], s.y[at], s.v[at])
         gaps, forces = found.gap.min(axis=0).tolist(), found.normal_force.max(axis=0).tolist()
         each = zip(self.contact_names, gaps, forces, strict=True)
         return {name: {"least_gap": gap, "largest_normal_force": force} for name, gap, force in each}

@@ -14,6 +14,8 @@ from erls.integrate.base import Solution
 from erls.maths.so3 import Array
 from erls.run.watches.base import Begun, Ended, Finding, Plan, Watch
 
+_MOST = 1000  # stretches between knots
+
 
 class Gap(NamedTuple):
     """Room before something touches, at the times of a motion: (k,) arrays of it and of its rate [m or rad, per s]."""
@@ -38,8 +40,8 @@ class Touching(Watch):
         found = _gaps(begun.formulation, np.zeros(1), y[None], v[None])
         return Finding(
             [
-                f"{gap.name} is pressed in by {-gap.room[0]:.3g} {gap.unit} at the start, and pushes back (start outside, "
-                "or where the force bears what lies on it)"
+                f"{gap.name} is pressed in by {-gap.room[0]:.3g} {gap.unit} at the start, and pushes back (start "
+                "outside, or where the force bears what lies on it)"
                 for gap in found
                 if gap.room[0] < 0
             ]
@@ -51,23 +53,27 @@ class Touching(Watch):
 
 
 def passed_over(formulation: Formulation, s: Solution) -> list[str]:
-    """Of gaps that are open at two knots, and would close between them by the cubic through both."""
-    result = []
+    """Of gaps that are open at two knots, and would close between them by the cubic through both; in the longest
+    stretches between knots.
+    """
+    result, h = [], np.diff(s.t)
+    longest = np.sort(np.argsort(-h, kind="stable")[:_MOST])
+    knots = np.concatenate([longest, longest + 1])
     with np.errstate(all="ignore"):
-        for gap in _gaps(formulation, s.t, s.y, s.v):
-            least = _least(np.diff(s.t), gap.room, gap.rate)
-            deepest = int(np.argmin(np.nan_to_num(least, nan=0.0))) if len(least) else 0
-            if len(least) and least[deepest] < 0:
+        for gap in _gaps(formulation, s.t[knots], s.y[knots], s.v[knots]) if len(longest) else ():
+            least = np.nan_to_num(_least(h[longest], gap.room, gap.rate), nan=0.0)
+            deepest = int(np.argmin(least))
+            if least[deepest] < 0:
                 by = f"{-least[deepest]:.3g} {gap.unit} (use a smaller simulation.tolerance, or a smaller step)"
-                result.append(f"{gap.name}: a step passed over it at t = {s.t[deepest]:.6g} s, by {by}")
+                result.append(f"{gap.name}: a step passed over it at t = {s.t[longest[deepest]]:.6g} s, by {by}")
     return result
 
 
 def _least(h: Array, room: Array, rate: Array) -> Array:
-    """(k - 1,) least value between knots of the cubic through values and rates (k,) that are positive there, where it
-    falls and then rises; infinite elsewhere.
+    """(k,) least value between knots of the cubic through values and rates (2 k,), of the first ones before those of
+    the second, that are positive there, where it falls and then rises; infinite elsewhere.
     """
-    start, end, falling, rising = room[:-1], room[1:], h * rate[:-1], h * rate[1:]
+    (start, end), (falling, rising) = np.split(room, 2), h * np.split(rate, 2)
     # start + falling s + b s² + c s³
     c = 2 * (start - end) + falling + rising
     b = end - start - falling - c
