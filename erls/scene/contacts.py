@@ -18,7 +18,7 @@ class Stops(Record, frozen=True, kw_only=True):
     restitution : float
         Rate after an impact over that before, of rigid links that nothing else slows down.
     exponent : float
-        n.
+        n: 1, a linear spring, or more.
     transition_rate : float
         Rate from which on the loss is full [rad/s or m/s].
     """
