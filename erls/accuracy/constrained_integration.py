@@ -117,7 +117,7 @@ def constrained_integration_error(run: ChainRun | BodyMotion) -> ConstrainedErro
     else:
         names, places, other = _of_chain(run, looks, companion)
         forces = _forces(run, companion, STATED if ratio < _TOO_LIKE else 1.0)
-    touches = isinstance(run, ChainRun) and run.formulation.mechanism.touches
+    touches = run.formulation.mechanism.touches if isinstance(run, ChainRun) else bool(run.scene.record.contacts)
     if ratio < _TOO_LIKE or touches:
         apart = np.maximum.accumulate(np.linalg.norm(places - other, axis=2), axis=0)
         # impacts turn within a step, by chance early or late: the distance is the error, which `sudden` multiplies

@@ -13,7 +13,8 @@ Rules for adding a formulation:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any, Protocol, runtime_checkable
 
 from erls.equations.system import SecondOrderSystem
@@ -136,6 +137,19 @@ class ContactSeries:
         """From numbers (k, c, 10) in the order of the attributes."""
         gap, rate, normal_force, energy = (known[:, :, at] for at in (0, 1, 2, 9))
         return cls(gap, rate, normal_force, known[:, :, 3:6], known[:, :, 6:9], energy)
+
+    def one(self, number: int, shape: tuple[int, ...]) -> ContactSeries:
+        """One of the contacts, times in this shape."""
+        parts = (getattr(self, field.name)[:, number] for field in fields(self))
+        return ContactSeries(*(part.reshape((*shape, *part.shape[1:])) for part in parts))
+
+    def columns(self, names: Sequence[str]) -> dict[str, Array]:
+        """Of a table, by the names of the contacts."""
+        found: dict[str, Array] = {}
+        for k, name in enumerate(names):
+            found[f"{name}.gap [m]"], found[f"{name}.normal_force [N]"] = self.gap[:, k], self.normal_force[:, k]
+            found |= {f"{name}.force.{axis} [N]": self.force[:, k, i] for i, axis in enumerate("xyz")}
+        return found
 
 
 class Formulation(Protocol):

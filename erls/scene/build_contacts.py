@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from erls.errors import Cause, SceneError
+from erls.maths.so3 import Array
 from erls.mechanism.chain import Point
 from erls.mechanism.contacts import ContactLaw, PointContact, Stops
 from erls.mechanism.links import Link
 from erls.mechanism.place import Place
 from erls.scene.chain import Scene
-from erls.scene.contacts import Contact
+from erls.scene.contacts import AgainstPlane, Plane, PlaneOfBody
 from erls.scene.contacts import Stops as StopsRecord
 from fe_import.model import IntArray
 
 WORLD = "world"
 
 
-def contact_law(record: Contact | StopsRecord, place: Place) -> ContactLaw:
+def contact_law(record: AgainstPlane | StopsRecord, place: Place) -> ContactLaw:
     """The law of a contact or of stops.
 
     Raises
@@ -83,12 +85,7 @@ def build_contacts(
     for k, record in enumerate(scene.record.contacts):
         place = Place(scene.folder, f"{scene.path}: contacts[{k}]")
         within, plane, point = place.at("plane"), record.plane, known[record.point]
-        position, normal = (
-            np.array([within.number(name, x) for x in getattr(plane, name)]) for name in ("position", "normal")
-        )
-        length = float(np.linalg.norm(normal))
-        if not length > 0.0:
-            raise within.error("normal", "without a direction", list(plane.normal), remedy="give one that is not zero")
+        position, normal = plane_of(plane, within)
         base = None
         if plane.on != WORLD:
             at = [link.name for link in links].index(plane.on)
@@ -108,18 +105,43 @@ def build_contacts(
                     field, "the point is where its plane is fixed", getattr(plane, field), remedy="name another point"
                 )
             base, position = (int(numbers[at]), node), position - model.nodes[node]
-        friction, sliding = record.friction, place.at("friction")
-        result.append(
-            PointContact(
-                name=record.name,
-                link=int(numbers[point.link]),
-                node=point.node,
-                base=base,
-                position=position,
-                normal=normal / length,
-                law=contact_law(record, place),
-                friction=sliding.not_negative("coefficient", friction.coefficient) if friction else 0.0,
-                friction_rate=sliding.positive("transition_rate", friction.transition_rate) if friction else 1.0,
-            )
-        )
+        given = replace(against_plane(record, place), link=int(numbers[point.link]), node=point.node, base=base)
+        result.append(replace(given, position=position, normal=normal))
     return result
+
+
+def plane_of(plane: Plane | PlaneOfBody, place: Place) -> tuple[Array, Array]:
+    """(3,) a point of a plane and its unit normal.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD.
+    """
+    position, normal = (np.array([place.number(n, x) for x in getattr(plane, n)]) for n in ("position", "normal"))
+    length = float(np.linalg.norm(normal))
+    if not length > 0.0:
+        raise place.error("normal", "without a direction", list(plane.normal), remedy="give one that is not zero")
+    return position, normal / length
+
+
+def against_plane(record: AgainstPlane, place: Place) -> PointContact:
+    """Law and friction of a contact, whose sides are not said yet.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD.
+    """
+    friction, sliding, none = record.friction, place.at("friction"), np.zeros(3)
+    return PointContact(
+        name=record.name,
+        link=-1,
+        node=-1,
+        base=None,
+        position=none,
+        normal=none,
+        law=contact_law(record, place),
+        friction=sliding.not_negative("coefficient", friction.coefficient) if friction else 0.0,
+        friction_rate=sliding.positive("transition_rate", friction.transition_rate) if friction else 1.0,
+    )

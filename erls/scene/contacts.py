@@ -54,6 +54,24 @@ class Plane(Record, frozen=True, kw_only=True):
     position: Vector = (0.0, 0.0, 0.0)
 
 
+class PlaneOfBody(Record, frozen=True, kw_only=True):
+    """Plane of a contact.
+
+    Attributes
+    ----------
+    normal : (3,) floats
+        Towards the side on which the node stays, of any length, in the world, as built.
+    on : str
+        ``world``, or a node, a body, or an inner node of a beam that it goes with.
+    position : (3,) floats
+        A point of the plane in the world, as built [m].
+    """
+
+    normal: Vector
+    on: str = "world"
+    position: Vector = (0.0, 0.0, 0.0)
+
+
 class ContactFriction(Record, frozen=True):
     """Coulomb friction along the plane, smooth around zero: ``coefficient`` · F · tanh(speed / ``transition_rate``).
 
@@ -69,18 +87,14 @@ class ContactFriction(Record, frozen=True):
     transition_rate: float = 0.01
 
 
-class Contact(Record, frozen=True, kw_only=True):
-    """A named point that a plane keeps on its side: by the force k δⁿ at a depth δ, more on the way in, less on the way
-    out.
+class AgainstPlane(Record, frozen=True, kw_only=True):
+    """What a plane does that keeps a point on its side: the force k δⁿ at a depth δ, more on the way in, less on the
+    way out.
 
     Attributes
     ----------
     name : str
         What reports and ``--set`` call it.
-    point : str
-        A name from ``[[points]]``.
-    plane : Plane
-        What it is pressed against.
     stiffness : float
         k [N/mⁿ].
     restitution : float
@@ -94,10 +108,39 @@ class Contact(Record, frozen=True, kw_only=True):
     """
 
     name: str
-    point: str
-    plane: Plane
     stiffness: float
     restitution: float
     exponent: float = 1.5
     transition_rate: float = 1e-3
     friction: ContactFriction | None = None
+
+
+class Contact(AgainstPlane, frozen=True, kw_only=True):
+    """A named point that a plane keeps on its side: by the force k δⁿ at a depth δ, more on the way in, less on the way
+    out.
+
+    Attributes
+    ----------
+    point : str
+        A name from ``[[points]]``.
+    plane : Plane
+        What it is pressed against.
+    """
+
+    point: str
+    plane: Plane
+
+
+class ContactOfBody(AgainstPlane, frozen=True, kw_only=True):
+    """A node that a plane keeps on its side: by the force k δⁿ at a depth δ, more on the way in, less on the way out.
+
+    Attributes
+    ----------
+    node : str
+        A node, a body, or an inner node of a beam.
+    plane : PlaneOfBody
+        What it is pressed against.
+    """
+
+    node: str
+    plane: PlaneOfBody

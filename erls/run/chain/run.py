@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any, cast
 
@@ -149,10 +149,8 @@ class ChainRun(ChainMotion):
     def contact(self, name: str, t: ArrayLike) -> ContactSeries:
         """Gap [m] and its rate, normal force [N], force on the point (..., 3) and where it acts, energy [J]."""
         choose(name, self.contact_names, "contact", SceneError)
-        number, (shape, *at) = self.contact_names.index(name), self._interpolated(t)
-        found = self.formulation.contact_series(*at)
-        parts = (np.array(getattr(found, field.name))[:, number] for field in fields(ContactSeries))
-        return ContactSeries(*(part.reshape((*shape, *part.shape[1:])) for part in parts))
+        shape, *at = self._interpolated(t)
+        return self.formulation.contact_series(*at).one(self.contact_names.index(name), shape)
 
     @cached_property
     def stability(self) -> Stability | None:
@@ -211,11 +209,9 @@ class ChainRun(ChainMotion):
             columns[f"{name}.effort [{effort}]"] = reactions.effort[:, k]
             vector(columns, f"{name}.force", "N", reactions.force[:, k])
             vector(columns, f"{name}.moment", "N m", reactions.moment[:, k])
-        for name in self.contact_names:
-            contact = self.contact(name, times)
-            columns[f"{plain(name)}.gap [m]"] = contact.gap
-            columns[f"{plain(name)}.normal_force [N]"] = contact.normal_force
-            vector(columns, f"{plain(name)}.force", "N", contact.force)
+        if self.contact_names:
+            found = self.formulation.contact_series(*self._interpolated(times)[1:])
+            columns |= found.columns([plain(name) for name in self.contact_names])
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):
             columns[f"energy.{kind} [J]"] = np.asarray(getattr(energy, kind))
