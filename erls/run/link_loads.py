@@ -117,6 +117,8 @@ def _given_loads(run: ChainRun, number: int, series: StateSeries) -> Array:
         if load.link == number and load.node in nodes:
             found = wrenches(mechanism, load, series) @ series.poses[number][:, :3, :3]
             result[:, nodes.index(load.node)] += found.reshape(-1, 6)
+    if not mechanism.contacts:
+        return result
     solution, t = run.solution, series.times
     at = hermite(solution.t, solution.y, solution.v, solution.a, t)
     for link, node, force, moment, _ in pushes(mechanism, run.formulation.contact_series(t, *at), series):

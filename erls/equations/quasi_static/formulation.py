@@ -317,7 +317,7 @@ class QuasiStatic:
 
     def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
         """That of all modes; scenes have no contacts beside a bandwidth."""
-        return self.inner.contact_series(t, *self.all_modes_at(t, y, v))
+        return self.inner.contact_series(t, *self.all_modes_at(t, y, v)[:2])
 
     def energy_series(self, t: Array, y: Array, v: Array) -> Array:
         """(k, 4) energies at times (k,), with those of the static deflection."""

@@ -144,7 +144,7 @@ class SerialFormulation(TreeFormulation):
         """Contacts at times (k,)."""
         system, known = self.compiled, np.zeros((len(t), len(self.mechanism.contacts), 10))
         if known.size:
-            states = contact_states(system, _see_serial(system.reals, system.integers, int(system.integers[0])))
+            states = contact_states(system)
             for k, at in enumerate(t.tolist()):
                 residual(system, at, y[k], v[k], np.zeros(0))
                 known[k] = [[*x.known[:3], *x.force, *x.point[9:], x.known[ENERGY]] for x in states]

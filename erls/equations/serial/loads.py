@@ -49,7 +49,7 @@ from fe_import.model import IntArray
 LOADS: Any = None
 """Signature of a formulation's ``loads``: place of the `Serial`, memory, time, y, v, forces."""
 TOUCH: Any = None
-"""Signature of `erls.equations.serial.contacts.touch`: place of the `Serial`, number of the load, memory."""
+"""Signature of `erls.equations.serial.touch.touch`: place of the `Serial`, number of the load, memory."""
 if ENABLED:
     from numba import types as _t
 
@@ -57,7 +57,7 @@ if ENABLED:
     LOADS = _t.void(_t.int64, *_memory, _t.float64, contract.REALS, contract.REALS, contract.REALS)
     TOUCH = _t.void(_t.int64, _t.int64, *_memory)
 
-call_touch = caller(TOUCH, "erls.equations.serial.contacts:touch")
+call_touch = caller(TOUCH, "erls.equations.serial.touch:touch")
 
 
 class Load(NamedTuple):

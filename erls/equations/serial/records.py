@@ -49,7 +49,7 @@ class Serial(NamedTuple):
         Places of the first `Node` and `NodeState`, of which each load has two: where it acts, and what turns it, or the
         other side of a contact.
     touch, contact_gains, residual : int
-        Where there are contacts, addresses of `erls.equations.serial.contacts`, of
+        Where there are contacts, addresses of `erls.equations.serial.touch`, of
         `erls.equations.serial.contact_gains` and of the residual of the formulation; otherwise -1.
     contact_count, contacts, contact_states : int
         How many, and places of the first `Contact` and `ContactState`.

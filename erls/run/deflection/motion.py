@@ -359,6 +359,8 @@ def _given_loads(mechanism: Mechanism, seen: StateSeries, k: int) -> list[_Given
 
 def _contact_loads(run: ChainRun, mechanism: Mechanism, seen: StateSeries, k: int) -> list[_Given]:
     """What contacts do to links, at the same times."""
+    if not mechanism.contacts:
+        return []
     s, middle = run.solution, slice(k, 2 * k)
     at = hermite(s.t, s.y, s.v, s.a, seen.times)
     found = solved(run.formulation).contact_series(seen.times, *at)
