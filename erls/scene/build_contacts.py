@@ -5,21 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.mechanism.chain import Point
 from erls.mechanism.contacts import ContactLaw, PointContact, Stops
-from erls.mechanism.links import Link
 from erls.mechanism.place import Place
 from erls.scene.chain import Scene
-from erls.scene.contacts import AgainstPlane, Plane, PlaneOfBody
+from erls.scene.contacts import WORLD, AgainstPlane, Plane, PlaneOfBody
 from erls.scene.contacts import Stops as StopsRecord
-from fe_import.model import IntArray
 
-WORLD = "world"
+if TYPE_CHECKING:  # reading a scene checks its joints, and needs no models of links
+    from erls.mechanism.chain import Point
+    from erls.mechanism.links import Link
+    from fe_import.model import IntArray
 
 
 def contact_law(record: AgainstPlane | StopsRecord, place: Place) -> ContactLaw:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from erls.errors import SceneError
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
-from erls.scene.build_contacts import WORLD
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, Load, SceneRecord
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
-from erls.scene.contacts import Contact
+from erls.scene.contacts import WORLD, Contact
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping, check_temperature

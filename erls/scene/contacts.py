@@ -5,6 +5,9 @@ from __future__ import annotations
 from erls.scene.records import Record
 from fe_import.description.records import Vector
 
+WORLD = "world"
+"""What carries a plane that stands still."""
+
 
 class Stops(Record, frozen=True, kw_only=True):
     """Ends of the range of a joint, which push back by the law of contacts.

@@ -6,7 +6,6 @@ from erls.errors import SceneError
 from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
-from erls.scene.build_contacts import WORLD
 from erls.scene.checks import (
     bad,
     check_joint_fields,
@@ -18,7 +17,7 @@ from erls.scene.checks import (
     not_negative,
     positive,
 )
-from erls.scene.contacts import ContactOfBody
+from erls.scene.contacts import WORLD, ContactOfBody
 from erls.scene.integrators import MATRICES
 from fe_import.description.check import check_expansion, check_temperature
 from fe_import.elements.sections import check_section

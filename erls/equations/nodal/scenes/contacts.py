@@ -13,7 +13,8 @@ from erls.maths.motion_maps import inverse
 from erls.maths.so3 import Array
 from erls.mechanism.place import Place
 from erls.scene.bodies.schema import BodySceneRecord
-from erls.scene.build_contacts import WORLD, against_plane, plane_of
+from erls.scene.build_contacts import against_plane, plane_of
+from erls.scene.contacts import WORLD
 
 
 def contacts(record: BodySceneRecord, numbers: Mapping[str, int], poses: Array, file: str) -> list[Contacts]:
