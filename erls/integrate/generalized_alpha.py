@@ -47,7 +47,7 @@ def generalized_alpha(
     capacity = int(min((times[1] - times[0]) / step, 1e6)) + 2 if times[1] > times[0] else 2
     capacity = 1024 if options.output_step else capacity + 2 * len(system.breakpoints)
     recorder = Recorder(system.size, observer, capacity, options.output_step)
-    method = _Equal(_steps(system, options, recorder), step, recorder) if system.size else None
+    method = _Equal(steps_of(system, options, recorder), step, recorder) if system.size else None
     return integrate_legs(system, times, y, v, recorder, method, options.keeper)
 
 
@@ -76,13 +76,14 @@ class _Equal:
         return self._steps.end()
 
 
-def _steps(system: SecondOrderSystem, options: Options, recorder: Recorder) -> Steps:
+def steps_of(system: SecondOrderSystem, options: Options, recorder: Recorder) -> Steps:
+    """Steps of a system; compiled ones where its equations are."""
     from erls.equations.independent import independent  # here: they import the compiler
-    from erls.equations.uncompiled import steps_of
+    from erls.equations.uncompiled import steps_of as plain_steps
 
     compiled = system.compiled
     own = compiled is not None and compiled.factoring is not None
     cost = _OWN_REFRESH_COST if own else _REFRESH_COST
     rules = Rules(options.spectral_radius, options.newton_tolerance, patience=cost)
-    known = steps_of(system) if compiled is None else independent(compiled)
+    known = plain_steps(system) if compiled is None else independent(compiled)
     return Steps(known, metre_scales(system), rules, Words(), recorder)

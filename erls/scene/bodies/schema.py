@@ -11,6 +11,7 @@ import msgspec
 
 from erls.mechanism.motions import Motion
 from erls.mechanism.profiles import Load as Profile
+from erls.mechanism.sensors.registry import AnySensor
 from erls.scene.bodies.analyses import Analysis
 from erls.scene.contacts import ContactOfBody
 from erls.scene.records import Record, SceneFile, SceneTables
@@ -248,6 +249,9 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
         Nodes that planes keep on their side, ``[[contacts]]``.
     report : list of str
         Nodes whose places are reported beside named nodes and bodies, such as BEAM/4.
+    sensors : list of AnySensor
+        Instruments of a motion, whose ``point`` is a node or body and whose ``joint`` a connection with one coordinate,
+        ``[[sensors]]``; nothing is recovered from beams, and connections have no motors.
     """
 
     simulation: Analysis
@@ -262,6 +266,7 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
     loads: list[Load] = []
     contacts: list[ContactOfBody] = []
     report: list[str] = []
+    sensors: list[AnySensor] = []
 
 
 @dataclass(frozen=True)
