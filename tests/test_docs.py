@@ -75,7 +75,7 @@ def test_annotated_link_and_scene_run(tmp_path: Path) -> None:
     assert run.end == 0.1
     assert set(tomllib.loads(scene)) == {
         *("name", "gravity", "simulation", "base", "initial", "joints", "links", "points"),
-        *("payloads", "loads", "events"),
+        *("payloads", "loads", "contacts", "events"),
     }
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from erls.accuracy.body_audits import body_audits
 from erls.accuracy.constrained_integration import constrained_integration_error
+from erls.accuracy.integration import SUDDEN
 from erls.accuracy.mesh_of_beams import FINER, SHARE, larger_steps
 from erls.accuracy.verdict import verdict
 from erls.equations.nodal.scenes.build import assemble
@@ -52,7 +53,7 @@ def stated_bodies(run: BodyMotion | BodyRest) -> BodyMotion | BodyRest:
         if isinstance(known, str):
             found, unjudged["integration"] = None, known
         else:
-            found = known.total
+            found = known.total * (SUDDEN if run.scene.record.contacts else 1.0)
             if found > tolerance:
                 horizon = known.horizon(tolerance)
     mesh, why = mesh_error(run)
@@ -92,7 +93,10 @@ def _refined(scene: BodyScene) -> BodyScene:
         return f"{beam}/{FINER * int(number)}" if slash and beam in beams and number.isdigit() else name
 
     def moved(item: object) -> object:
-        own = {key: renamed(getattr(item, key)) for key in ("node", "to") if hasattr(item, key)}
+        own: dict[str, object] = {key: renamed(getattr(item, key)) for key in ("node", "to") if hasattr(item, key)}
+        plane = getattr(item, "plane", None)
+        if plane is not None:
+            own["plane"] = msgspec.structs.replace(plane, on=renamed(plane.on))
         return msgspec.structs.replace(item, **own)  # type: ignore[type-var]
 
     finer = msgspec.structs.replace(
@@ -102,6 +106,7 @@ def _refined(scene: BodyScene) -> BodyScene:
         connections=[moved(x) for x in record.connections],
         springs=[moved(x) for x in record.springs],
         loads=[moved(x) for x in record.loads],
+        contacts=[moved(x) for x in record.contacts],
         report=[renamed(name) for name in record.report],
     )
     return replace(scene, record=finer)

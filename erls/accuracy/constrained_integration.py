@@ -117,9 +117,12 @@ def constrained_integration_error(run: ChainRun | BodyMotion) -> ConstrainedErro
     else:
         names, places, other = _of_chain(run, looks, companion)
         forces = _forces(run, companion, STATED if ratio < _TOO_LIKE else 1.0)
-    if ratio < _TOO_LIKE:
+    touches = run.formulation.mechanism.touches if isinstance(run, ChainRun) else bool(run.scene.record.contacts)
+    if ratio < _TOO_LIKE or touches:
         apart = np.maximum.accumulate(np.linalg.norm(places - other, axis=2), axis=0)
-        return ConstrainedError(names, t, STATED / (1 - SMALLER**2) * apart, evaluations, *forces)
+        # impacts turn within a step, by chance early or late: the distance is the error, which `sudden` multiplies
+        share = 1.0 if touches and ratio >= _TOO_LIKE else STATED / (1 - SMALLER**2)
+        return ConstrainedError(names, t, share * apart, evaluations, *forces)
     bands = distance_bands(t, places, other, s.work.steps, ratio, radius)
     return ConstrainedError(names, bands.t, STATED * errors_over_time(bands), evaluations, *forces)
 

@@ -27,6 +27,7 @@ from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 _ROUNDING = 1e-11  # of the energies themselves
+_CORNERS = 20.0  # times what rules are off by where powers of contacts bend within panels: up to 12 on bouncing balls
 
 
 class EnergyBalance(NamedTuple):
@@ -100,7 +101,7 @@ def _over_all(look: LookedAt, power: Array) -> EnergyBalance:
         evenly = panels.first[look.even]
         ties = tied_power(look.formulation, t[evenly], s.y[evenly], s.v[evenly])[1]
     left_out = _following(look.formulation, _states(look, ends).y) if look.dear else 0.0
-    error = float(panels.rule_errors(power).sum()) if power.any() else 0.0
+    error = float(_rule_errors(look, panels, power).sum()) if power.any() else 0.0
     force = max(_force(look, chosen, energies, np.isin(picked, look.even)), float(np.median(ties)))
     return EnergyBalance(float(off[np.abs(off).argmax()]), _exchanged(energies), error, force, True, left_out)
 
@@ -120,11 +121,16 @@ def _over_some(look: LookedAt, chosen: Panels) -> EnergyBalance:
     even = np.isin(look.picked, look.even)
     whole = float(look.panels.lengths.sum() / chosen.lengths[even].sum())
     worst, summed = float(off[np.abs(off).argmax()]), _of_all(off[even], whole)
-    rules = chosen.rule_errors(power)
+    rules = _rule_errors(look, chosen, power)
     error = float(rules[even].sum() * whole + rules[~even].sum())
     force = max(_force(look, chosen, energies, even), float(np.median(ties.reshape(count, width)[even])))
     largest = max(worst, summed, key=abs)
     return EnergyBalance(largest, _exchanged(energies), error, force, False, _following(states.formulation, y))
+
+
+def _rule_errors(look: LookedAt, panels: Panels, power: Array) -> Array:
+    """(p,) what integrals of powers (p, 4) may be off by."""
+    return panels.rule_errors(power) * (_CORNERS if look.mechanism.touches else 1.0)
 
 
 class States(NamedTuple):

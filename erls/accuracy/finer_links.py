@@ -7,7 +7,7 @@ these are then the coordinates that the lesser model lacks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -83,7 +83,7 @@ def finer_links(scene: Scene, whole: Mechanism, solved: Mechanism) -> FinerLinks
                 link,
                 source,
                 [p.node for p in solved.points if p.link == number],
-                {load.node for load in solved.loads if load.link == number and load.node != CENTRE},
+                {node for link, node in _pressed(solved) if link == number},
             )
             exact &= _same_inertia(link.model.invariants, left.invariants.truncated(np.arange(link.model.modes)))
             if not left.refined:
@@ -100,6 +100,15 @@ def finer_links(scene: Scene, whole: Mechanism, solved: Mechanism) -> FinerLinks
         links.append(finer)
     mechanism = replace(solved, links=tuple(links), bandwidth=None)
     return FinerLinks(mechanism, np.concatenate(run), np.concatenate(kept), exact, tuple(notes))
+
+
+def _pressed(mechanism: Mechanism) -> Iterator[tuple[int, int]]:
+    """Links and nodes on which loads and contacts act."""
+    yield from ((load.link, load.node) for load in mechanism.loads if load.node != CENTRE)
+    for contact in mechanism.contacts:
+        yield contact.link, contact.node
+        if contact.base is not None:
+            yield contact.base
 
 
 def lumped(link: Link) -> bool:

@@ -52,12 +52,13 @@ def free_momentum(look: LookedAt) -> Momentum | None:
 
 
 def _free(mechanism: Mechanism) -> bool:
-    """Whether neither a joint's force nor a load acts along the first joint, and no other one stands on the ground or
-    brings a motion along.
+    """Whether neither a joint's force, a load nor the ground acts along the first joint, and no other one stands on the
+    ground or brings a motion along.
     """
     first = mechanism.joints[0]
     acts = first.drive.kind != "free" or first.forces.active or first.freedom.vector or first.freedom.pitch
-    if acts or mechanism.loads or mechanism.parents.count(-1) != 1 or moved(mechanism):
+    acts = acts or bool(mechanism.loads) or any(contact.base is None for contact in mechanism.contacts)
+    if acts or mechanism.parents.count(-1) != 1 or moved(mechanism):
         return False
     axis = first.before[:3, first.freedom.axis]
     along = np.cross(mechanism.gravity, axis) if first.freedom.turns else mechanism.gravity @ axis

@@ -107,9 +107,10 @@ def _estimate(run: ChainRun, watched: Watched, system: Any, found: GlobalError) 
 
 
 def sudden(run: ChainRun) -> bool:
-    """Whether friction or motors at their limits act."""
-    joints = run.formulation.mechanism.joints
-    return any(joint.forces.friction or np.isfinite(joint.drive.torque_limit) for joint in joints)
+    """Whether friction, motors at their limits, contacts or stops act."""
+    mechanism = run.formulation.mechanism
+    joints = mechanism.joints
+    return mechanism.touches or any(joint.forces.friction or np.isfinite(joint.drive.torque_limit) for joint in joints)
 
 
 def _spread(found: GlobalError, count: int) -> Array:

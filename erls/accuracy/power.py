@@ -107,7 +107,7 @@ def reported_power(formulation: Formulation, t: Array, y: Array, v: Array, a: Ar
 def _power(joint: Joint | LoopFreedom, effort: Array, angle: Array, rate: Array) -> Array:
     """(k,) power along a joint, the spring's left out; the effort of a prescribed motion is that of its motor alone."""
     own = joint.forces
-    spring = -own.stiffness * (angle - own.rest)
+    spring = np.array([own.elastic_force(at) for at in angle.tolist()])
     if joint.drive.prescribed and own.active:
         passive = [own.force(*at) for at in zip(angle.tolist(), rate.tolist(), strict=True)]
         return np.asarray((effort + np.array(passive) - spring) * rate)

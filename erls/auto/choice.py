@@ -83,6 +83,8 @@ def choose_effects(scene: Scene, mechanism: Mechanism, thrifty: bool = True) -> 
         INTERRUPTED.
     """
     settings = scene.record.simulation
+    if mechanism.touches:
+        return Choice(note="effects: auto leaves nothing out where contacts or stops act: small changes decide impacts")
     cuts = possible_cuts(mechanism, settings.formulation)
     if not cuts:
         return Choice(note="effects: auto leaves nothing out: nothing that the scene holds would save anything")

@@ -13,7 +13,8 @@ Rules for adding a formulation:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any, Protocol, runtime_checkable
 
 from erls.equations.system import SecondOrderSystem
@@ -111,6 +112,49 @@ class FrameMotion:
     bias: Array
 
 
+@dataclass(frozen=True)
+class ContactSeries:
+    """Contacts of a mechanism at k times.
+
+    Attributes
+    ----------
+    gap, rate : (k, c) arrays
+        Of the node above its plane [m], and its rate.
+    normal_force : (k, c) array
+        [N]
+    force, place : (k, c, 3) arrays
+        What acts on the node, friction included, and where, in the world; its opposite acts there on the other side.
+    energy : (k, c) array
+        Elastic [J].
+    """
+
+    gap: Array
+    rate: Array
+    normal_force: Array
+    force: Array
+    place: Array
+    energy: Array
+
+    @classmethod
+    def of(cls, known: Array) -> ContactSeries:
+        """From numbers (k, c, 10) in the order of the attributes."""
+        gap, rate, normal_force, energy = (known[:, :, at] for at in (0, 1, 2, 9))
+        return cls(gap, rate, normal_force, known[:, :, 3:6], known[:, :, 6:9], energy)
+
+    def one(self, number: int, shape: tuple[int, ...]) -> ContactSeries:
+        """One of the contacts, times in this shape."""
+        parts = (getattr(self, field.name)[:, number] for field in fields(self))
+        return ContactSeries(*(part.reshape((*shape, *part.shape[1:])) for part in parts))
+
+    def columns(self, names: Sequence[str]) -> dict[str, Array]:
+        """Of a table, by the names of the contacts."""
+        found: dict[str, Array] = {}
+        for k, name in enumerate(names):
+            found[f"{name}.gap [m]"], found[f"{name}.normal_force [N]"] = self.gap[:, k], self.normal_force[:, k]
+            found |= {f"{name}.force.{axis} [N]": self.force[:, k, i] for i, axis in enumerate("xyz")}
+        return found
+
+
 class Formulation(Protocol):
     """Equations of motion of a mechanism with what is asked of its states."""
 
@@ -133,7 +177,10 @@ class Formulation(Protocol):
         """Energies."""
 
     def load_power(self, t: Array, y: Array, v: Array) -> Array:
-        """(k,) power of loads on nodes at times (k,), with coordinates and rates (k, n) [W]."""
+        """(k,) power of loads on nodes, less what contacts lose [W], at times (k,), coordinates and rates (k, n)."""
+
+    def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
+        """Contacts at times (k,), with coordinates and rates (k, n)."""
 
     def reactions(self, t: float, y: Array, v: Array) -> list[Reaction]:
         """Joint reactions, with the acceleration from the equations of motion."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from erls.equations.formulation import Energy, Formulation, Reaction, State
+from erls.equations.formulation import ContactSeries, Energy, Formulation, Reaction, State
 from erls.equations.serial.state_series import energy_series
 from erls.maths import rotation_maps
 from erls.maths.se3 import pose
@@ -55,6 +55,10 @@ class Substructured:
     def load_power(self, t: Array, y: Array, v: Array) -> Array:
         """(k,) that of the pieces."""
         return self.inner.load_power(t, y, v)
+
+    def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
+        """That of the pieces."""
+        return self.inner.contact_series(t, y, v)
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """That of all pieces."""

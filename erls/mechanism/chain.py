@@ -13,6 +13,7 @@ import numpy as np
 from erls.maths.rotation_maps import exp, tangent, tangent_derivative
 from erls.maths.se3 import pose, twist_cross, twist_transform
 from erls.maths.so3 import Array
+from erls.mechanism.contacts import PointContact
 from erls.mechanism.effects import ALL
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
@@ -51,6 +52,8 @@ class Mechanism:
         Joints that close it.
     loads : tuple of PointLoad
         Forces and moments on nodes.
+    contacts : tuple of PointContact
+        Nodes that planes keep on their side.
     effects : frozenset of str
         Names from `erls.mechanism.effects` that the equations of motion take into account.
     bandwidth : float or None
@@ -67,6 +70,7 @@ class Mechanism:
     elastic_assembly: bool = False
     loops: tuple[Loop, ...] = ()
     loads: tuple[PointLoad, ...] = ()
+    contacts: tuple[PointContact, ...] = ()
     effects: frozenset[str] = ALL
     bandwidth: float | None = None
 
@@ -80,6 +84,18 @@ class Mechanism:
         """Times at which drives of the tree or loads jump, in rising order [s]."""
         own = [joint.drive.breakpoints for joint in self.joints] + [load.breakpoints for load in self.loads]
         return tuple(sorted({t for times in own for t in times}))
+
+    @property
+    def acted_on(self) -> bool:
+        """Whether anything but joints and gravity acts on nodes."""
+        return bool(self.loads or self.contacts)
+
+    @property
+    def touches(self) -> bool:
+        """Whether contacts, or stops of joints, act from one moment on."""
+        forces = [joint.forces for joint in self.joints]
+        forces += [loop.freedom.forces for loop in self.loops if loop.freedom is not None]
+        return bool(self.contacts) or any(each.stops for each in forces)
 
     def carried(self, number: int) -> list[int]:
         """A link and all that it bears, by their numbers."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from erls.maths.se3 import twist_transform
 from erls.maths.so3 import Array
+from erls.mechanism.contacts import Stops
 from erls.mechanism.drives import Drive
 from erls.mechanism.joint_types import Freedom
 from fe_import.model import InterfaceNode
@@ -28,6 +29,8 @@ class JointForces:
         Coulomb friction, made smooth: ``friction`` · tanh(rate / ``transition_rate``).
     transition_rate : float
         Rate at which friction reaches 76 % of its size.
+    stops : Stops or None
+        Ends of the range.
     """
 
     stiffness: float = 0.0
@@ -35,25 +38,29 @@ class JointForces:
     damping: float = 0.0
     friction: float = 0.0
     transition_rate: float = 0.01
+    stops: Stops | None = None
 
     def force(self, angle: float, rate: float) -> float:
         """Force on the joint coordinate."""
         result = -self.stiffness * (angle - self.rest) - self.damping * rate
         if self.friction:
             result -= self.friction * math.tanh(rate / self.transition_rate)
-        return result
+        return result if self.stops is None else result + self.stops.force(angle, rate)[0]
 
-    def gains(self, rate: float) -> tuple[float, float]:
-        """-∂force/∂angle and -∂force/∂rate."""
-        slope = 0.0
-        if self.friction:
-            slope = self.friction / self.transition_rate / math.cosh(min(abs(rate) / self.transition_rate, 300)) ** 2
-        return self.stiffness, self.damping + slope
+    def elastic_force(self, angle: float) -> float:
+        """What of it follows from `energy`."""
+        result = -self.stiffness * (angle - self.rest)
+        return result if self.stops is None else result + self.stops.force(angle, 0.0)[1]
+
+    def energy(self, angle: float) -> float:
+        """Elastic energy of spring and stops."""
+        result = self.stiffness * (angle - self.rest) ** 2 / 2
+        return result if self.stops is None else result + self.stops.energy(angle)
 
     @property
     def active(self) -> bool:
         """Whether any force can arise."""
-        return bool(self.stiffness or self.damping or self.friction)
+        return bool(self.stiffness or self.damping or self.friction or self.stops)
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,9 @@ class LoopFreedom:
     @property
     def counts_turns(self) -> bool:
         """Whether forces depend on how often it has turned, and how far it has advanced does not tell."""
-        return self.freedom.turns and not self.freedom.pitch and bool(self.forces.stiffness or self.drive.kind == "pd")
+        return self.freedom.turns and not self.freedom.pitch and bool(
+            self.forces.stiffness or self.forces.stops or self.drive.kind == "pd"
+        )
 
 
 @dataclass(frozen=True)

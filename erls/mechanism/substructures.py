@@ -17,6 +17,7 @@ from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, Point
 from erls.mechanism.compound_joints import fixed_joint
+from erls.mechanism.contacts import PointContact
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, payload_invariants
 from erls.mechanism.loads import CENTRE, PointLoad
@@ -60,7 +61,7 @@ def is_split(mechanism: Mechanism) -> bool:
 
 
 def split(mechanism: Mechanism) -> Split:
-    """The mechanism of pieces; payloads, points, loads and loops sit on the piece that carries their node."""
+    """The mechanism of pieces; payloads, points, loads, contacts and loops sit on the piece that carries their node."""
     ends = np.cumsum([0, *(max(1, len(link.pieces)) for link in mechanism.links)]).tolist()
     ranges = tuple(range(a, b) for a, b in itertools.pairwise(ends))
     places = tuple(_places(link, own) for link, own in zip(mechanism.links, ranges, strict=True))
@@ -87,6 +88,7 @@ def split(mechanism: Mechanism) -> Split:
         links=tuple(links),
         points=tuple(Point(p.name, *places[p.link][p.node].tolist()) for p in mechanism.points),
         loops=tuple(replace(loop, inner=moved(loop.inner), outer=moved(loop.outer)) for loop in mechanism.loops),
+        contacts=tuple(_moved_contact(contact, places) for contact in mechanism.contacts),
         loads=tuple(moved for load in mechanism.loads for moved in _moved_loads(load, ranges, places)),
     )
     return Split(mechanism, pieces, ranges, places)
@@ -127,6 +129,17 @@ def _moved_loads(load: PointLoad, ranges: Sequence[range], places: Sequence[IntA
         of_piece, of_node = places[axes[0]][axes[1]].tolist()
         axes = of_piece, of_node
     return [replace(load, link=piece, node=node, axes=axes) for piece, node in at]
+
+
+def _moved_contact(contact: PointContact, places: Sequence[IntArray]) -> PointContact:
+    """A contact of the pieces that carry its node and its plane."""
+
+    def moved(link: int, node: int) -> tuple[int, int]:
+        piece, own = places[link][node].tolist()
+        return piece, own
+
+    link, node = moved(contact.link, contact.node)
+    return replace(contact, link=link, node=node, base=None if contact.base is None else moved(*contact.base))
 
 
 def _weld(link: Link, number: int, parent: int) -> Joint:

@@ -120,6 +120,8 @@ def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
     text += "\n\npoints: " + (", ".join(p.name for p in record.points) or "none")
     if record.loads:
         text += "\nloads: " + ", ".join(f"on {load.point or load.link}" for load in record.loads)
+    if record.contacts:
+        text += "\ncontacts: " + ", ".join(f"{c.name} ({c.point} on {c.plane.on})" for c in record.contacts)
     if record.loops:
         kinds = [msgspec.to_builtins(x.drive)["type"] for x in record.loops]
         driven = ["" if kind == "free" else f", {kind}" for kind in kinds]

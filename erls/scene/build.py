@@ -21,6 +21,7 @@ from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model,
 from erls.mechanism.place import Place
 from erls.mechanism.thermal import at_temperature, unwarmed
 from erls.mechanism.without_effects import without
+from erls.scene.build_contacts import build_contacts
 from erls.scene.build_joints import build_joints, stands_on
 from erls.scene.build_loads import build_loads
 from erls.scene.build_loops import build_loops
@@ -113,6 +114,7 @@ def build_mechanism(
         links=whole.links,
         points=tuple(replace(point, link=int(whole.numbers[point.link])) for point in points),
         loads=tuple(build_loads(scene, links, points, whole.numbers)),
+        contacts=tuple(build_contacts(scene, links, points, whole.numbers)),
         gravity=np.array(record.gravity),
         static_start=record.initial.deformation == "static" or record.initial.assemble == "elastic",
         allow_unstable=record.initial.allow_unstable,

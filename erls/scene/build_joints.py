@@ -16,6 +16,7 @@ from erls.mechanism.drives import build_drive
 from erls.mechanism.joint_types import JOINT_TYPES, Freedom
 from erls.mechanism.joints import Joint, JointForces
 from erls.mechanism.place import Place
+from erls.scene.build_contacts import build_stops
 from erls.scene.chain import Scene, SceneRecord
 from erls.scene.joints import Coordinate, Loop
 from erls.scene.joints import Joint as JointRecord
@@ -137,7 +138,7 @@ def angle(place: Place, name: str, plain: float | None, degrees: float | None) -
 
 
 def joint_forces(record: JointRecord | Coordinate | Loop, place: Place) -> JointForces:
-    """Spring, damper and friction of a joint.
+    """Spring, damper, friction and stops of a joint.
 
     Raises
     ------
@@ -151,6 +152,7 @@ def joint_forces(record: JointRecord | Coordinate | Loop, place: Place) -> Joint
         damping=place.not_negative("damping", record.damping),
         friction=within.not_negative("force", friction.force) if friction else 0.0,
         transition_rate=within.positive("transition_rate", friction.transition_rate) if friction else 1.0,
+        stops=build_stops(record.stops, place.at("stops")) if record.stops else None,
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from erls.mechanism.profiles import Load as Profile
 from erls.mechanism.sensors.registry import AnySensor
+from erls.scene.contacts import Contact
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
 from erls.scene.records import Pose, Record, SceneFile, SceneTables
@@ -169,6 +170,8 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
         Rigid bodies on points, ``[[payloads]]``.
     loads : list of Load
         Forces and moments on points and links, ``[[loads]]``.
+    contacts : list of Contact
+        Points that planes keep on their side, ``[[contacts]]``.
     initial : Initial
         How links start.
     loops : list of Loop
@@ -186,6 +189,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     points: list[Point] = []
     payloads: list[Payload] = []
     loads: list[Load] = []
+    contacts: list[Contact] = []
     initial: Initial = Initial()
     loops: list[Loop] = []
     events: list[Event] = []

@@ -10,6 +10,7 @@ from erls.scene.chain import Event, Load, SceneRecord
 from erls.scene.check_sensors import check_sensors
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
+from erls.scene.contacts import WORLD, Contact
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping, check_temperature
@@ -22,7 +23,9 @@ DEFORMATIONS = ("zero", "static")
 ASSEMBLIES = ("rigid", "elastic")
 AXES = ("world", "link")  # of loads
 # on one coordinate
-_ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
+_ACTING = (
+    "coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "stops", "motor",
+)  # fmt: skip
 
 
 def check_scene(scene: SceneRecord, file: str) -> None:
@@ -51,7 +54,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         counts = f"{len(scene.links)} links, {len(scene.joints)} joints"
         message = "joint k carries link k, so there must be as many links as joints"
         raise bad(f"{file}: links", message, counts, "add or remove one")
-    for kind in ("joints", "links", "points", "loops", "events"):
+    for kind in ("joints", "links", "points", "contacts", "loops", "events"):
         named = [(f"{file}: {kind}[{k}].name", item.name) for k, item in enumerate(getattr(scene, kind))]
         check_names(named)
     for k, joint in enumerate(scene.joints):
@@ -71,6 +74,8 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         choose(payload.point, [p.name for p in scene.points], f"{file}: payloads[{k}].point", SceneError)
     for k, load in enumerate(scene.loads):
         _check_load(load, scene, f"{file}: loads[{k}]")
+    for k, contact in enumerate(scene.contacts):
+        _check_contact(contact, scene, f"{file}: contacts[{k}]")
     for k, loop in enumerate(scene.loops):
         _check_loop(loop, scene, f"{file}: loops[{k}]")
     for k, event in enumerate(scene.events):
@@ -137,6 +142,19 @@ def _check_load(load: Load, scene: SceneRecord, place: str) -> None:
         if "force_per_mass" in given:
             field, message = "follower", "mass turns with no node"
         raise bad(f"{place}.{field}", message, getattr(load, field), "remove 'axes' or 'follower'")
+
+
+def _check_contact(contact: Contact, scene: SceneRecord, place: str) -> None:
+    plane, points = contact.plane, {point.name: point for point in scene.points}
+    choose(contact.point, list(points), f"{place}.point", SceneError)
+    choose(plane.on, [WORLD, *(link.name for link in scene.links)], f"{place}.plane.on", SceneError)
+    if not plane.point:
+        return
+    choose(plane.point, list(points), f"{place}.plane.point", SceneError)
+    if points[plane.point].link != plane.on:
+        message = f"this point is not on {plane.on!r}, which is to carry the plane"
+        remedy = f"give on = {points[plane.point].link!r}, or another point"
+        raise bad(f"{place}.plane.point", message, plane.point, remedy)
 
 
 def _check_feed_forward(acting: Acting, place: str) -> None:
@@ -265,6 +283,7 @@ def _check_bandwidth(scene: SceneRecord, place: str) -> None:
         (any(link.substructures > 1 and link.flexible for link in scene.links), "substructures"),
         (s.formulation == "nodal", "formulation = 'nodal'"),
         (s.coordinates == "absolute", "coordinates = 'absolute'"),
+        (bool(scene.contacts), "contacts"),
     ):
         if found:
             message = f"static correction of modes above a bandwidth does not go with {what}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from erls.mechanism.drives import DriveRecord, FreeDrive
+from erls.scene.contacts import Stops
 from erls.scene.records import Pose, Record
 from fe_import.description.records import Inertia, Vector
 
@@ -116,6 +117,8 @@ class Acting(Record, frozen=True, kw_only=True):
         Viscous damping [N m s/rad or N s/m].
     friction : Friction, optional
         Coulomb friction; none unless given.
+    stops : Stops, optional
+        Ends of its range; none unless given.
     """
 
     drive: DriveRecord = FreeDrive()
@@ -124,6 +127,7 @@ class Acting(Record, frozen=True, kw_only=True):
     rest_deg: float | None = None
     damping: float = 0.0
     friction: Friction | None = None
+    stops: Stops | None = None
 
 
 class OneCoordinate(Acting, frozen=True, kw_only=True):

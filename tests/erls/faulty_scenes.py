@@ -24,6 +24,9 @@ SLIDER = ("joints.0", {"name": "s", "type": "prismatic", "dh": {"convention": "s
 SECOND_JOINT = ("joints.1", {"name": "j", "dh": {"convention": "standard"}})
 SECOND_LINK = ("links.1", {"name": "m", "model": "link.toml"})
 LOAD = ("loads", [{"point": "tip", "force": [0.0, 0.0, 1.0]}])
+PLANE = {"normal": [0.0, 0.0, 1.0]}
+CONTACT = ("contacts", [{"name": "c", "point": "tip", "plane": PLANE, "stiffness": 1e6, "restitution": 0.5}])
+STOPS = ("joints.0.stops", {"lower_deg": -10.0, "upper_deg": 10.0, "stiffness": 1e3, "restitution": 0.5})
 PAYLOAD = ("payloads", [{"point": "tip", "mass": 1.0}])
 
 # edits of the sound scene, place of the error, words in it
@@ -266,6 +269,44 @@ FAULTS: dict[str, tuple[list[tuple[str, Any]], str, str]] = {
         "payloads[0]",
         "no rotation",
     ),
+    # contacts and stops
+    "contact of an unknown point": ([CONTACT, ("contacts.0.point", "hand")], "contacts[0].point", "elbow, tip"),
+    "contacts of one name": ([(CONTACT[0], 2 * CONTACT[1])], "contacts[1].name", "differ"),
+    "contact without a plane": ([CONTACT, ("contacts.0.plane", GONE)], "contacts[0]", "add plane"),
+    "contact without restitution": ([CONTACT, ("contacts.0.restitution", GONE)], "contacts[0]", "add restitution"),
+    "contact that pushes itself up": ([CONTACT, ("contacts.0.restitution", 1.1)], "contacts[0].restitution", "0 to 1"),
+    "contact restitution NaN": ([CONTACT, ("contacts.0.restitution", NAN)], "contacts[0].restitution", "finite"),
+    "contact that pulls": ([CONTACT, ("contacts.0.stiffness", -1.0)], "contacts[0].stiffness", "positive"),
+    "contact exponent": ([CONTACT, ("contacts.0.exponent", 0.5)], "contacts[0].exponent", "1 to 5"),
+    "contact without transition": ([CONTACT, ("contacts.0.transition_rate", 0.0)], "transition_rate", "positive"),
+    "contact friction": (
+        [CONTACT, ("contacts.0.friction", {"coefficient": -0.1})],
+        "contacts[0].friction.coefficient",
+        "negative",
+    ),
+    "plane without direction": ([CONTACT, ("contacts.0.plane.normal", [0, 0, 0])], "plane.normal", "direction"),
+    "plane at infinity": ([CONTACT, ("contacts.0.plane.position", [0, 0, INF])], "plane.position", "finite"),
+    "plane on an unknown link": ([CONTACT, ("contacts.0.plane.on", "m")], "contacts[0].plane.on", "world, l"),
+    "plane on its own point": (
+        [CONTACT, ("contacts.0.plane", {**PLANE, "on": "l", "point": "tip"})],
+        "contacts[0].plane.point",
+        "another point",
+    ),
+    "plane on a point elsewhere": (
+        [CONTACT, ("contacts.0.plane", {**PLANE, "point": "elbow"})],
+        "contacts[0].plane.point",
+        "on = 'l'",
+    ),
+    "contacts beside a bandwidth": ([CONTACT, ("simulation.bandwidth", 50.0)], "simulation.bandwidth", "contacts"),
+    "stops nowhere": (
+        [("joints.0.stops", {"stiffness": 1e3, "restitution": 0.5})],
+        "joints[0].stops.lower",
+        "neither a lower nor an upper",
+    ),
+    "stops crossed": ([STOPS, ("joints.0.stops.upper_deg", -20.0)], "joints[0].stops.upper", "above the lower"),
+    "stop given twice": ([STOPS, ("joints.0.stops.upper", 0.1)], "joints[0].stops.upper", "twice"),
+    "stop in degrees of a slider": ([SLIDER, STOPS], "joints[0].stops.lower_deg", "length"),
+    "stops of glue": ([STOPS, ("joints.0.stops.stiffness", 0.0)], "joints[0].stops.stiffness", "positive"),
     # loads
     "load on an unknown point": ([LOAD, ("loads.0.point", "hand")], "loads[0].point", "elbow, tip"),
     "load of nothing": ([LOAD, ("loads.0.force", [0, 0, 0])], "loads[0]", "neither a force nor a moment"),

@@ -24,6 +24,7 @@ from erls.equations.erls.records import (
 )
 from erls.equations.erls.second_order import correct_twist
 from erls.equations.serial.elastic import elastic_energy
+from erls.equations.serial.joints import joint_energy
 from erls.equations.serial.modal_inertia_kernels import (
     WARP,
     WARP_STATE,
@@ -123,7 +124,7 @@ def add_energies(
         moment[1] += link.mass[3, 2]
         moment[2] += link.mass[4, 0]
         out[2] -= link.mass[0, 0] * height[0] + dot3(state.down, moment)
-        out[3] += joint.stiffness * (motion.coordinate[0] - joint.rest) ** 2 / 2
+        out[3] += joint_energy(joint, motion.coordinate[0])
 
 
 @kernel(contract.ENERGY, counted=False)

@@ -68,7 +68,7 @@ class Erls(SerialFormulation):
         """See `erls.equations.formulation.Modular`."""
         own = f"erls.equations.erls.{'stiffened_' if self.stiffened else ''}"
         seen = self._module("energy"), self._module("states")
-        loads = ("erls.equations.erls.loads",) if self.mechanism.loads else ()
+        loads = ("erls.equations.erls.loads",) if self.mechanism.acted_on else ()
         every = f"{own}residual", f"{own}mass_matrix", *seen, *loads, "erls.equations.serial.stiffness"
         return tuple(dict.fromkeys(every))
 
@@ -125,6 +125,7 @@ class Erls(SerialFormulation):
         energy = function_in(self._module("energy"), "energy")()
         for i, at in enumerate(t.tolist()):
             energy(system.reals, system.integers, system.scratch, at, y[i], v[i], out[i])
+        out[:, 3] += self.contact_energy(t, y, v)
         return out
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:

@@ -43,7 +43,8 @@ def loads(
             _place(serial, chain, reals, integers, scratch, load.link, work.pose, work.spare)
             if load.reference >= 0:
                 _place(serial, chain, reals, integers, scratch, load.reference, work.other, work.spare)
-        act(serial, reals, integers, scratch, number, t, state.q, state.q_rate, turner.q, state.twist)
+        motions = state.q, state.q_rate, state.twist, turner.q, turner.q_rate, turner.twist
+        act(serial, at, reals, integers, scratch, number, t, *motions)
         subtract(work.wrench, state.wrench)
         subtract(work.forces, state.modal)
         subtract(work.forces[:6], state.force)

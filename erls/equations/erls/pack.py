@@ -11,6 +11,7 @@ from erls.equations.compiled_system import CompiledSystem, Factoring, function_i
 from erls.equations.erls import records as own
 from erls.equations.serial import pack, segments
 from erls.equations.serial.condensed import condensed as elimination_memory
+from erls.equations.serial.contacts import put_contacts
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.ends import end_state
 from erls.equations.serial.loads import put_loads
@@ -269,6 +270,8 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         end_states=pack.put_all(scratch, [end_state(6 + modes[k]) for k, _ in ends]),
     )
     rigid, rigid_state = pack.rigid_links(mechanism, constants, scratch)
+    size, own_name, kind = len(free) + sum(modes), "erls.equations.erls", "stiffened_" if bends else ""
+    residual = function_in(f"{own_name}.{kind}residual", "residual")()
     serial = Serial(
         links=count,
         joints=pack.put_all(constants, joints),
@@ -281,17 +284,16 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         rigid_links=rigid,
         rigid_states=rigid_state,
         **put_loads(mechanism, [shape.modes for shape in found], curved, constants, scratch),
+        **put_contacts(mechanism, residual, size, constants, scratch),
         own=0,
         gravity=mechanism.gravity,
     )
-    size, room = len(free) + sum(modes), len(condensed.numbers)
+    room = len(condensed.numbers)
     chain = chain._replace(factors=len(scratch.numbers), left=len(scratch.numbers) + room)
     serial = serial._replace(own=constants.put(chain))
     integers[0] = constants.put(serial)
-    own_name = "erls.equations.erls"
-    kind = "stiffened_" if bends else ""
     factoring = None
-    if size > dense and max((each.mixing for each in decoupled), default=0.0) < MIXING:
+    if size > dense and not mechanism.contacts and max((each.mixing for each in decoupled), default=0.0) < MIXING:
         factor, factor_complex = (
             function_in(f"{own_name}.{kind}factors", name)() for name in ("factor", "factor_complex")
         )
@@ -302,7 +304,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         reals=constants.numbers,
         integers=np.array(integers, dtype=np.int64),
         scratch=np.concatenate([scratch.numbers, np.zeros(room + (size if bends else 0))]),
-        residual=function_in(f"{own_name}.{kind}residual", "residual")(),
+        residual=residual,
         mass_matrix=function_in(f"{own_name}.{kind}mass_matrix", "mass_matrix")(),
         stiffness_and_damping=function_in("erls.equations.serial.stiffness", "stiffness_and_damping")(),
         load_acceleration=function_in(f"{own_name}.{kind}acceleration", "acceleration"),

@@ -16,6 +16,7 @@ import numpy as np
 
 from erls.equations.ffr.formulation import Ffr, body_moments
 from erls.equations.formulation import Energy, Reaction, State
+from erls.equations.serial.contacts import ENERGY, contact_states
 from erls.equations.system import metre_scales
 from erls.maths import motion_maps
 from erls.maths.se3 import inverse, pose
@@ -218,9 +219,10 @@ class ConstrainedFfr:
         for world, (mass, moment) in zip(q.poses, body_moments(self.tied, self.links), strict=True):
             gravity -= float(self.mechanism.gravity @ (mass * world[:3, 3] + world[:3, :3] @ moment))
         springs = sum(
-            joint.forces.stiffness * float(angle - joint.forces.rest) ** 2 / 2
+            joint.forces.energy(float(angle))
             for joint, angle in zip(self.mechanism.joints, q.angles, strict=True)
         )
+        springs += sum(float(contact.known[ENERGY]) for contact in contact_states(self.tied))
         return Energy(kinetic, self.reduced.elastic_energy(q.eta), gravity, float(springs))
 
     def reactions(self, t: float, q: Configuration, v: Array, a: Array, multipliers: Array) -> list[Reaction]:

@@ -15,6 +15,7 @@ from erls.equations.ffr.records import (
 )
 from erls.equations.ffr.segments import fill_segments
 from erls.equations.serial.elastic import elastic_energy
+from erls.equations.serial.joints import joint_energy
 from erls.equations.serial.nodes import NODE, NODE_STATE, read_node, read_node_state
 from erls.equations.serial.records import (
     JOINT,
@@ -61,7 +62,7 @@ def energy(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array,
         for r in range(own.change.shape[0]):
             out[0] += dot(own.change[r], rates) * dot(own.partner[r], rates) / 2
         out[0] += joint.rotor * turning.coordinate[1] ** 2 / 2
-        out[3] += joint.stiffness * (turning.coordinate[0] - joint.rest) ** 2 / 2
+        out[3] += joint_energy(joint, turning.coordinate[0])
         # g · place of the frame, from link to link
         height, gravity = state.spare, state.spare[9:]
         height[0] = 0.0

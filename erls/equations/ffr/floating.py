@@ -32,7 +32,14 @@ from erls.equations.serial.nodes import (
     read_node_state,
     to_node_axes,
 )
-from erls.equations.serial.records import MODES, Serial, call_feed_forward, read_modes, read_serial
+from erls.equations.serial.records import (
+    MODES,
+    Serial,
+    call_contact_gains,
+    call_feed_forward,
+    read_modes,
+    read_serial,
+)
 from erls.equations.serial.segments import SEGMENT, read_segment
 from erls.maths.jit import kernel, part
 from erls.maths.products import clear
@@ -108,7 +115,7 @@ def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: A
 def stiffness_and_damping(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, k: Array, c: Array
 ) -> None:
-    """Of the links' modes."""
+    """Of the links' modes and of contacts."""
     serial = read_serial(reals, integers, integers[0])
     frames = read_frames(reals, integers, serial.own)
     k[:, :] = 0.0
@@ -118,6 +125,8 @@ def stiffness_and_damping(
         first = 6 * serial.links + elastic_at(serial, frames, reals, integers, number)
         for i in range(len(modes.stiffness)):
             k[first + i, first + i], c[first + i, first + i] = modes.stiffness[i], modes.damping[i]
+    if serial.contact_gains >= 0:
+        call_contact_gains(serial.contact_gains, reals, integers, scratch, t, y, v, k, c)
 
 
 @part

@@ -28,7 +28,9 @@ def floating_loads(
         low, high = elastic_places(serial, reals, integers, k, in_v)
         copy(y[12 * k : 12 * k + 12], work.pose)
         copy(y[12 * reference : 12 * reference + 12], work.other)
-        twist = v[6 * k : 6 * k + 6]
-        act(serial, reals, integers, scratch, number, t, y[first:last], v[low:high], y[begin:end], twist)
+        since, until = elastic_places(serial, reals, integers, reference, in_v)
+        motion = y[first:last], v[low:high], v[6 * k : 6 * k + 6]
+        other = y[begin:end], v[since:until], v[6 * reference : 6 * reference + 6]
+        act(serial, at, reals, integers, scratch, number, t, *motion, *other)
         subtract(work.wrench, out[6 * k : 6 * k + 6])
         subtract(work.forces, out[low:high])

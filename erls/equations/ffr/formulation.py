@@ -88,7 +88,7 @@ class Ffr(SerialFormulation):
     def kernels(self) -> tuple[str, ...]:
         """See `erls.equations.formulation.Modular`."""
         own = "erls.equations.ffr"
-        loads = (f"{own}.loads",) if self.mechanism.loads else ()
+        loads = (f"{own}.loads",) if self.mechanism.acted_on else ()
         states = f"{own}.energy", f"{own}.states"
         return f"{own}.residual", f"{own}.mass", *states, *loads, "erls.equations.serial.stiffness"
 
@@ -150,6 +150,7 @@ class Ffr(SerialFormulation):
         energy = function_in("erls.equations.ffr.energy", "energy")()
         for i, at in enumerate(t.tolist()):
             energy(system.reals, system.integers, system.scratch, at, y[i], v[i], out[i])
+        out[:, 3] += self.contact_energy(t, y, v)
         return out
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:

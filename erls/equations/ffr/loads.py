@@ -41,6 +41,8 @@ def loads(
             if load.reference >= 0:
                 set_identity(work.other)
                 to_world(serial, frames, reals, integers, scratch, load.reference, work.other, work.spare)
-        act(serial, reals, integers, scratch, number, t, y[first:last], v[first:last], y[begin:end], state.twist)
+        turner = read_body_state(scratch, integers, frames.body_states + max(load.reference, 0) * BODY_STATE)
+        motions = y[first:last], v[first:last], state.twist, y[begin:end], v[begin:end], turner.twist
+        act(serial, at, reals, integers, scratch, number, t, *motions)
         subtract(work.wrench, state.wrench)
         subtract(work.forces, out[first:last])

@@ -14,6 +14,7 @@ from erls.equations.ffr.records import BentBody, Body, End, EndRoom, Frames, Roo
 from erls.equations.ffr.standard_data import StandardData
 from erls.equations.serial import pack
 from erls.equations.serial.condensed import condensed
+from erls.equations.serial.contacts import put_contacts
 from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
 from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import modal_inertia
@@ -204,7 +205,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         decoupled_modes(data.elastic, link.stiffness, link.damping)
         for data, link in zip(given.data, mechanism.links, strict=True)
     ]
-    linked = size > dense and max(found.mixing for found in decoupled) < MIXING
+    linked = size > dense and not mechanism.contacts and max(found.mixing for found in decoupled) < MIXING
     nodes, bodies = [_nodes(given, k) for k in links], [_body(given, k) for k in links]
     bent = any(body.bent for body in bodies)
     places = np.where(prescribed, -1, np.cumsum(~prescribed) - 1)
@@ -263,6 +264,8 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         weight=int(bool(np.any(mechanism.gravity))),
     )
     own = constants.put(frames)
+    residual = function_in(f"erls.equations.ffr.{'floating' if given.absolute else 'residual'}", "residual")()
+    velocities = size - free + 6 * len(links) if given.absolute else size
     integers[0] = constants.put(
         Serial(
             links=len(mechanism.links),
@@ -273,6 +276,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
             rigid_links=rigid_links,
             rigid_states=rigid_states,
             **put_loads(mechanism, given.bases, [given.bent(k) for k in links], constants, working),
+            **put_contacts(mechanism, residual, velocities, constants, working),
             own=own,
             gravity=mechanism.gravity,
         )
@@ -294,7 +298,7 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         reals=constants.numbers,
         integers=np.array(integers, dtype=np.int64),
         scratch=working.numbers,
-        residual=function_in("erls.equations.ffr.residual", "residual")(),
+        residual=residual,
         mass_matrix=function_in("erls.equations.ffr.mass", "mass_matrix")(),
         stiffness_and_damping=function_in("erls.equations.serial.stiffness", "stiffness_and_damping")(),
         load_acceleration=acceleration_in(accelerate),

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.linalg as la
 
-from erls.equations.formulation import Energy, LoopForce, Reaction, State
+from erls.equations.formulation import ContactSeries, Energy, LoopForce, Reaction, State
 from erls.equations.linearization import Linearization
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.neighbours import LoopNeighbours
@@ -293,14 +293,18 @@ class ClosedChain(Tied):
         y, v = self._closed_at(t, y, v)
         result = energy_series(self.bare, t, y, v)
         free = {k: loop.freedom for k, loop in enumerate(self.mechanism.loops) if loop.freedom is not None}
-        if not any(found.rotor_inertia or found.forces.stiffness for found in free.values()):
+        if not any(found.rotor_inertia or found.forces.stiffness or found.forces.stops for found in free.values()):
             return result
         for i, at in enumerate(t.tolist()):
             efforts = self.closure(at, y[i], v[i]).efforts
             for k, found in free.items():
                 result[i, 0] += 0.5 * found.rotor_inertia * efforts[k].rate ** 2
-                result[i, 3] += 0.5 * found.forces.stiffness * (efforts[k].coordinate - found.forces.rest) ** 2
+                result[i, 3] += found.forces.energy(efforts[k].coordinate)
         return result
+
+    def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
+        """That of the tree."""
+        return self.bare.contact_series(t, y, v)
 
     def load_power(self, t: Array, y: Array, v: Array) -> Array:
         """(k,) that of the tree."""

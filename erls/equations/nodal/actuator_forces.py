@@ -1,4 +1,4 @@
-"""Forces along the free axis of joints: drives, springs, dampers, friction, rotors; and the joint coordinates.
+"""Forces along the free axis of joints: drives, springs, dampers, friction, stops, rotors; and the joint coordinates.
 
 With the pose D of a joint's outer frame relative to its inner one, and the relative twist η in the outer frame's axes,
 the rate of the joint coordinate is η's entry about or along z, a row over the twists of both nodes. Forces act along
@@ -30,6 +30,7 @@ from erls.equations.nodal.joint_forces import frame_in_world, relative
 from erls.equations.nodal.motion import set_twists
 from erls.equations.nodal.rows import outer_product, push, rate_along
 from erls.maths.coefficients import angle_of
+from erls.maths.contact_law import stop_energy, stop_force, stop_gains
 from erls.maths.jit import kernel, part
 from erls.maths.motions import bracket, pair_minus, transformed, transposed
 from erls.maths.vectors import (
@@ -48,6 +49,7 @@ from erls.maths.vectors import (
 )
 from erls.maths.views import vector_at
 
+_STOPS = 9  # first of six columns of `Model.actuators`; their stiffness is 0 where there are none
 _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -118,6 +120,8 @@ def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> f
     torque -= law[k, 1] * (angle - law[k, 2]) + law[k, 3] * rate
     if law[k, 4] != 0.0:
         torque -= law[k, 4] * np.tanh(rate / law[k, 5])
+    if law[k, _STOPS + 2] != 0.0:
+        torque += stop_force(law[k, _STOPS:], angle, rate)[0]
     return torque
 
 
@@ -160,6 +164,9 @@ def _derivatives(model: Model, work: Work, k: int, block: Array) -> None:
     stiffness, damping = law[k, 1] + law[k, 6], law[k, 3] + law[k, 7]
     if law[k, 4] != 0.0:
         damping += law[k, 4] / law[k, 5] / np.cosh(min(abs(rate / law[k, 5]), 300.0)) ** 2
+    if law[k, _STOPS + 2] != 0.0:
+        pushed, damped = stop_gains(law[k, _STOPS:], work.turned[k], rate)
+        stiffness, damping = stiffness + pushed, damping + damped
     outer_product(block, work.rows[0], first, second, stiffness, damping, law[k, 0])
 
 
@@ -175,11 +182,14 @@ def actuator_derivatives(reals: Array, integers: IntArray, scratch: Array, mater
 
 @part
 def _energy(model: Model, work: Work, k: int) -> tuple[float, float]:
-    """Of the rotor, and of the spring."""
+    """Of the rotor, and of spring and stops."""
     _, _, reach, axes = _posed(model, work.poses, k)
     _, _, rate, _ = _turning(model, work, k, reach, axes)
     law = model.actuators
-    return 0.5 * law[k, 0] * rate * rate, 0.5 * law[k, 1] * (work.turned[k] - law[k, 2]) ** 2
+    stored = 0.5 * law[k, 1] * (work.turned[k] - law[k, 2]) ** 2
+    if law[k, _STOPS + 2] != 0.0:
+        stored += stop_energy(law[k, _STOPS:], work.turned[k])
+    return 0.5 * law[k, 0] * rate * rate, stored
 
 
 @kernel(ENERGIES, counted=False)

@@ -11,6 +11,8 @@ from erls.equations.nodal.springs import with_ground
 from erls.maths.so3 import Array
 from erls.mechanism.joints import Joint
 
+NO_STOPS = (-np.inf, np.inf, 0.0, 1.0, 0.0, 1.0)
+
 
 @dataclass(frozen=True)
 class Actuator:
@@ -52,14 +54,15 @@ class Actuators:
 
     @property
     def laws(self) -> Array:
-        """(e, 9) as in `erls.equations.nodal.contract.Model`."""
+        """(e, 15) as in `erls.equations.nodal.contract.Model`."""
         found = []
         for joint, acts in zip(self.joints, self.acting, strict=True):
             own, drive = joint.forces, joint.drive
             gains = drive.gains if acts else (0.0, 0.0)
             law = (own.stiffness, own.rest, own.damping, own.friction, own.transition_rate, *gains, drive.torque_limit)
-            found.append([joint.rotor_inertia, *law])
-        return np.array(found, dtype=float).reshape(-1, 9)
+            stops = NO_STOPS if own.stops is None else own.stops.numbers
+            found.append([joint.rotor_inertia, *law, *stops])
+        return np.array(found, dtype=float).reshape(-1, 15)
 
     def wanted(self, t: float) -> Array:
         """(e, 3) wanted coordinates, wanted rates, and torques besides."""

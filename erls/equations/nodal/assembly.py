@@ -219,7 +219,7 @@ class NodalSystem:
         return np.concatenate([found[..., :3], found[:, nodes, :3] + turned], axis=1)
 
     def energies(self, q: Nodes, v: Array) -> Array:
-        """(5,) kinetic, elastic of beams, gravity, springs, springs in joints [J]."""
+        """(5,) kinetic, elastic of beams, gravity, springs, what is elastic in joints and contacts [J]."""
         out = np.zeros(5)
         self._state(q, v, np.zeros(self.size))
         self._functions.energies(*self._memory, out)
@@ -239,6 +239,16 @@ class NodalSystem:
             self._state(q, v, a)
             self._sample(t)
             in_joints(*self._memory, out)
+        return out
+
+    def in_contacts(self, q: Nodes, v: Array) -> Array:
+        """(c, 11) as of `erls.equations.nodal.contact_forces.in_contacts`."""
+        out = np.zeros((len(self.model.contacts), 11))
+        if len(out):
+            from erls.equations.nodal.contact_forces import in_contacts  # here: it is compiled
+
+            self._state(q, v, np.zeros(self.size))
+            in_contacts(*self._memory, out)
         return out
 
     def samples(self, times: Array) -> Array:

@@ -15,6 +15,7 @@ from erls.equations.nodal.contract import (
     Work,
     call_actuator_derivatives,
     call_beam_derivatives,
+    call_contact_derivatives,
     call_spring_derivatives,
     read_layout,
     read_model,
@@ -78,6 +79,8 @@ def blocks(reals: Array, integers: IntArray, scratch: Array, material: int) -> N
         load_derivatives(model, work, sample, k, table[at + k])
     if known.actuator_derivatives >= 0:
         call_actuator_derivatives(known.actuator_derivatives, reals, integers, scratch, material)
+    if known.contact_derivatives >= 0:
+        call_contact_derivatives(known.contact_derivatives, reals, integers, scratch, material)
     if known.spring_derivatives >= 0:
         call_spring_derivatives(known.spring_derivatives, reals, integers, scratch, material)
     at = len(model.pairs) - len(model.joint_nodes)

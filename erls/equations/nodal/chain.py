@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,7 @@ from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.nodal.actuators import Actuator, Actuators
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.beam import Beams, halves
+from erls.equations.nodal.contacts import Contacts, NodalContact
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import GROUND, Joint, Motion
 from erls.equations.nodal.loads import NodalLoad, NodalLoads
@@ -27,6 +29,7 @@ from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.chain import poses as link_poses
+from erls.mechanism.contacts import PointContact
 from erls.mechanism.joint_types import Freedom, Z, single
 from erls.mechanism.joints import Joint as MechanismJoint
 from erls.mechanism.loads import CENTRE, PointLoad
@@ -166,6 +169,8 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
         passive.append(RigidBodies(bodies, mechanism.gravity))
     if mechanism.loads:
         passive.append(NodalLoads([x for load in mechanism.loads for x in _loads(mechanism, links, ends, load)]))
+    if mechanism.contacts:
+        passive.append(Contacts([_contact(mechanism, links, ends, contact) for contact in mechanism.contacts]))
     seats = _seats(mechanism, links, ends)
     closing = tuple(_closing(mechanism, links, ends, loop) for loop in mechanism.loops)
     acting = _actuators(mechanism, seats, positions)
@@ -187,11 +192,7 @@ def _loads(
     """A load on the node that carries its node; that on a link's mass on all of its nodes, half of each beam's at its
     ends.
     """
-
-    def at(link: int, node: int) -> tuple[int, Array]:
-        number = node_at(links[link], node, f"link {mechanism.links[link].name!r}")
-        return firsts[link] + number, mechanism.links[link].model.nodes[node] - links[link].nodes[number]
-
+    at = partial(_place, mechanism, links, firsts)
     places = [(*at(load.link, load.node), 1.0)] if load.node != CENTRE else _masses(links[load.link], firsts[load.link])
     axes = GROUND if load.axes is None else at(*load.axes)[0]
     factor: Callable[[float], float] = (lambda t: 1.0) if load.factor is None else load.factor.value
@@ -201,6 +202,26 @@ def _loads(
         own, (force, moment) = axes == node, (mass * load.wrench).reshape(2, 3)
         result.append(NodalLoad(node, force, moment, own, position, GROUND if own else axes, *times))
     return result
+
+
+def _place(
+    mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int], link: int, node: int
+) -> tuple[int, Array]:
+    """Number of what carries a node of a link's model, and the place of that in its axes."""
+    number = node_at(links[link], node, f"link {mechanism.links[link].name!r}")
+    return firsts[link] + number, mechanism.links[link].model.nodes[node] - links[link].nodes[number]
+
+
+def _contact(
+    mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int], contact: PointContact
+) -> NodalContact:
+    """A contact on the nodes that carry its point and its plane."""
+    at = partial(_place, mechanism, links, firsts)
+    node, arm = at(contact.link, contact.node)
+    if contact.base is None:
+        return NodalContact((node,), arm, contact)
+    base, offset = at(*contact.base)
+    return NodalContact((base, node), arm, replace(contact, position=contact.position + offset))
 
 
 def _masses(parts: LinkParts, first: int) -> list[tuple[int, Array, float]]:

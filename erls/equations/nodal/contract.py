@@ -39,8 +39,11 @@ class Model(NamedTuple):
         (l, 2) where they act and in whose axes they are given, -1 for the world; (l, 3), (l, 6), (l,) whether the load
         keeps its direction there, rather than in the axes of its own node.
     actuator_nodes, actuator_frames, actuator_along, actuator_active, actuators : arrays
-        (a, 2), (a, 24), (a,) row of the twist, (a,), and (a, 9): rotor, stiffness, rest, damping, friction, transition
-        rate, proportional and derivative gain, limit.
+        (a, 2), (a, 24), (a,) row of the twist, (a,), and (a, 15): rotor, stiffness, rest, damping, friction, transition
+        rate, proportional and derivative gain, limit, stops.
+    contact_nodes, contacts : arrays
+        (c, 2) what carries the plane, and the node, and (c, 21): the point in its node; in what carries the plane, a
+        point of that and its three axes; the law, friction and its rate.
     spring_nodes, springs : arrays
         (s, 2), and (s, 9): both points in their nodes, stiffness, damping, length without force.
     winding_nodes, winding_frames, windings : arrays
@@ -72,6 +75,8 @@ class Model(NamedTuple):
     actuator_along: Indices
     actuator_active: Indices
     actuators: Matrix
+    contact_nodes: Pairs
+    contacts: Matrix
     spring_nodes: Pairs
     springs: Matrix
     winding_nodes: Pairs
@@ -183,10 +188,12 @@ class Layout(NamedTuple):
     forces, remember, knot, blocks, weighted : int
         Addresses of the functions of `erls.equations.nodal.sums`, `outputs` and `blocks`.
     beam_forces, bend_beams, beam_derivatives, beam_energies : int
-        Those of `beam_forces`; of this and of the next two kinds -1, and nothing of them is compiled, where there are
+        Those of `beam_forces`; of this and of the next three kinds -1, and nothing of them is compiled, where there are
         none.
     actuator_forces, turn_actuators, actuator_derivatives, actuator_energies, store_actuators : int
         Those of `actuator_forces`.
+    contact_forces, contact_derivatives, contact_energies : int
+        Those of `contact_forces`.
     spring_forces, wind_springs, spring_derivatives, spring_energies : int
         Those of `spring_forces`, for springs along a line and about an axis.
     samples : int
@@ -214,6 +221,9 @@ class Layout(NamedTuple):
     actuator_derivatives: int
     actuator_energies: int
     store_actuators: int
+    contact_forces: int
+    contact_derivatives: int
+    contact_energies: int
     spring_forces: int
     wind_springs: int
     spring_derivatives: int
@@ -266,3 +276,6 @@ call_spring_forces = caller(FORCES, "erls.equations.nodal.spring_forces:spring_f
 call_wind_springs = caller(REMEMBER, "erls.equations.nodal.spring_forces:wind_springs")
 call_spring_derivatives = caller(BLOCKS, "erls.equations.nodal.spring_forces:spring_derivatives")
 call_spring_energies = caller(ENERGIES, "erls.equations.nodal.spring_forces:spring_energies")
+call_contact_forces = caller(FORCES, "erls.equations.nodal.contact_forces:contact_forces")
+call_contact_derivatives = caller(BLOCKS, "erls.equations.nodal.contact_forces:contact_derivatives")
+call_contact_energies = caller(ENERGIES, "erls.equations.nodal.contact_forces:contact_energies")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.consistency import consistent_acceleration, consistent_velocity
-from erls.equations.formulation import Energy, LoopForce, Reaction, State
+from erls.equations.formulation import ContactSeries, Energy, LoopForce, Reaction, State
 from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.loops.failures import warnings_of
 from erls.equations.nodal.assembly import NodalSystem
@@ -217,12 +217,20 @@ class Nodal:
         return Energy(kinetic, elastic, gravity, springs)
 
     def load_power(self, t: Array, y: Array, v: Array) -> Array:
-        """(k,) power of loads at times (k,) [W]."""
+        """(k,) power of loads, and what contacts lose, at times (k,) [W]."""
         loads, result = self.system.kinds.loads, np.zeros(len(t))
-        for k, at in enumerate(t.tolist() if loads.loads else ()):
+        for k, at in enumerate(t.tolist() if self.mechanism.acted_on else ()):
             q, velocity = self.configuration(y[k], v[k])
             result[k] = loads.power(at, q.poses, velocity.reshape(-1, 6))
+            result[k] += self.system.in_contacts(q, velocity)[:, 10].sum()
         return result
+
+    def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
+        """Contacts at times (k,)."""
+        known = np.zeros((len(t), len(self.mechanism.contacts), 11))
+        for k in range(len(t) if self.mechanism.contacts else 0):
+            known[k] = self.system.in_contacts(*self.configuration(y[k], v[k]))
+        return ContactSeries.of(known)
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """(n,) ÿ of frames and joint coordinates; 0 for the rest."""

@@ -59,6 +59,7 @@ def used_kinds(model: Model) -> list[str]:
     has = {
         "beam_forces": len(model.beam_nodes),
         "actuator_forces": len(model.actuator_nodes),
+        "contact_forces": len(model.contact_nodes),
         "spring_forces": len(model.spring_nodes) + len(model.winding_nodes),
     }
     return [name for name, count in has.items() if count]
@@ -102,6 +103,9 @@ def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Fun
         actuator_derivatives=address_for(contract.call_actuator_derivatives, "actuator_forces" in used),
         actuator_energies=address_for(contract.call_actuator_energies, "actuator_forces" in used),
         store_actuators=address_for(contract.call_store_actuators, "actuator_forces" in used),
+        contact_forces=address_for(contract.call_contact_forces, "contact_forces" in used),
+        contact_derivatives=address_for(contract.call_contact_derivatives, "contact_forces" in used),
+        contact_energies=address_for(contract.call_contact_energies, "contact_forces" in used),
         spring_forces=address_for(contract.call_spring_forces, "spring_forces" in used),
         wind_springs=address_for(contract.call_wind_springs, "spring_forces" in used),
         spring_derivatives=address_for(contract.call_spring_derivatives, "spring_forces" in used),

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from erls.equations.nodal.actuators import Actuators
 from erls.equations.nodal.beam import Beams
+from erls.equations.nodal.contacts import Contacts
 from erls.equations.nodal.contract import Factors, Model, Work
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import JointRows
@@ -33,9 +34,10 @@ class Kinds:
         self.bodies = _one(elements, RigidBodies) or RigidBodies([], np.zeros(3))
         self.loads = _one(elements, NodalLoads) or NodalLoads([])
         self.actuators = _all(elements, Actuators)
+        self.contacts = _one(elements, Contacts) or Contacts([])
         self.springs = _all(elements, Springs) or [Springs([])]
         self.windings = _all(elements, TurningSprings) or [TurningSprings([])]
-        known = (Beams, RigidBodies, NodalLoads, Actuators, Springs, TurningSprings)
+        known = (Beams, RigidBodies, NodalLoads, Actuators, Contacts, Springs, TurningSprings)
         strange = [type(e).__name__ for e in elements if not isinstance(e, known)]
         if strange:
             raise TypeError(f"there are no functions of {strange[0]}")
@@ -43,8 +45,8 @@ class Kinds:
     @property
     def pairs(self) -> IntArray:
         """(E, 2) nodes of all elements, in the order of `Model`."""
-        sets: list[Elements] = [self.beams, self.bodies, self.loads, *self.actuators, *self.springs, *self.windings]
-        return np.concatenate([_pairs(e.nodes) for e in sets])
+        sets: list[Elements] = [self.beams, self.bodies, self.loads, *self.actuators, self.contacts]
+        return np.concatenate([_pairs(e.nodes) for e in [*sets, *self.springs, *self.windings]])
 
 
 def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, places: IntArray) -> Model:
@@ -83,7 +85,9 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
         actuator_frames=_joined(frames, 24),
         actuator_along=np.concatenate([np.zeros(0, dtype=np.int64), *(a.along for a in actuators)]),
         actuator_active=np.concatenate([np.zeros(0, dtype=np.int64), *(a.active for a in actuators)]),
-        actuators=_joined([a.laws for a in actuators], 9),
+        actuators=_joined([a.laws for a in actuators], 15),
+        contact_nodes=kinds.contacts.nodes,
+        contacts=kinds.contacts.laws,
         spring_nodes=np.concatenate([s.nodes for s in kinds.springs]),
         springs=np.concatenate([s.laws for s in kinds.springs]),
         winding_nodes=np.concatenate([s.nodes for s in kinds.windings]),

@@ -9,6 +9,7 @@ from erls.equations.nodal.contract import (
     KNOT,
     call_actuator_energies,
     call_beam_energies,
+    call_contact_energies,
     call_spring_energies,
     call_store_actuators,
     read_layout,
@@ -22,7 +23,8 @@ from erls.maths.vectors import cross, dot, nine, plus, put, scaled, three, times
 
 @kernel(ENERGIES, counted=False)
 def energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
-    """Kinetic, elastic of beams, gravity, springs, springs in joints; loads count as work done from outside."""
+    """Kinetic, elastic of beams, gravity, springs, what is elastic in joints and contacts; loads are work from outside.
+    """
     known = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     set_twists(model, work)
@@ -36,6 +38,8 @@ def energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> No
         out[2] += gravity
     if known.spring_energies >= 0:
         call_spring_energies(known.spring_energies, reals, integers, scratch, out)
+    if known.contact_energies >= 0:
+        call_contact_energies(known.contact_energies, reals, integers, scratch, out)
     if known.actuator_energies >= 0:
         call_actuator_energies(known.actuator_energies, reals, integers, scratch, out)
 

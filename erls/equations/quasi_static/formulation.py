@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from erls.equations.formulation import Energy, Reaction, State, TreeFormulation
+from erls.equations.formulation import ContactSeries, Energy, Reaction, State, TreeFormulation
 from erls.equations.quasi_static.static_modes import StaticModes, static_modes
 from erls.equations.serial.motion_series import MotionSeries, motion_series
 from erls.equations.serial.state_series import (
@@ -321,6 +321,10 @@ class QuasiStatic:
     def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
         """Joint reactions at times (k,), with all modes under load and their accelerations."""
         return reaction_series(self.inner, t, *self.all_modes_at(t, y, v, a))
+
+    def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
+        """That of all modes; scenes have no contacts beside a bandwidth."""
+        return self.inner.contact_series(t, *self.all_modes_at(t, y, v)[:2])
 
     def energy_series(self, t: Array, y: Array, v: Array) -> Array:
         """(k, 4) energies at times (k,), with those of the static deflection."""

@@ -15,9 +15,10 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
+from erls.equations.formulation import ContactSeries, FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization
 from erls.equations.neighbours import small_motions
+from erls.equations.serial.contacts import ENERGY, contact_states
 from erls.equations.serial.equilibrium import Held, equilibrium, held_tree, size_of
 from erls.equations.serial.loads import load_powers
 from erls.equations.serial.neighbours import TreeNeighbours
@@ -132,15 +133,29 @@ class SerialFormulation(TreeFormulation):
         return np.asarray(np.linalg.solve(lower.swapaxes(1, 2), half)[..., 0])
 
     def load_power(self, t: Array, y: Array, v: Array) -> Array:
-        """(k,) power of loads at times (k,) [W]."""
+        """(k,) power of loads, and what contacts lose, at times (k,) [W]."""
         system, result = self.compiled, np.zeros(len(t))
-        if not self.mechanism.loads:
+        if not self.mechanism.acted_on:
             return result
         powers = load_powers(system, _see_serial(system.reals, system.integers, int(system.integers[0])))
         for k, at in enumerate(t.tolist()):
             residual(system, at, y[k], v[k], np.zeros(0))
             result[k] = sum(float(power[0]) for power in powers)
         return result
+
+    def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
+        """Contacts at times (k,)."""
+        system, known = self.compiled, np.zeros((len(t), len(self.mechanism.contacts), 10))
+        if known.size:
+            states = contact_states(system)
+            for k, at in enumerate(t.tolist()):
+                residual(system, at, y[k], v[k], np.zeros(0))
+                known[k] = [[*x.known[:3], *x.force, *x.point[9:], x.known[ENERGY]] for x in states]
+        return ContactSeries.of(known)
+
+    def contact_energy(self, t: Array, y: Array, v: Array) -> Array:
+        """(k,) elastic energy of all contacts [J]."""
+        return np.asarray(self.contact_series(t, y, v).energy.sum(axis=1))
 
     def elastic_name(self, place: int) -> str:
         """What messages call an elastic coordinate, by its place among them."""

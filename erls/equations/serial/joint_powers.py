@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.equations import compiled_system as contract
-from erls.equations.serial.joints import effort, set_coordinate
+from erls.equations.serial.joints import effort, elastic_effort, set_coordinate
 from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
@@ -21,8 +21,8 @@ from fe_import.model import IntArray
 
 @kernel(contract.STATES, counted=False)
 def joint_powers(reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array) -> None:
-    """Rows of ``out`` (k, 2) [W]: of drives, dampers and friction in joints, motors of prescribed motions and springs
-    left out; of the damping of modes. θ is the angle that these act along.
+    """Rows of ``out`` (k, 2) [W]: of drives, dampers, friction and stops in joints, motors of prescribed motions and
+    what is elastic left out; of the damping of modes. θ is the angle that these act along.
     """
     serial = read_serial(reals, integers, integers[0])
     for row in range(len(t)):
@@ -37,7 +37,7 @@ def joint_powers(reals: Array, integers: IntArray, scratch: Array, t: Array, y: 
                 set_coordinate(joint, motion, reals, integers, t[row], y[row], v[row], y[row, 0:0])
                 angle, rate = motion.coordinate[0], motion.coordinate[1]
                 force = effort(joint, reals, integers, t[row], angle, rate, motion.feed[0])
-                joints += (force + joint.stiffness * (angle - joint.rest)) * rate
+                joints += (force - elastic_effort(joint, angle)) * rate
             for i in range(len(modes.damping)):
                 damped -= modes.damping[i] * v[row, modes.first + i] ** 2
         out[row, 0], out[row, 1] = joints, damped

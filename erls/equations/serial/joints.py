@@ -1,4 +1,4 @@
-"""Motion of joints, and the forces of drives, springs, dampers, friction and rotors along them."""
+"""Motion of joints, and the forces of drives, springs, dampers, friction, stops and rotors along them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from erls.equations.serial.records import Joint, JointState, Serial, call_turn_by_vector
 from erls.equations.serial.time_curves import curve
+from erls.maths.contact_law import stop_energy, stop_force, stop_gains
 from erls.maths.jit import part
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -78,7 +79,7 @@ def wanted(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any,
 
 @part
 def effort(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any, rate: Any, feed: Any) -> Any:
-    """Force of drive, spring, damper and friction along a joint."""
+    """Force of drive, spring, damper, friction and stops along a joint."""
     force = wanted(joint, reals, integers, t, angle, rate, feed)
     if force.real > joint.limit.real:
         force = 0.0 * force + joint.limit
@@ -87,7 +88,27 @@ def effort(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any,
     force -= joint.stiffness * (angle - joint.rest) + joint.damping * rate
     if joint.friction != 0.0:
         force -= joint.friction * _saturated(rate / joint.transition)
+    if len(joint.stops) > 0:
+        force += stop_force(joint.stops, angle, rate)[0]
     return force
+
+
+@part
+def elastic_effort(joint: Joint, angle: Any) -> Any:
+    """What of it follows from `joint_energy`."""
+    force = -joint.stiffness * (angle - joint.rest)
+    if len(joint.stops) > 0:
+        force += stop_force(joint.stops, angle, 0.0 * angle)[1]
+    return force
+
+
+@part
+def joint_energy(joint: Joint, angle: Any) -> Any:
+    """Elastic energy of spring and stops."""
+    energy = joint.stiffness * (angle - joint.rest) ** 2 / 2
+    if len(joint.stops) > 0:
+        energy += stop_energy(joint.stops, angle)
+    return energy
 
 
 @part
@@ -100,6 +121,10 @@ def gains(
         ratio = rate / joint.transition
         if abs(ratio.real) < 300.0:  # beyond, cosh overflows
             damping += joint.friction / joint.transition / np.cosh(ratio) ** 2
+    if len(joint.stops) > 0:
+        pushed, damped = stop_gains(joint.stops, angle, rate)
+        stiffness += pushed
+        damping += damped
     if abs(wanted(joint, reals, integers, t, angle, rate, feed).real) <= joint.limit.real:  # else it gives no more
         stiffness += joint.gain
         damping += joint.rate_gain

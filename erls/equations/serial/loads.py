@@ -12,6 +12,7 @@ another node.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -33,38 +34,49 @@ from erls.equations.serial.nodes import (
 )
 from erls.equations.serial.records import MODES, Serial, read_modes
 from erls.equations.serial.time_curves import curve, put_curve
+from erls.maths.calls import caller
 from erls.maths.jit import ENABLED, part
 from erls.maths.products import add_columns, clear
 from erls.maths.records import Memory, Vector, python_reader, reader, room, table_size
 from erls.maths.so3 import Array
 from erls.maths.spatial import dot6, rotate, rotate_back, transform_force_back, transform_motion
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.contacts import PointContact
 from erls.mechanism.links import Link
-from erls.mechanism.loads import CENTRE
+from erls.mechanism.loads import CENTRE, PointLoad
 from fe_import.model import IntArray
 
 LOADS: Any = None
 """Signature of a formulation's ``loads``: place of the `Serial`, memory, time, y, v, forces."""
+TOUCH: Any = None
+"""Signature of `erls.equations.serial.touch.touch`: place of the `Serial`, number of the load, memory."""
 if ENABLED:
     from numba import types as _t
 
     _memory = (contract.REALS, contract.INTEGERS, contract.REALS)
     LOADS = _t.void(_t.int64, *_memory, _t.float64, contract.REALS, contract.REALS, contract.REALS)
+    TOUCH = _t.void(_t.int64, _t.int64, *_memory)
+
+call_touch = caller(TOUCH, "erls.equations.serial.touch:touch")
 
 
 class Load(NamedTuple):
-    """A wrench on a node.
+    """A wrench on a node, given or that of a contact.
 
     Attributes
     ----------
     link : int
         That carries the node.
     reference : int
-        Link whose node turns the wrench; -1 for the axes of the world.
+        Link whose node turns the wrench, or takes part in the contact; -1 for the world.
     follower : int
         Whether that is the node itself.
     factor : int
         Place of the curve that multiplies the wrench; -1 without.
+    contact : int
+        Number of the contact that gives the wrench; -1 without.
+    side : int
+        Of a contact: 0 its node, 1 what carries its plane.
     wrench : (6,) array
         Force [N] and moment [N m].
     """
@@ -73,6 +85,8 @@ class Load(NamedTuple):
     reference: int
     follower: int
     factor: int
+    contact: int
+    side: int
     wrench: Vector
 
 
@@ -87,10 +101,10 @@ class LoadState(NamedTuple):
         The wrench in the axes of its node.
     wrench, forces : (6,), (n,) arrays
         On the link's frame and on its coordinates.
-    moved : (6,) array
-        Twist of the node in its axes.
+    moved, turning : (6,) arrays
+        Twist of the node in its axes; of a contact, also that of the node on the other side.
     power : (1,) array
-        [W]
+        Of what is not elastic [W].
     """
 
     pose: Annotated[Array, "12"]
@@ -100,6 +114,7 @@ class LoadState(NamedTuple):
     wrench: Annotated[Array, "6"]
     forces: Annotated[Array, "n"]
     moved: Annotated[Array, "6"]
+    turning: Annotated[Array, "6"]
     power: Annotated[Array, "1"]
 
 
@@ -122,7 +137,9 @@ def put_loads(
         Which links have second-order displacements.
     constants, scratch : Memory
     """
-    own = mechanism.loads
+    sides = sides_of(mechanism.contacts)
+    own = [*mechanism.loads, *(load for load, _, _ in sides)]
+    places_of = [(-1, 0)] * len(mechanism.loads) + [(number, side) for _, number, side in sides]
 
     def at(k: int, node: int) -> Node:
         given = k, mechanism.links[k], bases[k]
@@ -135,9 +152,11 @@ def put_loads(
             reference=load.axes[0] if load.axes else -1,
             follower=int(load.follower),
             factor=put_curve(constants, load.factor),
+            contact=number,
+            side=side,
             wrench=load.wrench * (_mass(mechanism.links[load.link]) if load.node == CENTRE else 1.0),
         )
-        for load in own
+        for load, (number, side) in zip(own, places_of, strict=True)
     ]
     tables: dict[str, tuple[Memory, list[Any]]] = {
         "load_records": (constants, records),
@@ -145,8 +164,18 @@ def put_loads(
         "load_states": (scratch, [room(LoadState, n=bases[load.link].shape[1]) for load in own]),
         "load_node_states": (scratch, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in nodes]),
     }
-    places = {name: [memory.put(record) for record in every] for name, (memory, every) in tables.items()}
-    return {"load_count": len(own), **{name: every[0] if every else -1 for name, every in places.items()}}
+    found = {name: [memory.put(record) for record in every] for name, (memory, every) in tables.items()}
+    return {"load_count": len(own), **{name: every[0] if every else -1 for name, every in found.items()}}
+
+
+def sides_of(contacts: Sequence[PointContact]) -> list[tuple[PointLoad, int, int]]:
+    """Every contact as a load on its node, and one on what carries its plane; its number, and the side: 0, 1."""
+    result = []
+    for number, contact in enumerate(contacts):
+        result.append((PointLoad(contact.link, contact.node, np.zeros(6), contact.base), number, 0))
+        if contact.base is not None:
+            result.append((PointLoad(*contact.base, np.zeros(6), (contact.link, contact.node)), number, 1))
+    return result
 
 
 def _mass(link: Link) -> float:
@@ -169,29 +198,29 @@ def elastic_places(serial: Serial, reals: Array, integers: IntArray, k: int, shi
 
 @part
 def needs_world(load: Load) -> bool:
-    """Whether the wrench is turned by what stands on another link than its node, or by nothing."""
-    return load.reference != load.link
+    """Whether the wrench is turned by what stands on another link than its node, or by nothing, or is of a contact."""
+    return load.contact >= 0 or load.reference != load.link
 
 
 @part
 def act(
-    serial: Serial, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, q: Array, rates: Array,
-    q_reference: Array, twist: Array,
+    serial: Serial, at: int, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, q: Array,
+    rates: Array, twist: Array, other_q: Array, other_rates: Array, other_twist: Array,
 ) -> None:  # fmt: skip
     """A load in the motion of its link: ``wrench`` and ``forces``, what it does to the frame and to the coordinates.
 
     Parameters
     ----------
-    serial, reals, integers, scratch : Serial, arrays
+    serial, at, reals, integers, scratch : Serial, its place, arrays
     number : int
         Of the load, whose ``pose`` and ``other`` stand in its memory if `needs_world`.
     t : float
     q, rates : (n,) arrays
         Coordinates of the link and their rates.
-    q_reference : array
-        Coordinates of the link whose node turns the wrench.
     twist : (6,) array
         Of the link's frame, in its axes.
+    other_q, other_rates, other_twist : arrays
+        Those of the link whose node turns the wrench, or takes part in the contact.
     """
     load = read_load(reals, integers, serial.load_records + number * LOAD)
     work = read_load_state(scratch, integers, serial.load_states + number * LOAD_STATE)
@@ -199,22 +228,30 @@ def act(
     moved = read_node_state(scratch, integers, serial.load_node_states + 2 * number * NODE_STATE)
     place_node(node, moved, q)
     move_node(node, moved, rates, rates[0:0])
-    factor = 1.0 + 0.0 * load.wrench[0]
-    if load.factor >= 0:
-        factor = curve(reals, integers, load.factor, t)[0]
-    for i in range(6):
-        work.given[i] = factor * load.wrench[i]
-    if not load.follower:
-        turner = read_node(reals, integers, serial.load_nodes + (2 * number + 1) * NODE)
-        turned = read_node_state(scratch, integers, serial.load_node_states + (2 * number + 1) * NODE_STATE)
-        if load.reference >= 0:
-            place_node(turner, turned, q_reference)
-        _turn(load, work, turned, moved, work.given[:3])
-        _turn(load, work, turned, moved, work.given[3:])
     transform_motion(moved.pose, twist, work.moved)
     for i in range(6):
         work.moved[i] += moved.twist[i]
-    work.power[0] = dot6(work.given, work.moved)
+    turner = read_node(reals, integers, serial.load_nodes + (2 * number + 1) * NODE)
+    turned = read_node_state(scratch, integers, serial.load_node_states + (2 * number + 1) * NODE_STATE)
+    if load.reference >= 0 and not load.follower:
+        place_node(turner, turned, other_q)
+    if load.contact >= 0:
+        if load.reference >= 0:
+            move_node(turner, turned, other_rates, other_rates[0:0])
+            transform_motion(turned.pose, other_twist, work.turning)
+            for i in range(6):
+                work.turning[i] += turned.twist[i]
+        call_touch(serial.touch, at, number, reals, integers, scratch)
+    else:
+        factor = 1.0 + 0.0 * load.wrench[0]
+        if load.factor >= 0:
+            factor = curve(reals, integers, load.factor, t)[0]
+        for i in range(6):
+            work.given[i] = factor * load.wrench[i]
+        if not load.follower:
+            _turn(load, work, turned, moved, work.given[:3])
+            _turn(load, work, turned, moved, work.given[3:])
+        work.power[0] = dot6(work.given, work.moved)
     transform_force_back(moved.pose, work.given, work.wrench)
     from_node_axes(moved.pose, moved.tangent, work.given, work.moved)
     clear(work.forces)

@@ -70,6 +70,7 @@ def force_record(
         damping=forces.damping,
         friction=forces.friction,
         transition=forces.transition_rate,
+        stops=np.zeros(0) if forces.stops is None else forces.stops.numbers,
         rotor=rotor_inertia,
         gain=gain,
         rate_gain=rate_gain,
@@ -150,7 +151,7 @@ def addresses(mechanism: Mechanism, call_loads: Any) -> dict[str, int]:
     return {
         "feeds": address_for(call_feed_forward, feeds),
         "vectors": address_for(call_turn_by_vector, bool(mechanism.rotation_vectors)),
-        "loads": address_for(call_loads, bool(mechanism.loads)),
+        "loads": address_for(call_loads, mechanism.acted_on),
     }
 
 

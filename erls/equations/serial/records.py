@@ -23,6 +23,7 @@ if ENABLED:
     TURN = _t.void(_t.int64, _t.int64, _t.int64, *_state, contract.REALS, contract.REALS, contract.REALS)
 
 call_feed_forward = caller(FEED, "erls.equations.serial.feed_forward:feed_forward")
+call_contact_gains = caller(contract.STIFFNESS_AND_DAMPING, "erls.equations.serial.contact_gains:contact_gains")
 call_turn_by_vector = caller(TURN, "erls.equations.serial.rotation_vector:turn_by_vector")
 
 
@@ -45,7 +46,15 @@ class Serial(NamedTuple):
     load_count, load_records, load_states : int
         How many, and places of the first `Load` and `LoadState`.
     load_nodes, load_node_states : int
-        Places of the first `Node` and `NodeState`, of which each load has two: where it acts, and what turns it.
+        Places of the first `Node` and `NodeState`, of which each load has two: where it acts, and what turns it, or the
+        other side of a contact.
+    touch, contact_gains, residual : int
+        Where there are contacts, addresses of `erls.equations.serial.touch`, of
+        `erls.equations.serial.contact_gains` and of the residual of the formulation; otherwise -1.
+    contact_count, contacts, contact_states : int
+        How many, and places of the first `Contact` and `ContactState`.
+    contact_room : int
+        Place of a `ContactRoom`.
     own : int
         Place of the record of the formulation.
     gravity : (3,) array
@@ -66,6 +75,13 @@ class Serial(NamedTuple):
     load_states: int
     load_nodes: int
     load_node_states: int
+    touch: int
+    contact_gains: int
+    residual: int
+    contact_count: int
+    contacts: int
+    contact_states: int
+    contact_room: int
     own: int
     gravity: Vector
 
@@ -85,6 +101,8 @@ class Joint(NamedTuple):
         Whether the drive feeds forward; whether drive, spring, damper, friction or rotor act.
     stiffness, rest, damping, friction, transition : float
         Of `erls.mechanism.joints.JointForces`.
+    stops : (6,) array
+        Of `erls.mechanism.contacts.Stops`; empty without.
     rotor : float
         Inertia along the joint [kg m² or kg].
     gain, rate_gain, limit : float
@@ -109,6 +127,7 @@ class Joint(NamedTuple):
     damping: float
     friction: float
     transition: float
+    stops: Vector
     rotor: float
     gain: float
     rate_gain: float

@@ -1,4 +1,4 @@
-"""Stiffness and damping of links on joints: modes, springs, dampers, friction, controllers; all on the diagonals."""
+"""Stiffness and damping of links on joints: modes, springs, dampers, friction, controllers, on diagonals; contacts."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from erls.equations.serial.records import (
     JOINT,
     JOINT_STATE,
     MODES,
+    call_contact_gains,
     call_feed_forward,
     read_joint,
     read_joint_state,
@@ -39,3 +40,5 @@ def stiffness_and_damping(
         if at >= 0 and joint.acts:
             feed = read_joint_state(scratch, integers, serial.joint_states + number * JOINT_STATE).feed[0]
             k[at, at], c[at, at] = gains(joint, reals, integers, t, y[at], v[at], feed)
+    if serial.contact_gains >= 0:
+        call_contact_gains(serial.contact_gains, reals, integers, scratch, t, y, v, k, c)

@@ -96,6 +96,7 @@ class BodyMotion(BodyRun):
         """Whether total energy should stay constant."""
         record = self.scene.record
         damped = any(s.damping for s in record.springs)
+        damped = damped or any(c.friction or c.restitution < 1.0 for c in record.contacts)
         return not record.loads and not damped and all(c.motion is None for c in record.connections)
 
     def summary(self, times: Sequence[float] = ()) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from erls.equations.formulation import ContactSeries
 from erls.equations.nodal.joints import Joint
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.scenes.build import Assembly
@@ -128,6 +129,22 @@ class BodyRun(Run):
         both = np.array(pairs).reshape(-1, 2).T
         return both[0].reshape(np.shape(t)), both[1].reshape(np.shape(t))
 
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Contacts of the scene."""
+        return tuple(contact.name for contact in self.scene.record.contacts)
+
+    def contact(self, name: str, t: ArrayLike) -> ContactSeries:
+        """Gap [m] and its rate, normal force [N], force on the node (..., 3) and where it acts, energy [J]."""
+        choose(name, self.contact_names, "contact", SceneError)
+        return self._contacts(self.within(t)).one(self.contact_names.index(name), np.shape(t))
+
+    def _contacts(self, t: Array) -> ContactSeries:
+        """All of them at times (k,)."""
+        system, velocities = self.assembly.system, self.velocities(t)
+        found = [system.in_contacts(q, v) for q, v in zip(self.configurations(t), velocities, strict=True)]
+        return ContactSeries.of(np.array(found).reshape(len(t), len(self.contact_names), 11))
+
     def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
         """Nodes and connections at given times: places [m], coordinates, and what each connection does to its node
         there, in the world's axes.
@@ -163,8 +180,8 @@ class BodyRun(Run):
         }
 
     def columns(self, times: Array) -> dict[str, Array]:
-        """Of each reported node x, y, z; of each connection its coordinate, force and moment on its node (world axes);
-        energies.
+        """Of each reported node x, y, z; of each connection its coordinate, force and moment on its node; of each
+        contact gap, normal force and force on its node, in the world; energies.
         """
         samples, axis = self.samples(times.tolist()), self.axis
         columns = {f"{axis.symbol} [{axis.unit or '1'}]": times}
@@ -177,6 +194,8 @@ class BodyRun(Run):
                 columns[f"{plain(name)}.coordinate [{ONE_COORDINATE[joint.type]}]"] = values
             for what, unit in (("force", "N"), ("moment", "N m")):
                 vector(columns, f"{plain(name)}.{what}", unit, [s["connections"][name][what] for s in samples])
+        if self.contact_names:
+            columns |= self._contacts(times).columns([plain(name) for name in self.contact_names])
         for kind, energy in zip(("kinetic", "potential"), self.energy(times), strict=True):
             columns[f"energy.{kind} [J]"] = energy
         return columns

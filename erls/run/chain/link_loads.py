@@ -14,7 +14,7 @@ from erls.mechanism.links import Payload
 from erls.mechanism.loops import LoopEnd
 from erls.mechanism.sensors.base import Node
 from erls.run.chain.instants import Instants
-from erls.run.chain.loads import wrenches
+from erls.run.chain.loads import pushes, wrenches
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class LinkLoads:
 
 
 def link_loads(seen: Instants, number: int) -> LinkLoads:
-    """Loads on link ``number``: joint reactions, loads of the scene, weight and inertia of payloads and motors on its
-    interfaces. A payload or a load elsewhere on the link is left to the modes.
+    """Loads on link ``number``: joint reactions, loads and contacts of the scene, weight and inertia of payloads and
+    motors on its interfaces. What acts elsewhere on the link is left to the modes.
 
     Parameters
     ----------
@@ -51,6 +51,11 @@ def link_loads(seen: Instants, number: int) -> LinkLoads:
     for load in seen.formulation.mechanism.loads:
         if load.link == number and load.node in nodes:
             loads[:, nodes.index(load.node)] += wrenches(seen.formulation.mechanism, load, seen.motion.states)
+    if seen.formulation.mechanism.contacts:
+        contacts = seen.formulation.contact_series(seen.t, seen.y, seen.v)
+        for at, node, force, moment, _ in pushes(seen.formulation.mechanism, contacts, seen.motion.states):
+            if at == number and node in nodes:
+                loads[:, nodes.index(node)] += np.stack([force, moment], axis=1)
     for payload in link.payloads:
         if payload.node in nodes:
             loads[:, nodes.index(payload.node)] += _weight_and_inertia(seen, number, payload)

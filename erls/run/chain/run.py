@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from erls.equations.formulation import Energy, LoopFormulation
+from erls.equations.formulation import ContactSeries, Energy, LoopFormulation
 from erls.equations.serial.state_series import ReactionSeries, energy_series, reaction_series
 from erls.equations.stability import Stability, start_stability
 from erls.equations.substructures import solved
@@ -26,6 +26,7 @@ from erls.run.readings import reading, reading_columns, reading_curves, reading_
 from erls.run.record import Curve, plain, vector
 from fe_import.files.toml import choose
 
+_MOST_KNOTS = 4000
 _ENERGIES = ("kinetic", "elastic", "gravity", "springs")
 
 
@@ -142,6 +143,17 @@ class ChainRun(ChainMotion):
         found = [what(chain, *at, number) for at in zip(flat.tolist(), y, v, strict=True)]
         return np.array(found).reshape(np.shape(t))
 
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Contacts of the scene."""
+        return tuple(contact.name for contact in self.formulation.mechanism.contacts)
+
+    def contact(self, name: str, t: ArrayLike) -> ContactSeries:
+        """Gap [m] and its rate, normal force [N], force on the point (..., 3) and where it acts, energy [J]."""
+        choose(name, self.contact_names, "contact", SceneError)
+        shape, *at = self._interpolated(t)
+        return self.formulation.contact_series(*at).one(self.contact_names.index(name), shape)
+
     @cached_property
     def sensors(self) -> tuple[Sensor, ...]:
         """Those of the scene."""
@@ -162,13 +174,23 @@ class ChainRun(ChainMotion):
 
     @property
     def conservative(self) -> bool:
-        """Whether total energy should stay constant: no drives, loads, damping or friction."""
+        """Whether total energy should stay constant: no drives, loads, damping, friction or inelastic contacts."""
         mechanism = self.formulation.mechanism
         joints: list[Joint | LoopFreedom] = [*mechanism.joints]
         joints += [x.freedom for x in mechanism.loops if x.freedom is not None]
         passive = all(_passive(j) for j in joints)
         damped = any(link.damping.any() for link in mechanism.links)
-        return passive and not damped and not mechanism.loads and conserves_energy(mechanism.effects)
+        lossy = any(c.friction or c.law.loss for c in mechanism.contacts)
+        return passive and not (damped or lossy or mechanism.loads) and conserves_energy(mechanism.effects)
+
+    def _pressed(self) -> dict[str, dict[str, float]]:
+        """Least gap [m] and largest normal force [N] of each contact, at the knots of the run; of many, at some."""
+        s = self.solution
+        at = slice(None, None, 1 + len(s.t) // _MOST_KNOTS)
+        found = self.formulation.contact_series(s.t[at], s.y[at], s.v[at])
+        gaps, forces = found.gap.min(axis=0).tolist(), found.normal_force.max(axis=0).tolist()
+        each = zip(self.contact_names, gaps, forces, strict=True)
+        return {name: {"least_gap": gap, "largest_normal_force": force} for name, gap, force in each}
 
     def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
         """Joints, points and sensors at given times, as in the JSON of ``erls simulate``."""
@@ -191,7 +213,8 @@ class ChainRun(ChainMotion):
 
     def columns(self, times: Array) -> dict[str, Array]:
         """Of each point x, y, z; of each joint coordinate, physical angle, its rate, effort, reaction force and moment
-        on the outer link (world axes); what sensors read; energies.
+        on the outer link (world axes); of each contact gap, normal force and force on its point; what sensors read;
+        energies.
         """
         seen = self.instants(times)
         states, reactions = self.series(times), seen.reactions
@@ -206,6 +229,9 @@ class ChainRun(ChainMotion):
             columns[f"{name}.effort [{effort}]"] = reactions.effort[:, k]
             vector(columns, f"{name}.force", "N", reactions.force[:, k])
             vector(columns, f"{name}.moment", "N m", reactions.moment[:, k])
+        if self.contact_names:
+            found = self.formulation.contact_series(*self._interpolated(times)[1:])
+            columns |= found.columns([plain(name) for name in self.contact_names])
         columns.update(reading_columns(self.sensors, seen, len(times)))
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):
@@ -213,7 +239,7 @@ class ChainRun(ChainMotion):
         return columns
 
     def curves(self, times: Array) -> dict[str, Curve]:
-        """Points, joints, sensors, energies."""
+        """Points, joints, contacts, sensors, energies."""
         states, found = self.series(times), dict[str, Curve]()
         for k, name in enumerate(self.point_names):
             found[f"points/{name}"] = Curve(self.point_position(states, k), "m", "world position; time, axis")
@@ -221,6 +247,10 @@ class ChainRun(ChainMotion):
             for what in ("coordinates", "angles", "rates"):
                 values = np.array(getattr(states, what)[:, k])
                 found[f"joints/{name}/{what}"] = Curve(values, "rad or m, per s", "joint motion")
+        for name in self.contact_names:
+            contact = self.contact(name, times)
+            found[f"contacts/{name}/gap"] = Curve(contact.gap, "m", "height of the point above the plane")
+            found[f"contacts/{name}/force"] = Curve(contact.force, "N", "on the point, world axes; time, axis")
         found.update(reading_curves(self.sensors, self.instants(times), len(times)))
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):
@@ -250,6 +280,7 @@ class ChainRun(ChainMotion):
             },
             **({} if self.stability is None else {"stability": self.stability.summary()}),
             **self.stated(),
+            **({"contacts": self._pressed()} if self.contact_names else {}),
             "samples": self.samples(times),
             **({"events": [asdict(happening) for happening in self.events]} if self.scene.record.events else {}),
             "warnings": list(self.warnings),
@@ -259,4 +290,5 @@ class ChainRun(ChainMotion):
 def _passive(joint: Joint | LoopFreedom) -> bool:
     """Whether nothing in a joint does work but springs."""
     still = joint.drive.kind == "free" or (isinstance(joint, Joint) and joint.fixed)
-    return still and not joint.forces.damping and not joint.forces.friction
+    stops = joint.forces.stops
+    return still and not (joint.forces.damping or joint.forces.friction or (stops and stops.law.loss))

@@ -16,7 +16,7 @@ from erls.maths.so3 import Array, cross_all
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link, link_mass_properties, node_shape6
 from erls.mechanism.loads import CENTRE
-from erls.run.chain.loads import pull, wrenches
+from erls.run.chain.loads import pull, pushes, wrenches
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.lines import Lines, lines
 
@@ -150,6 +150,7 @@ def bending(run: ChainRun, nodes: Sequence[tuple[int, int]]) -> BendingRun:
     times = run.looks(_SAMPLES_OF_LOOPS if isinstance(formulation, ClosedChain) else _SAMPLES, step)
     seen = replace(run, formulation=formulation).series(np.concatenate([times - step, times, times + step]))
     loads = _loop_loads(run, mechanism, times) + _given_loads(mechanism, seen, len(times))
+    loads += _contact_loads(run, mechanism, seen, len(times))
     ends = {end.link for loop in mechanism.loops for end in (loop.inner, loop.outer)}
     sums: list[_Sums | None] = [None] * len(mechanism.links)
     found: dict[int, Bending] = {}
@@ -354,3 +355,16 @@ def _given_loads(mechanism: Mechanism, seen: StateSeries, k: int) -> list[_Given
         at = _world(seen.poses[load.link], local[:, None])[middle, 0]
         result.append(_Given(load.link, load.node, found[:, 0], found[:, 1] + cross_all(at, found[:, 0])))
     return result
+
+
+def _contact_loads(run: ChainRun, mechanism: Mechanism, seen: StateSeries, k: int) -> list[_Given]:
+    """What contacts do to links, at the same times."""
+    if not mechanism.contacts:
+        return []
+    s, middle = run.solution, slice(k, 2 * k)
+    at = hermite(s.t, s.y, s.v, s.a, seen.times)
+    found = solved(run.formulation).contact_series(seen.times, *at)
+    return [
+        _Given(link, node, force[middle], (moment + cross_all(place, force))[middle])
+        for link, node, force, moment, place in pushes(mechanism, found, seen)
+    ]

@@ -18,6 +18,7 @@ from erls.run.watches.small_displacements import SmallDisplacements
 from erls.run.watches.spin_stability import SpinStability
 from erls.run.watches.static_following import StaticFollowing
 from erls.run.watches.stored_output import StoredOutput
+from erls.run.watches.touching import Touching
 
 WATCHES: tuple[type[Watch], ...] = (
     Impulses,
@@ -33,6 +34,7 @@ WATCHES: tuple[type[Watch], ...] = (
     StoredOutput,
     StaticFollowing,
     MotorLimits,
+    Touching,
     SpinStability,
     IndefiniteMass,
 )

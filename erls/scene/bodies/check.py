@@ -18,6 +18,7 @@ from erls.scene.checks import (
     not_negative,
     positive,
 )
+from erls.scene.contacts import WORLD, ContactOfBody
 from erls.scene.integrators import MATRICES
 from fe_import.description.check import check_expansion, check_temperature
 from fe_import.elements.sections import check_section
@@ -60,6 +61,8 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
         _check_spring(spring, nodes, f"{file}: springs[{k}]")
     for k, load in enumerate(scene.loads):
         _check_load(load, nodes, f"{file}: loads[{k}]")
+    for k, contact in enumerate(scene.contacts):
+        _check_contact(contact, nodes, f"{file}: contacts[{k}]")
     if scene.sensors and not isinstance(scene.simulation, Dynamics):
         message = "sensors read motions, and nothing moves here"
         raise bad(f"{file}: sensors", message, len(scene.sensors), 'remove them, or use simulation.type = "dynamics"')
@@ -98,7 +101,7 @@ def _check_all_names(scene: BodySceneRecord, file: str) -> list[str]:
     bodies = [(f"{file}: bodies[{k}].name", body.name) for k, body in enumerate(scene.bodies)]
     named = [(f"{file}: nodes.{name}", name) for name in scene.nodes] + bodies
     check_names([("", GROUND), *named])
-    for kind in ("beams", "connections"):
+    for kind in ("beams", "connections", "contacts"):
         check_names((f"{file}: {kind}[{k}].name", x.name) for k, x in enumerate(getattr(scene, kind)))
     if not scene.bodies and not scene.beams:
         raise bad(f"{file}: bodies", "a scene needs a body or a beam", None, "add [[bodies]] or [[beams]]")
@@ -168,6 +171,14 @@ def _check_spring(spring: Spring, nodes: list[str], place: str) -> None:
     not_negative(f"{place}.length", spring.length or 0.0)
     if spring.to == GROUND and spring.to_position is None:
         raise bad(f"{place}.to_position", "where on the ground", None, "give its position in the world")
+
+
+def _check_contact(contact: ContactOfBody, nodes: list[str], place: str) -> None:
+    choose(contact.node, nodes, f"{place}.node", SceneError)
+    choose(contact.plane.on, [WORLD, *nodes], f"{place}.plane.on", SceneError)
+    if contact.plane.on == contact.node:
+        remedy = "name another node, or the world"
+        raise bad(f"{place}.plane.on", "the node that the plane is to keep off", contact.plane.on, remedy)
 
 
 def _check_load(load: Load, nodes: list[str], place: str) -> None:

@@ -13,6 +13,7 @@ from erls.mechanism.motions import Motion
 from erls.mechanism.profiles import Load as Profile
 from erls.mechanism.sensors.registry import AnySensor
 from erls.scene.bodies.analyses import Analysis
+from erls.scene.contacts import ContactOfBody
 from erls.scene.records import Record, SceneFile, SceneTables
 from fe_import.description.records import Inertia, Material, PointMass, Vector
 from fe_import.elements.sections import Section
@@ -244,6 +245,8 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
         Springs and dampers, ``[[springs]]``.
     loads : list of Load
         Forces and moments, ``[[loads]]``.
+    contacts : list of ContactOfBody
+        Nodes that planes keep on their side, ``[[contacts]]``.
     report : list of str
         Nodes whose places are reported beside named nodes and bodies, such as BEAM/4.
     sensors : list of AnySensor
@@ -261,6 +264,7 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
     connections: list[Connection] = []
     springs: list[Spring] = []
     loads: list[Load] = []
+    contacts: list[ContactOfBody] = []
     report: list[str] = []
     sensors: list[AnySensor] = []
 

@@ -127,9 +127,9 @@ class DenseChain(SerialFormulation):
         mass = self.full_mass_matrix(t, y)
         self.residual(t, y, v, np.zeros(0))
         place, rate = self.elimination.place[self.joints :], self.elimination.rate
-        springs = 0.0
+        springs = float(self.contact_energy(np.array([t]), y[None], v[None])[0])
         for joint, turns in zip(self.mechanism.joints, self.turns, strict=True):
-            springs += joint.forces.stiffness * (turns.turn[0] - joint.forces.rest) ** 2 / 2
+            springs += joint.forces.energy(float(turns.turn[0]))
         return Energy(
             kinetic=float(rate @ mass @ rate / 2),
             elastic=self.elastic_energy(place),

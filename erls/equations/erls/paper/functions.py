@@ -29,6 +29,7 @@ from erls.equations.serial.records import (
     JOINT_STATE,
     MODES,
     Serial,
+    call_contact_gains,
     call_feed_forward,
     read_joint,
     read_joint_state,
@@ -203,3 +204,5 @@ def stiffness_and_damping(
                 found = gains(joint, reals, integers, t, row.turn[0], row.turn[1], feed)
                 _add_square(found[which], row.gradient, every)
         _put_free_square(serial, paper, reals, integers, every, c if which else k)
+    if serial.contact_gains >= 0:
+        call_contact_gains(serial.contact_gains, reals, integers, scratch, t, y, v, k, c)

@@ -25,6 +25,8 @@ def loads(
         turner = read_body_state(scratch, integers, paper.body_states + max(load.reference, 0) * BODY_STATE)
         copy(state.world, work.pose)
         copy(turner.world, work.other)
-        act(serial, reals, integers, scratch, number, t, state.q, state.velocity[6:], turner.q, state.velocity[:6])
+        own, other = state.velocity, turner.velocity
+        motions = state.q, own[6:], own[:6], turner.q, other[6:], other[:6]
+        act(serial, at, reals, integers, scratch, number, t, *motions)
         subtract(work.wrench, state.force[:6])
         subtract(work.forces, state.force[6:])

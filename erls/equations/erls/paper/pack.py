@@ -23,6 +23,7 @@ from erls.equations.erls.paper.records import (
     call_extra_rows,
     call_loads,
 )
+from erls.equations.serial.contacts import put_contacts
 from erls.equations.serial.ends import end_state
 from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
@@ -252,6 +253,7 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
             rigid_links=rigid,
             rigid_states=rigid_states,
             **put_loads(mechanism, _modal_bases(mechanism), [len(b.coupling) > 0 for b in bent], constants, working),
+            **put_contacts(mechanism, functions.residual, free + elastic, constants, working),
             own=own,
             gravity=mechanism.gravity,
         )

@@ -16,6 +16,7 @@ from erls.equations.nodal.loads import NodalLoad, NodalLoads
 from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.equations.nodal.scenes.beam_mesh import course
+from erls.equations.nodal.scenes.contacts import contacts
 from erls.equations.nodal.scenes.springs import springs
 from erls.equations.nodal.section import BeamSection, beam_section
 from erls.errors import Cause, SceneError
@@ -101,6 +102,7 @@ def assemble(scene: BodyScene) -> Assembly:
         elements.append(RigidBodies(bodies, gravity))
     if loads:
         elements.append(NodalLoads(loads))
+    elements += contacts(record, numbers, built, file)
     elements += springs(record, numbers, built, file)
     joints = [
         _joint(x, numbers, built, scene.folder, f"{file}: connections[{k}]") for k, x in enumerate(record.connections)
