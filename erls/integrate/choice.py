@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from erls.equations.formulation import Formulation, Modular
 from erls.equations.registry import system_of
+from erls.equations.sticking import Rubbing, Sticking
 from erls.equations.substructures import solved
 from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.charts import in_charts
@@ -93,6 +94,25 @@ def _named(mechanism: Mechanism, settings: Simulation) -> Integrate:
     return integrator_named(settings.integrator)
 
 
+def _tree(mechanism: Mechanism, settings: Simulation) -> Integrate:
+    integrate = integrator_named(settings.integrator)
+    if not any(joint.forces.sticks for joint in mechanism.joints):
+        return integrate
+
+    def integrated(
+        system: Rubbing,
+        times: tuple[float, float],
+        y: Array,
+        v: Array,
+        options: Options,
+        observer: Observer | None = None,
+    ) -> Solution:
+        moving = system if system.dry is None else Sticking(system)  # None: their motions are prescribed
+        return integrate(moving, times, y, v, options, observer)
+
+    return integrated
+
+
 def _compile_named(system: Any, settings: Simulation) -> None:
     if INTEGRATORS[settings.integrator].kernels is None:
         if system.compiled is not None:
@@ -107,13 +127,19 @@ def _compile_named(system: Any, settings: Simulation) -> None:
     _ = system.compiled  # with what its size asks for, factors link by link
 
 
+def _compile_tree(system: Any, settings: Simulation) -> None:
+    _compile_named(system, settings)
+    if any(joint.forces.sticks for joint in system.mechanism.joints):
+        import_module("erls.equations.sticking_kernels")
+
+
 INTEGRATIONS: dict[str, Integration] = {
     "nodal": Integration(_nodal, _compile_nodal),
     "pieces": Integration(_pieces, _compile_pieces),
     "loops": Integration(_tied, _compile_tied),
     "quasi-static": Integration(_named, _compile_named),
     "absolute": Integration(_absolute, _compile_named),
-    "tree": Integration(_named, _compile_named),
+    "tree": Integration(_tree, _compile_tree),
 }
 """By kind of system, as in `erls.equations.registry.SYSTEMS`."""
 

@@ -23,7 +23,7 @@ from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.integrate.alpha_rules import Rules, Words
 from erls.integrate.alpha_steps import Steps, equal_steps
 from erls.integrate.base import Leg, Observer, Options, Solution
-from erls.integrate.driver import Recorder, integrate_legs
+from erls.integrate.driver import Recorder, integrate_legs, recorder_for
 from erls.maths.so3 import Array
 
 _REFRESH_COST, _OWN_REFRESH_COST = 4.0, 1.0
@@ -46,7 +46,7 @@ def generalized_alpha(
     step = options.step or min((times[1] - times[0]) / 1000, 1e-3)
     capacity = int(min((times[1] - times[0]) / step, 1e6)) + 2 if times[1] > times[0] else 2
     capacity = 1024 if options.output_step else capacity + 2 * len(system.breakpoints)
-    recorder = Recorder(system.size, observer, capacity, options.output_step)
+    recorder = recorder_for(system, observer, options, capacity)
     method = _Equal(_steps(system, options, recorder), step, recorder) if system.size else None
     return integrate_legs(system, times, y, v, recorder, method, options.keeper)
 

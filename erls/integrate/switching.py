@@ -1,0 +1,190 @@
+"""Switches of a motion whose joints stick and slide: found between the knots of a step, and located in time.
+
+A switch is where a joint that slides comes to rest, or where friction that holds one reaches what it can hold. Steps go
+on with the modes that they began with, so that what they interpolate is smooth, and a switch is as accurate as the
+knots (rule 4 of `erls.integrate.base`): it becomes the last knot of a leg, and another leg begins there with the modes
+that the set-valued law gives. What falls below zero and comes back between two looks is not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from erls.equations.sticking import Sticking
+from erls.equations.system import MovingSystem
+from erls.errors import Cause, SimulationError
+from erls.integrate.base import Leg, hermite_knots
+from erls.integrate.memory import Memory, taken
+from erls.maths.so3 import Array
+
+_LOOKS = 4  # in the interval between two knots
+_MANY, _AT_ONCE = 100, 1e-7  # switches, and the time in which nobody meant as many [s]
+_HAIR = 4e-12  # of the largest time, or of 1 s: a switch this close to the end of a leg is left to the next one
+_LEAST = 1e-9  # of the static force: more of it where interpolation would have a joint stick and break away for ever
+_ROUNDING = 4 * np.finfo(float).eps
+
+
+class Switch(Exception):
+    """A mode has ended, at the last knot that was recorded; y and v (n,) at time ``t``."""
+
+    def __init__(self, t: float, y: Array, v: Array) -> None:
+        super().__init__(t)
+        self.t, self.y, self.v = t, y, v
+
+
+class Switching:
+    """Looks for switches in the knots of a run.
+
+    Parameters
+    ----------
+    system : Sticking
+    """
+
+    def __init__(self, system: Sticking) -> None:
+        self.system = system
+        self._released = np.zeros(len(system.dry.places))
+        self._broke, self._more = np.full_like(self._released, -math.inf), np.zeros_like(self._released)
+        self._recent: deque[float] = deque(maxlen=_MANY)
+        self._knot = np.zeros((3, system.size))  # the last one
+        self._t = 0.0
+        self.leg = Leg(0.0, 0.0, 0.0, 0.0)
+        """What is being walked over: a leg, or what a switch leaves of one."""
+
+    def stand(self, leg: Leg, y: Array, v: Array) -> Array:
+        """Set the modes at the start of a leg; its accelerations (n,)."""
+        a = self.system.settle(leg.first, y, v, self._released)
+        self._released[:] = 0.0
+        self.leg, self._t, self._knot = leg, leg.start, np.array([y, v, a])
+        return a
+
+    def first(self, t: Array, knots: Array) -> tuple[int, Array | None, Switch | None]:
+        """The first switch in new knots.
+
+        Parameters
+        ----------
+        t : (k,) array
+        knots : (k, 3, n) array
+            y, v and a.
+
+        Returns
+        -------
+        count : int
+            Of knots before it; all of them where there is none.
+        knot : (3, n) array or None
+            At the switch; None where that is the last knot before.
+        switch : Switch or None
+        """
+        times = np.append(self._t, t)
+        y, v, a = np.concatenate([self._knot[None], knots]).swapaxes(0, 1)
+        looks = np.append((times[:-1, None] + np.diff(times)[:, None] * np.arange(_LOOKS) / _LOOKS).ravel(), times[-1])
+        ended = self._left(looks, *hermite_knots(times, y, v, a, looks)) < 0.0
+        ended[0] = False  # there the law has just spoken
+        ended &= (self.system.modes == 0.0) | (np.arange(len(looks)) % _LOOKS == 0)[:, None]
+        for at in np.flatnonzero(ended.any(axis=1)).tolist():
+            since = at - (_LOOKS if at % _LOOKS == 0 else 1)  # rates are looked at at knots
+            found = self._located(times, (y, v, a), looks[since], looks[at], np.flatnonzero(ended[at]))
+            if found is not None:
+                return found
+        self._t, self._knot = float(times[-1]), np.array([y[-1], v[-1], a[-1]])
+        return len(t), None, None
+
+    def _located(
+        self, times: Array, states: tuple[Array, Array, Array], start: float, end: float, joints: Array
+    ) -> tuple[int, Array | None, Switch] | None:
+        """The first switch of some joints between two looks; None where there is none, since between knots that do not
+        resolve a vibration interpolated accelerations do not tell, or where it is at the end of the leg.
+        """
+
+        def state(x: float) -> tuple[Array, Array]:
+            y, v, _ = hermite_knots(times, *states, np.array([x]))
+            return y[0], v[0]
+
+        def left(joint: int) -> Callable[[float], float]:
+            def value(x: float) -> float:
+                y, v = state(x)
+                a = self.system.acceleration(x, y, v)
+                return float(self._left(np.array([x]), y[None], v[None], a[None])[0, joint])
+
+            return value
+
+        roots = np.array([_root(left(int(joint)), start, end) for joint in joints])
+        t = float(roots.min())
+        if not t < self.leg.end - _HAIR * max(abs(self.leg.end), 1.0):
+            return None
+        system = self.system
+        now = joints[roots <= t + _ROUNDING * max(abs(t), end - start)]
+        y, v = state(t)
+        places, slides = system.dry.places[now], system.modes[now] != 0.0
+        v[places] = 0.0
+        a = system.acceleration(t, y, v)
+        along = system.holding(np.array([t]), y[None], v[None], a[None])[0, now]
+        self._released[now] = np.where(slides, 0.0, -np.sign(along))
+        at_once = slides & (t <= self._broke[now] + _ROUNDING * max(abs(t), 1.0))
+        self._more[now] = np.where(at_once, np.maximum(2 * self._more[now], _LEAST), np.where(slides, 0.0, self._more[now]))
+        self._broke[now[~slides]] = t
+        self._refuse_chatter(t, system.dry.names[int(now[0])])
+        before = int(np.searchsorted(times, t)) - 1  # knots of this step
+        knot = np.array([y, v, a]) if t > times[0] else None
+        return max(before, 0), knot, Switch(t, y, v)
+
+    def _left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
+        """`Sticking.left`; a joint that came to rest where it had just broken away holds a little more."""
+        own = self.system
+        return own.left(t, y, v, a) + np.where(own.modes == 0.0, self._more * own.dry.static, 0.0)
+
+    def _refuse_chatter(self, t: float, name: str) -> None:
+        self._recent.append(t)
+        if len(self._recent) == _MANY and t - self._recent[0] < _AT_ONCE:
+            raise SimulationError(
+                Cause.STEP_TOO_SMALL,
+                f"friction of joint {name!r} switches between sticking and sliding {_MANY} times at once",
+                where=f"t = {t:.9g} s",
+                value=f"{t - self._recent[0]:.3g} s",
+                limit=f"{_AT_ONCE:g} s for {_MANY} switches",
+                remedy="look for forces without bound on this joint; or use friction.law = 'smooth'",
+            )
+
+    def memory(self) -> Memory:
+        """Between two steps, see `erls.integrate.memory`."""
+        return {
+            "switching.modes": self.system.modes.copy(),
+            "switching.leg": np.array(self.leg),
+            "switching.t": np.array([self._t]),
+            "switching.knot": self._knot,
+            "switching.held": np.array([self._broke, self._more]),
+            "switching.recent": np.array(self._recent, dtype=float),
+        }
+
+    def restore(self, memory: Memory) -> None:
+        """As another run left it."""
+        self.system.modes[:] = taken(memory, "switching.modes", self._released)
+        self.leg = Leg(*taken(memory, "switching.leg", np.zeros(4)).tolist())
+        self._t = float(taken(memory, "switching.t", np.zeros(1))[0])
+        self._knot = taken(memory, "switching.knot", self._knot).copy()
+        self._broke, self._more = taken(memory, "switching.held", np.array([self._broke, self._more])).copy()
+        self._recent = deque(taken(memory, "switching.recent", np.zeros(0), axis=0).tolist(), maxlen=_MANY)
+
+
+def switching_of(system: MovingSystem) -> Switching | None:
+    """What looks for switches; None where nothing sticks."""
+    return Switching(system) if isinstance(system, Sticking) else None
+
+
+def _root(value: Callable[[float], float], start: float, end: float) -> float:
+    """Where a value that is positive after ``start`` falls below zero; infinite where it does not."""
+    from scipy.optimize import brentq  # here: only switches need it
+
+    if value(end) >= 0.0:
+        return math.inf
+    first = start
+    while value(first) <= 0.0:  # it starts from rest, as a joint does that has just broken away
+        if first > start:
+            end = first
+        first = start + (end - start) / 2
+        if end - start < _ROUNDING * max(abs(end), _ROUNDING):
+            return start
+    return float(brentq(value, first, end, xtol=1e-15, rtol=_ROUNDING))
