@@ -8,7 +8,7 @@ that follow (`erls.equations.dry_friction`). In between the equations are smooth
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.dry_friction import DryFriction, Settled
 from erls.equations.series import residual_series
 from erls.equations.system import SecondOrderSystem
-from erls.maths.calls import address_of
+from erls.maths.calls import address_of, handed
 from erls.maths.records import Memory, python_reader
 from erls.maths.so3 import Array
 
@@ -102,7 +102,12 @@ class Sticking:
 
     def holding(self, t: Array, y: Array, v: Array, a: Array) -> Array:
         """(k, m) friction that balances each joint at states of a motion."""
-        return residual_series(self._bare, t, y, v, a)[:, self.dry.places]
+        return residual_series(self._bare, t, y, v, a, self._address)[:, self.dry.places]
+
+    @cached_property
+    def _address(self) -> Any:
+        """Of the bare residual: asking for it takes longer than most calls."""
+        return handed(self._bare.residual, contract.RESIDUAL)
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
         """(n,) M a - f; of a joint that sticks, its acceleration."""

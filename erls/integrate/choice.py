@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias
@@ -29,6 +30,9 @@ TIED_STEPS = "erls.integrate.stepping.generalized_alpha"
 
 INTEGRATION_SHARE = 0.1
 """Of the error that a run is wanted to keep in all, what integration aims at."""
+
+_STICKING = 0.1
+"""Of that again, where joints stick on flexible links: vibrations which positions hardly show decide when they do."""
 
 Integrate: TypeAlias = Callable[..., Solution]
 """An `erls.integrate.base.Integrator` for one kind of system."""
@@ -96,8 +100,9 @@ def _named(mechanism: Mechanism, settings: Simulation) -> Integrate:
 
 def _tree(mechanism: Mechanism, settings: Simulation) -> Integrate:
     integrate = integrator_named(settings.integrator)
-    if not any(joint.forces.sticks for joint in mechanism.joints):
+    if not mechanism.sticks:
         return integrate
+    share = _STICKING if any(link.elastic_modes for link in mechanism.links) else 1.0
 
     def integrated(
         system: Rubbing,
@@ -108,7 +113,8 @@ def _tree(mechanism: Mechanism, settings: Simulation) -> Integrate:
         observer: Observer | None = None,
     ) -> Solution:
         moving = system if system.dry is None else Sticking(system)  # None: their motions are prescribed
-        return integrate(moving, times, y, v, options, observer)
+        aimed = replace(options, tolerance=share * options.tolerance)
+        return integrate(moving, times, y, v, aimed, observer)
 
     return integrated
 
@@ -129,7 +135,7 @@ def _compile_named(system: Any, settings: Simulation) -> None:
 
 def _compile_tree(system: Any, settings: Simulation) -> None:
     _compile_named(system, settings)
-    if any(joint.forces.sticks for joint in system.mechanism.joints):
+    if system.mechanism.sticks:
         import_module("erls.equations.sticking_kernels")
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -78,29 +79,31 @@ class Switching:
             At the switch; None where that is the last knot before.
         switch : Switch or None
         """
-        times = np.append(self._t, t)
-        y, v, a = np.concatenate([self._knot[None], knots]).swapaxes(0, 1)
-        looks = np.append((times[:-1, None] + np.diff(times)[:, None] * np.arange(_LOOKS) / _LOOKS).ravel(), times[-1])
-        ended = self._left(looks, *hermite_knots(times, y, v, a, looks)) < 0.0
+        times, states = np.append(self._t, t), np.concatenate([self._knot[None], knots])
+        slides = bool(self.system.modes.all())
+        looks, (y, v, a) = (times, states.swapaxes(0, 1)) if slides else _looks(times, states)
+        ended = self._left(looks, y, v, a) < 0.0
         ended[0] = False  # there the law has just spoken
-        ended &= (self.system.modes == 0.0) | (np.arange(len(looks)) % _LOOKS == 0)[:, None]
-        for at in np.flatnonzero(ended.any(axis=1)).tolist():
-            since = at - (_LOOKS if at % _LOOKS == 0 else 1)  # rates are looked at at knots
-            found = self._located(times, (y, v, a), looks[since], looks[at], np.flatnonzero(ended[at]))
-            if found is not None:
-                return found
-        self._t, self._knot = float(times[-1]), np.array([y[-1], v[-1], a[-1]])
+        if ended.any():
+            every = 1 if slides else _LOOKS  # looks from knot to knot; rates are looked at at knots alone
+            ended &= (self.system.modes == 0.0) | (np.arange(len(looks)) % every == 0)[:, None]
+            for at in np.flatnonzero(ended.any(axis=1)).tolist():
+                since = looks[at - (every if at % every == 0 else 1)]
+                found = self._located(times, states, since, looks[at], np.flatnonzero(ended[at]))
+                if found is not None:
+                    return found
+        self._t, self._knot = float(times[-1]), states[-1]
         return len(t), None, None
 
     def _located(
-        self, times: Array, states: tuple[Array, Array, Array], start: float, end: float, joints: Array
+        self, times: Array, states: Array, start: float, end: float, joints: Array
     ) -> tuple[int, Array | None, Switch] | None:
         """The first switch of some joints between two looks; None where there is none, since between knots that do not
         resolve a vibration interpolated accelerations do not tell, or where it is at the end of the leg.
         """
 
         def state(x: float) -> tuple[Array, Array]:
-            y, v, _ = hermite_knots(times, *states, np.array([x]))
+            y, v, _ = hermite_knots(times, *states.swapaxes(0, 1), np.array([x]))
             return y[0], v[0]
 
         def left(joint: int) -> Callable[[float], float]:
@@ -172,6 +175,25 @@ class Switching:
 def switching_of(system: MovingSystem) -> Switching | None:
     """What looks for switches; None where nothing sticks."""
     return Switching(system) if isinstance(system, Sticking) else None
+
+
+def _looks(times: Array, states: Array) -> tuple[Array, Array]:
+    """Times (q,), evenly between knots and at these, and y, v, a there (3, q, n), of knots (k,) and (k, 3, n)."""
+    span = np.diff(times)[:, None]
+    powers = span[:, :, None] ** np.arange(3)[:, None]
+    both = np.concatenate([states[:-1] * powers, states[1:] * powers], axis=1)  # per unit of the interval
+    between = np.einsum("dli,kin->dkln", _shapes(), both) / powers.swapaxes(0, 1)[..., None]
+    at = (times[:-1, None] + span * np.arange(_LOOKS) / _LOOKS).ravel()
+    found = between.reshape(3, len(at), states.shape[2])
+    return np.append(at, times[-1]), np.concatenate([found, states[-1][:, None]], axis=1)
+
+
+@cache
+def _shapes() -> Array:
+    """(3, looks, 6) value, rate and acceleration that y, v, a at either end of an interval of length 1 make at looks."""
+    at, ends = np.arange(_LOOKS) / _LOOKS, np.array([0.0, 1.0])
+    y, v, a = np.eye(6).reshape(2, 3, 6).swapaxes(0, 1)
+    return np.array(hermite_knots(ends, y, v, a, at))
 
 
 def _root(value: Callable[[float], float], start: float, end: float) -> float:

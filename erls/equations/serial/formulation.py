@@ -17,7 +17,7 @@ import scipy.linalg as la
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.dry_friction import DryFriction, Settled, dry_friction, settled
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
-from erls.equations.linearization import Linearization, derivatives, difference_steps
+from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
 from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
 from erls.equations.serial.loads import load_powers
 from erls.equations.serial.records import Serial
@@ -188,7 +188,7 @@ class SerialFormulation(TreeFormulation):
         return held_equilibrium(self, self.undeformed_start()[0], self.free_joints)
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
-        """Small motions about a state, with the accelerations of the equations of motion."""
+        """Small motions about a state, with the accelerations of the equations of motion; joints that stick rest."""
         a = self.acceleration(t, y, v)
         stiffness, _ = elastic_on_diagonal(self)
         steps = difference_steps(metre_scales(self), size_of(self.mechanism), stiffness)
@@ -198,7 +198,11 @@ class SerialFormulation(TreeFormulation):
 
         slope = derivatives(lambda many: forces(many, np.tile(v, (len(many), 1))), y, steps)
         damping = derivatives(lambda many: forces(np.tile(y, (len(many), 1)), many), v, steps)
-        return Linearization(self.mass_matrix(t, y), damping, slope, np.eye(self.size))
+        rows = np.zeros((0, self.size))
+        if self.dry is not None:
+            modes = self.settled(t, y, v, np.zeros(len(self.dry.places))).modes
+            rows = np.eye(self.size)[self.dry.places[modes == 0.0]]
+        return restricted(self.mass_matrix(t, y), damping, slope, ways_left(rows, np.ones(self.size)))
 
     @cached_property
     def stability(self) -> Stability:
