@@ -105,23 +105,22 @@ def test_block_behind_a_spring_that_is_pulled(tmp_path: Path) -> None:
     static, pull = 5.0, 0.05
     drive = {
         "type": "pd",
-        "stiffness": STIFFNESS,
-        "damping": 0.0,
-        "motion": [{"shape": "ramp", "start": 0.0, "duration": 100.0, "value": 100.0 * pull}],
+        "proportional_gain": STIFFNESS,
+        "derivative_gain": 0.0,
+        "motion": {"shape": "spin_up", "rate": pull, "duration": 0.02},  # lags behind v t by 0.01 s from then on
     }
     friction = {"force": FORCE, "static_force": static}
     run = sliding(tmp_path, friction, {"drive": drive}, duration=2.5, integrator="lobatto", tolerance=1e-6)
-    first = static / (STIFFNESS * pull)
+    first = static / (STIFFNESS * pull) + 0.01
     slides = (2 * math.pi - 2 * math.atan((static - FORCE) * OMEGA / (STIFFNESS * pull))) / OMEGA
     rests = 2 * (static - FORCE) / (STIFFNESS * pull)
     expected = np.cumsum([first, *[slides, rests] * 5])
     found = switches(run)
-    assert found == pytest.approx(expected[expected < run.end], abs=1e-6)
-    assert len(found) > 6
+    assert [t for t in found if t > 0.03] == pytest.approx(expected[expected < run.end], abs=1e-6)
+    assert len(found) > 5
     moved = run.joint_coordinate("slide", (expected[1] + expected[2]) / 2)
     assert moved == pytest.approx(pull * (slides + rests), abs=1e-6)
-    pulled = STIFFNESS * pull * 0.2
-    assert run.joint_effort("slide", 0.2) == pytest.approx(0.0, abs=1e-12 * pulled)  # held by as much as it is pulled
+    assert run.joint_effort("slide", 0.2) == pytest.approx(0.0, abs=1e-12)  # held by as much as it is pulled
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -149,7 +148,7 @@ def test_law_of_joints_at_rest(seed: int) -> None:
     assert (alone[modes != 0] == modes[modes != 0]).all()  # whoever breaks away slides on with less
 
 
-ROD = {"mass": 1.0, "center_of_mass": [0.5, 0.0, 0.0], "inertia": [0.0, 0.1, 0.1]}
+ROD = {"mass": 1.0, "centre_of_mass": [0.5, 0.0, 0.0], "inertia": [0.0, 0.1, 0.1]}
 
 
 def arm(folder: Path, forces: tuple[float, float], flexible: bool = False, **changes: Any) -> Path:
@@ -163,7 +162,7 @@ def arm(folder: Path, forces: tuple[float, float], flexible: bool = False, **cha
         "gravity": [0.0, 0.0, -9.81],
         "simulation": {"duration": 0.3},
         "joints": [
-            {"name": "first", "dh": {"convention": "modified", "alpha_deg": 90.0}},
+            {"name": "first", "dh": {"convention": "modified"}},
             {"name": "second", "dh": {"convention": "modified", "a": 0.5 if flexible else 1.0}},
         ],
         "links": [{"name": "upper", **link, **frame}, {"name": "lower", **link, **frame}],
@@ -171,7 +170,7 @@ def arm(folder: Path, forces: tuple[float, float], flexible: bool = False, **cha
     }
     for joint, force in zip(data["joints"], forces, strict=True):
         joint["friction"] = {"force": force, "law": "stick"}
-    return scenes.write_toml(folder / "arm.toml", scenes.merged(data, changes))
+    return scenes.write_toml(folder / "scene.toml", scenes.merged(data, changes))
 
 
 WEIGHT = 9.81 * 1.0 * (0.5 + 1.5), 9.81 * 0.5  # moments about both joints [N m]
@@ -190,18 +189,28 @@ def test_joints_that_friction_holds(tmp_path: Path) -> None:
 
 
 def test_static_start_that_friction_holds(tmp_path: Path) -> None:
-    """Turned up by a half turn and a bit it would fall; friction holds it, so nothing is said to grow."""
-    up = {"initial": {"deformation": "static"}, "base": {"rotation_deg": [-90.0, 0.0, 91.0]}}
-    run = erls.simulate(erls.load_scene(arm(tmp_path, (20.0, 5.0), flexible=True, **up)), verdict=False)
-    assert np.abs(run.joint_rate("first", [0.1, 0.3])).max() == 0.0
-    assert run.stability is not None
-    assert run.stability.growth <= 0.0
+    """It stands up and would fall; friction holds it, so that nothing is said to grow."""
+    up = {"initial": {"deformation": "static"}, "base": {"rotation_deg": [0.0, 0.0, 0.0]}, "simulation": {"duration": 0.1}}
+    roots = []
+    for friction in ({"force": 5.0, "law": "stick"}, {"force": 0.0}):
+        joints = [
+            {"name": "first", "dh": {"convention": "modified", "alpha_deg": -90.0}, "initial": {"position_deg": -91.0},
+             "friction": friction},
+            {"name": "second", "dh": {"convention": "modified", "a": 0.5}, "friction": friction},
+        ]  # fmt: skip
+        run = erls.simulate(erls.load_scene(arm(tmp_path, (5.0, 5.0), True, **up, joints=joints)), verdict=False)
+        assert run.stability is not None
+        assert run.stability.root is not None
+        roots.append(run.stability.root.real)
+        assert (run.joint_rate("first", 0.1) == 0.0) == (friction["force"] > 0)
+    assert roots[0] <= 0.0
+    assert roots[1] > 1.0
 
 
 def test_formulations_agree(tmp_path: Path) -> None:
     """Flexible links, both joints stick and slide: ERLS, FFR and steps of generalized-α; energy balances."""
-    settings = {"duration": 0.4, "effects": "linear", "tolerance": 1e-6, "integrator": "lobatto"}
-    swing = {"joints": [{"name": "first", "dh": {"convention": "modified", "alpha_deg": 90.0},
+    settings = {"duration": 0.4, "tolerance": 1e-6, "integrator": "lobatto"}
+    swing = {"joints": [{"name": "first", "dh": {"convention": "modified"}, "initial": {"position_deg": 60.0},
                          "friction": {"force": 1.5, "law": "stick"}},
                         {"name": "second", "dh": {"convention": "modified", "a": 0.5},
                          "friction": {"force": 0.3, "law": "stick", "static_force": 0.4}, "initial": {"rate": 4.0}}]}  # fmt: skip
@@ -237,8 +246,8 @@ def test_faulty_friction(changes: dict[str, Any], field: str, words: str, tmp_pa
     path = scenes.write_toml(tmp_path / "scene.toml", {**scenes.L_SCENE, "joints": joints})
     with pytest.raises(SceneError, match=words) as caught:
         erls.simulate(path)
-    assert caught.value.cause == Cause.BAD_FIELD
     assert caught.value.where.endswith(f"joints[0].{field}")
+    assert caught.value.exit_code == 2
 
 
 @pytest.mark.parametrize(
