@@ -111,6 +111,7 @@ class Recorder:
             t, rows = np.append(t, switch.t), np.concatenate([rows, knot.reshape(1, -1)])
         self._keep(t, rows, steps if switch is None else 1)
         if switch is not None:
+            self._look(switch.t)  # nothing is offered: the steps stand beyond it
             raise switch
 
     def _keep(self, t: Array, rows: Array, steps: int) -> None:
@@ -126,6 +127,11 @@ class Recorder:
             if now - self._told < _PAUSE:
                 return
             self._told = now
+        self._look(t)
+        self._offer()
+
+    def _look(self, t: float) -> None:
+        """Tell the observer, and drop what need not be kept."""
         whole: Sequence[float] | None = ()
         try:
             if self._observer is not None:
@@ -138,7 +144,6 @@ class Recorder:
             raise
         finally:
             self._thin(whole or ())
-        self._offer()
 
     def _thin(self, whole: Sequence[float]) -> None:
         """Drop what need not be kept, once the observer has seen it."""
