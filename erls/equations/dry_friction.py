@@ -62,9 +62,12 @@ def dry_friction(mechanism: Mechanism, free_joints: IntArray) -> DryFriction | N
     if not places:
         return None
     forces = [joints[place].forces for place in places]
-    sizes = ([getattr(own, name) for own in forces] for name in ("friction", "static"))
-    names = tuple(joints[place].name for place in places)
-    return DryFriction(np.array(places), *(np.array(each, dtype=float) for each in sizes), names)
+    return DryFriction(
+        places=np.array(places),
+        sliding=np.array([own.friction for own in forces]),
+        static=np.array([own.static for own in forces]),
+        names=tuple(joints[place].name for place in places),
+    )
 
 
 class Settled(NamedTuple):

@@ -102,7 +102,7 @@ class Sticking:
 
     def holding(self, t: Array, y: Array, v: Array, a: Array) -> Array:
         """(k, m) friction that balances each joint at states of a motion."""
-        return residual_series(self._bare, t, y, v, a, self._address)[:, self.dry.places]
+        return np.asarray(residual_series(self._bare, t, y, v, a, self._address)[:, self.dry.places])
 
     @cached_property
     def _address(self) -> Any:
@@ -111,7 +111,7 @@ class Sticking:
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
         """(n,) M a - f; of a joint that sticks, its acceleration."""
-        return residual_series(self.compiled, np.array([t]), y[None], v[None], a[None])[0]
+        return np.asarray(residual_series(self.compiled, np.array([t]), y[None], v[None], a[None])[0])
 
     def mass_matrix(self, t: float, y: Array) -> Array:
         """(n, n), with the unit matrix for joints that stick."""

@@ -262,7 +262,8 @@ class Pace:
 
     def __init__(self, recorder: Recorder, compiled: bool, single: bool) -> None:
         self._single = _SINGLE if single and recorder.observed else 0
-        self._recorder, self._steps, self._largest = recorder, _FIRST, LARGEST_CHUNK if compiled and recorder.switching is None else 1
+        many = compiled and recorder.switching is None
+        self._recorder, self._steps, self._largest = recorder, _FIRST, LARGEST_CHUNK if many else 1
         self._asked, self._begun = 1, 0.0
 
     def size(self) -> int:

@@ -21,6 +21,7 @@ from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, hermite_knots
 from erls.integrate.memory import Memory, taken
 from erls.maths.so3 import Array
+from fe_import.model import IntArray
 
 _LOOKS = 4  # in the interval between two knots
 _MANY, _AT_ONCE = 100, 1e-7  # switches, and the time in which nobody meant as many [s]
@@ -96,14 +97,14 @@ class Switching:
         return len(t), None, None
 
     def _located(
-        self, times: Array, states: Array, start: float, end: float, joints: Array
+        self, times: Array, states: Array, start: float, end: float, joints: IntArray
     ) -> tuple[int, Array | None, Switch] | None:
         """The first switch of some joints between two looks; None where there is none, since between knots that do not
         resolve a vibration interpolated accelerations do not tell, or where it is at the end of the leg.
         """
 
         def state(x: float) -> tuple[Array, Array]:
-            y, v, _ = hermite_knots(times, *states.swapaxes(0, 1), np.array([x]))
+            y, v, _ = hermite_knots(times, states[:, 0], states[:, 1], states[:, 2], np.array([x]))
             return y[0], v[0]
 
         def left(joint: int) -> Callable[[float], float]:
@@ -118,38 +119,44 @@ class Switching:
         t = float(roots.min())
         if not t < self.leg.end - _HAIR * max(abs(self.leg.end), 1.0):
             return None
-        system = self.system
-        now = joints[roots <= t + _ROUNDING * max(abs(t), end - start)]
+        now = joints[roots <= t + _ROUNDING * max(abs(t), 1.0)]
         y, v = state(t)
-        places, slides = system.dry.places[now], system.modes[now] != 0.0
-        v[places] = 0.0
-        a = system.acceleration(t, y, v)
-        along = system.holding(np.array([t]), y[None], v[None], a[None])[0, now]
-        self._released[now] = np.where(slides, 0.0, -np.sign(along))
-        at_once = slides & (t <= self._broke[now] + _ROUNDING * max(abs(t), 1.0))
-        self._more[now] = np.where(at_once, np.maximum(2 * self._more[now], _LEAST), np.where(slides, 0.0, self._more[now]))
-        self._broke[now[~slides]] = t
-        self._refuse_chatter(t, system.dry.names[int(now[0])])
-        before = int(np.searchsorted(times, t)) - 1  # knots of this step
-        knot = np.array([y, v, a]) if t > times[0] else None
-        return max(before, 0), knot, Switch(t, y, v)
+        v[self.system.dry.places[now[self.system.modes[now] != 0.0]]] = 0.0
+        a = self.system.acceleration(t, y, v)
+        self._end_modes(t, now, self.system.holding(np.array([t]), y[None], v[None], a[None])[0])
+        before = max(int(np.searchsorted(times, t)) - 1, 0)
+        return before, np.array([y, v, a]) if t > times[0] else None, Switch(t, y, v)
 
-    def _left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
-        """`Sticking.left`; a joint that came to rest where it had just broken away holds a little more."""
-        own = self.system
-        return own.left(t, y, v, a) + np.where(own.modes == 0.0, self._more * own.dry.static, 0.0)
+    def _end_modes(self, t: float, joints: IntArray, holding: Array) -> None:
+        """Some joints come to rest, or break away where they stick, and then slide as ``holding`` (m,) forces them to.
 
-    def _refuse_chatter(self, t: float, name: str) -> None:
+        Raises
+        ------
+        SimulationError
+            STEP_TOO_SMALL, where that goes on and on at one instant.
+        """
+        rest = joints[self.system.modes[joints] != 0.0]
+        gone = np.setdiff1d(joints, rest)
+        self._released[gone] = -np.sign(holding[gone])
+        at_once = t <= self._broke[rest] + _ROUNDING * max(abs(t), 1.0)
+        self._more[rest] = np.where(at_once, np.maximum(2 * self._more[rest], _LEAST), 0.0)
+        self._broke[gone] = t
         self._recent.append(t)
         if len(self._recent) == _MANY and t - self._recent[0] < _AT_ONCE:
             raise SimulationError(
                 Cause.STEP_TOO_SMALL,
-                f"friction of joint {name!r} switches between sticking and sliding {_MANY} times at once",
+                f"friction of joint {self.system.dry.names[int(joints[0])]!r} switches between sticking and sliding "
+                f"{_MANY} times at once",
                 where=f"t = {t:.9g} s",
                 value=f"{t - self._recent[0]:.3g} s",
                 limit=f"{_AT_ONCE:g} s for {_MANY} switches",
                 remedy="look for forces without bound on this joint; or use friction.law = 'smooth'",
             )
+
+    def _left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
+        """`Sticking.left`; a joint that came to rest where it had just broken away holds a little more."""
+        own = self.system
+        return own.left(t, y, v, a) + np.where(own.modes == 0.0, self._more * own.dry.static, 0.0)
 
     def memory(self) -> Memory:
         """Between two steps, see `erls.integrate.memory`."""
@@ -190,7 +197,7 @@ def _looks(times: Array, states: Array) -> tuple[Array, Array]:
 
 @cache
 def _shapes() -> Array:
-    """(3, looks, 6) value, rate and acceleration that y, v, a at either end of an interval of length 1 make at looks."""
+    """(3, looks, 6) value, rate and acceleration at looks in an interval of length 1, by y, v, a at either end."""
     at, ends = np.arange(_LOOKS) / _LOOKS, np.array([0.0, 1.0])
     y, v, a = np.eye(6).reshape(2, 3, 6).swapaxes(0, 1)
     return np.array(hermite_knots(ends, y, v, a, at))

@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import scenes
 
 import erls
+from erls.accuracy.energy_balance import energy_balance
+from erls.accuracy.looked_at import LookedAt
 from erls.equations.dry_friction import at_rest
 from erls.equations.registry import formulate
 from erls.equations.sticking import Sticking
@@ -41,19 +43,19 @@ def sliding(folder: Path, friction: dict[str, Any], joint: dict[str, Any], **set
         folder / "scene.toml",
         {
             "gravity": [0.0, 0.0, 0.0],
-            "simulation": {"duration": 1.5, **settings},
+            "simulation": {"duration": 1.1, **settings},
             "joints": [{**along, "friction": {"law": "stick", **friction}}],
             "links": [BODY],
             "points": [{"name": "block", "link": "body", "node": "root"}],
         },
     )
-    return erls.simulate(erls.load_scene(path))
+    return cast(ChainRun, erls.simulate(erls.load_scene(path)))
 
 
 def switches(run: ChainRun) -> list[float]:
     """Times at which the run begins anew."""
     t = run.solution.t
-    return np.unique(t[1:][np.diff(t) == 0]).tolist()
+    return [float(x) for x in np.unique(t[1:][np.diff(t) == 0])]
 
 
 def block_on_spring(t: float) -> tuple[float, float]:
@@ -88,7 +90,7 @@ def test_block_on_a_spring(integrator: str, tmp_path: Path) -> None:
     assert found[-1] == pytest.approx(rest, abs=1e-6)
     held = run.joint_rate("slide", np.linspace(found[-1], run.end, 7))
     assert (held == 0.0).all()  # it does not creep
-    place, (before, after) = run.position("block", run.end)[2], run.joint_effort("slide", [0.1, 1.4])
+    place, (before, after) = run.position("block", run.end)[2], run.joint_effort("slide", [0.1, 1.0])
     assert before == pytest.approx(-STIFFNESS * block_on_spring(0.1)[0] + FORCE, abs=1e-4)  # it moves back
     assert after == pytest.approx(0.0, abs=1e-9)  # spring and friction balance
     path = sum(abs(block_on_spring(b)[0] - block_on_spring(a)[0]) for a, b in itertools.pairwise([0.0, *found]))
@@ -99,8 +101,8 @@ def test_block_on_a_spring(integrator: str, tmp_path: Path) -> None:
 def test_block_behind_a_spring_that_is_pulled(tmp_path: Path) -> None:
     """Stick-slip: static friction larger than that of sliding, the end of the spring pulled at v.
 
-    It breaks away where the spring pulls by the static force, slides for (2π - 2 atan((S - F) ω / (k v))) / ω, and rests
-    until the spring is as long again: 2 (S - F) / (k v).
+    It breaks away where the spring pulls by the static force, slides for (2π - 2 atan((S - F) ω / (k v))) / ω, and
+    rests until the spring is as long again: 2 (S - F) / (k v).
     """
     static, pull = 5.0, 0.05
     drive = {
@@ -190,9 +192,10 @@ def test_joints_that_friction_holds(tmp_path: Path) -> None:
 
 def test_static_start_that_friction_holds(tmp_path: Path) -> None:
     """It stands up and would fall; friction holds it, so that nothing is said to grow."""
-    up = {"initial": {"deformation": "static"}, "base": {"rotation_deg": [0.0, 0.0, 0.0]}, "simulation": {"duration": 0.1}}
+    up = {"initial": {"deformation": "static"}, "base": {"rotation_deg": [0, 0, 0]}, "simulation": {"duration": 0.1}}
     roots = []
-    for friction in ({"force": 5.0, "law": "stick"}, {"force": 0.0}):
+    sticks: dict[str, Any] = {"force": 5.0, "law": "stick"}
+    for friction in (sticks, {"force": 0.0}):
         joints = [
             {"name": "first", "dh": {"convention": "modified", "alpha_deg": -90.0}, "initial": {"position_deg": -91.0},
              "friction": friction},
@@ -209,22 +212,29 @@ def test_static_start_that_friction_holds(tmp_path: Path) -> None:
 
 def test_formulations_agree(tmp_path: Path) -> None:
     """Flexible links, both joints stick and slide: ERLS, FFR and steps of generalized-α; energy balances."""
-    settings = {"duration": 0.4, "tolerance": 1e-6, "integrator": "lobatto"}
-    swing = {"joints": [{"name": "first", "dh": {"convention": "modified"}, "initial": {"position_deg": 60.0},
-                         "friction": {"force": 1.5, "law": "stick"}},
-                        {"name": "second", "dh": {"convention": "modified", "a": 0.5},
-                         "friction": {"force": 0.3, "law": "stick", "static_force": 0.4}, "initial": {"rate": 4.0}}]}  # fmt: skip
+    settings = {"duration": 0.25, "tolerance": 1e-5, "integrator": "lobatto"}
+    first = {"friction": {"force": 1.5, "law": "stick"}, "initial": {"position_deg": 60.0}}
+    second = {"friction": {"force": 0.3, "law": "stick", "static_force": 0.4}, "initial": {"rate": 4.0}}
+    swing = {
+        "joints": [
+            {"name": "first", "dh": {"convention": "modified"}, **first},
+            {"name": "second", "dh": {"convention": "modified", "a": 0.5}, **second},
+        ]
+    }
     runs = {}
     for name, own in {"erls": {}, "ffr": {}, "equal": {"integrator": "generalized_alpha", "step": 1e-4}}.items():
         formulation = {"formulation": name} if name != "equal" else {}
         path = arm(tmp_path, (1.5, 0.3), True, simulation={**settings, **formulation, **own}, **swing)
         runs[name] = erls.simulate(erls.load_scene(path), verdict=False)
-    times = np.linspace(0.0, 0.4, 41)
+    times = np.linspace(0.0, 0.25, 26)
     places = {name: run.position("end", times) for name, run in runs.items()}
     one = runs["erls"]
     stuck = [float(np.diff(one.solution.t)[one.solution.v[1:, k] == 0.0].sum()) for k in (0, 1)]
-    assert min(stuck) > 0.02  # both
-    assert max(stuck) < 0.39
+    assert min(stuck) > 0.01  # both
+    assert max(stuck) < 0.24
+    balance = energy_balance(LookedAt(one))
+    assert balance is not None
+    assert abs(balance.off) < 1e-6 * balance.exchanged
     moved = float(np.ptp(places["erls"], axis=0).max())
     assert moved > 0.01
     assert np.abs(places["ffr"] - places["erls"]).max() < 1e-5  # the tolerance, and what switches make of it
@@ -269,12 +279,16 @@ def test_what_sticking_does_not_go_with(settings: dict[str, Any], tmp_path: Path
     assert caught.value.where.endswith("joints[0].friction.law")
 
 
+def _switch_on_and_on(looking: Switching) -> None:
+    for _ in range(1000):
+        looking._end_modes(0.25, np.array([1]), np.ones(2))
+
+
 def test_chatter_ends(tmp_path: Path) -> None:
     """As many switches at one instant end the run, with the joint's name."""
     scene = erls.load_scene(arm(tmp_path, (20.0, 5.0)))
     formulation: Any = formulate(scenes.mechanism(scene.path), scene.record.simulation)
     looking = Switching(Sticking(formulation))
     with pytest.raises(SimulationError, match="'second' switches") as caught:
-        for _ in range(1000):
-            looking._refuse_chatter(0.25, "second")
+        _switch_on_and_on(looking)
     assert caught.value.cause == Cause.STEP_TOO_SMALL

@@ -32,7 +32,6 @@ from erls.mechanism.links import Link, node_shape6
 from erls.mechanism.loops import LoopEnd
 from erls.mechanism.thermal import elastic_rest
 
-
 _SUDDEN = 1e-12  # rate that counts as rest, of friction on a motion that is prescribed
 
 
