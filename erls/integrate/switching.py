@@ -26,7 +26,6 @@ from fe_import.model import IntArray
 _LOOKS = 4  # in the interval between two knots
 _MANY, _AT_ONCE = 100, 1e-7  # switches, and the time in which nobody meant as many [s]
 _HAIR = 4e-12  # of the largest time, or of 1 s: a switch this close to the end of a leg is left to the next one
-_LEAST = 1e-9  # of the static force: more of it where interpolation would have a joint stick and break away for ever
 _ROUNDING = 4 * np.finfo(float).eps
 
 
@@ -49,12 +48,13 @@ class Switching:
     def __init__(self, system: Sticking) -> None:
         self.system = system
         self._released = np.zeros(len(system.dry.places))
-        self._broke, self._more = np.full_like(self._released, -math.inf), np.zeros_like(self._released)
         self._recent: deque[float] = deque(maxlen=_MANY)
         self._knot = np.zeros((3, system.size))  # the last one
         self._t = 0.0
         self.leg = Leg(0.0, 0.0, 0.0, 0.0)
         """What is being walked over: a leg, or what a switch leaves of one."""
+        self.coarse = False
+        """Whether knots are ends of steps that need not resolve vibrations: accelerations there tell nothing between."""
 
     def stand(self, leg: Leg, y: Array, v: Array) -> Array:
         """Set the modes at the start of a leg; its accelerations (n,)."""
@@ -81,9 +81,9 @@ class Switching:
         switch : Switch or None
         """
         times, states = np.append(self._t, t), np.concatenate([self._knot[None], knots])
-        slides = bool(self.system.modes.all())
+        slides = self.coarse or bool(self.system.modes.all())
         looks, (y, v, a) = (times, states.swapaxes(0, 1)) if slides else _looks(times, states)
-        ended = self._left(looks, y, v, a) < 0.0
+        ended = self.system.left(looks, y, v, a) < 0.0
         ended[0] = False  # there the law has just spoken
         if ended.any():
             every = 1 if slides else _LOOKS  # looks from knot to knot; rates are looked at at knots alone
@@ -104,6 +104,8 @@ class Switching:
         """
 
         def state(x: float) -> tuple[Array, Array]:
+            if self.coarse:
+                return _cubic(times, states, x)
             y, v, _ = hermite_knots(times, states[:, 0], states[:, 1], states[:, 2], np.array([x]))
             return y[0], v[0]
 
@@ -111,11 +113,12 @@ class Switching:
             def value(x: float) -> float:
                 y, v = state(x)
                 a = self.system.acceleration(x, y, v)
-                return float(self._left(np.array([x]), y[None], v[None], a[None])[0, joint])
+                return float(self.system.left(np.array([x]), y[None], v[None], a[None])[0, joint])
 
             return value
 
-        roots = np.array([_root(left(int(joint)), start, end) for joint in joints])
+        slides = self.system.modes[joints] != 0.0
+        roots = np.array([_root(left(int(k)), start, end, bool(s)) for k, s in zip(joints, slides, strict=True)])
         t = float(roots.min())
         if not t < self.leg.end - _HAIR * max(abs(self.leg.end), 1.0):
             return None
@@ -135,12 +138,8 @@ class Switching:
         SimulationError
             STEP_TOO_SMALL, where that goes on and on at one instant.
         """
-        rest = joints[self.system.modes[joints] != 0.0]
-        gone = np.setdiff1d(joints, rest)
+        gone = joints[self.system.modes[joints] == 0.0]
         self._released[gone] = -np.sign(holding[gone])
-        at_once = t <= self._broke[rest] + _ROUNDING * max(abs(t), 1.0)
-        self._more[rest] = np.where(at_once, np.maximum(2 * self._more[rest], _LEAST), 0.0)
-        self._broke[gone] = t
         self._recent.append(t)
         if len(self._recent) == _MANY and t - self._recent[0] < _AT_ONCE:
             raise SimulationError(
@@ -153,11 +152,6 @@ class Switching:
                 remedy="look for forces without bound on this joint; or use friction.law = 'smooth'",
             )
 
-    def _left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
-        """`Sticking.left`; a joint that came to rest where it had just broken away holds a little more."""
-        own = self.system
-        return own.left(t, y, v, a) + np.where(own.modes == 0.0, self._more * own.dry.static, 0.0)
-
     def memory(self) -> Memory:
         """Between two steps, see `erls.integrate.memory`."""
         return {
@@ -165,7 +159,6 @@ class Switching:
             "switching.leg": np.array(self.leg),
             "switching.t": np.array([self._t]),
             "switching.knot": self._knot,
-            "switching.held": np.array([self._broke, self._more]),
             "switching.recent": np.array(self._recent, dtype=float),
         }
 
@@ -175,13 +168,23 @@ class Switching:
         self.leg = Leg(*taken(memory, "switching.leg", np.zeros(4)).tolist())
         self._t = float(taken(memory, "switching.t", np.zeros(1))[0])
         self._knot = taken(memory, "switching.knot", self._knot).copy()
-        self._broke, self._more = taken(memory, "switching.held", np.array([self._broke, self._more])).copy()
         self._recent = deque(taken(memory, "switching.recent", np.zeros(0), axis=0).tolist(), maxlen=_MANY)
 
 
 def switching_of(system: MovingSystem) -> Switching | None:
     """What looks for switches; None where nothing sticks."""
     return Switching(system) if isinstance(system, Sticking) else None
+
+
+def _cubic(times: Array, states: Array, x: float) -> tuple[Array, Array]:
+    """(n,) y and v by a cubic, from places and rates alone."""
+    k = int(np.clip(np.searchsorted(times, x), 1, len(times) - 1))
+    h = float(times[k] - times[k - 1])
+    s = (x - float(times[k - 1])) / h
+    (y0, v0), (y1, v1) = states[k - 1, :2], states[k, :2]
+    rise = (y1 - y0) / h
+    c, d = 3 * rise - 2 * v0 - v1, v0 + v1 - 2 * rise
+    return y0 + h * s * (v0 + s * (c + s * d)), v0 + s * (2 * c + 3 * s * d)
 
 
 def _looks(times: Array, states: Array) -> tuple[Array, Array]:
@@ -203,17 +206,20 @@ def _shapes() -> Array:
     return np.array(hermite_knots(ends, y, v, a, at))
 
 
-def _root(value: Callable[[float], float], start: float, end: float) -> float:
+def _root(value: Callable[[float], float], start: float, end: float, slides: bool) -> float:
     """Where a value that is positive after ``start`` falls below zero; infinite where it does not."""
     from scipy.optimize import brentq  # here: only switches need it
 
     if value(end) >= 0.0:
         return math.inf
     first = start
-    while value(first) <= 0.0:  # it starts from rest, as a joint does that has just broken away
-        if first > start:
-            end = first
-        first = start + (end - start) / 2
-        if end - start < _ROUNDING * max(abs(end), _ROUNDING):
+    if value(first) <= 0.0:
+        if not slides:
             return start
+        last = end  # it starts from rest, as a joint does that has just broken away
+        while value(first) <= 0.0:
+            end = first if first > start else end
+            first = start + (end - start) / 2
+            if end - start < _ROUNDING * max(abs(end), _ROUNDING):
+                return last  # and goes back at once, as far as steps tell
     return float(brentq(value, first, end, xtol=1e-15, rtol=_ROUNDING))
