@@ -20,6 +20,7 @@ from erls.equations.system import SecondOrderSystem
 from erls.maths.calls import address_of, handed
 from erls.maths.records import Memory, python_reader
 from erls.maths.so3 import Array
+from fe_import.model import IntArray
 
 
 class Rubbing(SecondOrderSystem, Protocol):
@@ -90,6 +91,18 @@ class Sticking:
         found = self._system.settled(t, y, v, released)
         self.modes[:] = found.modes
         return found.accelerations
+
+    def brought_to_rest(self, t: float, y: Array, v: Array, joints: IntArray) -> Array:
+        """(n,) rates when some joints come to rest, by what rates they have left: an impulse along each, and along
+        those that stick, so that momentum along all other coordinates stays as it is.
+        """
+        if not len(joints):
+            return v
+        held = self.dry.places[np.union1d(np.flatnonzero(self.modes == 0.0), joints)]
+        answers = np.linalg.solve(self._system.mass_matrix(t, y), np.eye(self.size)[:, held])
+        result = np.array(v - answers @ np.linalg.solve(answers[held], v[held]))
+        result[held] = 0.0
+        return result
 
     def left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
         """(k, m) of states of a motion with these modes: rate in the direction of one that slides, static force less

@@ -124,7 +124,7 @@ class Switching:
             return None
         now = joints[roots <= t + _ROUNDING * max(abs(t), 1.0)]
         y, v = state(t)
-        v[self.system.dry.places[now[self.system.modes[now] != 0.0]]] = 0.0
+        v = self.system.brought_to_rest(t, y, v, now[self.system.modes[now] != 0.0])
         a = self.system.acceleration(t, y, v)
         self._end_modes(t, now, self.system.holding(np.array([t]), y[None], v[None], a[None])[0])
         before = max(int(np.searchsorted(times, t)) - 1, 0)
