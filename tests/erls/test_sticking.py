@@ -212,7 +212,7 @@ def test_static_start_that_friction_holds(tmp_path: Path) -> None:
 
 def test_formulations_agree(tmp_path: Path) -> None:
     """Flexible links, both joints stick and slide: ERLS, FFR and steps of generalized-α; energy balances."""
-    settings = {"duration": 0.25, "tolerance": 1e-5, "integrator": "lobatto"}
+    settings = {"duration": 0.25, "tolerance": 1e-4, "integrator": "lobatto"}
     first = {"friction": {"force": 1.5, "law": "stick"}, "initial": {"position_deg": 60.0}}
     second = {"friction": {"force": 0.3, "law": "stick", "static_force": 0.4}, "initial": {"rate": 4.0}}
     swing = {
