@@ -54,7 +54,7 @@ class Switching:
         self.leg = Leg(0.0, 0.0, 0.0, 0.0)
         """What is being walked over: a leg, or what a switch leaves of one."""
         self.coarse = False
-        """Whether knots are ends of steps that need not resolve vibrations: accelerations there tell nothing between."""
+        """Whether steps need not resolve vibrations, so that accelerations at knots tell nothing of what is between."""
 
     def stand(self, leg: Leg, y: Array, v: Array) -> Array:
         """Set the modes at the start of a leg; its accelerations (n,)."""
