@@ -292,3 +292,23 @@ def test_chatter_ends(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match="'second' switches") as caught:
         _switch_on_and_on(looking)
     assert caught.value.cause == Cause.STEP_TOO_SMALL
+
+
+def test_load_that_comes_and_goes(tmp_path: Path) -> None:
+    """A joint at rest moves nothing while the load grows, so that steps grow, and yet breaks away in time."""
+    load = {"shape": "sine_burst", "start": 0.0, "amplitude": 4.5, "frequency_hz": 1.0, "cycles": 1.0}
+    friction = {"force": FORCE, "static_force": 4.0}
+    run = sliding(tmp_path, friction, {"drive": {"type": "torque", "profiles": [load]}}, integrator="lobatto")
+    first = math.asin(4.0 / 4.5) / (2 * math.pi)
+    assert switches(run)[0] == pytest.approx(first, abs=1e-9)
+    assert (run.joint_rate("slide", np.linspace(0.0, first, 5)[:-1]) == 0.0).all()
+    assert run.joint_effort("slide", 0.1) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_friction_on_a_prescribed_motion(tmp_path: Path) -> None:
+    """The motor gives what friction takes, against the rate."""
+    motion = {"shape": "sine", "amplitude": 0.1, "frequency_hz": 1.0}
+    run = sliding(tmp_path, {"force": FORCE}, {"drive": {"type": "motion", "motion": motion}})
+    t, omega = np.array([0.1, 0.3]), 2 * math.pi
+    expected = -MASS * 0.1 * omega**2 * np.sin(omega * t) + FORCE * np.sign(np.cos(omega * t))
+    assert run.joint_effort("slide", t) == pytest.approx(expected, rel=1e-9)
