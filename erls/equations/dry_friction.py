@@ -17,13 +17,15 @@ others along; here whoever S_k cannot hold slides, feels F_k from then on, and t
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from erls.maths.so3 import Array
-from erls.mechanism.chain import Mechanism
 from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.mechanism.chain import Mechanism
 
 _ROUNDING = 1e-11  # of the forces that hold, and of what they accelerate by
 

@@ -8,19 +8,17 @@ that follow (`erls.equations.dry_friction`). In between the equations are smooth
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from erls.equations import compiled_system as contract
-from erls.equations.compiled_system import CompiledSystem
-from erls.equations.dry_friction import DryFriction, Settled
-from erls.equations.series import residual_series
 from erls.equations.system import SecondOrderSystem
-from erls.maths.calls import address_of, handed
-from erls.maths.records import Memory, python_reader
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.equations.compiled_system import CompiledSystem
+    from erls.equations.dry_friction import DryFriction, Settled
 
 
 class Rubbing(SecondOrderSystem, Protocol):
@@ -52,7 +50,10 @@ class Sticking:
     @cached_property
     def compiled(self) -> CompiledSystem:
         """The equations; their working memory holds the modes."""
-        from erls.equations import sticking_kernels as own  # here: it imports the compiler
+        from erls.equations import compiled_system as contract  # here: they import the compiler
+        from erls.equations import sticking_kernels as own
+        from erls.maths.calls import address_of
+        from erls.maths.records import Memory
 
         bare, integers = self._bare, [int(i) for i in self._bare.integers]
         constants, scratch = Memory(integers, bare.reals), Memory(integers, bare.scratch)
@@ -66,7 +67,7 @@ class Sticking:
             sliding=self.dry.sliding,
         )
         integers.append(constants.put(whole))
-        return CompiledSystem(
+        return contract.CompiledSystem(
             size=self.size,
             reals=constants.numbers,
             integers=np.array(integers, dtype=np.int64),
@@ -80,7 +81,8 @@ class Sticking:
     @cached_property
     def modes(self) -> Array:
         """(m,) which equations read; see the module's docstring."""
-        from erls.equations import sticking_kernels as own
+        from erls.equations import sticking_kernels as own  # here: it imports the compiler
+        from erls.maths.records import python_reader
 
         system = self.compiled
         frictions = python_reader(own.Frictions)(system.reals, system.integers, int(system.integers[-1]))
@@ -115,15 +117,22 @@ class Sticking:
 
     def holding(self, t: Array, y: Array, v: Array, a: Array) -> Array:
         """(k, m) friction that balances each joint at states of a motion."""
+        from erls.equations.series import residual_series  # here: it imports the compiler
+
         return np.asarray(residual_series(self._bare, t, y, v, a, self._address)[:, self.dry.places])
 
     @cached_property
     def _address(self) -> Any:
         """Of the bare residual: asking for it takes longer than most calls."""
-        return handed(self._bare.residual, contract.RESIDUAL)
+        from erls.equations.compiled_system import RESIDUAL  # here: they import the compiler
+        from erls.maths.calls import handed
+
+        return handed(self._bare.residual, RESIDUAL)
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
         """(n,) M a - f; of a joint that sticks, its acceleration."""
+        from erls.equations.series import residual_series  # here: it imports the compiler
+
         return np.asarray(residual_series(self.compiled, np.array([t]), y[None], v[None], a[None])[0])
 
     def mass_matrix(self, t: float, y: Array) -> Array:
