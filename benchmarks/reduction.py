@@ -98,7 +98,7 @@ def l_mesh(dofs: int) -> SolidMesh:
     y = np.interp(lattice[:, 1], [0, 2 * across, 2 * (along + across)], [0.0, WIDTH, LEG + WIDTH])
     nodes = np.stack([x, y, lattice[:, 2] * HEIGHT / (2 * up)], axis=1)
     sets = {"root": np.flatnonzero(lattice[:, 0] == 0), "tip": np.flatnonzero(lattice[:, 1] == lattice[:, 1].max())}
-    return SolidMesh(nodes, elements.reshape(keys.shape), "hex20", node_sets=sets, source="benchmark")
+    return SolidMesh.uniform(nodes, elements.reshape(keys.shape), "hex20", node_sets=sets, source="benchmark")
 
 
 def peak_mb() -> float:
@@ -178,7 +178,7 @@ def reduce_case(dofs: int, modes: int) -> dict[str, Any]:
 
 def write_mesh(mesh: SolidMesh, path: Path) -> None:
     """An Abaqus input file, without leaving the mesh in memory."""
-    cells = [(mesh.element.meshio_name, mesh.elements)]
+    cells = [(mesh.only.element.meshio_name, mesh.only.elements)]
     meshio.Mesh(mesh.nodes, cells, point_sets=mesh.node_sets).write(path)
 
 

@@ -11,15 +11,29 @@ The command line in three lines::
 
 from typing import Any
 
-__all__ = ["load_run", "load_scene", "save_run", "section_forces", "simulate", "simulate_many", "stress"]
+__all__ = [
+    "linearize",
+    "load_run",
+    "load_scene",
+    "save_run",
+    "section_forces",
+    "sensitivities",
+    "simulate",
+    "simulate_many",
+    "stepper",
+    "stress",
+]
 
 _HOME = {
     "load_scene": ("erls.scene.read", "load_scene"),
+    "linearize": ("erls.linear.linearize", "linearize"),
     "simulate": ("erls.simulation.simulate", "simulate"),
     "simulate_many": ("erls.simulation.batch", "simulate_many"),
     "load_run": ("erls.run.file", "load_run"),
     "save_run": ("erls.run.file", "write_run"),
+    "sensitivities": ("erls.sensitivity.sensitivities", "sensitivities"),
     "section_forces": ("erls.run.recovery", "section_forces"),
+    "stepper": ("erls.simulation.stepper", "Stepper"),
     "stress": ("erls.run.recovery", "stress"),
 }
 

@@ -2,10 +2,11 @@
 
 from typing import Any
 
-__all__ = ["load_link", "read_modal_file", "reduce_link", "write_modal_file"]
+__all__ = ["load_link", "modal_derivatives", "read_modal_file", "reduce_link", "write_modal_file"]
 
 _HOME = {
     "load_link": "fe_import.description.link",
+    "modal_derivatives": "fe_import.derivatives",
     "reduce_link": "fe_import.reduce",
     "read_modal_file": "fe_import.modal.file",
     "write_modal_file": "fe_import.modal.file",

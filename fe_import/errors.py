@@ -101,6 +101,7 @@ class Cause(enum.StrEnum):
     BAD_REFERENCE = "reference to something that does not exist"
     MESH = "faulty mesh"
     UNSUPPORTED_ELEMENT = "unsupported element type"
+    NOT_USED = "content that would be lost"
     EXPORT = "faulty exported matrices"
     INTERFACE = "faulty interface"
     NOT_DEFINITE = "matrix not definite"

@@ -180,6 +180,12 @@ class FEModel:
         What ``mass`` holds of point masses.
     thermal : ThermalLoad or None
         Where a temperature change is given.
+    left_out : dict of int
+        What stands in the mesh file and is not part of the link, and how often.
+    second_order_lack : str
+        Why second-order displacements of a solid cannot be computed, where they cannot.
+    materials : dict
+        Those that the mesh file brings, where they are used, in its units: Young's modulus, Poisson's ratio, density.
     """
 
     name: str
@@ -201,6 +207,9 @@ class FEModel:
     beams: BeamLines | None = None
     added_mass: sp.csc_array | None = None
     thermal: ThermalLoad | None = None
+    left_out: dict[str, int] = field(default_factory=dict)
+    second_order_lack: str = ""
+    materials: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @property
     def interface_dofs(self) -> IntArray:

@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from fe_import.description.link import LinkFile, load_link
+from fe_import.description.records import Material
 from fe_import.files.toml import choose
 from fe_import.files.versions import package_version
 from fe_import.health.plausibility import plausible_link, plausible_materials
@@ -71,7 +72,8 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     where, options, wanted = str(link.path), link.description.reduction, link.description.recovery
     choose(options.method, REDUCTIONS, f"{where}: reduction.method")
     units = unit_factors(link.description, where)
-    checks = plausible_materials(link.description.materials, *units, where) + check_model(model, where)
+    materials = {**link.description.materials, **{name: Material(*m) for name, m in model.materials.items()}}
+    checks = plausible_materials(materials, *units, where) + check_model(model, where)
     _unit_checks(model, np.zeros(0), where)  # a slipped unit is named before the work is done
     basis = with_thermal_shape(model, REDUCTIONS[options.method](model, options, where))
     mass, stiffness = reduced_matrices(model, basis)
@@ -92,6 +94,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     checks += check_expansion(model, None if thermal is None else thermal.force, modes.omega)
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, where)
     checks += _unit_checks(model, modes.omega, where)
+    checks += _mesh_checks(model, link, shapes, modes.omega)
     residuals = mode_residuals(model, shapes, modes.omega)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
     field, statement = None, "not available in physical form"
@@ -134,6 +137,17 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     )
 
 
+def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) -> tuple[HealthCheck, ...]:
+    if link.description.solid is None:
+        return ()
+    from fe_import.elements.solid_stress import SolidStress  # frames have no use for it
+    from fe_import.health.mesh_error import check_mesh_error
+
+    assert isinstance(model.stress, SolidStress)
+    limit = link.description.solid.mesh_error
+    return check_mesh_error(model, model.stress, shapes, omega, limit, str(link.path))
+
+
 def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck, ...]:
     rigid = model.rigid_body_modes()
     mass = mass_properties(rigid.T @ (model.mass @ rigid)).mass
@@ -174,6 +188,7 @@ def provenance(link: LinkFile, model: FEModel, selection: dict[str, Any] | None 
         "options": json.dumps(options, sort_keys=True),
         **({"selection": json.dumps(selection, sort_keys=True)} if selection else {}),
         **{f"source: {key}": text for key, text in model.notes.items()},
+        **({"left out": json.dumps(model.left_out)} if model.left_out else {}),
         "versions": ", ".join(f"{p} {package_version(p)}" for p in packages),
     }
 

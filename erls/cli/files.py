@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from erls.cli.terminal import Force, Json, Output, Progress, print_json, report_times
+
+if TYPE_CHECKING:
+    from erls.run.record import Run
 
 
 def info(file: Path, /, *, json: Json = False) -> None:
@@ -39,13 +43,15 @@ def view(
     magnify: float = 1.0,
     fps: int = 30,
     speed: float = 1.0,
+    overlay: Path | None = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
     """Make a picture, film or export of a run; without -o, open a window.
 
     The ending of the output decides: .png or .jpg a picture, .mp4 or .gif a film, .pvd the deformed links, or beams and
-    bodies, for ParaView, .csv a table of joints, points, forces and energies.
+    bodies, for ParaView, .csv a table of joints, points, forces, sensors and energies, .html a page with a measured
+    record over the run (--overlay).
 
     Parameters
     ----------
@@ -63,6 +69,10 @@ def view(
         Frames per second of a film.
     speed
         Film time over real time; 0.5 is slow motion.
+    overlay
+        Measured record (CSV): time in its first column, then columns with heads of the table that -o RUN.csv gives.
+        They are drawn over those of the run, with largest and rms difference, correlation and lag; -o PAGE.html, or
+        the figures alone.
     force
         Replace an existing file that is no such picture, film, export or table of this program.
     json
@@ -76,6 +86,8 @@ def view(
     loaded = load_run(run)
     if mode is not None:
         loaded = mode_of(loaded, mode)
+    if overlay is not None or (output is not None and output.suffix == ".html"):
+        return _overlaid(loaded, run, overlay, output, force, json)
     if output is None:
         show(loaded)
         return
@@ -95,3 +107,25 @@ def view(
     if json:
         return print_json({"run": str(run), "output": str(output), "wall_s": time.perf_counter() - begun})
     print(f"written to {output}")
+
+
+def _overlaid(loaded: Run, run: Path, record: Path | None, output: Path | None, force: bool, json: bool) -> None:
+    """The part of `view` for a measured record."""
+    from erls.cli.reports import bad, tell_written, write
+    from erls.files.results import claim
+    from erls.report.overlay_page import overlay_page, overlay_text
+    from erls.studies.overlay import overlay, overlay_summary
+
+    if record is None:
+        raise bad("a page shows a measured record over the run", "--output", str(output), "give --overlay MEASURED.csv")
+    if output is not None:
+        if output.suffix != ".html":
+            raise bad("a record is drawn on a page", "--output", output.name, "end in .html")
+        claim(output, output.suffix, [run, record], force)
+    found = overlay(loaded, record)
+    if output is not None:
+        write(output, overlay_page(found))
+    if json:
+        return print_json({**overlay_summary(found), "output": None if output is None else str(output)})
+    print(overlay_text(found))
+    tell_written(output)

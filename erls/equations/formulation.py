@@ -66,6 +66,8 @@ class State:
         Joint coordinates θ, physical joint angles and their rates [rad or m].
     nodes : list of (n, 3) arrays, or None
         World positions of the nodes of each link's modal model, where ``poses`` and ``modal`` only approximate them.
+    turns : list of (n, 3, 3) arrays, or None
+        With them, how these nodes have turned in the world.
     """
 
     time: float
@@ -75,6 +77,7 @@ class State:
     angles: Array
     rates: Array
     nodes: list[Array] | None = None
+    turns: list[Array] | None = None
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,19 @@ symmetric. Where conditions Φ(t, y) = 0 hold, with multipliers λ, K = ∂(R + 
 they leave, Φ_y N = 0. That is exact about equilibria; of a state that moves, tangents are those of the instant, and N
 is taken as constant.
 
-A system says R at many states at once, and its derivatives are central differences: R is quadratic in v but for
-friction, so that those by v are exact to rounding; those by y have an error of 1e-12 of what changes R over the size
-of the mechanism, and rounding of 1e-10 of R over that size. Functions that are compiled take no complex steps.
+A system says R at many states at once, and its derivatives are central differences; functions that are compiled take no
+complex steps, and those that would have to be compiled for each kind of scene. `derivatives` takes two states for each
+coordinate, for iterations: an error of 1e-12 of what changes R over the size of the mechanism, and rounding of 1e-10 of
+R over that size. `slopes` takes four, a thousand times farther apart: what is left is rounding, 1e-13 of R over the
+size of the mechanism, and h⁴/30 of the fifth derivative, h = 1e-3 rad of a turn, 3e-14. Where R changes faster than
+that, as friction does within its transition, steps shrink until two and four states agree.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg as la
@@ -29,6 +33,10 @@ Series = Callable[[Array], Array]
 """(k, m) forces of (k, n) states."""
 
 STEP = 1e-6  # of the size of the mechanism, of differences
+WIDE = 1e-3  # the same for `slopes`
+_SHRINK, _SHRINKINGS = 1 / 16, 5  # of steps within which a function bends too much
+_BENT = 1e-4  # of a slope: difference between that of two and of four states
+_NOISE = 1e-13  # of a function over a step: differences that rounding makes
 _ROUNDING = 1e-12  # of the largest root: real parts below are zero
 _SYMMETRIC = 1e-7  # of a matrix of stiffness: less is rounding of differences
 
@@ -78,7 +86,55 @@ def derivatives(forces: Series, at: Array, steps: Array) -> Array:
     return np.asarray(((found[:n] - found[n:]) / taken).T)
 
 
-def difference_steps(metres: Array, size: float, stiffness: Array) -> Array:
+def slopes(function: Series, directions: Array, steps: Array) -> Array:
+    """(m, c) derivatives of a function (m,) along directions, at the place from which it is displaced.
+
+    Parameters
+    ----------
+    function : callable
+        Of (k, n) displacements.
+    directions : (n, c) array
+        Those of zeros are not evaluated.
+    steps : (c,) array
+        How far along each one.
+    """
+    moving = np.flatnonzero(np.abs(directions).max(axis=0, initial=0.0) > 0)
+    if not len(moving):
+        here = function(np.zeros((1, len(directions))))
+        return np.zeros((here.shape[1], directions.shape[1]))
+    best = _narrow(function, directions[:, moving], steps[moving])
+    for k in range(1, _SHRINKINGS + 1):
+        bent = np.flatnonzero(best.bend > _BENT * np.abs(best.slope).max(axis=0, initial=0.0) + best.noise)
+        if not len(bent):
+            break
+        finer = _narrow(function, directions[:, moving[bent]], steps[moving[bent]] * _SHRINK**k)
+        better = finer.bend < best.bend[bent]
+        best.slope[:, bent[better]], best.bend[bent[better]] = finer.slope[:, better], finer.bend[better]
+        best.noise[bent[better]] = finer.noise[better]
+    result = np.zeros((len(best.slope), directions.shape[1]))
+    result[:, moving] = best.slope
+    return result
+
+
+class _Slopes(NamedTuple):
+    """Slopes (m, c), their largest distance (c,) from those of two states, and what rounding may make of that."""
+
+    slope: Array
+    bend: Array
+    noise: Array
+
+
+def _narrow(function: Series, directions: Array, steps: Array) -> _Slopes:
+    count = directions.shape[1]
+    moved = (directions * steps).T
+    found = function(np.concatenate([moved, -moved, 2 * moved, -2 * moved])).reshape(4, count, -1)
+    two = (found[0] - found[1]) / (2 * steps[:, None])
+    slope = (4 * two - (found[2] - found[3]) / (4 * steps[:, None])) / 3
+    bend = np.abs(slope - two).max(axis=1, initial=0.0)
+    return _Slopes(slope.T, bend, _NOISE * np.abs(found).max(axis=(0, 2), initial=0.0) / steps)
+
+
+def difference_steps(metres: Array, size: float, stiffness: Array, share: float = STEP) -> Array:
     """(n,) steps of differences, each of about the same displacement.
 
     Parameters
@@ -90,8 +146,10 @@ def difference_steps(metres: Array, size: float, stiffness: Array) -> Array:
     stiffness : (n,) array
         Of each coordinate by itself, 0 where nothing holds it: one that moves no node (torsion of the last link) takes
         as much energy as the others.
+    share : float
+        Of the size.
     """
-    steps = STEP * size / metres
+    steps = share * size / metres
     energies = stiffness * steps**2
     held = energies > 0
     if held.any():
@@ -117,13 +175,13 @@ def ways_left(rows: Array, scales: Array) -> Array:
     return np.asarray(scales[:, None] * q[:, len(rows) :])
 
 
-def restricted(mass: Array, damping: Array, stiffness: Array, ways: Array) -> Linearization:
-    """Small motions on the ways (n, f) that conditions leave of tangents (n, n)."""
-    return Linearization(ways.T @ mass @ ways, ways.T @ damping @ ways, ways.T @ stiffness @ ways, ways)
-
-
 def roots(motions: Linearization) -> Array:
-    """(2 f,) complex roots s of s² M + s D + K, the rightmost first, of several the slowest [1/s].
+    """(2 f,) complex roots s of s² M + s D + K, the rightmost first, of several the slowest [1/s]: `small_modes`."""
+    return _state_matrix(motions).sorted(np.linalg.eigvals)[0]
+
+
+def small_modes(motions: Linearization) -> tuple[Array, Array]:
+    """The same with their shapes, (f, 2 f).
 
     Coordinates are turned into modes of M and the symmetric part of K, and their places measured in units of their
     rates, so that stiff and soft ones do not spoil each other: a root of size |s| beside the largest ω is right to
@@ -133,17 +191,34 @@ def roots(motions: Linearization) -> Array:
     ----------
     motions : Linearization
     """
+    state = _state_matrix(motions)
+    found, vectors = state.sorted(np.linalg.eig)
+    return found, state.shapes @ vectors[: state.shapes.shape[1]]
+
+
+class _State(NamedTuple):
+    """Matrix (2 n, 2 n) of modal places in units of their rates, then of rates; and shapes (f, n) of these units."""
+
+    matrix: Array
+    shapes: Array
+
+    def sorted(self, solve: Callable[[Array], Any]) -> tuple[Array, Array]:
+        """Roots, and what ``solve`` finds beside them."""
+        solved = solve(self.matrix)
+        values, vectors = (solved, self.matrix) if isinstance(solved, np.ndarray) else solved
+        found = values.astype(complex)
+        found.real[np.abs(found.real) <= _ROUNDING * np.abs(found).max(initial=0.0)] = 0.0
+        order = np.lexsort((-found.imag, np.abs(found.imag), -found.real))
+        return found[order], vectors[:, order]
+
+
+def _state_matrix(motions: Linearization) -> _State:
     modes = _modes(motions)
     stiffness, damping = (modes.T @ part @ modes for part in (motions.stiffness, motions.damping))
     n = len(stiffness)
-    if not n:
-        return np.zeros(0, dtype=complex)
     rates = np.sqrt(np.abs(np.diag(stiffness)))
     rates = np.maximum(rates, 1e-8 * rates.max()) if rates.any() else np.ones(n)
-    state = np.block([[np.zeros((n, n)), np.diag(rates)], [-stiffness / rates, -damping]])
-    found = np.linalg.eigvals(state).astype(complex)
-    found.real[np.abs(found.real) <= _ROUNDING * np.abs(found).max()] = 0.0
-    return np.asarray(found[np.lexsort((-found.imag, np.abs(found.imag), -found.real))])
+    return _State(np.block([[np.zeros((n, n)), np.diag(rates)], [-stiffness / rates, -damping]]), modes / rates)
 
 
 def _modes(motions: Linearization) -> Array:

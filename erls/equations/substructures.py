@@ -66,10 +66,12 @@ class Substructured:
         poses: list[Array] = []
         modal: list[Array] = []
         nodes: list[Array] = []
+        every: list[Array] = []
         for number, own in enumerate(self.parts.links):
             link, nearest = self.mechanism.links[number], self._nearest[number]
             places, turns = self._displaced(found, number)
             nodes.append(places)
+            every.append(turns)
             if nearest is None:
                 poses.append(found.poses[own.start])
                 modal.append(found.modal[own.start])
@@ -81,7 +83,8 @@ class Substructured:
             poses.append(frame)
             modal.append(nearest @ np.concatenate([moved, _reach(link) * turned]).ravel())
         joints = self.parts.joints
-        return State(t, poses, modal, found.coordinates[joints], found.angles[joints], found.rates[joints], nodes)
+        coordinates, angles, rates = (x[joints] for x in (found.coordinates, found.angles, found.rates))
+        return State(t, poses, modal, coordinates, angles, rates, nodes, every)
 
     def _displaced(self, found: State, number: int) -> tuple[Array, Array]:
         """Places (n, 3) and turns (n, 3, 3) of the nodes of a link in the world."""

@@ -30,6 +30,8 @@ _BEGINS = {
     ".jpeg": b"\xff\xd8",
     ".gif": b"GIF8",
     ".mp4": b"",
+    ".npz": b"PK",
+    ".mat": b"MATLAB",
 }
 _TABLE = re.compile(
     rb'"?(t \[s\]|load \[1\]),.*(energy\.\w+ \[J\]|: energy \[J\])"?\r?\n'  # of a run, or of several
@@ -84,7 +86,7 @@ def _is_earlier(target: Path, kind: str) -> bool:
     """Whether a file is a result of this kind."""
     with contextlib.suppress(OSError):
         if kind in (RUN, MODAL):
-            return _schema(target) == kind
+            return schema_of(target) == kind
         with target.open("rb") as file:
             begin = file.read(_END)
             file.seek(max(0, target.stat().st_size - _END))
@@ -95,7 +97,8 @@ def _is_earlier(target: Path, kind: str) -> bool:
     return False
 
 
-def _schema(target: Path) -> str:
+def schema_of(target: Path) -> str:
+    """Of an HDF5 file; empty of all others."""
     import h5py
 
     with contextlib.suppress(Exception), h5py.File(target, "r", locking="best-effort") as file:  # whatever it is

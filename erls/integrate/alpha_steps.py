@@ -192,6 +192,11 @@ class Steps:
         self.error = float(self._progress.rates[alpha.ERROR])
         return done, status
 
+    @property
+    def accelerations(self) -> Array:
+        """(n + m,) copy of the accelerations and multipliers of the last knot."""
+        return np.array(self._memory.a)
+
     def end(self) -> tuple[Any, Array]:
         """Configuration and velocity."""
         return self._system.unpack(self._start), self._memory.v.copy()

@@ -51,7 +51,7 @@ def generalized_alpha(
     recorder = recorder_for(system, observer, options, capacity)
     if recorder.switching is not None:
         recorder.switching.coarse = True
-    method = _Equal(system, _steps(system, options, recorder), step, options, recorder) if system.size else None
+    method = _Equal(system, steps_of(system, options, recorder), step, options, recorder) if system.size else None
     return integrate_legs(system, times, y, v, recorder, method, options.keeper)
 
 
@@ -93,13 +93,14 @@ class _Equal:
         return self._steps.end()
 
 
-def _steps(system: SecondOrderSystem, options: Options, recorder: Recorder) -> Steps:
+def steps_of(system: SecondOrderSystem, options: Options, recorder: Recorder) -> Steps:
+    """Steps of a system; compiled ones where its equations are."""
     from erls.equations.independent import independent  # here: they import the compiler
-    from erls.equations.uncompiled import steps_of
+    from erls.equations.uncompiled import steps_of as plain_steps
 
     compiled = system.compiled
     own = compiled is not None and compiled.factoring is not None
     cost = _OWN_REFRESH_COST if own else _REFRESH_COST
     rules = Rules(options.spectral_radius, options.newton_tolerance, patience=cost)
-    known = steps_of(system) if compiled is None else independent(compiled)
+    known = plain_steps(system) if compiled is None else independent(compiled)
     return Steps(known, metre_scales(system), rules, Words(), recorder)

@@ -30,7 +30,7 @@ from erls.integrate.alpha_to_tolerance import to_tolerance
 from erls.integrate.base import Leg, Observer
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.constrained_run import ConstrainedRecorder, tell_again
-from erls.integrate.driver import not_finite, run_to_end
+from erls.integrate.driver import Recorder, not_finite, run_to_end
 from erls.integrate.memory import Keeping
 from erls.integrate.step_plans import Plan, planned
 from erls.maths.jit import ENABLED
@@ -92,7 +92,7 @@ def _run(
             return
         refuse_redundant(system, walk[0].first, q)
         place, rate = consistent_start(system, walk[0].first, q, given.v, recorder.warnings)
-        steps = _steps(system, options, recorder)
+        steps = steps_of(system, options, recorder, recorder.kept)
         keeping = Keeping(options.keeper, recorder, steps)
         for number, leg in enumerate(walk):
             if keeping.passed(number):
@@ -112,8 +112,10 @@ def _run(
     return found
 
 
-def _steps(system: ConstrainedSystem, options: ConstrainedOptions, recorder: ConstrainedRecorder) -> Steps:
-    """By compiled functions, where there is a compiler, a system has them, and velocities are not projected."""
+def steps_of(system: ConstrainedSystem, options: ConstrainedOptions, recorder: Recorder, kept: int) -> Steps:
+    """Steps of a system that stores so many numbers of a knot: by compiled functions, where there is a compiler, the
+    system has them, and velocities are not projected.
+    """
     from erls.equations.uncompiled import tied_steps_of  # here: it imports the linear algebra of plain systems
 
     wanted = ENABLED if options.compiled is None else options.compiled
@@ -131,7 +133,7 @@ def _steps(system: ConstrainedSystem, options: ConstrainedOptions, recorder: Con
         over=2,
     )
     words = Words(system.constraint_names, "there", "a smaller step")
-    known = compiled or tied_steps_of(system, recorder.kept, options.project_velocity)
+    known = compiled or tied_steps_of(system, kept, options.project_velocity)
     return Steps(known, metre_scales(system), rules, words, recorder)
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import msgspec
 
-from erls.mechanism.curves import Curve
+from erls.mechanism.curves import Curve, merged
 from erls.mechanism.motions import Motion
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import Load, build_loads
@@ -34,7 +34,7 @@ class Drive:
     kind : str
         ``type`` of the record.
     load : Curve, optional
-        Torque over time.
+        Torque over time; a controller adds its own.
     motion : Curve, optional
         Prescribed or wanted coordinate over time.
     gains : (k, c)
@@ -61,8 +61,7 @@ class Drive:
     @property
     def breakpoints(self) -> tuple[float, ...]:
         """Rising times at which an integrator must stop, s."""
-        curve = self.motion if self.load is None else self.load
-        return () if curve is None else curve.breakpoints
+        return merged(t for curve in (self.load, self.motion) if curve is not None for t in curve.breakpoints)
 
     def torque(self, t: float, angle: float, rate: float, left: bool = False) -> float:
         """Torque, without feed-forward and not limited; 0 where it is a reaction.
@@ -76,12 +75,11 @@ class Drive:
         left : bool
             Take the limit from the left at a breakpoint.
         """
-        if self.load is not None:
-            return self.load.value(t, left)
+        load = 0.0 if self.load is None else self.load.value(t, left)
         if self.motion is None or self.prescribed:
-            return 0.0
+            return load
         wanted, wanted_rate, _ = self.motion.derivatives(t, left)
-        return self.gains[0] * (wanted - angle) + self.gains[1] * (wanted_rate - rate)
+        return load + self.gains[0] * (wanted - angle) + self.gains[1] * (wanted_rate - rate)
 
     def reference(self, t: float, left: bool = False) -> tuple[float, float, float] | None:
         """Prescribed or wanted coordinate, rate and acceleration; None where there is none."""

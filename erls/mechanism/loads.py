@@ -28,6 +28,8 @@ class PointLoad:
         load's own node makes it a follower; None stands for the world.
     factor : Curve or None
         What multiplies the wrench at a time; 1 at all times for None.
+    number : int
+        Of the load of the scene that it is, or is a part of.
     """
 
     link: int
@@ -35,6 +37,7 @@ class PointLoad:
     wrench: Array
     axes: tuple[int, int] | None = None
     factor: Curve | None = None
+    number: int = 0
 
     @property
     def follower(self) -> bool:

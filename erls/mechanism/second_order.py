@@ -89,6 +89,17 @@ class LinkSecondOrder:
         found[3:] -= lift[3:]
         return found
 
+    def bending(self, node: int) -> Array:
+        """(6, m, m) symmetric part of what `node` gives, known from the second time on."""
+        if node not in self._bending:
+            found = self.node(node)
+            self._bending[node] = (found + found.transpose(0, 2, 1)) / 2
+        return self._bending[node]
+
+    @cached_property
+    def _bending(self) -> dict[int, Array]:
+        return {}
+
     def interface(self, interface: InterfaceNode, frame: Array) -> Array:
         """(6, m, m) second-order displacement and rotation vector of a frame that moves rigidly with an interface, as
         `erls.mechanism.links.Link.interface_shape`.

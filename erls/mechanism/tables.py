@@ -39,8 +39,15 @@ def read_csv(path: Path, where: str) -> NDArray[np.float64]:
     SceneError
         File missing, not readable or too large, or a faulty line, which is named.
     """
+    return read_titled_csv(path, where)[1]
+
+
+def read_titled_csv(path: Path, where: str) -> tuple[list[str], NDArray[np.float64]]:
+    """The same with the header line, one title for each column; empty without one. Commas or semicolons separate titles
+    with blanks in them.
+    """
     rows: list[list[float]] = []
-    header = False
+    titles: list[str] = []
     for number, raw in enumerate(_read_text(path, where).split("\n"), start=1):
         line, mark, _ = raw.partition("#")
         if mark and line and not line[-1].isspace():
@@ -50,13 +57,13 @@ def read_csv(path: Path, where: str) -> NDArray[np.float64]:
         if not line:
             continue
         fields = _split(line)
-        if not rows and not header and all(_number(f) is None for f in fields):
-            header = True
+        if not rows and not titles and all(_number(f) is None for f in fields):
+            titles = [field.strip('"') for field in fields]
             continue
         rows.append(_row(path, number, fields, rows[-1] if rows else None))
     if not rows:
         raise _fault(path, "", "no numbers in it", remedy="give lines of time and value")
-    return np.array(rows)
+    return titles, np.array(rows)
 
 
 def _row(path: Path, number: int, fields: list[str], before: list[float] | None) -> list[float]:

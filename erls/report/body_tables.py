@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from erls.report.tables import statement_lines, table
+from erls.report.tables import readings_tables, statement_lines, table
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.run import BodyRun
 
@@ -56,6 +56,8 @@ def body_report(run: BodyRun, times: Sequence[float] = ()) -> str:
     if forces:
         axes = ("Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]")
         parts.append("On the node of each connection\n" + table((head, "connection", *axes), forces))
+    if isinstance(run, BodyMotion):
+        parts += readings_tables(run.sensors, s["samples"])
     return "\n\n".join(parts)
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import reduce
 from operator import getitem
+from typing import Any
 
 import numpy as np
 
+from erls.mechanism.sensors.base import Sensor
 from erls.run.accuracy import PARTS
 from erls.run.chain.run import ChainRun
+from erls.run.readings import output_names
 from erls.run.record import Run
 from fe_import.modal.inertia import MassProperties
 from fe_import.modal.model import HealthCheck, ModalModel
@@ -144,4 +147,15 @@ def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
             rows.append((f"{sample['t']:g}", name, show(joint["angle"]), coordinate, ""))
         for name, point in sample["points"].items():
             rows.append((f"{sample['t']:g}", name, *(f"{x:.6f}" for x in point)))
-    return "\n".join(lines) + "\n\n" + table(("t [s]", "", "x [m]", "y [m]", "z [m]"), rows)
+    parts = ["\n".join(lines), table(("t [s]", "", "x [m]", "y [m]", "z [m]"), rows)]
+    return "\n\n".join([*parts, *readings_tables(run.sensors, s["samples"])])
+
+
+def readings_tables(sensors: Sequence[Sensor], samples: Sequence[dict[str, Any]]) -> list[str]:
+    """What sensors read at the times of samples, a row for each component; nothing of scenes without sensors."""
+    rows = []
+    for sample in samples if sensors else ():
+        found = [x if isinstance(x, list) else [x] for x in sample["sensors"].values()]
+        values = (f"{value:.6g}" for parts in found for value in parts)
+        rows += [(f"{sample['t']:g}", *row) for row in zip(output_names(sensors), values, strict=True)]
+    return [table(("t [s]", "sensor", "reading"), rows)] if rows else []

@@ -1,30 +1,25 @@
 """Stress and section forces of a link during a run.
 
-They need a modal file with recovery maps (table ``[recovery]`` of the link description). What the modes of the scene
-carry is corrected by the static answer of all others to the loads of the run (mode acceleration): see
-`fe_import.modal.recovery_maps`.
+They need a modal file with recovery maps (table ``[recovery]`` of the link description): see
+`erls.run.chain.recovered`.
 """
 
 from __future__ import annotations
 
 import csv
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from erls.equations.substructures import solved
 from erls.errors import Cause, SceneError
 from erls.files.output import replacing
 from erls.maths.so3 import Array
 from erls.mechanism.links import Link
+from erls.run.chain.recovered import maps_of, recovered
 from erls.run.chain.run import ChainRun
-from erls.run.link_loads import link_loads
 from erls.run.record import Run
-from fe_import.modal.model import ModalModel
-from fe_import.modal.recovery_maps import UNITS, RecoveryMaps, spin_products
-from fe_import.recovery.recover import mode_acceleration, mode_displacement, required_maps
+from fe_import.modal.recovery_maps import UNITS, RecoveryMaps
 
 
 def recovery_places(run: ChainRun, link: str) -> RecoveryMaps:
@@ -37,7 +32,7 @@ def recovery_places(run: ChainRun, link: str) -> RecoveryMaps:
     FEImportError
         The link holds nothing to recover from.
     """
-    return required_maps(_link(run, link)[1].model, f"link {link!r}")
+    return maps_of(_link(run, link)[1])
 
 
 def stress(run: ChainRun, link: str, t: ArrayLike, *, static_correction: bool = True) -> Array:
@@ -114,8 +109,6 @@ def export_recovery(
 def _recovered(run: ChainRun, link: str, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
     """(..., p, 6) components at the places of the link's recovery maps."""
     maps = recovery_places(run, link)
-    if _link(run, link)[1].pieces:
-        return _of_pieces(run, _link(run, link)[1], t, quantity, static_correction)
     if maps.quantity != quantity:
         other = "section_forces" if maps.quantity == "section forces" else "stress"
         raise SceneError(
@@ -124,50 +117,8 @@ def _recovered(run: ChainRun, link: str, t: ArrayLike, quantity: str, static_cor
             where=f"link {link!r}",
             remedy=f"ask for erls.{other}",
         )
-    number, record = _link(run, link)
-    times = np.asarray(t, dtype=float)
-    if static_correction:
-        found = link_loads(run, number, times.ravel())
-        modes, loads, spin, warm = mode_acceleration(record.model)
-        values = np.tensordot(found.modal, modes, (1, 2)) + np.tensordot(found.interfaces, loads, (1, 2))
-        values += np.tensordot(spin_products(found.omega), spin, (1, 2))
-    else:
-        modes, warm = mode_displacement(record.model)
-        values = np.tensordot(run.modal_coordinates(link, times.ravel()), modes, (1, 2))
-    return np.asarray((values + warm).reshape(*times.shape, len(maps.nodes), 6))
-
-
-def _of_pieces(run: ChainRun, link: Link, t: ArrayLike, quantity: str, static_correction: bool) -> Array:
-    """(..., p, 6) components at the places of a split link."""
-    solved_for = replace(run, formulation=solved(run.formulation))
-    parts = [_recovered(solved_for, piece.name, t, quantity, static_correction) for piece in link.pieces]
-    return np.stack([parts[piece][..., at, :] for piece, at in _places_in_pieces(link)], axis=-2)
-
-
-def _places_in_pieces(link: Link) -> list[tuple[int, int]]:
-    """Piece and place in its maps of each place of a split link: at the same node, along the same element."""
-    maps = required_maps(link.model, f"link {link.name!r}")
-    names = {number: name for name, number in link.model.node_names.items()}
-    known: dict[str, list[tuple[Array, tuple[int, int]]]] = {}
-    for number, piece in enumerate(link.pieces):
-        own = required_maps(piece.model, piece.name)
-        own_names = {k: name for name, k in piece.model.node_names.items()}
-        for at, (node, element) in enumerate(zip(own.nodes.tolist(), own.elements.tolist(), strict=True)):
-            away = _direction(piece.model, node, element)
-            known.setdefault(own_names[node], []).append((away, (number, at)))
-    result = []
-    for node, element in zip(maps.nodes.tolist(), maps.elements.tolist(), strict=True):
-        away = _direction(link.model, node, element)
-        candidates = known[names[node]]
-        result.append(candidates[int(np.argmax([way @ away for way, _ in candidates]))][1])
-    return result
-
-
-def _direction(model: ModalModel, node: int, element: int) -> Array:
-    """(3,) unit vector from a node along an element of a frame that ends there."""
-    first, second = model.lines[element].tolist()
-    along = model.nodes[second if first == node else first] - model.nodes[node]
-    return np.asarray(along / np.linalg.norm(along))
+    found = recovered(run.instants(t), _link(run, link)[0], static_correction)
+    return found.reshape(*np.shape(t), *found.shape[1:])
 
 
 def _link(run: Run, name: str) -> tuple[int, Link]:

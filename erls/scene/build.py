@@ -114,8 +114,9 @@ def build_mechanism(
         points=tuple(replace(point, link=int(whole.numbers[point.link])) for point in points),
         loads=tuple(build_loads(scene, links, points, whole.numbers)),
         gravity=np.array(record.gravity),
-        static_start=record.initial.deformation == "static",
+        static_start=record.initial.deformation == "static" or record.initial.assemble == "elastic",
         allow_unstable=record.initial.allow_unstable,
+        elastic_assembly=record.initial.assemble == "elastic",
         bandwidth=record.simulation.bandwidth,
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
@@ -138,7 +139,7 @@ def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
             link.name if link.rigid else "",
         )
         if key not in made:
-            made[key] = _modal_model(scene, k, link, tell)
+            made[key] = link_model(scene, k, tell)
         result.append(made[key])
     return result
 
@@ -170,9 +171,22 @@ def link_description(scene: Scene, link: LinkRecord) -> LinkFile:
     return load_link(scene.folder / link.model, options, expands=link.temperature_change is not None)
 
 
-def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> ModalModel:
-    """The link's modal model in the modes that the scene asks for."""
-    place = f"{scene.path}: links[{k}]"
+def link_model(scene: Scene, k: int, tell: Message, description: LinkFile | None = None) -> ModalModel:
+    """Modal model of link ``k`` in the modes that the scene asks for.
+
+    Parameters
+    ----------
+    scene : Scene
+    k : int
+    tell : callable
+    description : LinkFile, optional
+        In place of what the scene's ``model`` names; reduced now, and not kept in the cache.
+
+    Raises
+    ------
+    SceneError, FEImportError
+    """
+    link, place = scene.record.links[k], f"{scene.path}: links[{k}]"
     if link.rigid is not None:
         rigid = link.rigid
         return rigid_model(
@@ -182,7 +196,11 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
             inertia_matrix(rigid.inertia, f"{place}.rigid.inertia", SceneError),
             {n: np.array(p) for n, p in rigid.points.items()},
         )
-    if link.modal_file:
+    if description is not None:
+        from fe_import.reduce import reduce_link  # here, as in `fe_import.cache`
+
+        model = reduce_link(description, tell)
+    elif link.modal_file:
         path = scene.folder / link.modal_file
         model = _within(f"{place}.modal_file", lambda: read_modal_file(path))
         if model.form != "orthonormal":
@@ -194,9 +212,9 @@ def _modal_model(scene: Scene, k: int, link: LinkRecord, tell: Message) -> Modal
                 remedy="reduce with form = 'orthonormal'",
             )
     else:
-        description = _within(f"{place}.model", lambda: link_description(scene, link))
-        model, cached = reduce_cached(description, cache_folder(), tell)
-        tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({description.path.name})")
+        given = _within(f"{place}.model", lambda: link_description(scene, link))
+        model, cached = reduce_cached(given, cache_folder(), tell)
+        tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({given.path.name})")
     model = _warmed(model, link, place)
     wanted = 0 if not link.flexible else link.elastic_modes
     if wanted is None:

@@ -53,7 +53,7 @@ def build_loads(scene: Scene, links: Sequence[Link], points: Sequence[Point], nu
             for node, wrench in _wrenches(load, known, link, place):
                 turner = node if load.follower else link.inboard.node if load.axes == "link" else None
                 axes = None if turner is None else (number, turner)
-                found.append(PointLoad(number, node, wrench, axes, factor))
+                found.append(PointLoad(number, node, wrench, axes, factor, k))
     return found
 
 

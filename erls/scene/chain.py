@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from erls.mechanism.profiles import Load as Profile
+from erls.mechanism.sensors.registry import AnySensor
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
 from erls.scene.records import Pose, Record, SceneFile, SceneTables
@@ -135,10 +136,14 @@ class Initial(Record, frozen=True):
         ``zero``: undeformed; ``static``: in static equilibrium with the joints held.
     allow_unstable : bool
         Whether a static start may lie on an unstable equilibrium, with links loaded beyond buckling; refused otherwise.
+    assemble : str
+        ``rigid``: undeformed links must close the loops; ``elastic``: flexible ones are bent into place, and start in
+        static equilibrium.
     """
 
     deformation: str = "zero"
     allow_unstable: bool = False
+    assemble: str = "rigid"
 
 
 class SceneRecord(SceneTables, frozen=True, kw_only=True):
@@ -170,6 +175,8 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
         Joints that close the chain, ``[[loops]]``.
     events : list of Event
         Crossings that are told after the run, or end it, ``[[events]]``.
+    sensors : list of AnySensor
+        Instruments whose readings are columns of tables, files and reports, ``[[sensors]]``.
     """
 
     simulation: Simulation
@@ -182,6 +189,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     initial: Initial = Initial()
     loops: list[Loop] = []
     events: list[Event] = []
+    sensors: list[AnySensor] = []
 
 
 @dataclass(frozen=True)

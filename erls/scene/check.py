@@ -7,6 +7,7 @@ from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, Load, SceneRecord
+from erls.scene.check_sensors import check_sensors
 from erls.scene.check_settings import check_settings
 from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
@@ -18,6 +19,7 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
+ASSEMBLIES = ("rigid", "elastic")
 AXES = ("world", "link")  # of loads
 # on one coordinate
 _ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
@@ -40,6 +42,9 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     check_tables(scene, file)
     check_settings(scene.simulation, f"{file}: simulation")
     choose(scene.initial.deformation, DEFORMATIONS, f"{file}: initial.deformation", SceneError)
+    choose(scene.initial.assemble, ASSEMBLIES, f"{file}: initial.assemble", SceneError)
+    if scene.initial.assemble == "elastic":
+        _check_assembly(scene, f"{file}: initial.assemble")
     if not scene.joints:
         raise bad(f"{file}: joints", "a scene needs at least one joint", None, "add [[joints]]")
     if len(scene.joints) != len(scene.links):
@@ -70,6 +75,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         _check_loop(loop, scene, f"{file}: loops[{k}]")
     for k, event in enumerate(scene.events):
         _check_event(event, scene, f"{file}: events[{k}]")
+    _check_sensors(scene, file)
     if scene.simulation.bandwidth is not None:
         _check_bandwidth(scene, f"{file}: simulation.bandwidth")
     _check_compound(scene, f"{file}: simulation")
@@ -84,6 +90,24 @@ def check_scene(scene: SceneRecord, file: str) -> None:
                 _check_feed_forward(coordinate, f"{file}: joints[{k}].coordinates.{name}")
         for k, loop in enumerate(scene.loops):
             _check_feed_forward(loop, f"{file}: loops[{k}]")
+
+
+def _check_sensors(scene: SceneRecord, file: str) -> None:
+    points = [point.name for point in scene.points]
+    moving = [name for joint in scene.joints for name in joint_coordinates(joint)]
+    moving += [loop.name for loop in scene.loops if JOINT_TYPES[loop.type].one is not None]
+    taken = {*points, *(joint.name for joint in scene.joints), *(loop.name for loop in scene.loops), "t", "energy"}
+    check_sensors(scene.sensors, file, {"point": points, "joint": moving}, taken)
+
+
+def _check_assembly(scene: SceneRecord, place: str) -> None:
+    message = remedy = ""
+    if not scene.loops:
+        message, remedy = "there is no loop to close", "remove it, or add [[loops]]"
+    elif scene.simulation.formulation == "nodal":
+        message, remedy = "'nodal' assembles rigid links", "use formulation = 'erls' or 'ffr', or remove it"
+    if message:
+        raise bad(place, message, scene.initial.assemble, remedy)
 
 
 _BORNE = {"point": ("force", "moment"), "link": ("force_per_length", "force_per_mass"), "mass": ("force_per_mass",)}

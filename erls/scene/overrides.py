@@ -6,6 +6,7 @@ import tomllib
 from typing import Any
 
 from erls.errors import Cause, SceneError
+from fe_import.files.toml import place_of
 
 _SHORT = {"effects": "simulation.effects"}
 
@@ -20,37 +21,11 @@ def apply_override(data: dict[str, Any], text: str) -> None:
     """
     key, equals, value = text.partition("=")
     where = f"--set {text}"
-    steps = _SHORT.get(key.strip(), key.strip()).split(".")
-    if not equals or not all(steps):
+    if not equals or not all(key.strip().split(".")):
         raise SceneError(Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4")
     try:
         found = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
         found = {}
-    parsed = found["value"] if len(found) == 1 else value.strip()  # a bare word is a string
-    at: Any = data
-    for step, following in zip(steps, [*steps[1:], None], strict=True):
-        if isinstance(at, list):
-            names = [str(k) for k in range(len(at))]
-            names += [str(item["name"]) for item in at if isinstance(item, dict) and "name" in item]
-            named = [k for k, item in enumerate(at) if isinstance(item, dict) and item.get("name") == step]
-            place: Any = named[0] if named else int(step) if step in names[: len(at)] else None
-            if place is None:
-                known = ", ".join(names) or "none"
-                raise SceneError(
-                    Cause.BAD_REFERENCE,
-                    f"no member {step!r}",
-                    where=where,
-                    value=step,
-                    remedy=f"known: {known}",
-                )
-        elif isinstance(at, dict):
-            place = step
-            if following is not None:
-                at.setdefault(step, {})
-        else:
-            raise SceneError(Cause.BAD_FIELD, f"{step!r} is not inside a table", where=where, remedy="check the key")
-        if following is None:
-            at[place] = parsed
-        else:
-            at = at[place]
+    at, place = place_of(data, _SHORT.get(key.strip(), key.strip()), where, SceneError)
+    at[place] = found["value"] if len(found) == 1 else value.strip()  # a bare word is a string

@@ -63,11 +63,21 @@ def load_chain(path: Path | str, overrides: Iterable[str] = ()) -> Scene:
     SceneError, FEImportError
         Also for a scene of bodies.
     """
-    scene = load_scene(path, overrides)
+    return chain_alone(load_scene(path, overrides))
+
+
+def chain_alone(scene: AnyScene) -> Scene:
+    """A scene for what works on chains only.
+
+    Raises
+    ------
+    SceneError
+        It is one of bodies.
+    """
     if isinstance(scene, BodyScene):
         message = "a scene of bodies, beams and connections, which is no chain of joints and links"
         remedy = "use erls simulate, info or view, and erls.simulate_many for variants"
-        raise SceneError(Cause.BAD_FIELD, message, where=str(path), remedy=remedy)
+        raise SceneError(Cause.BAD_FIELD, message, where=str(scene.path), remedy=remedy)
     return scene
 
 

@@ -17,6 +17,7 @@ from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.jit import announcing
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest, Modes, work
+from erls.run.bodies.sensors import body_sensors
 from erls.run.file import self_contained
 from erls.run.watches.base import BodyPlan, Started
 from erls.run.watches.watching import Warnings, Watching
@@ -66,6 +67,7 @@ def _motion(scene: BodyScene, assembly: Assembly, analysis: Dynamics, asked: Ask
     if asked.checkpoints is not None:
         asked.checkpoints.identify(self_contained(scene))
     checkpoint = asked.checkpoint(scene)
+    body_sensors(scene, assembly)  # refused before anything moves
     begun, warnings = time.perf_counter() - (0.0 if checkpoint is None else checkpoint.spent), Warnings(asked.tell)
     warnings(_redundancy(assembly))
     watching = Watching(BodyPlan(scene), warnings, asked.watches(checkpoint))

@@ -40,6 +40,10 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
         refuse_time(settings, asked.until)
     like, tell = asked.like, asked.tell
     built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))
+    if scene.record.sensors:
+        from erls.run.chain.sensors import with_compliances  # here: scenes without sensors need none of it
+
+        scene = with_compliances(scene, built.mechanism)
     scene = self_contained(scene)  # whatever becomes of the tables that it names while it runs
     if asked.checkpoints is not None:
         links = built.mechanism.links

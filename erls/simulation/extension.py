@@ -87,12 +87,14 @@ def refuse_other(scene: SceneFile, run: Run) -> None:
 
 
 def _tables(scene: SceneFile) -> dict[str, Any]:
-    """Of a scene, without what ``auto`` chooses and what an extension settles."""
+    """Of a scene, without what ``auto`` chooses, what an extension settles and what link descriptions say."""
     tables: dict[str, Any] = msgspec.to_builtins(scene.record)
     for name in _RESOLVED:
         tables["simulation"].pop(name, None)
     for link in tables.get("links", ()):
         link.pop("flexible", None)
+    for sensor in tables.get("sensors", ()):
+        sensor.pop("compliance", None)
     return tables
 
 

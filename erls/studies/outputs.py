@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from erls.equations.formulation import State
-from erls.equations.serial.state_series import StateSeries, accelerations, reaction_series, state_series
 from erls.integrate.base import hermite
 from erls.maths.so3 import Array
+from erls.mechanism.sensors.base import Node
+from erls.run.chain.instants import Instants
 from erls.run.chain.places import node_positions
 from erls.run.chain.run import ChainRun
-
-_NUDGE = 1e-4  # s; the second difference along a parabola of time has errors of its square and of rounding, both 1e-8
 
 
 @dataclass(frozen=True)
@@ -79,20 +78,17 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
     formulation, s = run.formulation, run.solution
     t = np.clip(np.asarray(times, dtype=float), s.t[0], s.t[-1])
     y, v = hermite(s.t, s.y, s.v, s.a, t)
-    a = accelerations(formulation, t, y, v)
-    nudges = (-_NUDGE, 0.0, _NUDGE)  # of the time, too: prescribed joints follow it
-    parabola = [state_series(formulation, t + h, y + h * v + h**2 / 2 * a, v + h * a) for h in nudges]
-    before, places, after = (_points(run, series) for series in parabola)
-    acceleration, states = (before - 2 * places + after) / _NUDGE**2, parabola[1]
-    reactions = reaction_series(formulation, t, y, v, a)
+    seen = Instants(formulation, t, y, v)
+    states, reactions = seen.motion.states, seen.reactions
+    points = {p.name: seen.node(Node(p.link, p.node)) for p in formulation.mechanism.points}
     energies = [formulation.energy(*at).total for at in zip(t.tolist(), y, v, strict=True)]
     joints = run.joint_names
     numbers = {name: run.link_number(name) for name in run.link_names}
     models = {name: formulation.mechanism.links[k].model for name, k in numbers.items()}
     return Outputs(
         times=t,
-        points={name: places[:, k] for k, name in enumerate(run.point_names)},
-        accelerations={name: acceleration[:, k] for k, name in enumerate(run.point_names)},
+        points={name: found.place for name, found in points.items()},
+        accelerations={name: found.acceleration for name, found in points.items()},
         angles={name: states.angles[:, k] for k, name in enumerate(joints)},
         coordinates={name: states.coordinates[:, k] for k, name in enumerate(joints)},
         forces={name: reactions.force[:, k] for k, name in enumerate(joints)},
@@ -110,12 +106,6 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
         mode_frequencies={name: m.frequencies_hz[6:] for name, m in models.items()},
         summary=run.summary(),
     )
-
-
-def _points(run: ChainRun, states: StateSeries) -> Array:
-    """(k, p, 3) places of all named points."""
-    count = len(run.point_names)
-    return np.array([run.point_position(states, k) for k in range(count)]).reshape(count, -1, 3).swapaxes(0, 1)
 
 
 def _deflection(run: ChainRun, state: State) -> float:

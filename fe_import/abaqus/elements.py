@@ -5,16 +5,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-_SOLIDS = {
-    4: "tetra",
-    10: "tetra10",
-    8: "hexahedron",
-    20: "hexahedron20",
-    27: "hexahedron27",
-    6: "wedge",
-    15: "wedge15",
-    5: "pyramid",
-}
+from fe_import.elements.reference_cells import HEXAHEDRON
+from fe_import.elements.solid_elements import MESH_ELEMENTS, SolidElement
+
+_SOLIDS = {element.size: element for element in MESH_ELEMENTS.values()}
 _FACES = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8", 9: "quad9"}
 _LINES = {2: "line", 3: "line3"}
 _BEAMS = {1: 2, 3: 2, 2: 3}  # B31, B33, B32
@@ -52,8 +46,8 @@ def element_type(kind: str) -> ElementType:
         return ElementType(0)
     family, number = found[1], int(found[2])
     if family == "C3D":
-        known = number in _SOLIDS
-        return ElementType(number if known else 0, _SOLIDS.get(number, kind), 3)
+        solid = _SOLIDS.get(number)
+        return ElementType(0, kind, 3) if solid is None else ElementType(number, solid.meshio_name, 3)
     if family in ("SC", "CSS"):
         return ElementType(number, kind, 3)
     if family == "B3":
@@ -62,3 +56,23 @@ def element_type(kind: str) -> ElementType:
     table, dimension = (_LINES, 1) if family == "T3D" else (_FACES, 2)
     count = 6 if family == "STRI" and number == 65 else number
     return ElementType(count, table[count], dimension) if count in table else ElementType(0)
+
+
+def solid_type(kind: str) -> SolidElement | None:
+    """The solid element that the name of a type (capitals) means; None for all others."""
+    found = _TYPE.match(kind)
+    return _SOLIDS.get(int(found[2])) if found and found[1] == "C3D" else None
+
+
+def in_mesh_order(nodes: list[int]) -> list[int]:
+    """Nodes of a C3D27 in meshio's order; decks begin the further ones with the centre, then those of S1, S2 ..."""
+    places = [21 + HEXAHEDRON.deck_faces.index(face) for face in range(6)]
+    return [*nodes[:20], *(nodes[k] for k in places), nodes[20]]
+
+
+def face_nodes(kind: str, number: int) -> list[int]:
+    """Places, in meshio's order, of the nodes of face S1, S2 ... of a solid; none where there is no such face."""
+    solid = solid_type(kind)
+    if solid is None or not 1 <= number <= len(solid.faces):
+        return []
+    return [int(k) for k in solid.faces[solid.cell.deck_faces[number - 1]]]

@@ -7,12 +7,14 @@ the matrices. Upper and lower case make no difference, as in these programs.
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fe_import.abaqus.elements import ElementType, element_type
+from fe_import.abaqus.elements import ElementType, element_type, in_mesh_order
+from fe_import.abaqus.keywords import canonical
 from fe_import.abaqus.lines import DeckReader
 from fe_import.abaqus.sets import Item, NodesOf, SetTable, set_items
 from fe_import.errors import Cause, shortened
@@ -21,6 +23,36 @@ from fe_import.files.text import TextFile
 _ELSEWHERE = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")  # make or move nodes and elements
 _ENDED = ("STEP", "PART", "ASSEMBLY", "INSTANCE")
 _LARGEST_LABEL = 999_999_999
+
+
+STATEMENTS = (
+    *("MATERIAL", "ELASTIC", "DENSITY", "MASS", "ROTARY INERTIA", "SPRING"),
+    *("EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING"),
+)
+
+
+@dataclass
+class Statement:
+    """A keyword that `fe_import.abaqus.attachments` or `fe_import.abaqus.materials` interprets at the end of the deck.
+
+    Attributes
+    ----------
+    name : str
+    options : dict of str
+        Parameters, without blanks in their names.
+    rows : list of lists of str
+        Data lines.
+    following : Statement or None
+        *KINEMATIC or *DISTRIBUTING of a *COUPLING.
+    follows : bool
+        Whether it is one of these.
+    """
+
+    name: str
+    options: dict[str, str]
+    rows: list[list[str]]
+    following: Statement | None = None
+    follows: bool = False
 
 
 @dataclass
@@ -32,15 +64,20 @@ class Deck:
     points : dict
         Label -> position.
     elements : dict
-        Type -> label -> labels of its nodes, none for types that are not known.
+        Type -> label -> labels of its nodes in meshio's order, none for types that are not known.
     types : dict of ElementType
     kinds : dict of str
         Label of an element -> its type.
     node_sets, element_sets : SetTable
     surfaces : dict
         Name -> whether it is made of nodes, and its data lines.
+    solid_sections : list of dict
+        Parameters of each *SOLID SECTION.
+    statements : list of Statement
     keywords : Counter of str
         All keywords, in capitals.
+    places : dict of str
+        Where keywords and types of elements stand first.
     """
 
     points: dict[int, tuple[float, ...]] = field(default_factory=dict)
@@ -50,7 +87,10 @@ class Deck:
     node_sets: SetTable = field(default_factory=SetTable)
     element_sets: SetTable = field(default_factory=SetTable)
     surfaces: dict[str, tuple[bool, list[list[str]]]] = field(default_factory=dict)
+    solid_sections: list[dict[str, str]] = field(default_factory=list)
+    statements: list[Statement] = field(default_factory=list)
     keywords: Counter[str] = field(default_factory=Counter)
+    places: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.node_sets.nodes_of = self.nodes_of
@@ -68,7 +108,7 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
     ----------
     path : Path
     where : str
-        To name in messages.
+        To name in messages; the names of included files start at its folder.
     cause : Cause
         Of a faulty deck.
 
@@ -79,13 +119,11 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
         there, parameters that are not known, an end that is missing, what would have to be looked up elsewhere.
     """
     deck = Deck()
-    with TextFile(path, where, cause) as file:
-        reader = DeckReader(file)
+    with TextFile(path, where, cause) as file, contextlib.closing(DeckReader(file, Path(where))) as reader:
         while (keyword := reader.keyword()) is not None:
-            name, options = keyword
+            name, options = canonical(keyword[0]), keyword[1]
             deck.keywords[name] += 1
-            if name == "INCLUDE":
-                raise reader.fault("*INCLUDE is not followed", remedy="join the files into one")
+            deck.places.setdefault(name, reader.place)
             if name in _ELSEWHERE:
                 raise reader.fault(f"*{name} is not followed", remedy="write all nodes and elements out")
             if name in _KEYWORDS:
@@ -93,6 +131,8 @@ def read_deck(path: Path, where: str, cause: Cause) -> Deck:
                     _KEYWORDS[name](reader, reader.known(name, options), deck)
                 except ValueError as problem:
                     raise reader.fault(f"*{name}: {problem}") from None
+            elif name in STATEMENTS:
+                _statement(reader, name, options, deck)
         for name in _ENDED:
             if deck.keywords[name] > deck.keywords[f"END {name}"]:
                 raise reader.fault(f"*{name} without *END {name}: the deck is cut off")
@@ -127,6 +167,7 @@ def _nodes(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
 def _elements(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     kind = _named(options, "TYPE").upper()
     deck.types[kind] = known = element_type(kind)
+    deck.places.setdefault(kind, reader.place)
     cells = deck.elements.setdefault(kind, {})
     labels: list[int] = []
     while (fields := reader.data()) is not None:
@@ -140,6 +181,8 @@ def _elements(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
             continue
         label, *nodes = map(reader.integer, fields)
         nodes = nodes[: known.nodes]
+        if known.nodes == 27:
+            nodes = in_mesh_order(nodes)
         if deck.kinds.setdefault(label, kind) != kind or cells.setdefault(label, nodes) != nodes:
             raise reader.fault(f"element {label} stands twice, with different nodes or types")
         labels.append(label)
@@ -172,6 +215,21 @@ def _surface(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     deck.surfaces[_named(options, "NAME")] = (options.get("TYPE", "ELEMENT").upper() == "NODE", rows)
 
 
+def _solid_section(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
+    _named(options, "ELSET")
+    deck.solid_sections.append(options)
+
+
+def _statement(reader: DeckReader, name: str, options: dict[str, str], deck: Deck) -> None:
+    rows = []
+    while (fields := reader.data()) is not None:
+        rows.append(fields)
+    found = Statement(name, options, rows)
+    if name in ("KINEMATIC", "DISTRIBUTING") and deck.statements and deck.statements[-1].name == "COUPLING":
+        deck.statements[-1].following, found.follows = found, True
+    deck.statements.append(found)
+
+
 def _instance(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
     if deck.keywords["INSTANCE"] > 1:
         raise ValueError("several instances; a link is one part")
@@ -186,6 +244,7 @@ _KEYWORDS: dict[str, Callable[[DeckReader, dict[str, str], Deck], None]] = {
     "NSET": _node_set,
     "ELSET": _element_set,
     "SURFACE": _surface,
+    "SOLID SECTION": _solid_section,
     "INSTANCE": _instance,
 }
 

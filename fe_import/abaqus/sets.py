@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fe_import.abaqus.elements import face_nodes, solid_type
 from fe_import.model import IntArray
 
 MOST_MEMBERS = 20_000_000  # of generated sets, together; a deck of a few lines must not fill the memory
@@ -24,19 +25,6 @@ class NodesOf:
 Item = int | range | str | NodesOf  # a label, labels, the name of another set
 _LABEL = re.compile(r"(?:[A-Za-z_][^=*]*\.)?(\d{1,18})\Z")
 _NAME = re.compile(r"[A-Za-z_][^=*]*\Z")
-
-# corners of face S1, S2 ... of an element of that many corners, in the deck's (meshio's) order
-_FACES = {
-    8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
-    4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-}
-_CORNERS = {4: 4, 10: 4, 8: 8, 20: 8, 27: 8}
-_TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-_HEX_EDGES = (
-    *((0, 1), (1, 2), (2, 3), (3, 0)),
-    *((4, 5), (5, 6), (6, 7), (7, 4)),
-    *((0, 4), (1, 5), (2, 6), (3, 7)),
-)
 
 
 class LostSet(Exception):
@@ -171,9 +159,15 @@ def _item(word: str) -> Item:
 
 
 def surface_nodes(
-    rows: list[list[str]], elements: SetTable, connectivity: dict[int, list[int]], node_sets: SetTable, by_nodes: bool
+    rows: list[list[str]],
+    elements: SetTable,
+    connectivity: dict[int, tuple[str, list[int]]],
+    node_sets: SetTable,
+    by_nodes: bool,
 ) -> set[int]:
     """Labels of the nodes of a *SURFACE: rows of (element or set, face) or of (node or set).
+
+    ``connectivity`` holds type and nodes of each element.
 
     Raises
     ------
@@ -195,24 +189,19 @@ def surface_nodes(
         for label in labels:
             if label not in connectivity:
                 raise LostSet(f"it needs element {label}, which the deck does not define")
-            found.update(_face_nodes(connectivity[label], face))
+            found.update(_face_nodes(*connectivity[label], face))
     return found
 
 
-def _face_nodes(nodes: list[int], face: str) -> list[int]:
+def _face_nodes(kind: str, nodes: list[int], face: str) -> list[int]:
     if face in ("SPOS", "SNEG"):
         return nodes
-    corners = _CORNERS.get(len(nodes))
-    if corners is None or not face.startswith("S") or not face[1:].isdigit():
-        raise LostSet(f"face {face or 'of the free surface'!r} of an element of {len(nodes)} nodes is not followed")
-    number = int(face[1:])
-    if not 1 <= number <= len(_FACES[corners]):
-        raise LostSet(f"elements of {corners} corners have no face {face}")
-    chosen = set(_FACES[corners][number - 1])
-    # a mid-side node belongs to the face when both corners of its edge do
-    edges = _HEX_EDGES if corners == 8 else _TET_EDGES
-    inside = [k for k, edge in enumerate(edges, start=corners) if k < len(nodes) and chosen.issuperset(edge)]
-    return [nodes[k] for k in (*sorted(chosen), *inside)]
+    if solid_type(kind) is None or not face.startswith("S") or not face[1:].isdigit():
+        raise LostSet(f"face {face or 'of the free surface'!r} of an element of type {kind} is not followed")
+    places = face_nodes(kind, int(face[1:]))
+    if not places:
+        raise LostSet(f"elements of type {kind} have no face {face}")
+    return [nodes[k] for k in places]
 
 
 def indices(labels: set[int], place: dict[int, int], what: str) -> IntArray:

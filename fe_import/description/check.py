@@ -25,6 +25,7 @@ _CHOICES = {
     "frame.theory": ("timoshenko", "euler-bernoulli"),
     "frame.mass": ("consistent", "lumped"),
     "frame.torsion": ("saint-venant", "polar"),
+    "solid.hex8": ("incompatible-modes", "compatible"),
 }
 
 
@@ -59,6 +60,9 @@ def check_link(link: LinkDescription, file: str) -> None:
             raise _fail(
                 f"{place}.poissons_ratio", "Poisson's ratio out of range", m.poissons_ratio, "between -1 and 0.5"
             )
+    if link.solid is not None and not 0 < link.solid.mesh_error < math.inf:
+        message, remedy = "an error must be positive", "give a share, as 0.05 for 5 percent"
+        raise _fail(f"{file}: solid.mesh_error", message, link.solid.mesh_error, remedy)
     for name, section in link.sections.items():
         check_section(section, f"{file}: sections.{name}")
     for table, nodes in (("frame", link.frame), ("solid", link.solid), ("matrices", link.matrices)):

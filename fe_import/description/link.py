@@ -13,6 +13,7 @@ import msgspec
 from fe_import.description.check import check_link
 from fe_import.description.records import LinkDescription
 from fe_import.description.reduction import Reduction
+from fe_import.files.includes import with_included
 from fe_import.files.toml import convert, read_toml
 
 _METHOD = Reduction().method
@@ -35,7 +36,8 @@ class LinkFile:
         digest = hashlib.sha256(msgspec.json.encode(self.description, order="deterministic"))
         for name in self.description.files():
             with contextlib.suppress(OSError, ValueError):  # reported with its name when it is read
-                digest.update((self.folder / name).read_bytes())
+                for file in with_included(self.folder / name):
+                    digest.update(file.read_bytes())
         return digest.hexdigest()
 
 

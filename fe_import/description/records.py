@@ -134,19 +134,33 @@ class Solid(_Record, frozen=True):
     Attributes
     ----------
     mesh : str
-        Any file that meshio reads, also packed as ``.gz``; the path starts at the description.
+        An input deck, bulk data, or any file that meshio reads, also packed as ``.gz``; the path starts at the
+        description.
     material : str
-        A name from ``[materials]``, for the whole mesh.
+        A name from ``[materials]``, for the whole mesh; without it and ``regions`` an input deck brings its materials.
     regions : list of Region
         Instead of ``material``: one for each set of elements, ``[[solid.regions]]``.
     nodes : dict of (3,) floats
         Names for the mesh nodes nearest to these positions [m]; scenes may refer to them.
+    hex8 : str
+        How hexahedra of 8 nodes strain: with ``incompatible-modes``, or ``compatible``, which locks in bending.
+    raise_order : bool
+        Linear elements become quadratic ones, with nodes in the middle of their straight edges.
+    mesh_error : float
+        Largest error of the first elastic frequencies by the mesh, estimated, as a share: beyond it the health check
+        fails, and linear elements (tetrahedra, wedges, pyramids, compatible hexahedra) are refused.
+    ignore : list of str
+        Keywords, cards and types of elements of the mesh file that the link is to be without.
     """
 
     mesh: str
     material: str = ""
     regions: list[Region] = []
     nodes: dict[str, Vector] = {}
+    hex8: str = "incompatible-modes"
+    raise_order: bool = False
+    mesh_error: float = 0.05
+    ignore: list[str] = []
 
 
 class Matrices(_Record, frozen=True):

@@ -69,14 +69,15 @@ def assemble_solid(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> tuple
     pattern = NodePattern(mesh)
     masses, stiffnesses = np.zeros(pattern.size), np.zeros(9 * pattern.size)
     for material, elements in zip(materials, assigned, strict=True):
-        for some in chunks(mesh, elements):
-            pattern.add_masses(masses, some, element_masses(mesh, some, material.density))
-            pattern.add_stiffnesses(stiffnesses, some, element_stiffnesses(mesh, some, *material.lame))
+        for element, nodes, _ in chunks(mesh, elements):
+            corners = mesh.nodes[nodes]
+            pattern.add_masses(masses, nodes, element_masses(element, corners, material.density))
+            pattern.add_stiffnesses(stiffnesses, nodes, element_stiffnesses(element, corners, *material.lame))
     return pattern.mass(masses), pattern.stiffness(stiffnesses)
 
 
 def _assigned_elements(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> list[IntArray]:
-    count = len(mesh.elements)
+    count = mesh.count
     uses = np.zeros(count, dtype=np.int64)
     assigned = []
     for k, material in enumerate(materials):

@@ -12,47 +12,100 @@ from collections.abc import Iterator
 import numpy as np
 import scipy.sparse as sp
 
+from fe_import.elements.solid_elements import SolidElement
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.model import Array, IntArray
 
 _CHUNK_VALUES = 3_000_000  # entries of element matrices held at a time
 
 
-def element_masses(mesh: SolidMesh, elements: IntArray, density: float) -> Array:
-    """(e, k, k) consistent mass between the nodes of each element, the same for all three components [kg]."""
-    points, weights = mesh.element.quadrature(mesh.element.mass_order)
-    values = mesh.element.shape_values(points)
+def element_masses(element: SolidElement, corners: Array, density: float) -> Array:
+    """(e, k, k) consistent mass between the nodes of each element, the same for all three components [kg].
+
+    ``corners`` (e, k, 3): positions of the nodes.
+    """
+    points, weights = element.quadrature(element.mass_order)
+    values = element.shape_values(points)
     products = np.einsum("iq,jq->qij", values, values).reshape(len(weights), -1)
-    volume = _volumes(_tangents(mesh, elements, mesh.element.shape_gradients(points))) * weights
-    masses = (density * volume @ products).reshape(len(elements), len(values), len(values))
+    volume = _volumes(_tangents(corners, element.shape_gradients(points))) * weights
+    masses = (density * volume @ products).reshape(len(corners), len(values), len(values))
     return np.asarray((masses + masses.swapaxes(1, 2)) / 2)
 
 
-def element_stiffnesses(mesh: SolidMesh, elements: IntArray, lam: float, mu: float) -> Array:
-    """(e, 3 k, 3 k) stiffness of each element, row 3 * node + component, symmetric to the last bit [N/m]."""
-    points, weights = mesh.element.quadrature(mesh.element.stiffness_order)
-    reference = mesh.element.shape_gradients(points)
-    tangents = _tangents(mesh, elements, reference)
-    volume = _volumes(tangents)
-    k, q = reference.shape[0], reference.shape[2]
-    # ∂φ/∂x = Σ_d (∂X_d/∂x) ∂φ/∂X_d, and ∂X_0/∂x = t_1 × t_2 / volume
-    normals = np.stack([np.cross(tangents[d - 2], tangents[d - 1]) for d in range(3)], axis=-1)  # (e, q, 3, 3)
-    scaled = (normals * np.sqrt(weights / volume)[:, :, None, None]) @ reference.transpose(2, 1, 0)
-    scaled = scaled.transpose(0, 3, 2, 1).reshape(len(elements), 3 * k, q)
-    g = (scaled @ scaled.swapaxes(1, 2)).reshape(len(elements), k, 3, k, 3)
-    stiffness = lam * g + mu * g.swapaxes(2, 4)
-    trace = mu * np.einsum("eiaja->eij", g)
-    for a in range(3):
-        stiffness[:, :, a, :, a] += trace
-    stiffness = stiffness.reshape(len(elements), 3 * k, 3 * k)
+def element_stiffnesses(element: SolidElement, corners: Array, lam: float, mu: float) -> Array:
+    """(e, 3 k, 3 k) stiffness of each element, row 3 * node + component, symmetric to the last bit [N/m].
+
+    ``corners`` (e, k, 3): positions of the nodes. Incompatible modes are eliminated.
+    """
+    full, size = _with_modes(element, corners, lam, mu), 3 * element.size
+    if not element.incompatible:
+        return full
+    motion = _motion_of_modes(full, size)
+    stiffness = full[:, :size, :size] + full[:, :size, size:] @ motion
     return np.asarray((stiffness + stiffness.swapaxes(1, 2)) / 2)
 
 
-def _tangents(mesh: SolidMesh, elements: IntArray, gradients: Array) -> Array:
+def motion_of_modes(element: SolidElement, corners: Array, lam: Array, mu: Array) -> Array:
+    """(e, 9 or 0, 3 k) incompatible modes that go with the displacements of the nodes; ``lam``, ``mu`` (e,)."""
+    size = 3 * element.size
+    if not element.incompatible:
+        return np.zeros((len(corners), 0, size))
+    return _motion_of_modes(_with_modes(element, corners, lam[:, None, None], mu[:, None, None]), size)
+
+
+def _motion_of_modes(full: Array, size: int) -> Array:
+    return np.asarray(-np.linalg.solve(full[:, size:, size:], full[:, size:, :size]))
+
+
+def _with_modes(element: SolidElement, corners: Array, lam: float | Array, mu: float | Array) -> Array:
+    """(e, 3 k', 3 k') stiffness over nodes and incompatible modes."""
+    scaled = _weighted_slopes(element, corners, *element.quadrature(element.stiffness_order))
+    count, q, _, k = scaled.shape
+    scaled = scaled.transpose(0, 3, 2, 1).reshape(count, 3 * k, q)
+    g = scaled @ scaled.swapaxes(1, 2)
+    terms = g.reshape(count, k, 3, k, 3)
+    stiffness = (lam * g + mu * terms.swapaxes(2, 4).reshape(g.shape)).reshape(terms.shape)
+    trace = mu * np.einsum("eiaja->eij", terms)
+    for a in range(3):
+        stiffness[:, :, a, :, a] += trace
+    stiffness = stiffness.reshape(g.shape)
+    return np.asarray((stiffness + stiffness.swapaxes(1, 2)) / 2)
+
+
+def _weighted_slopes(element: SolidElement, corners: Array, points: Array, weights: Array) -> Array:
+    """(e, q, 3, k') derivatives of shape functions and incompatible modes, times the root of weight and volume."""
+    reference = element.shape_gradients(points)
+    tangents = _tangents(corners, reference)
+    root = np.sqrt(weights / _volumes(tangents))[:, :, None, None]
+    # ∂φ/∂x = Σ_d (∂X_d/∂x) ∂φ/∂X_d, and ∂X_0/∂x = t_1 × t_2 / volume
+    scaled = (_normals(tangents) * root) @ reference.transpose(2, 1, 0)
+    if not element.incompatible:
+        return np.asarray(scaled)
+    centre = np.full((3, 1), 0.5)
+    normals = _normals(_tangents(corners, element.shape_gradients(centre)))
+    modes = (normals * root) @ element.incompatible_gradients(points).transpose(2, 1, 0)
+    return np.concatenate([scaled, modes], axis=3)
+
+
+def slopes(element: SolidElement, corners: Array, points: Array) -> tuple[Array, Array]:
+    """Derivatives in space (e, q, 3, k') of shape functions, then of incompatible modes, and volume (e, q) there.
+
+    ``corners`` (e, k, 3): positions of the nodes; ``points`` (3, q) of the reference cell.
+    """
+    volume = _volumes(_tangents(corners, element.shape_gradients(points)))
+    scaled = _weighted_slopes(element, corners, points, np.ones(points.shape[1]))
+    return scaled / np.sqrt(volume)[:, :, None, None], volume
+
+
+def _normals(tangents: Array) -> Array:
+    """(e, q, 3, 3) columns t_1 × t_2 ..., the reference coordinates' slopes times the volume."""
+    return np.stack([np.cross(tangents[d - 2], tangents[d - 1]) for d in range(3)], axis=-1)
+
+
+def _tangents(corners: Array, gradients: Array) -> Array:
     """(3, e, q, 3) derivatives of the position by each reference coordinate."""
-    corners = mesh.nodes[mesh.elements[elements]].swapaxes(1, 2)  # (e, 3, k)
     k, _, q = gradients.shape
-    by_all = (corners @ gradients.reshape(k, 3 * q)).reshape(-1, 3, 3, q)
+    by_all = (corners.swapaxes(1, 2) @ gradients.reshape(k, 3 * q)).reshape(-1, 3, 3, q)
     return np.ascontiguousarray(by_all.transpose(2, 0, 3, 1))
 
 
@@ -61,11 +114,13 @@ def _volumes(tangents: Array) -> Array:
     return np.asarray(np.einsum("eqc,eqc->eq", tangents[0], np.cross(tangents[1], tangents[2])))
 
 
-def chunks(mesh: SolidMesh, elements: IntArray) -> Iterator[IntArray]:
-    """A few elements at a time, which bounds the memory."""
-    step = max(1, _CHUNK_VALUES // (9 * len(mesh.element.reference_nodes) ** 2))
-    for start in range(0, len(elements), step):
-        yield elements[start : start + step]
+def chunks(mesh: SolidMesh, chosen: IntArray | None = None) -> Iterator[tuple[SolidElement, IntArray, IntArray]]:
+    """A few elements of one type at a time, which bounds the memory: type, nodes (e, k) and numbers (e,)."""
+    for block, rows, numbers in mesh.parts(chosen):
+        step = max(1, _CHUNK_VALUES // (9 * block.element.size**2))
+        for start in range(0, len(rows), step):
+            some = slice(start, start + step)
+            yield block.element, block.elements[rows[some]], numbers[some]
 
 
 class NodePattern:
@@ -77,11 +132,11 @@ class NodePattern:
     """
 
     def __init__(self, mesh: SolidMesh) -> None:
-        self._elements = mesh.elements
-        count, k = mesh.elements.shape
-        shape = (len(mesh.nodes), count)
-        ends = mesh.elements.ravel(), np.arange(count).repeat(k)
-        belongs = sp.csr_array((np.ones(count * k, dtype=np.int32), ends), shape)
+        ends = (
+            np.concatenate([block.elements.ravel() for block in mesh.blocks]),
+            np.concatenate([numbers.repeat(block.element.size) for block, _, numbers in mesh.parts()]),
+        )
+        belongs = sp.csr_array((np.ones(len(ends[0]), dtype=np.int32), ends), (len(mesh.nodes), mesh.count))
         pattern = (belongs @ belongs.T).tocsr()
         pattern.sort_indices()
         self._start = pattern.indptr.astype(np.int64)
@@ -93,13 +148,13 @@ class NodePattern:
         """Number of pairs of nodes."""
         return len(self._columns)
 
-    def add_masses(self, data: Array, elements: IntArray, masses: Array) -> None:
-        """Add element matrices (e, k, k) to the entries (size,) of a matrix over the nodes."""
-        np.add.at(data, self._places(elements).ravel(), masses.ravel())
+    def add_masses(self, data: Array, nodes: IntArray, masses: Array) -> None:
+        """Add matrices (e, k, k) of elements with ``nodes`` (e, k) to the entries (size,) of one over the nodes."""
+        np.add.at(data, self._places(nodes).ravel(), masses.ravel())
 
-    def add_stiffnesses(self, data: Array, elements: IntArray, stiffnesses: Array) -> None:
-        """Add element matrices (e, 3 k, 3 k) to the entries (9 size,) of a matrix over the nodal components."""
-        nodes, place = self._elements[elements], self._places(elements)
+    def add_stiffnesses(self, data: Array, nodes: IntArray, stiffnesses: Array) -> None:
+        """The same with matrices (e, 3 k, 3 k), to the entries (9 size,) of a matrix over the nodal components."""
+        place = self._places(nodes)
         start = self._start[nodes][:, :, None]
         length = self._start[nodes + 1][:, :, None] - start
         # row 3 i + a begins after 9 entries per earlier pair and 3 a per pair of this node; 3 entries per pair in it
@@ -130,9 +185,9 @@ class NodePattern:
         at -= np.repeat((indptr[:-1] - np.repeat(each * self._start[:-1], 3)).astype(small), rows)
         return indptr, at
 
-    def _places(self, elements: IntArray) -> IntArray:
+    def _places(self, nodes: IntArray) -> IntArray:
         """(e, k, k) entry of each pair of nodes of each element."""
-        nodes, count = self._elements[elements], len(self._start) - 1
+        count = len(self._start) - 1
         return np.asarray(np.searchsorted(self._keys, nodes[:, :, None] * count + nodes[:, None, :]))
 
 

@@ -1,13 +1,62 @@
-"""A mesh of one solid element type, and its surface: data only."""
+"""A mesh of solid elements, of one type or several, and its surface: data only."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from fe_import.elements.attachments import Attachment
 from fe_import.elements.solid_elements import SOLID_ELEMENTS, SolidElement
 from fe_import.model import Array, IntArray
+
+
+@dataclass(frozen=True)
+class ElementBlock:
+    """Elements of one type.
+
+    Attributes
+    ----------
+    type : str
+        Key of ``SOLID_ELEMENTS``.
+    elements : (m, k) int array
+        Nodes of each element in meshio's (VTK's) order.
+    """
+
+    type: str
+    elements: IntArray
+
+    @property
+    def element(self) -> SolidElement:
+        """The element type's entry in the registry."""
+        return SOLID_ELEMENTS[self.type]
+
+    def __len__(self) -> int:
+        return len(self.elements)
+
+
+@dataclass(frozen=True)
+class MeshMaterials:
+    """Materials that a mesh file brings.
+
+    Attributes
+    ----------
+    constants : dict
+        Name -> Young's modulus, Poisson's ratio, density, in the units of the file.
+    sections : tuple of pairs
+        Element set and material.
+    lack : str
+        Why they cannot be used; empty when they can.
+    names : tuple of str
+        What of the file they are made of.
+    """
+
+    constants: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    sections: tuple[tuple[str, str], ...] = ()
+    lack: str = "it is none that brings materials"
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -18,10 +67,8 @@ class SolidMesh:
     ----------
     nodes : (n, 3) array
         Positions in the mesh frame, in the file's unit of length; every node belongs to an element.
-    elements : (m, k) int array
-        Nodes of each element in meshio's (VTK's) order.
-    element_type : str
-        Key of ``SOLID_ELEMENTS``.
+    blocks : tuple of ElementBlock
+        Elements are counted through all blocks.
     element_sets : dict
         Name -> elements, rising.
     node_sets : dict
@@ -30,42 +77,111 @@ class SolidMesh:
         File that the mesh came from.
     lost_sets : dict
         Name -> why a set of the file is not among these.
+    left_out : dict of int
+        What stands in the file and is not part of the link, and how often.
+    further_nodes : (k, 3) array
+        Of no element, which attachments need.
+    attachments : tuple of Attachment
+        Further nodes have negative numbers: those of the mesh and these in one array, counted from its end.
+    materials : MeshMaterials
     """
 
     nodes: Array
-    elements: IntArray
-    element_type: str
+    blocks: tuple[ElementBlock, ...]
     element_sets: dict[str, IntArray] = field(default_factory=dict)
     node_sets: dict[str, IntArray] = field(default_factory=dict)
     source: str = ""
     lost_sets: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, int] = field(default_factory=dict)
+    further_nodes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    attachments: tuple[Attachment, ...] = ()
+    materials: MeshMaterials = field(default_factory=MeshMaterials)
+
+    @staticmethod
+    def uniform(nodes: Array, elements: IntArray, element_type: str, **further: Any) -> SolidMesh:
+        """A mesh of one element type."""
+        return SolidMesh(nodes, (ElementBlock(element_type, elements),), **further)
 
     @property
-    def element(self) -> SolidElement:
-        """The element type's entry in the registry."""
-        return SOLID_ELEMENTS[self.element_type]
+    def only(self) -> ElementBlock:
+        """The block of a mesh of one type."""
+        (block,) = self.blocks
+        return block
+
+    @property
+    def count(self) -> int:
+        """Number of elements."""
+        return sum(map(len, self.blocks))
+
+    def parts(self, chosen: IntArray | None = None) -> Iterator[tuple[ElementBlock, IntArray, IntArray]]:
+        """Each block with its chosen elements: their rows in it, and their numbers through all blocks."""
+        start = 0
+        for block in self.blocks:
+            if chosen is None:
+                rows = np.arange(len(block))
+            else:
+                rows = chosen[(chosen >= start) & (chosen < start + len(block))] - start
+            yield block, rows, rows + start
+            start += len(block)
+
+    def nodes_of(self, chosen: IntArray) -> IntArray:
+        """Nodes of elements, rising."""
+        used = [block.elements[rows].ravel() for block, rows, _ in self.parts(chosen)]
+        return np.unique(np.concatenate(used))
+
+    def element_nodes(self, number: int) -> IntArray:
+        """(k,) nodes of one element."""
+        for block, rows, _ in self.parts(np.array([number])):
+            if len(rows):
+                return np.asarray(block.elements[rows[0]])
+        raise IndexError(number)
 
 
-def element_faces(mesh: SolidMesh) -> tuple[IntArray, IntArray]:
-    """All faces of all elements, and which of them are one and the same.
+@dataclass(frozen=True)
+class ElementFaces:
+    """All faces of all elements, anticlockwise seen from outside.
 
-    Returns
-    -------
-    faces : (m * faces of an element, nodes of a face) int array
-        Element by element, anticlockwise seen from outside.
-    label : (m * faces of an element,) int array
+    Attributes
+    ----------
+    nodes : (f, w) int array
+        Corners, mid-edge nodes, centre; filled up with -1.
+    sizes : (f,) int array
+        How many nodes each has.
+    label : (f,) int array
         Equal for faces of equal corners.
+    owner : (f,) int array
+        Elements.
     """
-    faces = mesh.elements[:, mesh.element.faces].reshape(-1, mesh.element.faces.shape[1])
-    corners = np.sort(faces[:, : len(mesh.element.corner_faces[0])], axis=1)
-    label = np.unique(corners, axis=0, return_inverse=True)[1]
-    return faces, np.asarray(label.ravel(), dtype=np.int64)
+
+    nodes: IntArray
+    sizes: IntArray
+    label: IntArray
+    owner: IntArray
 
 
-def boundary_faces(mesh: SolidMesh) -> IntArray:
-    """(f, nodes of a face) faces of one element only, anticlockwise seen from outside."""
-    faces, label = element_faces(mesh)
-    return np.asarray(faces[np.bincount(label)[label] == 1])
+def element_faces(mesh: SolidMesh) -> ElementFaces:
+    """All faces of all elements, and which of them are one and the same."""
+    width = max(len(face) for block in mesh.blocks for face in block.element.faces)
+    nodes, corners, sizes, owner = [], [], [], []
+    for block, _, numbers in mesh.parts():
+        for face, edges in zip(block.element.faces, block.element.cell.faces, strict=True):
+            rows = np.full((len(block), width), -1, dtype=np.int64)
+            rows[:, : len(face)] = block.elements[:, face]
+            ends = np.full((len(block), 4), -1, dtype=np.int64)
+            ends[:, : len(edges)] = block.elements[:, edges]
+            nodes.append(rows)
+            corners.append(ends)
+            sizes.append(np.full(len(block), len(face)))
+            owner.append(numbers)
+    label = np.unique(np.sort(np.concatenate(corners), axis=1), axis=0, return_inverse=True)[1]
+    return ElementFaces(np.concatenate(nodes), np.concatenate(sizes), label.ravel(), np.concatenate(owner))
+
+
+def boundary_faces(mesh: SolidMesh) -> list[IntArray]:
+    """Faces of one element only, anticlockwise seen from outside: an array (f, k) for each number of nodes k."""
+    faces = element_faces(mesh)
+    alone = np.bincount(faces.label)[faces.label] == 1
+    return [faces.nodes[alone & (faces.sizes == k), :k] for k in np.unique(faces.sizes[alone])]
 
 
 # a face of n nodes -> triangles over its nodes (corners, then mid-edge nodes, then centre), same sense
@@ -78,14 +194,12 @@ FACE_TRIANGLES = {
 }
 
 
-def surface_triangles(mesh: SolidMesh) -> IntArray:
-    """Faces of one element only, split into triangles over all their nodes, so that curvature shows.
+def split_faces(faces: list[IntArray]) -> IntArray:
+    """(t, 3) triangles over all nodes of faces (f, k), so that curvature shows; the same sense."""
+    triangles = [f[:, np.array(FACE_TRIANGLES[f.shape[1]])].reshape(-1, 3) for f in faces]
+    return np.concatenate([np.zeros((0, 3), dtype=np.int64), *triangles])
 
-    Returns
-    -------
-    (t, 3) int array
-        Anticlockwise seen from outside.
-    """
-    boundary = boundary_faces(mesh)
-    corners = np.array(FACE_TRIANGLES[boundary.shape[1]])
-    return np.asarray(boundary[:, corners].reshape(-1, 3), dtype=np.int64)
+
+def surface_triangles(mesh: SolidMesh) -> IntArray:
+    """(t, 3) triangles of the surface, anticlockwise seen from outside."""
+    return split_faces(boundary_faces(mesh))

@@ -1,9 +1,9 @@
 """Stress at the nodes of a solid as a linear map of the nodal displacements.
 
 Strains are taken at the points where those of the element are most accurate (J. Barlow, Int. J. Numer. Methods Eng.
-10, 1976: 2 x 2 x 2 Gauss points of hexahedra, 4 points of the tet10, the centre of the tet4), extrapolated to its
-nodes by the polynomial through these points, and averaged over the elements that meet at a node. Where two materials
-meet, the average is over both.
+10, 1976: 2 x 2 x 2 Gauss points of hexahedra, 4 points of the tet10, 3 x 2 of the wedge15, the centre of linear
+elements), extrapolated to its nodes by the polynomial through these points (of the pyramid13 the linear one nearest to
+8), and averaged over the elements that meet at a node. Where two materials meet, the average is over both.
 """
 
 from __future__ import annotations
@@ -13,11 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fe_import.elements.reference_cells import HEXAHEDRON, TETRAHEDRON, WEDGE
+from fe_import.elements.solid_assembly import chunks, motion_of_modes, slopes
 from fe_import.elements.solid_elements import SolidElement
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.model import Array, IntArray
 
 _CHUNK_VALUES = 4_000_000  # stress values held at a time
+_POWERS = (np.zeros((1, 3), dtype=int), np.vstack([np.zeros((1, 3), dtype=int), np.eye(3, dtype=int)]))
 
 
 @dataclass(frozen=True)
@@ -53,26 +56,50 @@ class SolidStress:
 
     def evaluate(self, fields: Array, dof_map: IntArray, sites: IntArray) -> Array:
         """(p, 6, m) stress xx, yy, zz, xy, yz, zx [Pa] of displacement fields (d, m), mesh axes."""
-        mesh, element = self.mesh, self.mesh.element
-        points, to_nodes = sampling(element)
-        gradients = element.shape_gradients(points)
+        mesh = self.mesh
         place = np.full(len(mesh.nodes), -1, dtype=np.int64)
         place[sites] = np.arange(len(sites))
-        touching = np.flatnonzero((place[mesh.elements] >= 0).any(axis=1))
         total, count = np.zeros((len(sites), 6, fields.shape[1])), np.zeros(len(sites))
-        step = max(1, _CHUNK_VALUES // (len(to_nodes) * 9 * max(1, fields.shape[1])))
-        for start in range(0, len(touching), step):
-            some = touching[start : start + step]
-            nodes = mesh.elements[some]
-            jacobian = np.einsum("eka,kbq->eqab", mesh.nodes[nodes], gradients)
-            slopes = np.einsum("kbq,eqba->eqak", gradients, np.linalg.inv(jacobian))
-            moved = fields[dof_map[nodes, :3]].reshape(len(some), nodes.shape[1], -1)
-            strained = (slopes.reshape(len(some), -1, nodes.shape[1]) @ moved).reshape(*slopes.shape[:3], 3, -1)
-            nodal = np.einsum("nq,eqsm->ensm", to_nodes, _stress(strained, self.lame[some]))
-            at = place[nodes]
-            np.add.at(total, at[at >= 0], nodal[at >= 0])
-            np.add.at(count, at[at >= 0], 1.0)
+        for block, _, numbers in mesh.parts():
+            points, to_nodes = sampling(block.element)
+            touching = np.flatnonzero((place[block.elements] >= 0).any(axis=1))
+            step = max(1, _CHUNK_VALUES // (len(to_nodes) * 9 * max(1, fields.shape[1])))
+            for start in range(0, len(touching), step):
+                some = touching[start : start + step]
+                nodes = block.elements[some]
+                moved = fields[dof_map[nodes, :3]].reshape(len(some), nodes.shape[1], -1)
+                stress = self._at(block.element, nodes, numbers[some], moved, points)
+                nodal = np.einsum("nq,eqsm->ensm", to_nodes, stress)
+                at = place[nodes]
+                np.add.at(total, at[at >= 0], nodal[at >= 0])
+                np.add.at(count, at[at >= 0], 1.0)
         return total / count[:, None, None]
+
+    def energy_of_error(self, fields: Array, dof_map: IntArray) -> tuple[Array, Array]:
+        """(m,) ∫ e : C⁻¹ : e / 2 of the difference e between this stress and the one averaged at the nodes, and the
+        energy of this stress [J]."""
+        averaged = self.evaluate(fields, dof_map, self.site_nodes)
+        totals = np.zeros((2, fields.shape[1]))
+        for element, nodes, numbers in chunks(self.mesh):
+            points, weights = element.quadrature(element.stiffness_order)
+            moved = fields[dof_map[nodes, :3]].reshape(len(nodes), nodes.shape[1], -1)
+            stress = self._at(element, nodes, numbers, moved, points)
+            smooth = np.einsum("kq,eksm->eqsm", element.shape_values(points), averaged[nodes])
+            volume = slopes(element, self.mesh.nodes[nodes], points)[1] * weights
+            for total, part in zip(totals, (smooth - stress, stress), strict=True):
+                total += np.einsum("eqm,eq->m", _energy(part, self.lame[numbers]), volume)
+        return totals[0], totals[1]
+
+    def _at(self, element: SolidElement, nodes: IntArray, numbers: IntArray, moved: Array, points: Array) -> Array:
+        """(e, q, 6, m) stress at points of elements whose nodes move by ``moved`` (e, k, 3 m)."""
+        corners, lame = self.mesh.nodes[nodes], self.lame[numbers]
+        gradients, _ = slopes(element, corners, points)
+        count, size = nodes.shape
+        modes = motion_of_modes(element, corners, *lame.T)
+        inner = (modes @ moved.reshape(count, 3 * size, -1)).reshape(count, -1, moved.shape[2])
+        moved = np.concatenate([moved, inner], axis=1)
+        strained = gradients.reshape(count, -1, moved.shape[1]) @ moved
+        return _stress(strained.reshape(*gradients.shape[:3], 3, -1), lame)
 
     def converted(self, length: float, stress: float) -> SolidStress:
         """The same elements in other units; see `fe_import.model.StressSource`."""
@@ -81,27 +108,32 @@ class SolidStress:
 
 def solid_stress(mesh: SolidMesh, lame: Array) -> SolidStress:
     """Stress of a mesh with Lamé's parameters (elements, 2) of each element."""
-    sets = {name: np.unique(mesh.elements[elements]) for name, elements in mesh.element_sets.items()}
+    sets = {name: mesh.nodes_of(elements) for name, elements in mesh.element_sets.items()}
     return SolidStress(mesh, lame, {**sets, **mesh.node_sets})
 
 
 def sampling(element: SolidElement) -> tuple[Array, Array]:
     """Points (3, q) at which strains are taken, and the (k, q) matrix from values there to values at the nodes."""
-    if element.corners == 8:
-        points = element.quadrature(3)[0]
-        powers = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    elif element.midpoints:
+    cell, quadratic = element.cell, bool(element.midpoints)
+    powers = _POWERS[1 if quadratic else 0]
+    points = cell.quadrature(3 if quadratic else 1)[0]
+    if cell is HEXAHEDRON:
+        points, powers = cell.quadrature(3)[0], np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    elif cell is WEDGE:
+        triangle = np.full((2, 3), 1 / 6) + np.eye(2, 3) / 2 if quadratic else np.full((2, 1), 1 / 3)
+        heights = np.polynomial.legendre.leggauss(2)[0] / 2 + 0.5
+        points = np.vstack([np.repeat(triangle, 2, axis=1), np.tile(heights, triangle.shape[1])])
+        plane = [[0, 0], [1, 0], [0, 1]] if quadratic else [[0, 0]]
+        powers = np.array([[*p, k] for p in plane for k in (0, 1)])
+    elif cell is TETRAHEDRON and quadratic:
         far, near = (5 + 3 * np.sqrt(5)) / 20, (5 - np.sqrt(5)) / 20
         points = np.full((3, 4), near)
         points[:, 1:] += (far - near) * np.eye(3)
-        powers = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    else:
-        points, powers = np.full((3, 1), 0.25), np.zeros((1, 3), dtype=int)
 
     def monomials(at: Array) -> Array:
         return np.asarray(np.prod(at[:, None, :] ** powers, axis=2))
 
-    return points, monomials(element.reference_nodes) @ np.linalg.inv(monomials(points.T))
+    return points, monomials(element.reference_nodes) @ np.linalg.pinv(monomials(points.T))
 
 
 def _stress(gradient: Array, lame: Array) -> Array:
@@ -111,3 +143,11 @@ def _stress(gradient: Array, lame: Array) -> Array:
     parts = [trace + 2 * mu * gradient[:, :, a, a] for a in range(3)]
     parts += [mu * (gradient[:, :, a, b] + gradient[:, :, b, a]) for a, b in ((0, 1), (1, 2), (2, 0))]
     return np.stack(parts, axis=2)
+
+
+def _energy(stress: Array, lame: Array) -> Array:
+    """(e, q, m) energy per volume of stress (e, q, 6, m)."""
+    lam, mu = (part[:, None, None] for part in lame.T)
+    normal, shear = stress[:, :, :3], stress[:, :, 3:]
+    squares = (normal**2).sum(axis=2) + 2 * (shear**2).sum(axis=2)
+    return np.asarray((squares - lam / (3 * lam + 2 * mu) * normal.sum(axis=2) ** 2) / (4 * mu))

@@ -18,12 +18,12 @@ from fe_import.description.records import Vector
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.base import Export, ExportFormat
 from fe_import.exports.entries import matrix_of_entries
-from fe_import.exports.nastran_cards import Card, read_cards
-from fe_import.exports.nastran_grid import CARDS, grid_points
 from fe_import.exports.points import Points, points_of
 from fe_import.exports.superelement import assembled, refuse_cut
 from fe_import.files.text import TextFile
 from fe_import.model import IntArray
+from fe_import.nastran.cards import Card, read_cards
+from fe_import.nastran.grid import CARDS, grid_points
 
 _SQUARE, _SYMMETRIC = 1, 6
 _FORMS = {2: "rectangular", 9: "rectangular"}

@@ -63,6 +63,9 @@ def read_op4(files: Mapping[str, Path], options: Op4Options, where: str) -> Expo
             source = files.get(role, files["stiffness"])
             whole[role] = _unpacked(source, Path(folder) / role)
             headers[role] = _header(op4_layout(whole[role], str(source)), name, role, str(source))
+            if headers[role].columns >= whole[role].stat().st_size:  # every column of a link's matrix has an entry
+                message = "a header states a matrix that the file has no room for"
+                raise _fault(message, str(source), headers[role].columns, whole[role].stat().st_size)
         size = headers["stiffness"].columns
         if headers["mass"].columns != size:
             raise _fault("mass and stiffness differ in size", str(files["stiffness"]), headers["mass"].columns, size)

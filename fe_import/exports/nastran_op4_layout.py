@@ -19,6 +19,8 @@ from typing import IO, NoReturn
 
 from fe_import.errors import Cause, FEImportError
 
+_MOST = 2**31  # rows or columns
+_CLOSING = (0, 4, 8, 16)  # bytes of the number in the record behind the last column, whatever its count of words says
 _BIG_ROWS = 65536  # from here on sparse columns are BIGMAT whatever the sign of the rows
 _LONGEST_LINE = 1000
 _DIGITS = 9  # of an integer in a header
@@ -71,9 +73,9 @@ class _Walk:
         _fail(f"{message} (byte {self.file.tell()})", self.where, value, limit)
 
     def check_header(self, rows: int, columns: int) -> None:
-        """Every column of a link's matrix has an entry somewhere, so a file has more bytes than columns."""
-        if not (0 < columns < self.size and 0 < abs(rows) < self.size):
-            self.fail("a header states a matrix that the file has no room for", f"{rows} x {columns}", self.size)
+        """A matrix of zeros may be larger than its file; whether one that is wanted fits, its reader checks."""
+        if not (0 <= columns < _MOST and 0 <= abs(rows) < _MOST):
+            self.fail("a header states a matrix of an absurd size", f"{rows} x {columns}", _MOST)
 
     def check_column(self, column: int, last: int, columns: int) -> None:
         if not last < column <= columns + 1:
@@ -141,7 +143,8 @@ class _Binary(_Walk):
             column, row, count = self.integers(3)
             unit = self.integer if kind % 2 else 8
             expected = 3 * self.integer + count * (unit // words)
-            if count < 0 or length != expected or begin + length + 4 > self.size:
+            closing = column > columns and length - 3 * self.integer in _CLOSING
+            if count < 0 or not (length == expected or closing) or begin + length + 4 > self.size:
                 self.fail("a record does not fit its length or the file", length, expected)
             self.check_column(column, last, columns)
             if column > columns:
@@ -211,8 +214,8 @@ class _Text(_Walk):
             yield Op4Header(line[32:40].strip().lower(), abs(rows), columns, form, kind, values)
 
     def number_format(self, text: str) -> tuple[int, int]:
-        """Numbers per line and their width, from ``1P,3E23.16``."""
-        body = text.strip().upper().removeprefix("1P,").replace("D", "E")
+        """Numbers per line and their width, from ``1P,3E23.16``; 5E16.9 where the header ends with the name."""
+        body = (text.strip() or "5E16.9").upper().removeprefix("1P,").replace("D", "E")
         count, _, rest = body.partition("E")
         width = rest.partition(".")[0]
         if not (count.isdigit() and width.isdigit() and 0 < int(count) * int(width) <= _LONGEST_LINE):
@@ -228,7 +231,8 @@ class _Text(_Walk):
             self.check_column(column, last, columns)
             last = column
             if column > columns:
-                self.numbers(max(count, 1), per_line, width)
+                if len(self.line()) != width:  # one number, whatever its count of words says
+                    self.fail("the record behind the last column is not one number")
                 return total
             layout = self.column_layout(row, rows, layout)
             if layout == "full":

@@ -244,6 +244,54 @@ def _suggest(name: str, fields: list[str], further_in: list[str]) -> str:
     return "known fields: " + ", ".join(sorted(set(fields))) if fields else "remove it"
 
 
+def place_of(
+    data: dict[str, Any], key: str, where: str, error: type[ReportedError] = FEImportError
+) -> tuple[Any, Any]:
+    """The table or list that holds what a dotted key names, and its key or number there; tables on the way are made.
+
+    Parameters
+    ----------
+    data : dict
+        Parsed TOML.
+    key : str
+        Members of lists go by name or number.
+    where : str
+        For messages.
+
+    Raises
+    ------
+    ReportedError
+        Of class ``error``: no such place.
+    """
+    steps = key.split(".")
+    at: Any = data
+    for step, following in zip(steps, [*steps[1:], None], strict=True):
+        if isinstance(at, list):
+            names = [str(k) for k in range(len(at))]
+            names += [str(item["name"]) for item in at if isinstance(item, dict) and "name" in item]
+            named = [k for k, item in enumerate(at) if isinstance(item, dict) and item.get("name") == step]
+            place: Any = named[0] if named else int(step) if step in names[: len(at)] else None
+            if place is None:
+                known = ", ".join(names) or "none"
+                raise error(
+                    Cause.BAD_REFERENCE,
+                    f"no member {step!r}",
+                    where=where,
+                    value=step,
+                    remedy=f"known: {known}",
+                )
+        elif isinstance(at, dict):
+            place = step
+            if following is not None:
+                at.setdefault(step, {})
+        else:
+            raise error(Cause.BAD_FIELD, f"{step!r} is not inside a table", where=where, remedy="check the key")
+        if following is None:
+            return at, place
+        at = at[place]
+    raise AssertionError("a key has steps")
+
+
 def choose(value: str, options: Any, where: str, error: type[ReportedError] = FEImportError) -> None:
     """Refuse a name that is not among the options of a registry, with a suggestion."""
     names = [str(o.value) if isinstance(o, enum.Enum) else str(o) for o in options]

@@ -57,7 +57,15 @@ def check_model(model: FEModel, where: str) -> tuple[HealthCheck, ...]:
         count = HealthCheck("mass matrix: motions of negative kinetic energy", _negative_masses(model), 0.0)
         checks.append((count, negative))
         _refuse(checks[-1:], where)
-    return tuple(check for check, _ in checks)
+    return tuple(check for check, _ in checks) + _left_out(model)
+
+
+def _left_out(model: FEModel) -> tuple[HealthCheck, ...]:
+    """What stands in the mesh file and is not part of the link: reported, not judged."""
+    if not model.left_out:
+        return ()
+    listed = ", ".join(f"{count} {name}" for name, count in model.left_out.items())
+    return (HealthCheck(f"left out of the mesh file: {listed}", float(sum(model.left_out.values())), NO_LIMIT),)
 
 
 def _negative_masses(model: FEModel) -> float:

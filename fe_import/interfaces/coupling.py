@@ -60,6 +60,7 @@ def couple_interfaces(
     source: str = "",
     dof_map: IntArray | None = None,
     rows: int | None = None,
+    state: Dependence | None = None,
 ) -> Coupling:
     """Add an interface node to each face and couple the face to it.
 
@@ -73,6 +74,8 @@ def couple_interfaces(
         Row of each nodal component; None for a solid's nodes, row 3 * node + component.
     rows : int or None
         Rows of the matrices; those of ``dof_map`` unless there are others (modal coordinates).
+    state : Dependence or None
+        Constraints between the rows that hold already.
 
     Raises
     ------
@@ -92,11 +95,19 @@ def couple_interfaces(
     added = start + np.arange(6 * (i + sum(map(len, auxiliary)))).reshape(-1, 6)
     interface_rows, patch_rows = added[:i], np.split(added[i:], np.cumsum([len(a) for a in auxiliary])[:-1])
 
-    state = Dependence.free(start + added.size)
+    state = Dependence.free(start + added.size) if state is None else state.extended(added.size)
     for k in sorted(range(i), key=lambda k: faces[k].coupling != "rigid"):  # what is rigid follows its own node only
         face, points = faces[k], nodes[faces[k].nodes]
         if face.coupling == "rigid":
             offsets = points - face.position
+            followers = dof_map[face.nodes]
+            if (state.columns(followers[followers >= 0]) < 0).any():
+                raise FEImportError(
+                    Cause.INTERFACE,
+                    f"nodes of interface {face.name!r} follow others already, by constraints of the mesh file",
+                    where=source,
+                    remedy='leave these constraints out (ignore in [solid]), or use coupling = "averaged"',
+                )
             state = follow_rigidly(state, dof_map[face.nodes], offsets, interface_rows[k])
         else:
             members = Items.of_nodes(dof_map[face.nodes, :3], points, face.shares)

@@ -30,6 +30,12 @@ class Dependence:
         """No constraint."""
         return Dependence(sp.eye_array(count, format="csr"), np.arange(count))
 
+    def extended(self, count: int) -> Dependence:
+        """With further components behind, all independent."""
+        matrix = sp.block_diag([self.matrix, sp.eye_array(count)], format="csr")
+        rows = self.matrix.shape[0] + np.arange(count)
+        return Dependence(sp.csr_array(matrix), np.concatenate([self.independent, rows]))
+
     def columns(self, rows: IntArray) -> IntArray:
         """Columns of the independent dofs among rows; -1 for rows that depend on others."""
         place = np.searchsorted(self.independent, rows).clip(max=len(self.independent) - 1)

@@ -78,9 +78,8 @@ def area_weights(mesh: SolidMesh, chosen: IntArray, name: str) -> Array:
     FEImportError
         ``INTERFACE``: a node of no such face.
     """
-    faces = boundary_faces(mesh)
-    faces = faces[np.isin(faces, chosen).all(axis=1)]
-    areas = nodal_areas(mesh.nodes, faces)[chosen]
+    within = [faces[np.isin(faces, chosen).all(axis=1)] for faces in boundary_faces(mesh)]
+    areas = sum((nodal_areas(mesh.nodes, faces) for faces in within), np.zeros(len(mesh.nodes)))[chosen]
     bare = np.flatnonzero(areas <= 0)
     if bare.size:
         raise FEImportError(

@@ -9,6 +9,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from fe_import.elements.reference_cells import Tuples
+from fe_import.elements.solid_elements import SolidElement
 from fe_import.elements.solid_mesh import SolidMesh, element_faces
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, IntArray
@@ -48,7 +50,7 @@ def _place(point: Array) -> str:
 
 
 def _element(mesh: SolidMesh, index: int) -> str:
-    return f"element {index} (centre {_place(mesh.nodes[mesh.elements[index]].mean(axis=0))})"
+    return f"element {index} (centre {_place(mesh.nodes[mesh.element_nodes(index)].mean(axis=0))})"
 
 
 def _check_coordinates(mesh: SolidMesh) -> None:
@@ -63,12 +65,13 @@ def _check_coordinates(mesh: SolidMesh) -> None:
 
 
 def _check_repeated_nodes(mesh: SolidMesh) -> None:
-    bad = np.flatnonzero((np.diff(np.sort(mesh.elements, axis=1), axis=1) == 0).any(axis=1))
+    twice = [(np.diff(np.sort(block.elements, axis=1), axis=1) == 0).any(axis=1) for block in mesh.blocks]
+    bad = np.flatnonzero(np.concatenate(twice))
     if bad.size:
         raise _faulty(
             mesh,
             f"{bad.size} elements use a node twice, the first is {_element(mesh, int(bad[0]))}",
-            "replace collapsed elements; mesh with tetrahedra or with hexahedra only",
+            "replace collapsed elements by wedges, pyramids or tetrahedra",
         )
 
 
@@ -91,16 +94,17 @@ def scaled_jacobians(mesh: SolidMesh) -> Array:
     Taken at the element's nodes and at the stiffness's quadrature points; 1 for a brick, 0 for a flat
     element, negative for an inverted one.
     """
-    element = mesh.element
-    points = np.hstack([element.reference_nodes.T, element.quadrature(element.stiffness_order)[0]])
-    gradients = element.shape_gradients(points)
-    result = np.empty(len(mesh.elements))
-    for start in range(0, len(result), _CHUNK):
-        chunk = mesh.elements[start : start + _CHUNK]
-        columns = np.einsum("mkc,kdq->mqdc", mesh.nodes[chunk], gradients)
-        scale = np.linalg.norm(columns, axis=3).prod(axis=2)
-        ratio = np.linalg.det(columns) / np.where(scale > 0, scale, 1.0)
-        result[start : start + _CHUNK] = ratio.min(axis=1)
+    result = np.empty(mesh.count)
+    for block, _, numbers in mesh.parts():
+        element = block.element
+        points = np.hstack([element.reference_nodes.T, element.quadrature(element.stiffness_order)[0]])
+        gradients = element.shape_gradients(points)
+        for start in range(0, len(block), _CHUNK):
+            chunk = block.elements[start : start + _CHUNK]
+            columns = np.einsum("mkc,kdq->mqdc", mesh.nodes[chunk], gradients)
+            scale = np.linalg.norm(columns, axis=3).prod(axis=2)
+            ratio = np.linalg.det(columns) / np.where(scale > 0, scale, 1.0)
+            result[numbers[start : start + _CHUNK]] = ratio.min(axis=1)
     return result
 
 
@@ -123,24 +127,42 @@ def _check_shapes(mesh: SolidMesh) -> None:
 
 def _check_mid_nodes(mesh: SolidMesh) -> None:
     """Neighbours must share the mid-side nodes of a shared edge or face, and nobody else may use them."""
-    element = mesh.element
-    corners = np.unique(mesh.elements[:, : element.corners])
-    for count in sorted({len(between) for between in element.midpoints}):
-        here = [i for i, between in enumerate(element.midpoints) if len(between) == count]
-        keys = np.concatenate([np.sort(mesh.elements[:, element.midpoints[i]], axis=1) for i in here])
-        values = np.concatenate([mesh.elements[:, element.corners + i] for i in here])
-        label = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-        pairs = np.unique(np.column_stack([label, values]), axis=0)
-        bad = np.isin(label, _repeated(pairs[:, 0])) | np.isin(values, _repeated(pairs[:, 1]))
-        bad |= np.isin(values, corners)
+    corners = np.unique(np.concatenate([b.elements[:, : b.element.corners].ravel() for b in mesh.blocks]))
+    for count in (2, 4, 8):
+        keys, values, owners = [], [], []
+        for block, _, numbers in mesh.parts():
+            element = block.element
+            at = {frozenset(between): element.corners + i for i, between in enumerate(element.midpoints)}
+            for between in _entities(element, count):
+                node = at.get(frozenset(between), -1)
+                keys.append(np.sort(block.elements[:, between], axis=1))
+                values.append(block.elements[:, node] if node >= 0 else np.full(len(block), -1))
+                owners.append(numbers)
+        value = np.concatenate([np.zeros(0, dtype=np.int64), *values])
+        if not (value >= 0).any():
+            continue
+        label = np.unique(np.concatenate(keys), axis=0, return_inverse=True)[1].ravel()
+        pairs = np.unique(np.column_stack([label, value]), axis=0)
+        bad = np.isin(label, _repeated(pairs[:, 0])) | np.isin(value, _repeated(pairs[pairs[:, 1] >= 0, 1]))
+        bad |= np.isin(value, corners)
         if bad.any():
             first = int(np.flatnonzero(bad)[0])
+            at_node = f"{value[first]} at {_place(mesh.nodes[value[first]])}" if value[first] >= 0 else "that it lacks"
             raise _faulty(
                 mesh,
-                f"{_element(mesh, first % len(mesh.elements))} does not fit its neighbours at mid-side node "
-                f"{values[first]} at {_place(mesh.nodes[values[first]])}",
+                f"{_element(mesh, int(np.concatenate(owners)[first]))} does not fit its neighbours at mid-side node "
+                + at_node,
                 "neighbours must share the corners and the mid-side nodes of a common face",
             )
+
+
+def _entities(element: SolidElement, count: int) -> Tuples:
+    """Corners of the edges (2), quadrilateral faces (4) or the inside (8) of an element."""
+    if count == 2:
+        return element.cell.edges
+    if count == 4:
+        return tuple(face for face in element.cell.faces if len(face) == 4)
+    return (tuple(range(8)),) if element.corners == 8 else ()
 
 
 def _repeated(values: IntArray) -> IntArray:
@@ -149,8 +171,8 @@ def _repeated(values: IntArray) -> IntArray:
 
 
 def _check_connections(mesh: SolidMesh) -> None:
-    _, label = element_faces(mesh)
-    owner = np.repeat(np.arange(len(mesh.elements)), len(mesh.element.faces))
+    faces = element_faces(mesh)
+    label, owner = faces.label, faces.owner
     crowded = np.flatnonzero(np.bincount(label)[label] > 2)
     if crowded.size:
         raise _faulty(
@@ -160,7 +182,7 @@ def _check_connections(mesh: SolidMesh) -> None:
         )
     incidence = sp.csr_array((np.ones(len(label)), (owner, label)))
     shared = (incidence @ incidence.T).tocoo()
-    twins = (shared.row != shared.col) & (shared.data == len(mesh.element.faces))
+    twins = (shared.row != shared.col) & (shared.data == np.bincount(owner)[shared.row])
     if twins.any():
         raise _faulty(
             mesh,
@@ -171,7 +193,8 @@ def _check_connections(mesh: SolidMesh) -> None:
     if parts > 1:
         sizes = np.bincount(part)
         smallest = _element(mesh, int((part == sizes.argmin()).argmax()))
-        touching = np.intersect1d(mesh.elements[part == 0], mesh.elements[part != 0]).size > 0
+        one, others = (mesh.nodes_of(np.flatnonzero(own)) for own in (part == 0, part != 0))
+        touching = np.intersect1d(one, others).size > 0
         raise _faulty(
             mesh,
             f"the mesh has {parts} parts that no element face joins"

@@ -24,8 +24,6 @@ _MEMORY_PER_BYTE = 64  # Python's lists of numbers over their text
 _FREE_MEMORY = 1 << 30
 _BLOCK = 1 << 20
 _HEAD = 1 << 20  # of a .vtu file, where its counts stand
-NASTRAN = (".bdf", ".fem", ".nas")
-_GRID = re.compile(rb"^GRID", re.MULTILINE)
 _VTU_COUNT = re.compile(rb'NumberOf(Points|Cells)\s*=\s*["\']\s*([^"\']*)')
 
 
@@ -80,7 +78,7 @@ def check_declared(path: Path, name: str) -> None:
     Raises
     ------
     FEImportError
-        ``MESH``: a count of a .msh or .vtu file that is no number, or more than it can hold; Nastran without GRID;
+        ``MESH``: a count of a .msh or .vtu file that is no number, or more than it can hold;
         ``NOT_READABLE``: a section of a .msh file without end.
     """
     size = path.stat().st_size
@@ -95,10 +93,6 @@ def check_declared(path: Path, name: str) -> None:
                 for count in _msh_counts(text, section):
                     _check_count(section.decode(), count, size // 4, name)
             _check_sections(text, name)
-        elif path.suffix.lower() in NASTRAN and not _GRID.search(text, max(0, text.find(b"BEGIN BULK"))):
-            raise FEImportError(  # meshio would look for it for ever
-                Cause.MESH, "no GRID after BEGIN BULK", where=name, remedy="export the bulk data with its mesh"
-            )
 
 
 def _number(word: bytes) -> float:

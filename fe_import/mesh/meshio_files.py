@@ -17,11 +17,12 @@ import meshio
 import numpy as np
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.mesh.guard import NASTRAN, bounded_memory, check_declared, check_found
+from fe_import.mesh.guard import bounded_memory, check_declared, check_found
 from fe_import.mesh.raw import Block, RawMesh
 
+meshio._mesh.topological_dimension.update({"wedge15": 3, "pyramid13": 3})  # which meshio 5 knows but for this
 MOST_GROUPS = 1000  # different numbers in an array; more are labels, not groups
-_SHORT_NAMES = {"gmsh:physical": "physical", "nastran:ref": "PID", "medit:ref": "ref"}
+_SHORT_NAMES = {"gmsh:physical": "physical", "medit:ref": "ref"}
 _OTHER_MEANING = {"gmsh:geometrical", "cell_tags", "point_tags", "gmsh:dim_tags"}
 
 
@@ -37,20 +38,12 @@ def read_with_meshio(path: Path, name: str) -> RawMesh:
     Raises
     ------
     FEImportError
-        ``NOT_READABLE``; ``MESH``: declared sizes that the file cannot hold, Nastran's local coordinate systems.
+        ``NOT_READABLE``; ``MESH``: declared sizes that the file cannot hold.
     """
     raw = _read(path, name)
-    suffix = path.suffix.lower()
-    if suffix in NASTRAN and np.any(raw.point_data.get("nastran:ref", 0)):
-        raise FEImportError(
-            Cause.MESH,
-            "GRID points in local coordinate systems (CP) are not converted",
-            where=name,
-            remedy="export the mesh in the basic coordinate system",
-        )
     blocks = [_block(b, name) for b in raw.cells]
     check_found(path, name, len(raw.points), sum(len(b.cells) for b in blocks))
-    mesh = RawMesh(raw.points, blocks, mirrored=suffix == ".med")
+    mesh = RawMesh(raw.points, blocks, mirrored=path.suffix.lower() == ".med")
     mesh.point_sets.update({str(key): points for key, points in raw.point_sets.items()})
     for key, cells in raw.cell_sets.items():
         if not str(key).startswith("gmsh:"):
@@ -62,8 +55,6 @@ def read_with_meshio(path: Path, name: str) -> RawMesh:
         for group, members in _groups(key, list(per_block), mesh, named):
             mesh.cell_sets.setdefault(group, members)
     for key, values in raw.point_data.items():
-        if suffix in NASTRAN and key == "nastran:ref":
-            continue  # coordinate systems, no groups
         for group, members in _groups(key, [values], mesh, []):
             mesh.point_sets.setdefault(group, members[0])
     return mesh

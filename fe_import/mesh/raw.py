@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from fe_import.elements.attachments import Attachment
+from fe_import.elements.solid_mesh import MeshMaterials
 from fe_import.model import Array, IntArray
 
 
@@ -15,6 +17,30 @@ class Block:
     type: str
     dimension: int
     cells: IntArray
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """What a file holds besides its mesh.
+
+    Attributes
+    ----------
+    name : str
+        Keyword, card or type of elements.
+    count : int
+    where : str
+        Place of the first.
+    loss : str
+        What the link would lack; empty where it cannot matter to a link.
+    used : bool
+        Read after all, as attachments; they may be left out when asked for.
+    """
+
+    name: str
+    count: int
+    where: str
+    loss: str = ""
+    used: bool = False
 
 
 @dataclass
@@ -31,6 +57,10 @@ class RawMesh:
         Name -> points.
     lost : dict
         Name -> why a set of the file is not among these.
+    left_out : list of LeftOut
+    attachments : list of Attachment
+        With numbers of points.
+    materials : MeshMaterials
     mirrored : bool
         Whether the format turns elements inside out, so that all of them may be.
     """
@@ -40,4 +70,7 @@ class RawMesh:
     cell_sets: dict[str, list[Any]] = field(default_factory=dict)
     point_sets: dict[str, Any] = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
+    left_out: list[LeftOut] = field(default_factory=list)
+    attachments: list[Attachment] = field(default_factory=list)
+    materials: MeshMaterials = field(default_factory=MeshMaterials)
     mirrored: bool = False

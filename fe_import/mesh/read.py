@@ -1,30 +1,34 @@
-"""Mesh files: everything that meshio reads -> a checked mesh of one solid element type with its named sets.
+"""Mesh files: everything that meshio reads -> a checked mesh of solid elements with its named sets.
 
-meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX by `fe_import.mesh.abaqus_files`.
+meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX are read by
+`fe_import.mesh.abaqus_files`, bulk data of Nastran by `fe_import.mesh.nastran_files`.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fe_import.elements.solid_elements import SOLID_ELEMENTS
-from fe_import.elements.solid_mesh import SolidMesh
+from fe_import.elements.attachments import AttachedMass, Attachment, nodes_of, renumbered
+from fe_import.elements.solid_elements import MESH_ELEMENTS
+from fe_import.elements.solid_mesh import ElementBlock, SolidMesh
 from fe_import.errors import Cause, FEImportError
+from fe_import.files.toml import choose
 from fe_import.mesh.checks import check_mesh, scaled_jacobians
 from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
 from fe_import.model import IntArray
 
-_BY_MESHIO_NAME = {element.meshio_name: name for name, element in SOLID_ELEMENTS.items()}
+_NASTRAN = (".bdf", ".fem", ".nas")
+_BY_MESHIO_NAME = {element.meshio_name: name for name, element in MESH_ELEMENTS.items()}
 
 
-def read_mesh(path: Path) -> SolidMesh:
+def read_mesh(path: Path, ignore: Sequence[str] = ()) -> SolidMesh:
     """Read and check a mesh file, or a ``.gz`` of one; its format follows from the suffix.
 
     Named cell sets (gmsh's physical groups, Abaqus' element sets, families of MED) of solid elements become element
@@ -35,6 +39,8 @@ def read_mesh(path: Path) -> SolidMesh:
     Parameters
     ----------
     path : Path
+    ignore : sequence of str
+        Keywords, cards and types of elements of the file that the link is to be without.
 
     Returns
     -------
@@ -44,30 +50,36 @@ def read_mesh(path: Path) -> SolidMesh:
     Raises
     ------
     FEImportError
-        ``FILE_NOT_FOUND``, ``NOT_READABLE``; ``UNSUPPORTED_ELEMENT``: solid elements of another type than
-        tet4/10 and hex8/20/27; ``MESH``: declared sizes that the file cannot hold, no or mixed solid elements, and
-        what ``check_mesh`` finds; ``DISCONNECTED``.
+        ``FILE_NOT_FOUND``, ``NOT_READABLE``; ``UNSUPPORTED_ELEMENT``: solid elements of another type than those of
+        `MESH_ELEMENTS`; ``NOT_USED``: masses, springs, constraints and the like; ``MESH``: declared sizes that the
+        file cannot hold, no solid elements, and what ``check_mesh`` finds; ``DISCONNECTED``.
     """
     if not path.exists():
         raise FEImportError(Cause.FILE_NOT_FOUND, "no such mesh file", where=str(path), remedy="check the path")
     raw = _read(path)
-    element_type, blocks = _solid_blocks(raw, str(path))
-    elements = np.concatenate([raw.blocks[b].cells for b in blocks]).astype(np.int64)
+    left_out = _left_out(raw, ignore, str(path))
+    solids = _solid_blocks(raw, str(path))
+    used = np.unique(np.concatenate([raw.blocks[b].cells.ravel() for b in solids])).astype(np.int64)
     points = np.asarray(raw.points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3 or elements.min() < 0 or elements.max() >= len(points):
+    if points.ndim != 2 or points.shape[1] != 3 or used[0] < 0 or used[-1] >= len(points):
         raise FEImportError(
             Cause.MESH,
             "elements refer to nodes that are not in the file",
             where=str(path),
             remedy="write the mesh again",
         )
-    used = np.unique(elements)
     dense = np.full(len(points), -1, dtype=np.int64)
     dense[used] = np.arange(len(used))
-    element_sets, node_sets, lost = _sets(raw, blocks, dense)
-    mesh = SolidMesh(points[used], dense[elements], element_type, element_sets, node_sets, str(path), lost)
+    element_sets, node_sets, lost = _sets(raw, solids, dense)
+    blocks = _joined(raw, solids, dense)
+    further, attachments = _attachments(raw, left_out, dense, str(path))
+    mesh = SolidMesh(
+        points[used], blocks, element_sets, node_sets, str(path), lost, left_out, points[further], attachments,
+        raw.materials,
+    )  # fmt: skip
     if raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
-        mesh = replace(mesh, elements=mesh.elements[:, mesh.element.mirrored_order])
+        turned = (replace(block, elements=block.elements[:, block.element.mirrored_order]) for block in mesh.blocks)
+        mesh = replace(mesh, blocks=tuple(turned))
     check_mesh(mesh)
     return mesh
 
@@ -82,12 +94,66 @@ def _read(path: Path) -> RawMesh:
             from fe_import.mesh.abaqus_files import read_abaqus
 
             return read_abaqus(plain, str(path))
+        if plain.suffix.lower() in _NASTRAN:
+            from fe_import.mesh.nastran_files import read_nastran
+
+            return read_nastran(plain, str(path))
         from fe_import.mesh.meshio_files import read_with_meshio  # meshio is heavy
 
         return read_with_meshio(plain, str(path))
 
 
-def _solid_blocks(raw: RawMesh, where: str) -> tuple[str, list[int]]:
+def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]:
+    """How many of what the link is without; a loss that nobody asked for is refused."""
+    names_there = {item.name.upper(): item.name for item in raw.left_out}
+    asked = [names_there.get(name.upper(), name) for name in ignore]
+    for name in asked:
+        choose(name, sorted(names_there.values()), f"{where}: what to ignore")
+    losses = [item for item in raw.left_out if item.loss and item.name not in asked]
+    if losses:
+        names = ", ".join(f'"{name}"' for name in dict.fromkeys([*asked, *(item.name for item in losses)]))
+        raise FEImportError(
+            Cause.NOT_USED,
+            "the link would lack " + "; ".join(f"{i.loss}: {i.count} {i.name} from {i.where}" for i in losses),
+            where=where,
+            remedy=f"give them in the link description or the scene if they matter, then ignore = [{names}] in [solid]",
+        )
+    counts: Counter[str] = Counter()
+    for item in (i for i in raw.left_out if not i.used or i.name in asked):
+        counts[item.name] += item.count
+    return dict(counts)
+
+
+def _attachments(
+    raw: RawMesh, left_out: dict[str, int], dense: IntArray, where: str
+) -> tuple[IntArray, tuple[Attachment, ...]]:
+    """Points of no element that attachments need, and these: elements' nodes, then from -1 backwards the others."""
+    chosen = [item for item in raw.attachments if item.keyword not in left_out]
+    further = sorted({node for item in chosen for node in nodes_of(item) if dense[node] < 0})
+    number = {node: k - len(further) for k, node in enumerate(further)}
+    joined = {node for item in chosen if not isinstance(item, AttachedMass) for node in nodes_of(item)}
+    for item in chosen:
+        if isinstance(item, AttachedMass) and item.node in number and item.node not in joined:
+            raise FEImportError(
+                Cause.DISCONNECTED,
+                f"{item.keyword} on a node that nothing joins to the solid, at {raw.points[item.node].tolist()}",
+                where=where,
+                remedy=f'join it (*RIGID BODY, RBE2 ...), or ignore = ["{item.keyword}"] in [solid]',
+            )
+    items = tuple(renumbered(i, lambda node: number[node] if node in number else int(dense[node])) for i in chosen)
+    return np.array(further, dtype=np.int64), items
+
+
+def _joined(raw: RawMesh, solids: list[int], dense: IntArray) -> tuple[ElementBlock, ...]:
+    """One block of each type."""
+    cells: dict[str, list[IntArray]] = {}
+    for b in solids:
+        cells.setdefault(raw.blocks[b].type, []).append(raw.blocks[b].cells.astype(np.int64))
+    return tuple(ElementBlock(_BY_MESHIO_NAME[name], dense[np.concatenate(parts)]) for name, parts in cells.items())
+
+
+def _solid_blocks(raw: RawMesh, where: str) -> list[int]:
+    """Which blocks hold solid elements, type by type in the order in which types come first."""
     blocks = [b for b, block in enumerate(raw.blocks) if block.dimension == 3 and len(block.cells)]
     counts: Counter[str] = Counter()
     for b in blocks:
@@ -109,14 +175,7 @@ def _solid_blocks(raw: RawMesh, where: str) -> tuple[str, list[int]]:
             where=where,
             remedy="export the volume mesh, not its surface",
         )
-    if len(counts) > 1:
-        raise FEImportError(
-            Cause.MESH,
-            "mixed solid element types: " + _listing(counts.items()),
-            where=where,
-            remedy="mesh the link with one type",
-        )
-    return _BY_MESHIO_NAME[next(iter(counts))], blocks
+    return sorted(blocks, key=lambda b: list(counts).index(raw.blocks[b].type))
 
 
 def _listing(counts: Iterable[tuple[str, int]]) -> str:
@@ -128,7 +187,7 @@ def _sets(
 ) -> tuple[dict[str, IntArray], dict[str, IntArray], dict[str, str]]:
     """Element sets and node sets in the numbering of the checked mesh, and why others are not among them."""
     counts = [len(block.cells) for block in raw.blocks]
-    offset = {b: sum(counts[other] for other in blocks if other < b) for b in blocks}
+    offset = dict(zip(blocks, np.cumsum([0, *(counts[b] for b in blocks)]).tolist(), strict=False))
     element_sets: dict[str, IntArray] = {}
     node_sets: dict[str, IntArray] = {}
     lost = dict(raw.lost)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
+import scipy.sparse as sp
 
 from fe_import.description.link import LinkFile
 from fe_import.description.records import LinkDescription, Solid
+from fe_import.elements.attachments import AttachedSpring, needs_rotations
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
+from fe_import.elements.solid_orders import raised, with_incompatible_modes
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
@@ -15,6 +20,7 @@ from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.mesh.read import read_mesh
 from fe_import.model import FEModel
+from fe_import.models.attached import attached_constraints, attached_matrices, attached_nodes
 
 
 def solid_model(link: LinkFile) -> FEModel:
@@ -38,13 +44,25 @@ def solid_model(link: LinkFile) -> FEModel:
             value=solid.mesh,
             remedy="give a path that starts at the folder of the link description",
         )
-    mesh = read_mesh(path)
-    materials = _materials(description, solid, mesh, where)
+    mesh = read_mesh(path, solid.ignore)
+    if solid.raise_order:
+        mesh = raised(mesh)
+    if solid.hex8 == "incompatible-modes":
+        mesh = with_incompatible_modes(mesh)
+    materials, own = _materials(description, solid, mesh, where), not (solid.material or solid.regions)
     mass, stiffness = assemble_solid(mesh, materials)
-    lame = np.empty((len(mesh.elements), 2))
+    lame = np.empty((mesh.count, 2))
     for material in materials:
         lame[slice(None) if material.elements is None else material.elements] = material.lame
-    coupled = couple_interfaces(mesh.nodes, _faces(description, mesh, where), where)
+    faces = _faces(description, mesh, where)
+    if mesh.attachments:
+        places = attached_nodes(mesh)
+        added, springs = attached_matrices(mesh, places)
+        mass, stiffness = _sum(mass, added), _sum(stiffness, springs)
+        constraints = attached_constraints(mesh, places)
+        coupled = couple_interfaces(places.nodes, faces, where, places.dof_map, places.rows, constraints)
+    else:
+        coupled = couple_interfaces(mesh.nodes, faces, where)
     return FEModel(
         name=description.name,
         nodes=coupled.nodes,
@@ -59,14 +77,37 @@ def solid_model(link: LinkFile) -> FEModel:
         kind="solid",
         source=where,
         stress=solid_stress(mesh, lame),
+        left_out={name: n for name, n in mesh.left_out.items() if not own or name not in mesh.materials.names},
+        materials=mesh.materials.constants if own else {},
+        notes=_attached_notes(mesh),
+        second_order_lack=_second_order_lack(mesh),
     )
 
 
+def _sum(matrix: sp.csc_array, added: sp.csc_array) -> sp.csc_array:
+    """A matrix of the first rows, and one of all."""
+    coo = sp.coo_array(matrix)
+    return (sp.csc_array((coo.data, coo.coords), shape=added.shape) + added).tocsc()
+
+
+def _attached_notes(mesh: SolidMesh) -> dict[str, str]:
+    counts = Counter(item.keyword for item in mesh.attachments)
+    return {"attached": ", ".join(f"{count} {name}" for name, count in counts.items())} if counts else {}
+
+
+def _second_order_lack(mesh: SolidMesh) -> str:
+    """Why there is no second-order field: nodes that turn, and springs, would need theirs."""
+    turning = any(needs_rotations(item) or isinstance(item, AttachedSpring) for item in mesh.attachments)
+    return "the mesh file attaches springs, or nodes that turn, to the solid" if turning else ""
+
+
 def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[SolidMaterial]:
-    if bool(solid.material) == bool(solid.regions):
+    if not solid.material and not solid.regions:
+        return _materials_of_mesh(mesh, where)
+    if solid.material and solid.regions:
         raise FEImportError(
             Cause.BAD_FIELD,
-            "give exactly one of 'material' and 'regions'",
+            "give one of 'material' and 'regions'",
             where=f"{where}: solid",
             remedy="one material for the whole mesh, or one per element set",
         )
@@ -89,6 +130,20 @@ def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str)
         elements = mesh.element_sets[region.set]
         result.append(SolidMaterial(m.youngs_modulus, m.poissons_ratio, m.density, elements))
     return result
+
+
+def _materials_of_mesh(mesh: SolidMesh, where: str) -> list[SolidMaterial]:
+    found = mesh.materials
+    lost = next((name for name, _ in found.sections if name not in mesh.element_sets), None)
+    if found.lack or lost is not None:
+        reason = found.lack or f"its set {lost!r} holds no solid elements that could be followed"
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            f"no 'material' and no 'regions', and the materials of the mesh file cannot be used: {reason}",
+            where=f"{where}: solid",
+            remedy="give material = NAME for the whole mesh, or [[solid.regions]] for its element sets",
+        )
+    return [SolidMaterial(*found.constants[name], mesh.element_sets[key]) for key, name in found.sections]
 
 
 def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[InterfaceFace]:

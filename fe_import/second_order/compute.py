@@ -29,6 +29,8 @@ def second_order(model: FEModel, shapes: Array, reference: int) -> tuple[SecondO
     count = shapes.shape[1] - 6
     if count > MOST_MODES:
         return None, f"not available: more than {MOST_MODES} elastic modes; keep fewer (reduction.elastic_modes)"
+    if model.second_order_lack:
+        return None, f"not available: {model.second_order_lack}"
     if model.kind == "solid":
         if count > MOST_MODES_OF_SOLIDS:
             return None, (

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fe_import.elements.solid_assembly import chunks
+from fe_import.elements.solid_assembly import chunks, motion_of_modes, slopes
 from fe_import.elements.solid_stress import SolidStress
 from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, FEModel, IntArray
@@ -122,17 +122,16 @@ def _followed(model: FEModel, relative: Array, first: IntArray, second: IntArray
 
 def _membrane_forces(solid: SolidStress, fields: Array, dof_map: IntArray, first: IntArray, second: IntArray) -> Array:
     """(d, pairs) ∫ ε(δ) : C : sym(∇φ_aᵀ ∇φ_b) dV."""
-    mesh, element = solid.mesh, solid.mesh.element
-    points, weights = element.quadrature(element.stiffness_order)
-    gradients = element.shape_gradients(points)
+    mesh = solid.mesh
     result = np.zeros((len(fields), len(first)))
-    for some in chunks(mesh, np.arange(len(mesh.elements))):
-        nodes = mesh.elements[some]
-        jacobian = np.einsum("eka,kbq->eqab", mesh.nodes[nodes], gradients)
-        slopes = np.einsum("kbq,eqba->eqak", gradients, np.linalg.inv(jacobian))  # ∂_a of shape k
-        volume = weights * np.linalg.det(jacobian)
+    for element, nodes, some in chunks(mesh):
+        points, weights = element.quadrature(element.stiffness_order)
+        corners, k = mesh.nodes[nodes], element.size
+        derivatives, volume = slopes(element, corners, points)  # ∂_a of shape k
+        volume *= weights
+        modes = motion_of_modes(element, corners, *solid.lame[some].T)
         moved = fields[dof_map[nodes, :3]]  # (e, k, 3, n)
-        gradient = np.einsum("eqak,ekcn->eqacn", slopes, moved)  # ∂_a u_c
+        gradient = np.einsum("eqak,ekcn->eqacn", derivatives[..., :k], moved)  # ∂_a u_c
         for begin in range(0, len(first), 64):
             pairs = slice(begin, begin + 64)
             product = np.einsum("eqacp,eqbcp->eqabp", gradient[..., first[pairs]], gradient[..., second[pairs]])
@@ -142,7 +141,9 @@ def _membrane_forces(solid: SolidStress, fields: Array, dof_map: IntArray, first
             trace = lam * np.einsum("eqaap->eqp", strain)
             for a in range(3):
                 stress[:, :, a, a] += trace
-            forces = np.einsum("eqak,eqacp,eq->ekcp", slopes, stress, volume, optimize=True)
+            forces = np.einsum("eqak,eqacp,eq->ekcp", derivatives, stress, volume, optimize=True)
+            inner = forces[:, k:].reshape(len(nodes), -1, forces.shape[3])
+            forces = forces[:, :k] + (modes.swapaxes(1, 2) @ inner).reshape(len(nodes), k, 3, -1)
             np.add.at(result[:, pairs], dof_map[nodes, :3].ravel(), forces.reshape(-1, forces.shape[-1]))
     return result
 

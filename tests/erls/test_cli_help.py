@@ -23,8 +23,10 @@ OPTIONS = {
                    "--points", "--norm", "--reference", "--budget", "--apply", "--set", "--workers", "--force",
                    "--json"],
     "effects": ["--set", "--json"],
+    "linearize": ["--output", "-o", "--at", "--equilibrium", "--inputs", "--outputs", "--campbell", "--locus", "--mode",
+                  "--set", "--force", "--json"],
     "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--force", "--json"],
+    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--overlay", "--force", "--json"],
 }
 
 

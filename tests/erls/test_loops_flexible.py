@@ -21,7 +21,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES
 from erls.mechanism.links import link_mass_properties
 from erls.mechanism.loops import Loop, LoopEnd
-from erls.run.link_loads import link_loads
+from erls.run.chain.link_loads import link_loads
 
 STEP = 1e-6
 OFFSET = pose(fixed_axes(0.3, -0.5, 0.8), np.array([0.02, -0.01, 0.03]))
@@ -181,7 +181,7 @@ def test_loads_on_a_link_include_those_of_its_loop(tmp_path: Path) -> None:
     still = {"shape": "polynomial", "from_deg": 60.0, "to_deg": 60.0, "duration": 1.0}
     run = loop_scenes.run(tmp_path, loop_scenes.driven(data, {"type": "motion", "motion": still}), duration=1e-3)
     link, state = run.formulation.mechanism.links[2], run.states([0.0])[0]
-    wrenches = link_loads(run, 2, np.array([0.0])).interfaces.reshape(2, 6)
+    wrenches = link_loads(run.instants([0.0]), 2).interfaces.reshape(2, 6)
     properties = link_mass_properties(link)
     world = state.poses[2][:3, :3]
     weight = world.T @ run.formulation.mechanism.gravity * properties.mass

@@ -10,7 +10,7 @@ import pytest
 import scenes
 
 import erls
-from erls.equations.linearization import restricted, roots, stiffness_left, ways_left
+from erls.equations.linearization import Linearization, roots, stiffness_left, ways_left
 from erls.equations.registry import formulate
 from erls.equations.serial.formulation import SerialFormulation
 from erls.errors import Cause, SimulationError
@@ -188,7 +188,7 @@ def test_roots_on_the_ways_that_conditions_leave() -> None:
     """Two masses that a rod joins move as one: s = ± i √((k₁ + k₂) / (m₁ + m₂))."""
     mass, stiffness = np.diag([1.0, 3.0]), np.diag([5.0, 11.0])
     ways = ways_left(np.array([[1.0, -1.0]]), np.ones(2))
-    found = roots(restricted(mass, np.zeros((2, 2)), stiffness, ways))
+    found = roots(Linearization(ways.T @ mass @ ways, np.zeros((1, 1)), ways.T @ stiffness @ ways, ways))
     np.testing.assert_allclose(found, [2j, -2j], atol=1e-14)
 
 

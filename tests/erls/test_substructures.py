@@ -12,7 +12,7 @@ import scenes
 
 import erls
 from erls.errors import SceneError
-from erls.run.link_loads import link_loads
+from erls.run.chain.link_loads import link_loads
 from erls.scene.build import build_mechanism
 from fe_import.description.link import load_link
 from fe_import.errors import Cause, FEImportError
@@ -151,7 +151,7 @@ def test_payloads_and_points_sit_on_their_pieces(tmp_path: Path) -> None:
     assert weight == pytest.approx(9.81 * (2.34 + 0.5), rel=1e-6)
     solved = runs[1].formulation.inner.mechanism.links
     assert [len(link.payloads) for link in solved] == [1, 0]
-    assert link_loads(runs[1], 0, np.array([0.01])).interfaces.shape == (1, 12)
+    assert link_loads(runs[1].instants([0.01]), 0).interfaces.shape == (1, 12)
 
 
 def test_every_link_of_a_spatial_chain_in_pieces(tmp_path: Path) -> None:

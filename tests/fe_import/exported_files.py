@@ -51,11 +51,11 @@ def link_matrices() -> tuple[SolidMesh, sp.csc_array, sp.csc_array]:
 
 def deck(mesh: SolidMesh) -> str:
     """Nodes (numbers 10, 20, ...), elements and sets."""
-    kind = {"hex8": "C3D8", "tet10": "C3D10"}[mesh.element_type]
+    kind = {"hex8": "C3D8", "tet10": "C3D10"}[mesh.only.type]
     lines = ["** a comment", "*NODE, NSET=Nall"]
     lines += [f"{10 * (k + 1)}, " + ", ".join(map(repr, p.tolist())) for k, p in enumerate(mesh.nodes)]
     lines += [f"*ELEMENT, TYPE={kind}, ELSET=EALL"]
-    lines += [", ".join(map(str, [k, *(10 * (e + 1)).tolist()])) for k, e in enumerate(mesh.elements, start=1)]
+    lines += [", ".join(map(str, [k, *(10 * (e + 1)).tolist()])) for k, e in enumerate(mesh.only.elements, start=1)]
     for name in ("x0", "x1"):
         lines += [f"*NSET, NSET={name}", *(f"{10 * (n + 1)}," for n in mesh.node_sets[name])]
     return "\n".join(lines) + "\n"
@@ -68,8 +68,8 @@ def frd_files() -> Files:
     lines = ["    1C", f"    2C{len(mesh.nodes):30d}{1:38d}"]
     for k, position in enumerate(mesh.nodes.tolist(), start=1):
         lines.append(f" -1{10 * k:10d}" + "".join(f"{x:12.5E}" for x in position))
-    lines += [" -3", f"    3C{len(mesh.elements):30d}{1:38d}"]
-    for k, nodes in enumerate(mesh.elements.tolist(), start=1):
+    lines += [" -3", f"    3C{len(mesh.only.elements):30d}{1:38d}"]
+    for k, nodes in enumerate(mesh.only.elements.tolist(), start=1):
         lines += [f" -1{k:10d}    1    0    1", " -2" + "".join(f"{10 * (n + 1):10d}" for n in nodes)]
     sets = [f"{name.upper()} {' '.join(str(10 * (n + 1)) for n in mesh.node_sets[name])}\n" for name in ("x0", "x1")]
     return {"k.frd": ("\n".join([*lines, " -3", ""])).encode(), "sets.txt": "".join(sets).encode()}

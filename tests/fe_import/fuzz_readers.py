@@ -37,11 +37,11 @@ from fe_import.models.model import build_model
 def mesh_facts(mesh: SolidMesh) -> Facts:
     """Nodes, elements and sets by position, as numbers change when a node is lost."""
     places = [tuple(p) for p in mesh.nodes.tolist()]
-    found: set[Any] = {("type", mesh.element_type), *(("node", p) for p in places)}
-    found |= {("element", tuple(places[n] for n in e)) for e in mesh.elements.tolist()}
+    found: set[Any] = {("type", mesh.only.type), *(("node", p) for p in places)}
+    found |= {("element", tuple(places[n] for n in e)) for e in mesh.only.elements.tolist()}
     found |= {("set", name, places[n]) for name, members in mesh.node_sets.items() for n in members}
     for name, members in mesh.element_sets.items():
-        found |= {("set", name, tuple(places[n] for n in mesh.elements[e])) for e in members}
+        found |= {("set", name, tuple(places[n] for n in mesh.only.elements[e])) for e in members}
     return frozenset(found)
 
 
@@ -166,20 +166,20 @@ def gmsh_text(mesh: SolidMesh, ends: list[np.ndarray]) -> bytes:
     lines += ["$EndPhysicalNames", "$Entities", "0 0 2 1", f"1 {low} {high} 1 2 0", f"2 {low} {high} 1 3 0"]
     lines += [f"1 {low} {high} 1 1 2 1 2", "$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"3 1 0 {count}"]
     lines += [*(str(k + 1) for k in range(count)), *(" ".join(map(repr, p)) for p in mesh.nodes.tolist())]
-    lines += ["$EndNodes", "$Elements", f"3 {2 + len(mesh.elements)} 1 {2 + len(mesh.elements)}"]
+    lines += ["$EndNodes", "$Elements", f"3 {2 + len(mesh.only.elements)} 1 {2 + len(mesh.only.elements)}"]
     for k, quad in enumerate(ends, start=1):
         lines += [f"2 {k} 3 1", f"{k} " + " ".join(str(n + 1) for n in quad.ravel())]
-    lines.append(f"3 1 5 {len(mesh.elements)}")
-    lines += [f"{k} " + " ".join(str(n + 1) for n in e) for k, e in enumerate(mesh.elements.tolist(), start=3)]
+    lines.append(f"3 1 5 {len(mesh.only.elements)}")
+    lines += [f"{k} " + " ".join(str(n + 1) for n in e) for k, e in enumerate(mesh.only.elements.tolist(), start=3)]
     return "\n".join([*lines, "$EndElements", ""]).encode()
 
 
 def _meshes() -> Iterator[Reader]:
     mesh = box("hex8", (2, 1, 1))
-    ends = [mesh.elements[:1, [0, 3, 7, 4]], mesh.elements[1:, [1, 2, 6, 5]]]
+    ends = [mesh.only.elements[:1, [0, 3, 7, 4]], mesh.only.elements[1:, [1, 2, 6, 5]]]
     part = meshio.Mesh(
         mesh.nodes,
-        [("hexahedron", mesh.elements), ("quad", np.concatenate(ends))],
+        [("hexahedron", mesh.only.elements), ("quad", np.concatenate(ends))],
         cell_data={"part": [np.array([1, 1]), np.array([2, 3])]},
     )
     shells = meshio.Mesh(mesh.nodes, part.cells, cell_data={"nastran:ref": part.cell_data["part"]})

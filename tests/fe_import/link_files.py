@@ -36,7 +36,7 @@ FRAME: dict[str, Any] = {
 
 SOLID: dict[str, Any] = {
     "materials": {"m": {"youngs_modulus": 7e10, "poissons_ratio": 0.33, "density": 2700.0}},
-    "solid": {"mesh": "box.inp", "material": "m"},
+    "solid": {"mesh": "box.inp", "material": "m", "mesh_error": 1e3},  # coarse
     "interfaces": [{"name": "hub", "face": "x0"}, {"name": "hand", "face": "x1"}],
 }
 
@@ -86,16 +86,15 @@ def straight_link(folder: Path, length: float, elements: int, **changes: Any) ->
     return load_link(write_toml(folder / "link.toml", merged({**base, "frame": frame}, changes)))
 
 
-def write_box(path: Path, scale: float = 1.0) -> Path:
+def write_box(path: Path, scale: float = 1.0, kind: str = "hex20", along: int = 3) -> Path:
     """An Abaqus mesh of 3 x 1 x 1 hexahedra with 20 nodes, 0.3 x 0.02 x 0.03 times ``scale``, sets x0 and x1."""
-    mesh = box("hex20", (3, 1, 1), (0.3, 0.02, 0.03))
+    mesh = box(kind, (along, 1, 1), (0.3, 0.02, 0.03))
     lines = ["*NODE"]
     lines += [f"{k}, " + ", ".join(repr(float(x * scale)) for x in p) for k, p in enumerate(mesh.nodes, start=1)]
-    lines += ["*ELEMENT, TYPE=C3D20, ELSET=all"]
-    order = [*range(12), 12, 13, 14, 15, 16, 17, 18, 19]
-    for k, nodes in enumerate(mesh.elements, start=1):
-        numbers = [str(k), *(str(n + 1) for n in nodes[order])]
-        lines += [", ".join(numbers[:16]) + ",", ", ".join(numbers[16:])]
+    lines += [f"*ELEMENT, TYPE=C3D{mesh.only.element.size}, ELSET=all"]
+    for k, nodes in enumerate(mesh.only.elements, start=1):
+        numbers = [str(k), *(str(n + 1) for n in nodes)]
+        lines += [", ".join(numbers[at : at + 16]) + "," for at in range(0, len(numbers), 16)]
     for name in ("x0", "x1"):
         lines += [f"*NSET, NSET={name}"]
         lines += [f"{n + 1}," for n in mesh.node_sets[name]]

@@ -151,7 +151,7 @@ def pulled(element_type: str, coupling: str) -> tuple[np.ndarray, np.ndarray, fl
     mesh = box(element_type, (4, 2, 2) if element_type == "hex27" else (8, 4, 4), (0.4, B, B))
     c = ends(mesh, coupling, "area" if coupling == "averaged" else "uniform")
     u = clamped(mesh, c)[:, :1]
-    lame = np.tile(STEEL.lame, (len(mesh.elements), 1))
+    lame = np.tile(STEEL.lame, (len(mesh.only.elements), 1))
     face = mesh.node_sets["x0"]
     stress = solid_stress(mesh, lame).evaluate(u, c.dof_map, face)[:, :, 0] * B**2
     top, bottom = (u[c.dof_map[np.intersect1d(face, mesh.node_sets[s]), 1], 0].mean() for s in ("y1", "y0"))
@@ -243,8 +243,8 @@ SHARES = {  # of the area of one face: corner, mid-side node, centre
 def test_shares_of_the_area(element_type):
     """Diagonal-scaled shares of flat faces in closed form (Hinton, Rock & Zienkiewicz 1976), to rounding."""
     mesh = box(element_type, (1, 1, 1), (1.0, 2.0, 3.0))
-    element = mesh.element
-    face = mesh.elements[:1, element.faces[0]]
+    element = mesh.only.element
+    face = mesh.only.elements[:1, element.faces[0]]
     found = nodal_areas(mesh.nodes, face)[face[0]]
     corners = mesh.nodes[face[0, : 4 if element.corners == 8 else 3]]
     a, b = corners[1] - corners[0], corners[-1] - corners[0]
@@ -257,7 +257,7 @@ def test_shares_of_the_area(element_type):
 def test_area_of_a_curved_face():
     """The bore of a ring: π r h / 2, to 1e-4 (eight quadratic arcs); weights positive, sum 1, alike by symmetry."""
     ring = quarter_ring("hex20", 8, 0.4, 0.5, 0.1)
-    faces = ring.elements[:, ring.element.faces].reshape(-1, 8)
+    faces = ring.only.elements[:, ring.only.element.faces].reshape(-1, 8)
     bore = faces[np.isin(faces, ring.node_sets["x0"]).all(axis=1)]
     assert nodal_areas(ring.nodes, bore).sum() == pytest.approx(np.pi / 2 * 0.4 * 0.1, rel=1e-4)
     weights = area_weights(ring, ring.node_sets["x0"], "BORE")

@@ -12,9 +12,9 @@ from nastran_files import DMIG, check_message, own_frequencies, reduced, small
 from superelements import Reduced, condensed, description, dmig, frame_model, grid_cards, punch
 
 from fe_import.errors import FEImportError
-from fe_import.exports.nastran_cards import read_cards
 from fe_import.exports.nastran_dmig import DmigOptions, read_dmig
-from fe_import.exports.nastran_grid import CARDS, grid_points
+from fe_import.nastran.cards import read_cards
+from fe_import.nastran.grid import CARDS, grid_points
 from fe_import.reduce import reduce_link
 
 
@@ -122,6 +122,18 @@ def test_lines_and_scalar_points() -> None:
 PCH = punch(small())
 
 
+def test_curved_displacement_frames() -> None:
+    """Axes of a cylindrical frame at 90 degrees: outward y, around -x; of a spherical one on the equator: -z first."""
+    frames = "CORD2C,5,,,,,,,1.\n,1.,0.,0.\nCORD2S,6,,,,,,,1.\n,1.,0.,0.\n"
+    text = frames + "GRID,1,5,2.,90.,3.,5\nGRID   *               2               6              2.             90.\n"
+    text += "*                    90.               6\n"
+    points = grid_points(read_cards(text.splitlines(), CARDS, "m.bdf"))
+    np.testing.assert_allclose(points.positions[1], [0.0, 2.0, 3.0], atol=1e-15)
+    np.testing.assert_allclose(points.axes[1].T, [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], atol=1e-15)
+    np.testing.assert_allclose(points.positions[2], [0.0, 2.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(points.axes[2].T, [[0, 1, 0], [0, 0, -1], [-1, 0, 0]], atol=1e-15)
+
+
 def without(start: str) -> str:
     """The punch file without the cards that start so."""
     return "".join(line for line in PCH.splitlines(keepends=True) if not line.startswith(start))
@@ -151,10 +163,6 @@ DMIG_FAULTS: dict[str, tuple[str, str]] = {
     "grid twice": ("GRID,21\n" + PCH, "stands twice"),
     "GRDSET": ("GRDSET,,,,,,3\n" + PCH, "defaults for GRID"),
     "unknown coordinate system": (PCH.replace("GRID,21,,", "GRID,21,5,"), "coordinate system 5 is not there"),
-    "cylindrical": (
-        PCH.replace("GRID,21,,", "GRID,21,5,") + "CORD2C,5,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n",
-        "5 is a CORD2C",
-    ),
     "CORD1R": (PCH.replace("GRID,21,,", "GRID,21,5,") + "CORD1R,5,11,21,11\n", "5 is a CORD1R"),
     "circular": (
         PCH.replace("GRID,21,,", "GRID,21,5,") + "CORD2R,5,6,,,,,,1.\n,1.\nCORD2R,6,5,,,,,,1.\n,1.\n",

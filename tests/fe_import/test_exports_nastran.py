@@ -158,7 +158,7 @@ OP4_FAULTS: dict[str, tuple[bytes, str]] = {
     "other names": (op4_bytes(name="KGG"), "no matrix KAAX for the stiffness"),
     "twice": (GOOD + GOOD, "more than one matrix KAAX"),
     "giant header": (op4_bytes(size=(2_000_000_000, 2_000_000_000)), "no room for"),
-    "negative header": (op4_bytes(size=(-5, 13)), "no room for"),
+    "negative header": (op4_bytes(size=(-5, 13)), "absurd size"),
     "more columns than rows": (op4_bytes(size=(14, 13)), "not square"),
     "not symmetric": (spoiled_op4(_unsymmetric), "declared symmetric, but is not"),
     "not a number": (spoiled_op4(_not_a_number), "not finite"),
@@ -196,6 +196,38 @@ def test_files_written_here_are_read(tmp_path: Path, content: bytes) -> None:
     assert reduce_link(description(tmp_path, "nastran-dmig", {"stiffness": "m.pch"}, small())).elastic_modes == 7
 
 
+def with_zeros() -> bytes:
+    """A matrix of zeros, far larger than the file, before the others; closing records that count a double as 1 word."""
+    header = struct.pack("<iiiii8si", 24, 100_000, 100_000, 2, 2, b"PHI     ", 24)
+    closing = struct.pack("<iiiidi", 20, 100_001, 1, 1, 1.0, 20)
+    last = struct.pack("<iii", 14, 1, 2)
+    assert GOOD.count(last) == 2
+    return header + closing + GOOD.replace(last, struct.pack("<iii", 14, 1, 1))
+
+
+def without_format() -> bytes:
+    """Text whose headers end with the name: numbers as 5E16.9; a closing record that counts a double as 2 words."""
+    rows = []
+    for matrix, name in ((small().stiffness, "KAAX"), (small().mass, "MAAX")):
+        count = len(matrix)
+        rows.append(f"{count:8d}{count:8d}{6:8d}{2:8d}{name}")
+        for k, column in enumerate(matrix.T, start=1):
+            texts = [f"{x:16.9E}" for x in column]
+            rows += [f"{k:8d}{1:8d}{count:8d}", *("".join(texts[at : at + 5]) for at in range(0, count, 5))]
+        rows += [f"{count + 1:8d}{1:8d}{2:8d}", f"{1.0:16.9E}"]
+    return "\n".join([*rows, ""]).encode()
+
+
+@pytest.mark.parametrize("content", [with_zeros(), without_format()], ids=["zeros", "no format"])
+def test_habits_of_real_files(tmp_path: Path, content: bytes) -> None:
+    """As Nastran and others write them: the matrices of `small`, the text to its ten digits."""
+    (tmp_path / "m.op4").write_bytes(content)
+    export = read_op4({"stiffness": tmp_path / "m.op4"}, Op4Options(boundary=[1, 2], positions=TWO_POINTS), "link.toml")
+    np.testing.assert_allclose(export.stiffness.toarray(), small().stiffness, rtol=1e-9)
+    np.testing.assert_allclose(export.mass.toarray(), small().mass, rtol=1e-9)
+
+
+TWO_POINTS = {"1": (0.0, 0.0, 0.0), "2": (1.0, 0.0, 0.0)}
 OPTION_FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "no boundary": ({"options": {"boundary": []}}, "need the grid points they belong to"),
     "boundary too long": ({"options": {"boundary": [1, 2, 3, 4, 5, 6]}}, "need the grid points they belong to"),

@@ -9,16 +9,18 @@ import meshio
 import numpy as np
 import pytest
 from link_files import solid_link
-from solid_meshes import box
+from solid_meshes import box, side
 
-from fe_import.elements.solid_elements import SOLID_ELEMENTS
+from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.read import read_mesh
 from fe_import.models.model import build_model
+from fe_import.reduce import reduce_link
 
-TYPES = sorted(SOLID_ELEMENTS)
-ABAQUS = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8R", "hex20": "C3D20"}
+TYPES = sorted(MESH_ELEMENTS)
+ABAQUS = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8R", "hex20": "C3D20", "wedge6": "C3D6", "wedge15": "C3D15"}
+ABAQUS |= {"pyramid5": "C3D5", "pyramid13": "C3D13"}
 BAR = box("hex8", (3, 1, 1))
 LABELS = 10 * np.arange(len(BAR.nodes)) + 7  # of nodes in decks: neither dense nor from 1
 
@@ -28,8 +30,8 @@ def deck(mesh: SolidMesh, *more: str, split: bool = False) -> str:
     rows = [f"{10 * k + 7}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(mesh.nodes.tolist())]
     text = ["** a comment", "*Heading", "bar", "*Node, nset=Half", *rows[: len(rows) // 2]]
     text += ["*NODE", *rows[len(rows) // 2 :]]
-    head = f"*Element, type={ABAQUS[mesh.element_type].lower()}, elset=Body"
-    for k, nodes in enumerate(mesh.elements):
+    head = f"*Element, type={ABAQUS[mesh.only.type].lower()}, elset=Body"
+    for k, nodes in enumerate(mesh.only.elements):
         if k == 0 or split:
             text.append(head)
         fields = [str(k + 1), *(str(10 * n + 7) for n in nodes)]
@@ -65,7 +67,7 @@ SETS = {  # lines of the deck, node set, what it is
     "several lines": (["*NSET, NSET=X, UNSORTED", "7,17,", "27"], "X", np.array([0, 1, 2])),
     "stands twice": (["*NSET, NSET=X", "7", "*NSET, NSET=x", "17"], "X", np.array([0, 1])),
     "set of sets": (["*NSET, NSET=X", "A, 17", "*NSET, NSET=a", "7"], "X", np.array([0, 1])),
-    "of elements": (["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last"], "X", np.unique(BAR.elements[2])),
+    "of elements": (["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last"], "X", np.unique(BAR.only.elements[2])),
     "of elements twice": (
         ["*ELSET, ELSET=LAST", "3", "*NSET, NSET=X, ELSET=last", "*NSET, NSET=X, ELSET=Body", "*NSET, NSET=Z", "X"],
         "Z",
@@ -77,7 +79,7 @@ SETS = {  # lines of the deck, node set, what it is
     "surface of a set": (["*ELSET, ELSET=E", "3", "*SURFACE, NAME=X", "E, s4"], "X", END),
     "surface of nodes": (["*NSET, NSET=E", "7", "*SURFACE, TYPE=NODE, NAME=X", "E,", "17, 1."], "X", np.array([0, 1])),
     "shell elements": (
-        ["*ELEMENT, TYPE=S4, ELSET=X", "9," + ",".join(str(LABELS[n]) for n in BAR.elements[2, [1, 2, 6, 5]])],
+        ["*ELEMENT, TYPE=S4, ELSET=X", "9," + ",".join(str(LABELS[n]) for n in BAR.only.elements[2, [1, 2, 6, 5]])],
         "X",
         END,
     ),
@@ -90,37 +92,38 @@ def test_sets_of_decks(tmp_path, name):
     lines, key, expected = SETS[name]
     found = read(tmp_path, *lines)
     np.testing.assert_allclose(found.nodes, BAR.nodes, atol=0)
-    np.testing.assert_array_equal(found.elements, BAR.elements)
+    np.testing.assert_array_equal(found.only.elements, BAR.only.elements)
     np.testing.assert_array_equal(found.node_sets[key], expected)
     assert found.lost_sets == {}
 
 
 @pytest.mark.parametrize("split", [False, True])
 def test_element_sets_of_decks(tmp_path, split):
-    """Sets of one or several *ELEMENT blocks, generated, made of others, with elements that are no solids."""
+    """Sets of one or several *ELEMENT blocks, generated, made of others; lines without a section mark nodes."""
     more = [
         "*ELSET, ELSET=ENDS, GENERATE",
         "1, 3, 2",
         "*ELSET, ELSET=ALL",
         "Ends, 2",
-        "*ELEMENT, TYPE=MASS, ELSET=M",
-        "8, 7",
+        "*ELEMENT, TYPE=T3D2, ELSET=M",
+        "8, 7, 17",
     ]
     found = read(tmp_path, *more, split=split)
     np.testing.assert_array_equal(found.element_sets["Body"], [0, 1, 2])
     np.testing.assert_array_equal(found.element_sets["ENDS"], [0, 2])
     np.testing.assert_array_equal(found.element_sets["ALL"], [0, 1, 2])
-    assert "holds nothing" in found.lost_sets["M"]
+    np.testing.assert_array_equal(found.node_sets["M"], [0, 1])
+    assert found.left_out == {"HEADING": 1, "T3D2": 1}
 
 
 @pytest.mark.parametrize("name", sorted(ABAQUS))
 def test_surfaces_of_every_element(tmp_path, name):
     """Faces S1, S2 ... of an element hold the corners and mid-side nodes of one face each; together all of them."""
     mesh = box(name, (1, 1, 1))
-    faces = len(mesh.element.faces)
+    faces = len(mesh.only.element.faces)
     lines = [line for k in range(1, faces + 1) for line in (f"*SURFACE, NAME=F{k}", f"1, S{k}")]
     found = read(tmp_path, *lines, mesh=mesh)
-    ours = {frozenset(face) for face in found.elements[0][found.element.faces].tolist()}
+    ours = {frozenset(found.only.elements[0][face].tolist()) for face in found.only.element.faces}
     theirs = {frozenset(found.node_sets[f"F{k}"].tolist()) for k in range(1, faces + 1)}
     assert ours == theirs
 
@@ -144,7 +147,7 @@ def test_sets_that_cannot_be_followed(tmp_path, name):
     """The mesh is read without them; whoever names one is told why."""
     lines, reason = LOST[name]
     found = read(tmp_path, *lines)
-    assert len(found.elements) == 3
+    assert len(found.only.elements) == 3
     if reason:
         assert reason in found.lost_sets["X"]
         assert "X" not in {**found.node_sets, **found.element_sets}
@@ -162,7 +165,8 @@ DECKS = {
     "no type": (["*ELEMENT", "9, 7, 17"], "lacks TYPE"),
     "no name": (["*NSET", "7"], "lacks NSET"),
     "cylindrical": (["*NODE, SYSTEM=C", "999, 1, 2, 3"], "cylindrical"),
-    "include": (["*INCLUDE, INPUT=other.inp"], "join the files"),
+    "include": (["*INCLUDE, INPUT=other.inp"], "no such file, or this one is packed; got 'other.inp'"),
+    "includes itself": (["*INCLUDE, INPUT=bar.inp"], "includes itself"),
     "two instances": (["*INSTANCE, NAME=A, PART=P", "*INSTANCE, NAME=B, PART=P"], "several instances"),
     "moved instance": (["*INSTANCE, NAME=A, PART=P", "0., 0., 0.5"], "moved"),
     "backwards": (["*NSET, NSET=X, GENERATE", "1, 9, -1"], "step of -1"),
@@ -191,16 +195,87 @@ def test_faulty_decks(tmp_path, name):
     assert str(tmp_path / "bar.inp") in str(caught.value)
 
 
+NODES = ", ".join(str(label) for label in LABELS[:4])
+LOSSES = {  # lines of the deck, what the message counts, what the link may be without
+    "support": (["*BOUNDARY", "7, 1, 3"], "1 BOUNDARY from line 29", ["BOUNDARY"]),
+    "support in a step": (["*STEP", "*Boundary", "7, 1, 3", "*END STEP"], "joints hold it): 1 BOUND", ["Boundary"]),
+    "mass without value": (["*ELEMENT, TYPE=MASS, ELSET=M", "9, 7"], "masses (elements without a value", ["MASS"]),
+    "springs": (
+        ["*ELEMENT, TYPE=SPRING1, ELSET=S", "9, 7", "*SPRING, ELSET=S", "1", "100."],
+        "stiffness (a spring to the ground; a link is free): 1 SPRING from line",
+        ["SPRING"],
+    ),
+    "shells": (
+        ["*ELEMENT, TYPE=S4, ELSET=S", f"9, {NODES}", "*SHELL SECTION, ELSET=S, MATERIAL=M", "0.01"],
+        "shells: 1 SHELL SECTION",
+        ["SHELL SECTION"],
+    ),
+    "beams": (
+        ["*ELEMENT, TYPE=B31, ELSET=B", "9, 7, 17", "*BEAM SECTION, ELSET=B, SECTION=RECT", "1., 1."],
+        "beams: 1 BEAM SECTION",
+        ["BEAM SECTION"],
+    ),
+    "trusses": (
+        ["*ELEMENT, TYPE=T3D2, ELSET=T", "9, 7, 17", "*SOLID SECTION, ELSET=T, MATERIAL=M", "1."],
+        "trusses or plane elements: 1 T3D2",
+        ["T3D2"],
+    ),
+    "equation": (["*EQUATION", "2", "Half, 1, 1., 17, 1, -1."], "a set of nodes (Half) in an equation", ["EQUATION"]),
+    "rigid body": (["*RIGID BODY, PIN NSET=Half, REF NODE=7"], "parameter PINNSET is not followed", ["RIGID BODY"]),
+    "multi-point": (["*MPC", "PLANE, 7, 17"], "constraints between nodes: 1 MPC", ["MPC"]),
+    "tie": (["*TIE, NAME=T", "A, B"], "1 TIE", ["TIE"]),
+    "contact": (["*CONTACT PAIR, INTERACTION=I", "A, B"], "contact: 1 CONTACT PAIR", ["CONTACT PAIR"]),
+    "unknown keyword": (["*ODD ONE", "1, 2"], "not known here: 1 ODD ONE", ["ODD ONE"]),
+    "unknown element": (["*ELEMENT, TYPE=Q99", "9, 7, 17"], "not known here: 1 Q99", ["Q99"]),
+}
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_nothing_is_dropped(tmp_path, name):
+    """What a link would lack is refused with count and line; asked for, it is left out and counted."""
+    lines, words, ignored = LOSSES[name]
+    with pytest.raises(FEImportError) as caught:
+        read(tmp_path, *lines)
+    assert caught.value.cause is Cause.NOT_USED
+    assert words in str(caught.value)
+    found = read_mesh(tmp_path / "bar.inp", ignored)
+    np.testing.assert_array_equal(found.only.elements, BAR.only.elements)
+    assert {name.upper() for name in ignored} <= found.left_out.keys()
+
+
+def test_all_losses_in_one_message(tmp_path):
+    """The remedy is the whole list, with what was asked for already; a slip in it is refused."""
+    lines = ["*BOUNDARY", "7, 1", "*EQUATION", "2", "7, 1, 1., Half, 1, -1.", "*TIE, NAME=T", "A, B"]
+    read_lines = [*lines, "*CLOAD", "7, 1, 2.", "*MATERIAL, NAME=M", "*ELASTIC", "1., .3", "*DENSITY", "1."]
+    with pytest.raises(FEImportError, match="BOUNDARY"):
+        read(tmp_path, *read_lines)
+    with pytest.raises(FEImportError, match=r'ignore = \["TIE", "BOUNDARY", "EQUATION"\]'):
+        read_mesh(tmp_path / "bar.inp", ["tie"])
+    with pytest.raises(FEImportError, match="did you mean 'BOUNDARY'"):
+        read_mesh(tmp_path / "bar.inp", ["BOUNDRY"])
+
+
+def test_what_is_left_out_is_reported(tmp_path):
+    """Counts in the health report and in the provenance of the modal file."""
+    link = solid_link(tmp_path, solid={"ignore": ["BOUNDARY"]})
+    mesh = tmp_path / "box.inp"
+    mesh.write_text(mesh.read_text() + "*BOUNDARY\nx0, 1, 3\n")
+    model = reduce_link(link)
+    (check,) = [c for c in model.health if c.name.startswith("left out of the mesh file")]
+    assert "1 BOUNDARY" in check.name
+    assert check.ok
+    assert '"BOUNDARY": 1' in model.provenance["left out"]
+
+
 @pytest.mark.parametrize("name", sorted(ABAQUS))
 @pytest.mark.parametrize("packed", [False, True])
 def test_properties_of_nastran(tmp_path, name, packed):
     """PID 3 and PID 5 of a deck, through meshio and through gzip."""
     mesh = box(name, (2, 1, 1))
     path = tmp_path / "bar.bdf"
-    tags = np.where(np.arange(len(mesh.elements)) % 2, 5, 3)
-    meshio.write(
-        path, meshio.Mesh(mesh.nodes, [(mesh.element.meshio_name, mesh.elements)], cell_data={"nastran:ref": [tags]})
-    )
+    tags = np.where(np.arange(len(mesh.only.elements)) % 2, 5, 3)
+    cells = [(mesh.only.element.meshio_name, mesh.only.elements)]
+    meshio.write(path, meshio.Mesh(mesh.nodes, cells, cell_data={"nastran:ref": [tags]}))
     if packed:
         path = tmp_path / "bar.bdf.gz"
         path.write_bytes(gzip.compress((tmp_path / "bar.bdf").read_bytes()))
@@ -213,13 +288,13 @@ def test_properties_of_nastran(tmp_path, name, packed):
 def test_local_coordinates_of_nastran(tmp_path):
     path = tmp_path / "bar.bdf"
     meshio.write(
-        path, meshio.Mesh(BAR.nodes, [("hexahedron", BAR.elements)], point_data={"nastran:ref": np.full(16, 4)})
+        path, meshio.Mesh(BAR.nodes, [("hexahedron", BAR.only.elements)], point_data={"nastran:ref": np.full(16, 4)})
     )
     text = path.read_text()
     assert "GRID" in text
-    with pytest.raises(FEImportError, match="local coordinate systems") as caught:
+    with pytest.raises(FEImportError, match="coordinate system 4 is not there") as caught:
         read_mesh(path)
-    assert caught.value.cause is Cause.MESH
+    assert caught.value.cause is Cause.BAD_REFERENCE
 
 
 def test_integer_arrays_of_vtu(tmp_path):
@@ -228,7 +303,7 @@ def test_integer_arrays_of_vtu(tmp_path):
     medium = np.array([3, 3, 4])
     raw = meshio.Mesh(
         BAR.nodes,
-        [("hexahedron", BAR.elements)],
+        [("hexahedron", BAR.only.elements)],
         cell_data={"medium": [medium], "stress": [np.array([1.0, 2.0, 3.0])]},
         point_data={
             "side": (BAR.nodes[:, 0] == 3).astype(int),
@@ -250,14 +325,13 @@ def test_integer_arrays_of_vtu(tmp_path):
 def test_families_of_med(tmp_path, name):
     """Groups of elements, faces and nodes; elements numbered inside out, as Salome writes them, are turned."""
     mesh = box(name, (2, 1, 1))
-    faces = mesh.elements[:, mesh.element.faces].reshape(-1, mesh.element.faces.shape[1])
-    ends = faces[np.isin(faces, mesh.node_sets["x1"]).all(axis=1)]
-    shape = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}[faces.shape[1]]
-    inside_out = mesh.elements[:, np.argsort(mesh.element.mirrored_order)]
+    ends = side(mesh, "x1")
+    shape = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}[ends.shape[1]]
+    inside_out = mesh.only.elements[:, np.argsort(mesh.only.element.mirrored_order)]
     raw = meshio.Mesh(
         mesh.nodes,
-        [(mesh.element.meshio_name, inside_out), (shape, ends)],
-        cell_data={"cell_tags": [np.full(len(mesh.elements), -1), np.full(len(ends), -2)]},
+        [(mesh.only.element.meshio_name, inside_out), (shape, ends)],
+        cell_data={"cell_tags": [np.full(len(mesh.only.elements), -1), np.full(len(ends), -2)]},
         point_data={"point_tags": np.where(mesh.nodes[:, 0] == 0, 1, 0)},
     )
     raw.cell_tags = {-1: ["BODY"], -2: ["END", "BOTH"]}
@@ -265,8 +339,8 @@ def test_families_of_med(tmp_path, name):
     path = tmp_path / "bar.med"
     meshio.write(path, raw)
     found = read_mesh(path)
-    np.testing.assert_array_equal(found.elements, mesh.elements)
-    np.testing.assert_array_equal(found.element_sets["BODY"], np.arange(len(mesh.elements)))
+    np.testing.assert_array_equal(found.only.elements, mesh.only.elements)
+    np.testing.assert_array_equal(found.element_sets["BODY"], np.arange(len(mesh.only.elements)))
     for key in ("END", "BOTH"):
         np.testing.assert_array_equal(found.node_sets[key], mesh.node_sets["x1"])
     np.testing.assert_array_equal(found.node_sets["ROOT"], mesh.node_sets["x0"])
@@ -277,7 +351,7 @@ def test_groups_of_gmsh_without_names(tmp_path):
     path = tmp_path / "bar.msh"
     tags = [np.array([7, 7, 8])]
     raw = meshio.Mesh(
-        BAR.nodes, [("hexahedron", BAR.elements)], cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}
+        BAR.nodes, [("hexahedron", BAR.only.elements)], cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}
     )
     meshio.write(path, raw, file_format="gmsh22", binary=False)
     found = read_mesh(path)
@@ -291,7 +365,7 @@ def test_a_group_without_members(tmp_path):
     tags = [np.array([1, 1, 1])]
     raw = meshio.Mesh(
         BAR.nodes,
-        [("hexahedron", BAR.elements)],
+        [("hexahedron", BAR.only.elements)],
         cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
         field_data={"BODY": np.array([1, 3]), "FACE": np.array([2, 2])},
     )

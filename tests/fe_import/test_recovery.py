@@ -135,7 +135,7 @@ def write_long_box(path: Path) -> None:
     mesh = box("hex20", (24, 1, 2), (0.6, 0.02, 0.03))
     lines = ["*NODE", *(f"{k}, " + ", ".join(map(repr, p)) for k, p in enumerate(mesh.nodes.tolist(), start=1))]
     lines += ["*ELEMENT, TYPE=C3D20, ELSET=all"]
-    for k, nodes in enumerate(mesh.elements + 1, start=1):
+    for k, nodes in enumerate(mesh.only.elements + 1, start=1):
         lines += [", ".join(map(str, [k, *nodes[:15]])) + ",", ", ".join(map(str, nodes[15:]))]
     for name in ("x0", "x1"):
         lines += [f"*NSET, NSET={name}", *(f"{n + 1}," for n in mesh.node_sets[name])]
@@ -173,7 +173,7 @@ def nodal_stress(mesh: Any, lam: float, mu: float, field: Array) -> Array:
     n = len(mesh.nodes)
     dof_map = np.full((n, 6), -1)
     dof_map[:, :3] = np.arange(3 * n).reshape(n, 3)
-    source = solid_stress(mesh, np.tile([lam, mu], (len(mesh.elements), 1)))
+    source = solid_stress(mesh, np.tile([lam, mu], (len(mesh.only.elements), 1)))
     return source.evaluate(field.reshape(-1, 1), dof_map, source.site_nodes)[:, :, 0]
 
 

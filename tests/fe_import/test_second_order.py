@@ -216,11 +216,11 @@ def green_energy(model: FEModel, u: Array) -> float:
     """Elastic energy of a Saint-Venant-Kirchhoff solid at nodal displacements."""
     solid = model.stress
     assert isinstance(solid, SolidStress)
-    mesh, element = solid.mesh, solid.mesh.element
+    mesh, element = solid.mesh, solid.mesh.only.element
     points, weights = element.quadrature(element.stiffness_order)
-    jacobian = np.einsum("eka,kbq->eqab", mesh.nodes[mesh.elements], element.shape_gradients(points))
+    jacobian = np.einsum("eka,kbq->eqab", mesh.nodes[mesh.only.elements], element.shape_gradients(points))
     slopes = np.einsum("kbq,eqba->eqak", element.shape_gradients(points), np.linalg.inv(jacobian))
-    gradient = np.einsum("eqak,ekc->eqac", slopes, u[model.dof_map[mesh.elements, :3]])
+    gradient = np.einsum("eqak,ekc->eqac", slopes, u[model.dof_map[mesh.only.elements, :3]])
     strain = (gradient + gradient.swapaxes(2, 3) + gradient @ gradient.swapaxes(2, 3)) / 2
     lam, mu = solid.lame.T
     density = lam[:, None] / 2 * np.einsum("eqaa->eq", strain) ** 2

@@ -10,19 +10,27 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 import skfem
+from scipy.special import beta, factorial
 from skfem.helpers import ddot, dot, sym_grad, trace
 from skfem.mapping import MappingIsoparametric
-from solid_meshes import box, quarter_ring
+from solid_meshes import box, mixed_box, quarter_ring
 
 from fe_import.elements.solid import SolidMaterial, assemble_solid
-from fe_import.elements.solid_elements import SOLID_ELEMENTS
-from fe_import.elements.solid_mesh import SolidMesh
+from fe_import.elements.solid_elements import MESH_ELEMENTS, SOLID_ELEMENTS
+from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
+from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.checks import check_mesh
 from fe_import.modal.inertia import mass_properties
 
 STEEL = SolidMaterial(2.1e11, 0.3, 7850.0)
 TYPES = sorted(SOLID_ELEMENTS)
+OF_SKFEM = [name for name, e in sorted(MESH_ELEMENTS.items()) if isinstance(e.shape, str)]
+TOPOLOGY = {
+    "tetrahedron": skfem.MeshTet1,
+    "wedge": skfem.MeshWedge1,
+    "hexahedron": skfem.MeshHex1,
+}
 SECOND_ORDER = [name for name in TYPES if SOLID_ELEMENTS[name].midpoints]
 DISTORTED = [(name, 0.2, 0.0) for name in TYPES] + [(name, 0.15, 0.05) for name in SECOND_ORDER]
 
@@ -35,9 +43,18 @@ def rigid_modes(nodes: np.ndarray) -> np.ndarray:
     return modes.reshape(-1, 6)
 
 
+EXACT = {  # ∫ x^a y^b z^c over the reference cell
+    "tetrahedron": lambda a, b, c: factorial(a) * factorial(b) * factorial(c) / factorial(a + b + c + 3),
+    "wedge": lambda a, b, c: factorial(a) * factorial(b) / factorial(a + b + 2) / (c + 1),
+    "hexahedron": lambda a, b, c: 1 / ((a + 1) * (b + 1) * (c + 1)),
+    # x = u w, y = v w, w = 1 - z: ∫u^a ∫v^b ∫w^(a+b+2) (1-w)^c, Euler's beta function
+    "pyramid": lambda a, b, c: (1 - a % 2) * (1 - b % 2) * 4 / ((a + 1) * (b + 1)) * beta(a + b + 3, c + 1),
+}
+
+
 @pytest.mark.parametrize("name", TYPES)
 def test_quadrature_integrates_its_order(name):
-    """Monomials of the stated order to rounding (unit tetrahedron: a! b! c! / (a + b + c + 3)!)."""
+    """Monomials of the stated order to rounding."""
     element = SOLID_ELEMENTS[name]
     for order in (element.stiffness_order, element.mass_order):
         (x, y, z), w = element.quadrature(order)
@@ -45,19 +62,17 @@ def test_quadrature_integrates_its_order(name):
         for a in range(order + 1):
             for b in range(order + 1 - a):
                 c = order - a - b
-                if element.corners == 4:
-                    factorial = scipy.special.factorial
-                    exact = factorial(a) * factorial(b) * factorial(c) / factorial(order + 3)
-                else:
-                    exact = 1 / ((a + 1) * (b + 1) * (c + 1))
-                assert (w * x**a * y**b * z**c).sum() == pytest.approx(exact, rel=1e-12)
+                exact = EXACT[element.cell.name](a, b, c)
+                assert (w * x**a * y**b * z**c).sum() == pytest.approx(exact, rel=1e-12, abs=1e-14)
 
 
 @pytest.mark.parametrize("name", TYPES)
 def test_registry_gradients_follow_our_node_order(name):
     """Σ ∂φ_i/∂X x_i = 1 on the reference cell, to rounding: node order and shape functions match."""
     element = SOLID_ELEMENTS[name]
-    assert sorted(element.skfem_order) == list(range(len(element.reference_nodes)))
+    if name in OF_SKFEM:
+        assert sorted(element.skfem_order) == list(range(element.size))
+    np.testing.assert_allclose(element.shape_values(element.reference_nodes.T), np.eye(element.size), atol=1e-14)
     gradients = element.shape_gradients(element.quadrature(element.mass_order)[0])
     jacobian = np.einsum("kc,kdq->qcd", element.reference_nodes, gradients)
     np.testing.assert_allclose(jacobian, np.broadcast_to(np.eye(3), jacobian.shape), atol=1e-13)
@@ -167,6 +182,35 @@ def test_curved_volume_converges(name):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.2)
 
 
+@pytest.mark.parametrize("quadratic", [False, True])
+def test_mixed_elements(quadratic):
+    """Hexahedron, wedges, pyramids and tetrahedra in one mesh: constant strain, mass and rigid bodies to rounding."""
+    mesh = mixed_box(quadratic)
+    check_mesh(mesh)
+    inner = np.setdiff1d(np.arange(len(mesh.nodes)), surface_triangles(mesh))
+    mesh.nodes[inner] += 0.05
+    mass, stiffness = assemble_solid(mesh, [STEEL])
+    modes = rigid_modes(mesh.nodes)
+    properties = mass_properties(modes.T @ mass @ modes)
+    assert properties.mass == pytest.approx(3 * 7850, rel=1e-12)
+    np.testing.assert_allclose(properties.centre_of_mass, [1.5, 0.5, 0.5], rtol=1e-12)
+    np.testing.assert_allclose(np.diag(properties.inertia), 7850 * np.array([0.5, 2.5, 2.5]), rtol=1e-12)
+    eigenvalues = np.linalg.eigvalsh(stiffness.toarray())
+    assert np.sum(eigenvalues < 1e-10 * eigenvalues[-1]) == 6
+    gradient = np.array([[1.0, 0.3, -0.2], [0.5, -0.7, 0.4], [-0.1, 0.6, 0.9]]) * 1e-3
+    forces = (stiffness @ (mesh.nodes @ gradient.T).ravel()).reshape(-1, 3)
+    assert np.abs(forces[inner]).max() < 1e-12 * np.abs(forces).max()
+    lame = np.tile(STEEL.lame, (mesh.count, 1))
+    dof_map = np.arange(3 * len(mesh.nodes)).reshape(-1, 3)
+    field = (mesh.nodes @ gradient.T).ravel()[:, None]
+    stress = solid_stress(mesh, lame).evaluate(field, dof_map, np.arange(len(mesh.nodes)))[:, :, 0]
+    strain = (gradient + gradient.T) / 2
+    lam, mu = STEEL.lame
+    tensor = lam * np.trace(strain) * np.eye(3) + 2 * mu * strain
+    expected = tensor[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]]
+    np.testing.assert_allclose(stress, np.tile(expected, (len(stress), 1)), rtol=1e-11, atol=1e-11 * tensor.max())
+
+
 def test_two_materials_add_up():
     """Matrices are linear in the materials: two halves of one material give the whole, to rounding."""
     mesh = box("hex20", (4, 1, 1), distortion=0.1)
@@ -181,9 +225,11 @@ def test_two_materials_add_up():
 
 def assembled_by_scikit_fem(mesh: SolidMesh, material: SolidMaterial) -> tuple[sp.csc_array, sp.csc_array]:
     """Mass and stiffness by scikit-fem's assembly of the weak form with vectorial elements."""
-    element = mesh.element
-    local_nodes = np.ascontiguousarray(mesh.elements[:, element.skfem_order].T)
-    topology = element.topology(np.ascontiguousarray(mesh.nodes.T), local_nodes, elem=type(element.shape))
+    element = mesh.only.element
+    local_nodes = np.ascontiguousarray(mesh.only.elements[:, element.skfem_order].T)
+    shape = element.skfem_element
+    mesh_class = TOPOLOGY[element.cell.name]
+    topology = mesh_class(np.ascontiguousarray(mesh.nodes.T), local_nodes, elem=type(shape))
     lam, mu = material.lame
     matrices = []
     for order, form in (
@@ -195,8 +241,8 @@ def assembled_by_scikit_fem(mesh: SolidMesh, material: SolidMaterial) -> tuple[s
     ):
         basis = skfem.Basis(
             topology,
-            skfem.ElementVector(element.shape),
-            mapping=MappingIsoparametric(topology, element.shape),
+            skfem.ElementVector(shape),
+            mapping=MappingIsoparametric(topology, shape),
             quadrature=element.quadrature(order),
         )
         row = np.empty(basis.N, dtype=np.int64)
@@ -208,7 +254,7 @@ def assembled_by_scikit_fem(mesh: SolidMesh, material: SolidMaterial) -> tuple[s
     return matrices[0], matrices[1]
 
 
-@pytest.mark.parametrize(("name", "distortion", "curvature"), DISTORTED)
+@pytest.mark.parametrize(("name", "distortion", "curvature"), [case for case in DISTORTED if case[0] in OF_SKFEM])
 def test_assembly_against_scikit_fem(name, distortion, curvature):
     """Every entry of both matrices, to 1e-12 of the largest: rounding of sums over up to 125 points."""
     mesh = box(name, (3, 2, 2), (1.0, 0.8, 1.2), distortion, curvature)
@@ -256,6 +302,6 @@ def test_node_numbers_are_the_users():
     nodes = np.empty_like(mesh.nodes)
     nodes[new] = mesh.nodes
     row = (3 * new[:, None] + np.arange(3)).ravel()
-    renumbered = assemble_solid(SolidMesh(nodes, new[mesh.elements], "hex27"), [STEEL])
+    renumbered = assemble_solid(SolidMesh.uniform(nodes, new[mesh.only.elements], "hex27"), [STEEL])
     for before, after in zip(assemble_solid(mesh, [STEEL]), renumbered, strict=True):
         assert abs(before - after[row][:, row]).max() < 1e-14 * abs(before).max()

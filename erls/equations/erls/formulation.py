@@ -18,6 +18,7 @@ from erls.equations.erls.records import LINK_STATE, Chain, LinkState
 from erls.equations.formulation import Energy, State
 from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
 from erls.equations.serial.modal_inertia import stiffened
+from erls.equations.serial.motion_series import MotionSeries
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.state_series import StateSeries, single_energy
@@ -138,6 +139,26 @@ class Erls(SerialFormulation):
             forces = _see_joint(system.scratch, system.integers, first + k * JOINT_STATE).forces
             result.append((link.wrench, forces[:1], forces[1:]))
         return result
+
+    @cached_property
+    def _moving(self) -> list[Array]:
+        """Views of what a residual leaves: six of each link, and the acceleration of each joint."""
+        views: list[Array] = []
+        for s in self._links(self.complete):
+            views += [s.twist, s.twist_rate, s.u_rate, s.q_rate[6:], s.u_acceleration, s.q_acceleration[6:]]
+        return views + self.joint_accelerations()
+
+    def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
+        """Motion at (k,) times: twists of the frames that the poses are of, and what the links do in them."""
+        left = self.left_by_residuals(self._moving, t, y, v, a)
+        links, angles = left[: 6 * self.joints], left[6 * self.joints :]
+        pairs = [list(zip(links[i::6], links[i + 1 :: 6], strict=True)) for i in (2, 4)]  # u̇ and q̇_d, ü and q̈_d
+        rates, accelerations = (
+            [np.hstack(both) @ shape.T for both, shape in zip(every, self._shapes, strict=True)] for every in pairs
+        )
+        return MotionSeries(
+            self.series(t, y, v), links[::6], links[1::6], rates, accelerations, np.hstack(angles).reshape(len(t), -1)
+        )
 
     @property
     def kind(self) -> dict[str, Any]:

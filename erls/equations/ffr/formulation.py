@@ -20,6 +20,7 @@ from erls.equations.ffr.records import BODY, BODY_STATE, Body, BodyState, Frames
 from erls.equations.ffr.standard_data import StandardData
 from erls.equations.formulation import Energy, State
 from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
+from erls.equations.serial.motion_series import MotionSeries
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.state_series import StateSeries, single_energy
 from erls.maths.records import python_reader
@@ -170,6 +171,24 @@ class Ffr(SerialFormulation):
             forces = _read_joint_state(system.scratch, system.integers, first + k * JOINT_STATE).forces
             result.append((body.wrench, forces[:1], forces[1:]))
         return result
+
+    @cached_property
+    def _moving(self) -> list[Array]:
+        """Views of what a residual leaves: two of each link, and the acceleration of each joint."""
+        frames = [x for body in self._bodies(self.complete) for x in (body.twist, body.twist_rate)]
+        return frames + self.joint_accelerations()
+
+    def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
+        """Motion at (k,) times: of the floating frames, and of the fields that deform the links in them."""
+        left = self.left_by_residuals(self._moving, t, y, v, a)
+        frames, angles = left[: 2 * self.joints], left[2 * self.joints :]
+        own = [np.asarray(x)[:, len(self.free_joints) :] for x in (v, a)]
+        rates, accelerations = (
+            [x[:, at] @ basis.T for basis, at in zip(self.bases, self.modes, strict=True)] for x in own
+        )
+        return MotionSeries(
+            self.series(t, y, v), frames[::2], frames[1::2], rates, accelerations, np.hstack(angles).reshape(len(t), -1)
+        )
 
     @property
     def kind(self) -> dict[str, Any]:

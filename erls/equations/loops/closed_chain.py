@@ -17,13 +17,17 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
-from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
+from erls.equations.linearization import Linearization
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
+from erls.equations.loops.neighbours import LoopNeighbours
 from erls.equations.loops.rows import Closure, applied
-from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
-from erls.equations.loops.static import closed_equilibrium
+from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity, stays_open
+from erls.equations.loops.static import held_loops
 from erls.equations.loops.tied import OPEN, Tied
-from erls.equations.serial.equilibrium import elastic_on_diagonal
+from erls.equations.neighbours import small_motions
+from erls.equations.serial.equilibrium import Held, equilibrium
+from erls.equations.serial.motion_series import MotionSeries, motion_series
+from erls.equations.serial.neighbours import TreeNeighbours
 from erls.equations.serial.state_series import (
     ReactionSeries,
     StateSeries,
@@ -101,7 +105,12 @@ class ClosedChain(Tied):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know about the loops."""
-        return (*warnings_of(self.redundant), *assembled_warning(self.start, ASSEMBLED * self.reach))
+        assembled = assembled_warning(self.start, ASSEMBLED * self.reach, self._force_at_start)
+        return (*warnings_of(self.redundant), *assembled)
+
+    def _force_at_start(self) -> float:
+        """Largest force of a closing joint there [N]."""
+        return max(float(np.linalg.norm(found.force)) for found in self.loop_forces(0.0, *self.initial_state()))
 
     def refuse_open(self, t: float, found: Closure) -> None:
         """Raise when a loop has come apart.
@@ -172,6 +181,11 @@ class ClosedChain(Tied):
         """(n,) accelerations, with decay of what loops are open by; NaN where they lock: integrators step around it."""
         return self._accelerate(self.loops, t, y, v)
 
+    def acceleration_series(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, n) of the nearest closed states at times (k,), without such decay: what runs report."""
+        at = zip(t.tolist(), *self._closed_at(t, y, v), strict=True)
+        return np.array([self.accelerations(*state)[0] for state in at]).reshape(y.shape)
+
     def mass_matrix(self, t: float, y: Array) -> Array:
         """(n, n) of the chain, with rotors in closing joints."""
         return self.loops.masses(t, y)
@@ -205,24 +219,41 @@ class ClosedChain(Tied):
 
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
-        """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness."""
-        return closed_equilibrium(self, self.exact, self._closed_start, self.start.held)
+        """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness.
 
-    def linearized(self, t: float, y: Array, v: Array) -> Linearization:
-        """Small motions about a closed state on the ways that the loops leave, with their forces as they are there."""
+        Raises
+        ------
+        SimulationError
+            LOOP_OPEN where no link gives way in a direction that undeformed links leave open, beside what
+            `erls.equations.serial.equilibrium.equilibrium` raises.
+        """
+        y, bearing = equilibrium(self.held, self._closed_start)
+        if self._gap:
+            gaps = np.abs(self.openings(self.closure(0.0, y, np.zeros(self.size))))
+            worst = int(np.argmax(gaps))
+            if gaps[worst] > ASSEMBLED * self.reach:
+                raise stays_open(self, f"no link gives way: {self.rows.names[worst]} stays open", float(gaps[worst]))
+        return y, bearing
+
+    @property
+    def held(self) -> Held:
+        """The closed chain at rest with the joints held that the loops leave free."""
+        return held_loops(self, self.exact, self._closed_start, self.start.held, self._gap)
+
+    @property
+    def _gap(self) -> float:
+        """What undeformed links leave open [m]; 0 where that is nothing to speak of."""
+        return self.start.gap if self.start.gap > ASSEMBLED * self.reach else 0.0
+
+    def neighbours(self, t: float, y: Array, v: Array) -> LoopNeighbours:
+        """States beside a closed one, with the forces of the loops as they are there."""
         a = self._accelerate(self.exact, t, y, v)
         multipliers = self.exact.room.multipliers.copy()
-        stiffness, _ = elastic_on_diagonal(self.bare)
-        steps = difference_steps(self.metres, self.reach, stiffness)
+        return LoopNeighbours(self, TreeNeighbours(self.bare, t, y, v, a), multipliers, self.kept)
 
-        def forces(y: Array, v: Array) -> Array:
-            every = (np.tile(x, (len(y), 1)) for x in (a, multipliers))
-            return self.exact.held(np.full(len(y), t), y, v, *every)
-
-        slope = derivatives(lambda many: forces(many, np.tile(v, (len(many), 1))), y, steps)
-        damping = derivatives(lambda many: forces(np.tile(y, (len(many), 1)), many), v, steps)
-        rows = self.closure(t, y, v).rows[self.kept][:, self.bare.free]
-        return restricted(self.exact.masses(t, y), damping, slope, ways_left(rows, 1 / self.metres))
+    def linearized(self, t: float, y: Array, v: Array) -> Linearization:
+        """Small motions about a closed state on the ways that the loops leave."""
+        return small_motions(self.neighbours(t, y, v))
 
     @cached_property
     def stability(self) -> Stability:
@@ -252,6 +283,10 @@ class ClosedChain(Tied):
     def series(self, t: Array, y: Array, v: Array) -> StateSeries:
         """The same at times (k,)."""
         return state_series(self.bare, t, *self._closed_at(t, y, v))
+
+    def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
+        """Motion at times (k,) with accelerations (k, n)."""
+        return motion_series(self.bare, t, *self._closed_at(t, y, v), a)
 
     def energy_series(self, t: Array, y: Array, v: Array) -> Array:
         """(k, 4) energies at times (k,), with those of springs and rotors in closing joints."""

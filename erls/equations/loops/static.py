@@ -1,4 +1,4 @@
-"""Static equilibrium of a chain with loops: links deform, joints follow; those that the loops leave free are held."""
+"""A chain with loops at rest: links deform, joints follow; those that the loops leave free are held."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from erls.equations.loops.tied import Tied
-from erls.equations.serial.equilibrium import Angles, Held, elastic_on_diagonal, equilibrium
-from erls.equations.stability import Bearing
+from erls.equations.serial.equilibrium import Angles, Held, elastic_on_diagonal
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -16,8 +15,8 @@ if TYPE_CHECKING:
     from erls.equations.loops.compiled import CompiledLoops
 
 
-def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray) -> tuple[Array, Bearing]:
-    """(n,) equilibrium under gravity, springs and drives, and what loads leave of the stiffness.
+def held_loops(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray, gap: float) -> Held:
+    """The chain under gravity, springs and drives.
 
     Parameters
     ----------
@@ -28,11 +27,8 @@ def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArr
         Loops closed, links undeformed.
     held : int array
         Free joints, by their place in y, whose physical angles keep their values.
-
-    Raises
-    ------
-    SimulationError
-        As `erls.equations.serial.equilibrium.equilibrium`.
+    gap : float
+        What undeformed links leave open [m], for messages; 0 where that is nothing to speak of.
     """
     kept, free, still = loops.given.kept, chain.bare.free, np.zeros(chain.size)
     angles = Angles(chain.bare, chain.bare.free_joints[held], y, chain.metres, chain.reach)
@@ -46,5 +42,7 @@ def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArr
         both = found.violation[kept], turned
         return np.concatenate(both), np.concatenate([found.rows[kept][:, free], rows])
 
+    what = "no static equilibrium of the closed chain"
+    what += f", which undeformed links leave {gap:.3g} m open," if gap else ""
     given = chain.mechanism, forces, conditions, len(kept), *elastic_on_diagonal(chain.bare)
-    return equilibrium(Held(*given, chain.metres, chain.reach, "no static equilibrium of the closed chain"), y)
+    return Held(*given, chain.metres, chain.reach, what)

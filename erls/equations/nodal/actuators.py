@@ -68,11 +68,8 @@ class Actuators:
             drive = joint.drive
             if not self.acting[k]:
                 continue
-            if drive.load is not None or drive.motion is None:
-                result[k, 2] = drive.torque(t, 0.0, 0.0) + lead(t)
-            else:
-                coordinate, rate, _ = drive.motion.derivatives(t)
-                result[k] = coordinate, rate, lead(t)
+            coordinate, rate, _ = (0.0, 0.0, 0.0) if drive.motion is None else drive.motion.derivatives(t)
+            result[k] = coordinate, rate, lead(t) + (0.0 if drive.load is None else drive.load.value(t))
         return result
 
     @property

@@ -7,6 +7,7 @@ integrator found with them: the rates of the nodes' twists and the multipliers.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,9 +18,11 @@ from erls.equations.consistency import consistent_acceleration, consistent_veloc
 from erls.equations.formulation import Energy, LoopForce, Reaction, State
 from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.loops.failures import warnings_of
+from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain, Seat, build_chain
 from erls.equations.nodal.joints import GROUND
 from erls.equations.nodal.link_state import LinkView
+from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import link_parts
 from erls.equations.nodal.redundant import smallest_multipliers
@@ -144,8 +147,22 @@ class Nodal:
         if self.chain.closing:  # links that bend at the start do not move as rigid ones do
             velocity = consistent_velocity(self.system, 0.0, q, velocity)
         a, multipliers = consistent_acceleration(self.system, 0.0, q, velocity)
-        y, rate_of_y, _ = self.system.stored(0.0, q, velocity, a)
-        return np.concatenate([y, a, multipliers]), np.concatenate([rate_of_y, 0 * a, 0 * multipliers])
+        return _stored(self.system, 0.0, q, velocity, a, lambda: multipliers)[:2]
+
+    def neighbours(self, t: float, y: Array, v: Array) -> NodalNeighbours:
+        """States beside one, with accelerations and multipliers that go with it."""
+        q, velocity = self.configuration(y, v)
+        return nodal_neighbours(self.system, t, q, velocity, _stored, self._names)
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        """(n,) of the motions of the nodes."""
+        owners = [
+            f"link {link.name}, node {k + 1}"
+            for link, own in zip(self.mechanism.links, self.chain.nodes, strict=True)
+            for k in range(own.stop - own.start)
+        ]
+        return names_of_nodes(owners)
 
     def _equilibrium(self) -> Nodes:
         """At rest under gravity, and what acts in joints, with joints held; those that follow loops are not."""
@@ -172,9 +189,8 @@ class Nodal:
             psi = self._vector(q, k)
             angles[k : k + 3] = psi
             rates[k : k + 3] = rotations.tangent_inverse(psi) @ self._spin(q, velocity, k)
-        return State(
-            t, [x.frame for x in found], [x.modal for x in found], angles, angles, rates, [x.nodes for x in found]
-        )
+        frames, modal = [x.frame for x in found], [x.modal for x in found]
+        return State(t, frames, modal, angles, angles, rates, [x.nodes for x in found], [x.turns for x in found])
 
     def _frames_of(self, q: Nodes, seat: Seat) -> tuple[Array, Array]:
         """(4, 4) frames of a joint in the world: the inner and the outer one."""
@@ -292,6 +308,15 @@ class Nodal:
             "conditions": self.system.constraints,
             **({"loops": loops} if loops else {}),
         }
+
+
+def _stored(
+    system: NodalSystem, t: float, q: Nodes, v: Array, a: Array, multipliers: Callable[[], Array]
+) -> tuple[Array, Array, Array]:
+    """y with its derivatives, those of what the integrator finds left out."""
+    y, *rates = system.stored(t, q, v, a)
+    found = np.concatenate([a, multipliers()])
+    return np.concatenate([y, found]), *(np.concatenate([rate, 0 * found]) for rate in rates)  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,12 @@ from erls.mechanism.links import Link
 @dataclass(frozen=True)
 class LinkState:
     """Link frame in the world (4, 4), which goes with the inboard node; places of the model's nodes (n, 3) in the world
-    [m]; modal coordinates (m,) whose displacements come nearest to them and to their rotations.
+    [m], and how they have turned there (n, 3, 3); the modal coordinates (m,) that come nearest to both.
     """
 
     frame: Array
     nodes: Array
+    turns: Array
     modal: Array
 
 
@@ -54,10 +55,11 @@ class LinkView:
         frame = poses[self._inboard] @ self._back
         model = self._model
         if self._axes is None or beams is None:
-            return LinkState(frame, model.nodes @ frame[:3, :3].T + frame[:3, 3], np.zeros(model.modes))
+            turns = np.tile(frame[:3, :3], (len(model.nodes), 1, 1))
+            return LinkState(frame, model.nodes @ frame[:3, :3].T + frame[:3, 3], turns, np.zeros(model.modes))
         sections = beams.sections_at(poses, bent, self._elements, self._fractions)
         nodes = sections[:, :3, 3]
         moved = (nodes - frame[:3, 3]) @ frame[:3, :3] - model.nodes
-        turned = frame[:3, :3].T @ sections[:, :3, :3] @ np.swapaxes(self._axes, 1, 2)
-        turns = rotations.log(turned[model.rotation_nodes])
-        return LinkState(frame, nodes, self._nearest @ np.concatenate([moved, self._reach * turns]).ravel())
+        turns = sections[:, :3, :3] @ np.swapaxes(self._axes, 1, 2)
+        turned = self._reach * rotations.log(frame[:3, :3].T @ turns[model.rotation_nodes])
+        return LinkState(frame, nodes, turns, self._nearest @ np.concatenate([moved, turned]).ravel())

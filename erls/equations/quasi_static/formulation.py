@@ -34,6 +34,7 @@ import numpy as np
 
 from erls.equations.formulation import Energy, Reaction, State, TreeFormulation
 from erls.equations.quasi_static.static_modes import StaticModes, static_modes
+from erls.equations.serial.motion_series import MotionSeries, motion_series
 from erls.equations.serial.state_series import (
     ReactionSeries,
     StateSeries,
@@ -304,16 +305,22 @@ class QuasiStatic:
         """The same at times (k,), with coordinates and rates (k, s)."""
         return state_series(self.inner, t, *self.all_modes_at(t, y, v)[:2])
 
-    def all_modes_at(self, t: Array, y: Array, v: Array) -> Array:
-        """(3, k, n) coordinates, rates and accelerations of all modes at times (k,)."""
+    def all_modes_at(self, t: Array, y: Array, v: Array, a: Array | None = None) -> Array:
+        """(3, k, n) coordinates, rates and accelerations of all modes at times (k,); ``a`` (k, s) from the equations of
+        motion unless given.
+        """
         found = np.zeros((3, len(t), self.inner.size))
         for k, at in enumerate(t.tolist()):
-            found[:, k] = self.all_modes(at, y[k], v[k], self._accelerated(at, y[k], v[k]))
+            found[:, k] = self.all_modes(at, y[k], v[k], self._accelerated(at, y[k], v[k]) if a is None else a[k])
         return found
+
+    def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
+        """Motion at times (k,) with slow accelerations (k, s)."""
+        return motion_series(self.inner, t, *self.all_modes_at(t, y, v, a))
 
     def reaction_series(self, t: Array, y: Array, v: Array, a: Array | None = None) -> ReactionSeries:
         """Joint reactions at times (k,), with all modes under load and their accelerations."""
-        return reaction_series(self.inner, t, *self.all_modes_at(t, y, v))
+        return reaction_series(self.inner, t, *self.all_modes_at(t, y, v, a))
 
     def energy_series(self, t: Array, y: Array, v: Array) -> Array:
         """(k, 4) energies at times (k,), with those of the static deflection."""

@@ -199,8 +199,8 @@ def _bearing(held: Held, y: Array, slope: Array) -> Bearing:
     return Bearing(left, links[int(np.argmax(by_link))].name)
 
 
-def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray) -> tuple[Array, Bearing]:
-    """The same of a tree under gravity, and what prescribed motions do at time 0.
+def held_tree(equations: TreeFormulation, y: Array, held_joints: IntArray) -> Held:
+    """A tree at rest under gravity, and what prescribed motions do at time 0.
 
     Parameters
     ----------
@@ -209,11 +209,6 @@ def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray
         Independent coordinates with the joints in place and the links undeformed; joint coordinates first.
     held_joints : int array
         Joints whose coordinates stand in ``y``.
-
-    Raises
-    ------
-    SimulationError
-        As `equilibrium`.
     """
     metres, size = metre_scales(equations), size_of(equations.mechanism)
     angles = Angles(equations, held_joints, y, metres, size)
@@ -223,7 +218,7 @@ def held_equilibrium(equations: TreeFormulation, y: Array, held_joints: IntArray
         return np.array([equations.residual(0.0, at, still, still) for at in many]).reshape(many.shape)
 
     stiffness, rest = elastic_on_diagonal(equations)
-    return equilibrium(Held(equations.mechanism, forces, angles.conditions, 0, stiffness, rest, metres, size), y)
+    return Held(equations.mechanism, forces, angles.conditions, 0, stiffness, rest, metres, size)
 
 
 def elastic_on_diagonal(equations: TreeFormulation) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ follow from time.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -17,10 +17,12 @@ import scipy.linalg as la
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.dry_friction import DryFriction, Settled, dry_friction, settled
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
-from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
-from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
+from erls.equations.linearization import Linearization
+from erls.equations.neighbours import small_motions
+from erls.equations.serial.equilibrium import Held, equilibrium, held_tree, size_of
 from erls.equations.serial.loads import load_powers
-from erls.equations.serial.records import Serial
+from erls.equations.serial.neighbours import TreeNeighbours
+from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
 from erls.equations.series import mass_series, residual_series
@@ -33,7 +35,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.loops import loop_ends
 from erls.mechanism.thermal import elastic_rest
 
-_see_serial = python_reader(Serial)
+_see_serial, _see_joint = python_reader(Serial), python_reader(JointState)
 
 
 class SerialFormulation(TreeFormulation):
@@ -185,24 +187,24 @@ class SerialFormulation(TreeFormulation):
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
         """Static equilibrium with the joints held, and what loads leave of the stiffness."""
-        return held_equilibrium(self, self.undeformed_start()[0], self.free_joints)
+        return equilibrium(self.held, self.undeformed_start()[0])
+
+    @property
+    def held(self) -> Held:
+        """The mechanism at rest with its joints held."""
+        return held_tree(self, self.undeformed_start()[0], self.free_joints)
+
+    def neighbours(self, t: float, y: Array, v: Array) -> TreeNeighbours:
+        """States beside one, with the accelerations of the equations of motion."""
+        if self.dry is None:
+            return TreeNeighbours(self, t, y, v, self.acceleration(t, y, v))
+        found = self.settled(t, y, v, np.zeros(len(self.dry.places)))
+        stuck = tuple(self.dry.places[found.modes == 0.0].tolist())
+        return TreeNeighbours(self, t, y, v, found.accelerations, stuck)
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
         """Small motions about a state, with the accelerations of the equations of motion; joints that stick rest."""
-        a = self.acceleration(t, y, v)
-        stiffness, _ = elastic_on_diagonal(self)
-        steps = difference_steps(metre_scales(self), size_of(self.mechanism), stiffness)
-
-        def forces(y: Array, v: Array) -> Array:
-            return residual_series(self.compiled, np.full(len(y), t), y, v, np.tile(a, (len(y), 1)))
-
-        slope = derivatives(lambda many: forces(many, np.tile(v, (len(many), 1))), y, steps)
-        damping = derivatives(lambda many: forces(np.tile(y, (len(many), 1)), many), v, steps)
-        rows = np.zeros((0, self.size))
-        if self.dry is not None:
-            modes = self.settled(t, y, v, np.zeros(len(self.dry.places))).modes
-            rows = np.eye(self.size)[self.dry.places[modes == 0.0]]
-        return restricted(self.mass_matrix(t, y), damping, slope, ways_left(rows, np.ones(self.size)))
+        return small_motions(self.neighbours(t, y, v))
 
     @cached_property
     def stability(self) -> Stability:
@@ -244,24 +246,34 @@ class SerialFormulation(TreeFormulation):
         """
         a = self.acceleration_series(t, y, v) if a is None else a
         states, count = state_series(self, t, y, v), len(self.mechanism.joints)
-        borne = self.borne()
-        wrenches, along = np.empty((len(t), count, 6)), np.empty((2, len(t), count))
-        for i, at in enumerate(t.tolist()):
-            residual(self.complete, at, y[i], v[i], a[i])
-            for k, (wrench, whole, given) in enumerate(borne):
-                wrenches[i, k], along[0, i, k], along[1, i, k] = wrench, whole[0], given[0]
-        force, moment = np.empty((len(t), count, 3)), np.empty((len(t), count, 3))
-        prescribed = np.array([joint.drive.prescribed for joint in self.mechanism.joints], dtype=bool)
-        effort = np.where(prescribed, along[0], along[1])
+        left = self.left_by_residuals([view for views in self.borne() for view in views], t, y, v, a)
+        force, moment, effort = np.empty((len(t), count, 3)), np.empty((len(t), count, 3)), np.empty((len(t), count))
+        for k, (link, joint) in enumerate(zip(self.mechanism.links, self.mechanism.joints, strict=True)):
+            wrench, whole, given = left[3 * k : 3 * k + 3]
+            place = inboard_place(link, states.modal[k])
+            turn, push = states.poses[k][:, :3, :3], wrench[:, :3]
+            force[:, k] = np.einsum("tij,tj->ti", turn, push)
+            moment[:, k] = np.einsum("tij,tj->ti", turn, wrench[:, 3:] - cross_all(place, push))
+            effort[:, k] = (whole if joint.drive.prescribed else given)[:, 0]
         if self.dry is not None:
             joints = self.free_joints[self.dry.places]
-            effort[:, joints] += self.dry.given(v, along[0][:, joints])
-        for k, link in enumerate(self.mechanism.links):
-            place = inboard_place(link, states.modal[k])
-            turn, push = states.poses[k][:, :3, :3], wrenches[:, k, :3]
-            force[:, k] = np.einsum("tij,tj->ti", turn, push)
-            moment[:, k] = np.einsum("tij,tj->ti", turn, wrenches[:, k, 3:] - cross_all(place, push))
+            effort[:, joints] += self.dry.given(v, np.column_stack([left[3 * k + 1] for k in joints.tolist()]))
         return ReactionSeries(force, moment, effort)
+
+    def joint_accelerations(self) -> list[Array]:
+        """Views (1,) of what a residual of `complete` leaves of each joint."""
+        reals, integers, scratch = self.complete.reals, self.complete.integers, self.complete.scratch
+        first = _see_serial(reals, integers, int(integers[0])).joint_states
+        return [_see_joint(scratch, integers, first + k * JOINT_STATE).coordinate[2:] for k in range(self.joints)]
+
+    def left_by_residuals(self, views: Sequence[Array], t: Array, y: Array, v: Array, a: Array) -> list[Array]:
+        """(k, ...) what residuals of `complete` at times (k,) leave in each of some views of its working memory."""
+        result = [np.empty((len(t), *view.shape)) for view in views]
+        for i, at in enumerate(t.tolist()):
+            residual(self.complete, at, y[i], v[i], a[i])
+            for found, view in zip(result, views, strict=True):
+                found[i] = view
+        return result
 
     def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
         """Joint reactions that give these accelerations."""

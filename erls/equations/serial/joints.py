@@ -68,7 +68,7 @@ def wanted(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any,
     force = 0.0 * angle
     if joint.load >= 0:
         force += curve(reals, integers, joint.load, t)[0]
-    elif joint.motion >= 0:
+    if joint.motion >= 0:
         goal, goal_rate, _ = curve(reals, integers, joint.motion, t)
         force += joint.gain * (goal - angle) + joint.rate_gain * (goal_rate - rate)
     if joint.feeds:

@@ -27,7 +27,7 @@ class StateSeries:
         Modal coordinates of each link (6 rigid-body, then elastic).
     coordinates, angles, rates : (k, n) arrays
         Joint coordinates θ, physical joint angles and their rates [rad or m].
-    nodes : list of (k, n, 3) arrays, or None
+    nodes, turns : list of (k, n, 3) and of (k, n, 3, 3) arrays, or None
         As in `State`.
     """
 
@@ -38,13 +38,15 @@ class StateSeries:
     angles: Array
     rates: Array
     nodes: list[Array] | None = None
+    turns: list[Array] | None = None
 
     def states(self) -> list[State]:
         """One by one."""
-        per_link = [list(zip(*parts, strict=True)) for parts in (self.poses, self.modal, self.nodes or [])]
+        parts = self.poses, self.modal, self.nodes or [], self.turns or []
+        poses, modal, nodes, turns = ([list(x) for x in zip(*part, strict=True)] for part in parts)
         joints = zip(self.coordinates, self.angles, self.rates, strict=True)
         return [
-            State(t, list(per_link[0][k]), list(per_link[1][k]), *joint, list(per_link[2][k]) if self.nodes else None)
+            State(t, poses[k], modal[k], *joint, nodes[k] if self.nodes else None, turns[k] if self.turns else None)
             for k, (t, joint) in enumerate(zip(self.times.tolist(), joints, strict=True))
         ]
 
@@ -71,6 +73,7 @@ def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> Stat
     models = [link.model for link in formulation.mechanism.links]
     placed = any(s.nodes is not None for s in states)
     places = [np.array([s.nodes[k] for s in states if s.nodes is not None]) for k in range(len(models))]
+    turns = [np.array([s.turns[k] for s in states if s.turns is not None]) for k in range(len(models))]
     joints = len(formulation.mechanism.joints)
     return StateSeries(
         t,
@@ -80,6 +83,7 @@ def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> Stat
         np.array([s.angles for s in states]).reshape(-1, joints),
         np.array([s.rates for s in states]).reshape(-1, joints),
         nodes=places if placed else None,
+        turns=turns if placed else None,
     )
 
 

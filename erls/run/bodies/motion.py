@@ -11,12 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from erls.equations.nodal.nodes import Nodes
-from erls.errors import SimulationError
-from erls.integrate.base import hermite
+from erls.errors import SceneError, SimulationError
+from erls.integrate.base import hermite_knots
 from erls.integrate.constrained import ConstrainedSolution
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
+from erls.mechanism.sensors.base import Sensor
 from erls.run.bodies.run import BodyRun
+from erls.run.bodies.sensors import BodyInstants, body_sensors, node_motion
+from erls.run.readings import reading, reading_columns, reading_curves, reading_samples
+from erls.run.record import Curve
+from fe_import.files.toml import choose
 from fe_import.model import IntArray
 
 _MOST_ENERGIES = 2001
@@ -119,12 +124,66 @@ class BodyMotion(BodyRun):
 
     def _interpolated(self, times: Array, nodes: Sequence[int] | None) -> tuple[Array, Array]:
         """(k, n, 12) places and rotation matrices of nodes, and their rates."""
+        place, rate, _ = self.moving(times, nodes)
+        return place, rate
+
+    def moving(self, times: Array, nodes: Sequence[int] | None = None) -> tuple[Array, Array, Array]:
+        """The same with their second derivatives."""
         s, count = self.solution, self.assembly.system.count
         own = np.arange(count) if nodes is None else np.asarray(nodes)
         columns = (12 * own[:, None] + np.arange(12)).ravel()
         own_knots = s.y[:, columns], s.v[:, columns], s.a[:, columns]
-        y, v = hermite(s.t, *own_knots, np.clip(times, s.t[0], self.end))
-        return y.reshape(len(times), len(own), 12), v.reshape(len(times), len(own), 12)
+        y, v, a = hermite_knots(s.t, *own_knots, np.clip(times, s.t[0], self.end))
+        place, rate, acceleration = (x.reshape(len(times), len(own), 12) for x in (y, v, a))
+        return place, rate, acceleration
+
+    def velocity(self, point: str, t: ArrayLike) -> Array:
+        """(..., 3) of a node or body against the world [m/s]."""
+        return self._of_node(point, t, "velocity")
+
+    def acceleration(self, point: str, t: ArrayLike) -> Array:
+        """(..., 3) of a node or body [m/s²]."""
+        return self._of_node(point, t, "acceleration")
+
+    def angular_velocity(self, point: str, t: ArrayLike) -> Array:
+        """(..., 3) of a node or body, world axes [rad/s]."""
+        return self._of_node(point, t, "spin")
+
+    def angular_acceleration(self, point: str, t: ArrayLike) -> Array:
+        """(..., 3) of a node or body, world axes [rad/s²]."""
+        return self._of_node(point, t, "spin_rate")
+
+    def _of_node(self, point: str, t: ArrayLike, what: str) -> Array:
+        choose(point, self.assembly.numbers, "node", SceneError)
+        found: Array = getattr(node_motion(*self.moving(self.within(t), [self.assembly.numbers[point]])), what)
+        return found.reshape(*np.shape(t), 3)
+
+    @cached_property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Those of the scene."""
+        return body_sensors(self.scene, self.assembly)
+
+    def sensor(self, name: str, t: ArrayLike) -> Array:
+        """(...) reading of a sensor with one component, (..., c) of others."""
+        return reading(self.sensors, name, BodyInstants(self, self.within(t)), np.shape(t))
+
+    def columns(self, times: Array) -> dict[str, Array]:
+        """What all runs of bodies give, and what sensors read before the energies."""
+        found = super().columns(times)
+        energies = {name: found.pop(name) for name in [name for name in found if name.startswith("energy.")]}
+        return {**found, **reading_columns(self.sensors, BodyInstants(self, times), len(times)), **energies}
+
+    def curves(self, times: Array) -> dict[str, Curve]:
+        """Points, coordinates of connections, sensors."""
+        return {**super().curves(times), **reading_curves(self.sensors, BodyInstants(self, times), len(times))}
+
+    def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
+        """What all runs of bodies give, and what sensors read."""
+        found = super().samples(times)
+        if not self.sensors:
+            return found
+        read = reading_samples(self.sensors, BodyInstants(self, np.asarray(times, dtype=float)), len(times))
+        return [{**sample, "sensors": sensors} for sample, sensors in zip(found, read, strict=True)]
 
     def _of_group(self, poses: Array, twists: Array) -> Array:
         """(k, 6 n) velocities from twists in node axes."""

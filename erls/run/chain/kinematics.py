@@ -10,11 +10,13 @@ from numpy.typing import ArrayLike
 
 from erls.equations.formulation import Formulation, State
 from erls.equations.serial.state_series import StateSeries, state_series
-from erls.errors import SceneError, SimulationError
+from erls.errors import Cause, SceneError, SimulationError
 from erls.integrate.base import Solution, hermite
 from erls.maths.so3 import Array
 from erls.mechanism.effects import Certificate
+from erls.mechanism.sensors.base import Node
 from erls.run.accuracy import Accuracy, Trust
+from erls.run.chain.instants import Instants
 from erls.run.chain.places import point_position
 from erls.run.record import Run
 from erls.scene.chain import Scene
@@ -90,12 +92,63 @@ class ChainMotion(Run):
         choose(link, self.link_names, "link", SceneError)
         return self.formulation.mechanism.bodies[self.link_names.index(link)]
 
+    def instants(self, t: ArrayLike) -> Instants:
+        """What is asked of the motion at times, which it finds once."""
+        return Instants(self.formulation, *self._interpolated(t)[1:])
+
+    def velocity(self, point: str, t: ArrayLike) -> Array:
+        """(..., 3) of a named point against the world [m/s]."""
+        return self._of_node(self._point(point), t, "velocity")
+
+    def acceleration(self, point: str, t: ArrayLike) -> Array:
+        """(..., 3) of a named point [m/s²]; where forces jump, that after the jump."""
+        return self._of_node(self._point(point), t, "acceleration")
+
+    def angular_velocity(self, name: str, t: ArrayLike) -> Array:
+        """(..., 3) of what a named point sits on, or of a link at its inboard interface; world axes [rad/s]."""
+        return self._of_node(self._turning(name), t, "spin")
+
+    def angular_acceleration(self, name: str, t: ArrayLike) -> Array:
+        """(..., 3) of the same; world axes [rad/s²]."""
+        return self._of_node(self._turning(name), t, "spin_rate")
+
+    def _point(self, point: str) -> Node:
+        choose(point, self.point_names, "point", SceneError)
+        found = self.formulation.mechanism.points[self.point_names.index(point)]
+        return Node(found.link, found.node)
+
+    def _turning(self, name: str) -> Node:
+        """A node that turns."""
+        links = self.formulation.mechanism.links
+        if name not in self.point_names:
+            choose(name, (*self.point_names, *self.link_names), "point or link", SceneError)
+            number = self.link_number(name)
+            return Node(number, links[number].inboard.node)
+        at = self._point(name)
+        if at.node not in links[at.link].model.rotation_nodes:
+            raise SceneError(
+                Cause.BAD_FIELD,
+                "this node has no rotation",
+                where="point",
+                value=name,
+                remedy="ask at an interface, or of the link",
+            )
+        return at
+
+    def _of_node(self, at: Node, t: ArrayLike, what: str) -> Array:
+        found: Array = getattr(self.instants(t).node(at), what)
+        return found.reshape(*np.shape(t), 3)
+
     def _interpolated(self, t: ArrayLike) -> tuple[tuple[int, ...], Array, Array, Array]:
         """Shape of ``t``; flat times, y and v."""
         flat = self.within(t)
         s = self.solution
         y, v = hermite(s.t, s.y, s.v, s.a, np.clip(flat, s.t[0], self.end))
         return np.shape(t), flat, y, v
+
+    def coordinates(self, t: ArrayLike) -> tuple[Array, Array]:
+        """(k, n) coordinates of the equations and their rates at times (k,)."""
+        return self._interpolated(t)[2:]
 
     def states(self, t: ArrayLike) -> list[State]:
         """The mechanism at each time."""

@@ -19,8 +19,10 @@ from erls.maths.so3 import Array
 from erls.mechanism.effects import conserves_energy, in_order
 from erls.mechanism.joints import Joint
 from erls.mechanism.loops import LoopFreedom
+from erls.mechanism.sensors.base import Sensor
 from erls.run.chain.kinematics import ChainMotion
 from erls.run.events import Happening, happenings
+from erls.run.readings import reading, reading_columns, reading_curves, reading_samples
 from erls.run.record import Curve, plain, vector
 from fe_import.files.toml import choose
 
@@ -141,6 +143,19 @@ class ChainRun(ChainMotion):
         return np.array(found).reshape(np.shape(t))
 
     @cached_property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Those of the scene."""
+        if not self.scene.record.sensors:
+            return ()
+        from erls.run.chain.sensors import sensors_of  # here: scenes without sensors need none of it
+
+        return sensors_of(self.scene, self.formulation.mechanism)
+
+    def sensor(self, name: str, t: ArrayLike) -> Array:
+        """(...) reading of a sensor with one component, (..., c) of others."""
+        return reading(self.sensors, name, self.instants(t), np.shape(t))
+
+    @cached_property
     def stability(self) -> Stability | None:
         """Of a static start of links that are linear in their own frames; None of other starts."""
         return start_stability(solved(self.formulation))
@@ -156,8 +171,9 @@ class ChainRun(ChainMotion):
         return passive and not damped and not mechanism.loads and conserves_energy(mechanism.effects)
 
     def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
-        """Joints and points at given times, as in the JSON of ``erls simulate``."""
+        """Joints, points and sensors at given times, as in the JSON of ``erls simulate``."""
         result = []
+        read = reading_samples(self.sensors, self.instants(times), len(times)) if self.sensors else None
         for t, s in zip(times, self.states(times), strict=True):
             joints: dict[str, Any] = {}
             for k, name in enumerate(self.joint_names):
@@ -169,13 +185,16 @@ class ChainRun(ChainMotion):
                     joints[joint] = found
             points = {name: self.point_position(s, k).tolist() for k, name in enumerate(self.point_names)}
             result.append({"t": float(t), "joints": joints, "points": points})
+            if read is not None:
+                result[-1]["sensors"] = read[len(result) - 1]
         return result
 
     def columns(self, times: Array) -> dict[str, Array]:
         """Of each point x, y, z; of each joint coordinate, physical angle, its rate, effort, reaction force and moment
-        on the outer link (world axes); energies.
+        on the outer link (world axes); what sensors read; energies.
         """
-        states, reactions = self.series(times), self._reactions(times)
+        seen = self.instants(times)
+        states, reactions = self.series(times), seen.reactions
         columns = {"t [s]": times}
         for k, name in enumerate(self.point_names):
             vector(columns, plain(name), "m", self.point_position(states, k))
@@ -187,13 +206,14 @@ class ChainRun(ChainMotion):
             columns[f"{name}.effort [{effort}]"] = reactions.effort[:, k]
             vector(columns, f"{name}.force", "N", reactions.force[:, k])
             vector(columns, f"{name}.moment", "N m", reactions.moment[:, k])
+        columns.update(reading_columns(self.sensors, seen, len(times)))
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):
             columns[f"energy.{kind} [J]"] = np.asarray(getattr(energy, kind))
         return columns
 
     def curves(self, times: Array) -> dict[str, Curve]:
-        """Points, joints, energies."""
+        """Points, joints, sensors, energies."""
         states, found = self.series(times), dict[str, Curve]()
         for k, name in enumerate(self.point_names):
             found[f"points/{name}"] = Curve(self.point_position(states, k), "m", "world position; time, axis")
@@ -201,6 +221,7 @@ class ChainRun(ChainMotion):
             for what in ("coordinates", "angles", "rates"):
                 values = np.array(getattr(states, what)[:, k])
                 found[f"joints/{name}/{what}"] = Curve(values, "rad or m, per s", "joint motion")
+        found.update(reading_curves(self.sensors, self.instants(times), len(times)))
         energy = self.energy(times)
         for kind in (*_ENERGIES, "total"):
             found[f"energy/{kind}"] = Curve(np.asarray(getattr(energy, kind)), "J", f"{kind} energy")

@@ -22,7 +22,7 @@ from erls.run.deflection.lines import Lines, lines
 
 _SAMPLES, _SAMPLES_OF_LOOPS = 61, 31  # forces of loops are found time by time
 _TURNING = 1e-8  # of the most that a unit of energy turns stations: rounding
-_STEP = 1e-5  # s, of central differences, as in `erls.run.link_loads`
+_STEP = 1e-5  # s, of central differences
 
 
 class Carried(NamedTuple):

@@ -6,6 +6,7 @@ from erls.errors import SceneError
 from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
+from erls.scene.check_sensors import check_sensors
 from erls.scene.checks import (
     bad,
     check_joint_fields,
@@ -59,6 +60,11 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
         _check_spring(spring, nodes, f"{file}: springs[{k}]")
     for k, load in enumerate(scene.loads):
         _check_load(load, nodes, f"{file}: loads[{k}]")
+    if scene.sensors and not isinstance(scene.simulation, Dynamics):
+        message = "sensors read motions, and nothing moves here"
+        raise bad(f"{file}: sensors", message, len(scene.sensors), 'remove them, or use simulation.type = "dynamics"')
+    joints = [joint.name for joint in scene.connections]
+    check_sensors(scene.sensors, file, {}, {*nodes, *joints, "t", "energy"})
     for k, name in enumerate(scene.report):
         choose(name, nodes, f"{file}: report[{k}]", SceneError)
     ends = {end for beam in scene.beams for end in (beam.start, beam.end)}

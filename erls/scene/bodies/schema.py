@@ -11,6 +11,7 @@ import msgspec
 
 from erls.mechanism.motions import Motion
 from erls.mechanism.profiles import Load as Profile
+from erls.mechanism.sensors.registry import AnySensor
 from erls.scene.bodies.analyses import Analysis
 from erls.scene.records import Record, SceneFile, SceneTables
 from fe_import.description.records import Inertia, Material, PointMass, Vector
@@ -245,6 +246,9 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
         Forces and moments, ``[[loads]]``.
     report : list of str
         Nodes whose places are reported beside named nodes and bodies, such as BEAM/4.
+    sensors : list of AnySensor
+        Instruments of a motion, whose ``point`` is a node or body and whose ``joint`` a connection with one coordinate,
+        ``[[sensors]]``; nothing is recovered from beams, and connections have no motors.
     """
 
     simulation: Analysis
@@ -258,6 +262,7 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
     springs: list[Spring] = []
     loads: list[Load] = []
     report: list[str] = []
+    sensors: list[AnySensor] = []
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from erls.equations.erls.paper.records import BODY_STATE, Balance, BodyState, Pa
 from erls.equations.formulation import Energy, State
 from erls.equations.serial.formulation import SerialFormulation
 from erls.equations.serial.modal_inertia import stiffened
+from erls.equations.serial.motion_series import MotionSeries
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import Serial
 from erls.equations.serial.state_series import StateSeries
@@ -142,6 +143,23 @@ class DenseChain(SerialFormulation):
         force = _see_balance(scratch, integers, self._places.balance).force
         joints = enumerate(zip(self.links, self.turns, strict=True))
         return [(link.borne, force[k : k + 1], joint.turn[3:]) for k, (link, joint) in joints]
+
+    def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
+        """Motion at times (k,)."""
+        views = [x for link in self.links for x in (link.velocity, link.acceleration)]
+        views += [x for joint in self.turns for x in (joint.turn[2:3], joint.gradient)]
+        left = self.left_by_residuals([*views, self.elimination.acceleration], t, y, v, a)
+        links, joints, whole = left[: 2 * self.joints], left[2 * self.joints : -1], left[-1]
+        angles = [bias[:, 0] + (row * whole).sum(axis=1) for bias, row in zip(joints[::2], joints[1::2], strict=True)]
+        rates, accelerations = links[::2], links[1::2]
+        return MotionSeries(
+            self.series(t, y, v),
+            [x[:, :6] for x in rates],
+            [x[:, :6] for x in accelerations],
+            [x[:, 6:] for x in rates],
+            [x[:, 6:] for x in accelerations],
+            np.stack(angles, axis=1),
+        )
 
     @property
     def kind(self) -> dict[str, Any]:

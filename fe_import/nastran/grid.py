@@ -1,4 +1,4 @@
-"""Nastran grid points: positions and displacement frames from GRID and CORD2R cards."""
+"""Nastran grid points: positions and displacement frames from GRID and CORD2R, CORD2C, CORD2S cards."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.exports.nastran_cards import Card
 from fe_import.model import Array
+from fe_import.nastran.cards import Card
 
-_OTHER_FRAMES = ("CORD1R", "CORD1C", "CORD1S", "CORD2C", "CORD2S")
+_FRAMES = ("CORD2R", "CORD2C", "CORD2S")
+_OTHER_FRAMES = ("CORD1R", "CORD1C", "CORD1S")
 _DEEPEST = 100  # coordinate systems defined in each other
-CARDS = frozenset({"GRID", "GRDSET", "SPOINT", "PLOTEL", "CORD2R", *_OTHER_FRAMES})
+CARDS = frozenset({"GRID", "GRDSET", "SPOINT", "PLOTEL", *_FRAMES, *_OTHER_FRAMES})
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,37 @@ class GridPoints:
 
 @dataclass(frozen=True)
 class _Frame:
+    """Origin and axes (columns) in the basic frame; ``kind``: rectangular R, cylindrical C, spherical S."""
+
     origin: Array
     axes: Array
+    kind: str = "R"
+
+    def position(self, given: Array) -> Array:
+        """Of a point with these coordinates; angles in degrees."""
+        if self.kind == "C":
+            radius, angle = given[0], np.radians(given[1])
+            given = np.array([radius * np.cos(angle), radius * np.sin(angle), given[2]])
+        elif self.kind == "S":
+            radius, (polar, angle) = given[0], np.radians(given[1:])
+            flat = radius * np.sin(polar)
+            given = np.array([flat * np.cos(angle), flat * np.sin(angle), radius * np.cos(polar)])
+        return np.asarray(self.origin + self.axes @ given)
+
+    def axes_at(self, position: Array) -> Array:
+        """(3, 3) axes (columns) at a point; on the axis of a curved frame those of the frame."""
+        x, y, z = self.axes.T @ (position - self.origin)
+        flat = float(np.hypot(x, y))
+        if self.kind == "R" or flat <= 1e-12 * np.hypot(flat, z):
+            return self.axes
+        outward, around = np.array([x, y, 0.0]) / flat, np.array([-y, x, 0.0]) / flat
+        if self.kind == "C":
+            local = np.stack([outward, around, [0.0, 0.0, 1.0]], axis=1)
+        else:
+            radius = np.hypot(flat, z)
+            radial = np.array([x, y, z]) / radius
+            local = np.stack([radial, outward * z / radius - np.array([0, 0, flat / radius]), around], axis=1)
+        return np.asarray(self.axes @ local)
 
 
 _BASIC = _Frame(np.zeros(3), np.eye(3))
@@ -53,7 +83,7 @@ def grid_points(cards: Iterable[Card]) -> GridPoints:
     ------
     FEImportError
         ``EXPORT``: a faulty field, a number that stands twice, GRDSET; ``BAD_REFERENCE``: a coordinate system that is
-        not there, or not a CORD2R.
+        not there, or not a CORD2R, CORD2C or CORD2S.
     """
     found = list(cards)
     frames = _Frames(found)
@@ -76,10 +106,10 @@ def _add_grid(card: Card, frames: _Frames, points: GridPoints) -> None:
         raise card.fault("this grid point stands twice", number)
     placed = frames.get(card.integer(2, 0), card)
     local = np.array([card.real(k, 0.0) for k in (3, 4, 5)])
-    points.positions[number] = placed.origin + placed.axes @ local
+    points.positions[number] = placed.position(local)
     frame = card.integer(6, 0)
     if frame:
-        points.axes[number] = frames.get(frame, card).axes
+        points.axes[number] = frames.get(frame, card).axes_at(points.positions[number])
 
 
 def _numbers(card: Card) -> Iterable[int]:
@@ -110,32 +140,32 @@ class _Frames:
         if number in self._known:
             return self._known[number]
         card = self._cards.get(number)
-        if card is None or card.name != "CORD2R":
+        if card is None or card.name not in _FRAMES:
             raise FEImportError(
                 Cause.BAD_REFERENCE,
                 f"{user.name}: coordinate system {number} is " + ("not there" if card is None else f"a {card.name}"),
                 where=user.where,
                 value=number,
-                limit="0 or a CORD2R",
-                remedy="export grid points with rectangular coordinate systems (CORD2R)",
+                limit="0, a CORD2R, CORD2C or CORD2S",
+                remedy="export grid points in the basic frame, or with coordinate systems by three points (CORD2R ...)",
             )
         if number in self._open or len(self._open) > _DEEPEST:
             deep = number not in self._open
             message = "is nested too deeply" if deep else "is defined by itself"
             raise card.fault(f"this coordinate system {message}", number)
         self._open.add(number)
-        frame = self._known[number] = _rectangular(card, self.get(card.integer(2, 0), card))
+        frame = self._known[number] = _by_points(card, self.get(card.integer(2, 0), card))
         self._open.discard(number)
         return frame
 
 
-def _rectangular(card: Card, reference: _Frame) -> _Frame:
-    """CORD2R: origin A, z axis towards B, xz plane through C, all in the frame of reference."""
-    a, b, c = (np.array([card.real(k + j, 0.0) for j in range(3)]) for k in (3, 6, 9))
+def _by_points(card: Card, reference: _Frame) -> _Frame:
+    """CORD2x: origin A, z axis towards B, xz plane through C, all in the frame of reference."""
+    a, b, c = (reference.position(np.array([card.real(k + j, 0.0) for j in range(3)])) for k in (3, 6, 9))
     z, side = b - a, c - a
     y = np.cross(z, side)
     if not np.linalg.norm(y) > 1e-9 * np.linalg.norm(z) * np.linalg.norm(side):
         raise card.fault("the three points lie on one line")
     axes = np.stack([np.cross(y, z), y, z], axis=1)
     axes /= np.linalg.norm(axes, axis=0)
-    return _Frame(reference.origin + reference.axes @ a, reference.axes @ axes)
+    return _Frame(a, axes, card.name[-1])

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from fe_import.errors import Cause, FEImportError
 
 _INTEGER = re.compile(r"[+-]?\d{1,18}")
 _REAL = re.compile(r"([+-]?(?:\d+\.\d*|\.\d+|\d+(?=[EDed])))(?:[EDed]?([+-]\d{1,4})|[EDed](\d{1,4}))?")
-_COMMENT_IN_WORD = re.compile(r"[^\s,]\$")
+_COMMENT_IN_WORD = re.compile(r"[^\s,]\$\w")
 _DATA_COLUMNS = 72  # the rest of a line names its continuation
 _FREE_FORMAT = 10  # a comma among the first ten columns
 
@@ -58,17 +58,19 @@ class Card:
         return value
 
 
-def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Iterator[Card]:
+def read_cards(
+    lines: Iterable[str], names: frozenset[str] | None, where: str | Callable[[int], str]
+) -> Iterator[Card]:
     """The cards with given names, in order.
 
     Parameters
     ----------
     lines : iterable of str
         Executive and case control before ``BEGIN BULK`` may be among them, cards behind ``ENDDATA`` are left out.
-    names : frozenset of str
-        In capitals.
-    where : str
-        Name of the file, for messages.
+    names : frozenset of str or None
+        In capitals; all cards when None.
+    where : str or callable
+        Name of the file, for messages; or the place of a line by its number, from 1.
 
     Raises
     ------
@@ -76,6 +78,7 @@ def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Itera
         ``EXPORT``: an INCLUDE that would have to be followed; a line behind a card that is neither a card nor its
         continuation.
     """
+    place = where if callable(where) else f"{where}: line {{}}".format
     name, fields, start = "", [], 0
     for number, raw in enumerate(lines, start=1):
         line = raw.partition("$")[0].rstrip().expandtabs(8)
@@ -83,30 +86,30 @@ def read_cards(lines: Iterable[str], names: frozenset[str], where: str) -> Itera
             continue
         head, data = _split(line)
         if name and _COMMENT_IN_WORD.search(raw):
-            raise _damaged(f"{where}: line {number}", "a comment begins within a field", raw)
+            raise _damaged(place(number), "a comment begins within a field", raw)
         if not head or head[0] in "+*":
             if name:
                 fields += data
             continue
         if name:
             if not head[0].isalpha():
-                raise _damaged(f"{where}: line {number}", "neither a card nor the continuation of one", raw)
-            yield Card(name, tuple(fields), f"{where}: line {start}")
+                raise _damaged(place(number), "neither a card nor the continuation of one", raw)
+            yield Card(name, tuple(fields), place(start))
         name = ""
-        keyword = head.rstrip("*").upper()
+        keyword = head.rstrip("* ").upper()
         if keyword == "ENDDATA":
             return
         if keyword.startswith("INCLUDE"):
             raise FEImportError(
                 Cause.EXPORT,
                 "INCLUDE is not followed",
-                where=f"{where}: line {number}",
+                where=place(number),
                 remedy="give one file that holds all cards",
             )
-        if keyword in names:
+        if names is None or keyword in names:
             name, fields, start = keyword, data, number
     if name:
-        yield Card(name, tuple(fields), f"{where}: line {start}")
+        yield Card(name, tuple(fields), place(start))
 
 
 def _damaged(where: str, message: str, line: str) -> FEImportError:

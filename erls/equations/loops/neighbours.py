@@ -1,0 +1,122 @@
+"""States beside one of a chain with loops (`erls.equations.neighbours`): those of its tree, and the conditions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from erls.equations.formulation import Formulation
+from erls.equations.loops.tied import Tied
+from erls.equations.neighbours import States
+from erls.equations.serial.neighbours import TreeNeighbours, fastest
+from erls.maths.so3 import Array
+from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.equations.loops.compiled import CompiledLoops  # it imports the compiler
+
+
+@dataclass(frozen=True)
+class LoopNeighbours:
+    """Of a closed state of a chain, with the multipliers (m,) of the conditions ``kept``.
+
+    Attributes
+    ----------
+    tree : TreeNeighbours
+        Of its tree.
+    """
+
+    chain: Tied
+    tree: TreeNeighbours
+    multipliers: Array
+    kept: IntArray
+
+    @cached_property
+    def loops(self) -> CompiledLoops:
+        """Of the conditions that count, whose violations do not decay."""
+        return self.chain.packed(self.kept, 0.0)
+
+    @property
+    def time(self) -> float:
+        """See `Neighbours`."""
+        return self.tree.time
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those of the tree."""
+        return self.tree.names
+
+    @property
+    def metres(self) -> Array:
+        """See `Neighbours`."""
+        return self.chain.metres
+
+    @property
+    def stiffness(self) -> Array:
+        """See `Neighbours`."""
+        return self.tree.stiffness
+
+    @property
+    def size(self) -> float:
+        """See `Neighbours`."""
+        return self.chain.reach
+
+    @property
+    def reach(self) -> float:
+        """See `Neighbours`."""
+        return self.chain.reach
+
+    @property
+    def speed(self) -> Array:
+        """See `Neighbours`."""
+        return self.tree.v
+
+    @property
+    def acceleration(self) -> Array:
+        """See `Neighbours`."""
+        return self.tree.a
+
+    @property
+    def driven(self) -> tuple[float, float]:
+        """See `Neighbours`."""
+        found = (loop.freedom for loop in self.chain.mechanism.loops if loop.prescribed)
+        own = fastest([(free.drive, free.freedom) for free in found if free is not None], self.time, self.reach)
+        fast, faster = map(max, own, self.tree.driven)
+        return fast, faster
+
+    def forces(self, x: Array, w: Array, b: Array) -> Array:
+        """See `Neighbours`."""
+        return self.loops.held(*self.states(x, w, b), np.tile(self.multipliers, (len(x), 1)))
+
+    def mass(self) -> Array:
+        """See `Neighbours`."""
+        return self.loops.masses(self.tree.time, self.tree.y)
+
+    def rows(self) -> Array:
+        """See `Neighbours`."""
+        found = self.chain.closure(self.tree.time, self.tree.y, self.tree.v)
+        return np.asarray(found.rows[self.kept][:, self.chain.bare.free])
+
+    def violation(self) -> Array:
+        """See `Neighbours`."""
+        return np.asarray(self.chain.closure(self.tree.time, self.tree.y, self.tree.v).violation[self.kept])
+
+    def states(self, x: Array, w: Array, b: Array) -> States:
+        """See `Neighbours`."""
+        return self.tree.states(x, w, b)
+
+    def later(self, tau: float) -> LoopNeighbours:
+        """See `Neighbours`."""
+        return replace(self, tree=self.tree.later(tau))
+
+    def at_rest(self, x: Array, multipliers: Array) -> LoopNeighbours:
+        """See `Neighbours`."""
+        return replace(self, tree=self.tree.at_rest(x, multipliers), multipliers=multipliers)
+
+    def of(self, formulation: Formulation) -> LoopNeighbours:
+        """See `Neighbours`."""
+        chain: Tied = formulation  # type: ignore[assignment]  # closed like this one
+        return replace(self, chain=chain, tree=self.tree.of(chain.bare))

@@ -1,0 +1,1 @@
+"""Mechanisms as linear systems about a state: matrices, poles, responses, diagrams."""

@@ -1,0 +1,1 @@
+"""Virtual sensors: what instruments on a mechanism would read."""

@@ -1,0 +1,1 @@
+"""Derivatives of what runs give, by parameters of their scenes."""

@@ -1,0 +1,80 @@
+"""Exact tangents of the equations of motion along a run: ∂R/∂a, ∂R/∂v and ∂R/∂y of R = M a - f at its knots.
+
+The iteration matrices of implicit methods leave out what only costs iterations (gyroscopic, centrifugal, geometric
+terms); derivatives of a run need all of it. R is evaluated at many states in one call
+(`erls.equations.series.residual_series`) and differenced as in `erls.equations.linearization`, there with its accuracy.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from erls.equations.compiled_system import CompiledSystem
+from erls.equations.linearization import difference_steps
+from erls.equations.series import mass_series, residual_series
+from erls.maths.so3 import Array
+
+_ROUGHER = 5.0
+"""Times the steps of `difference_steps`: rounding and the third derivative take equal shares of 1e-11 then."""
+
+
+class Tangents(NamedTuple):
+    """(k, n, n) ∂R/∂a, ∂R/∂v, ∂R/∂y at k knots."""
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+
+
+class Knots(NamedTuple):
+    """(k,) times at which forces are asked for, (k, n) coordinates, rates and accelerations."""
+
+    t: Array
+    y: Array
+    v: Array
+    a: Array
+
+    def part(self, first: int, end: int) -> Knots:
+        """Some of them."""
+        return Knots(*(array[first:end] for array in self))
+
+
+def tangents(system: CompiledSystem, knots: Knots, steps: Array) -> Tangents:
+    """At all knots.
+
+    Parameters
+    ----------
+    system : CompiledSystem
+    knots : Knots
+    steps : (n,) array
+        Of differences, `steps_of`.
+    """
+    t, y, v, a = knots
+    n = y.shape[1]
+    damping, stiffness = np.empty((2, len(t), n, n))
+    for j in range(n):
+        damping[:, :, j] = _difference(lambda x: residual_series(system, t, y, x, a), v, j, steps[j])
+        stiffness[:, :, j] = _difference(lambda x: residual_series(system, t, x, v, a), y, j, steps[j])
+    return Tangents(mass_series(system, t, y), damping, stiffness)
+
+
+def _difference(forces, x: Array, place: int, step: float) -> Array:  # type: ignore[no-untyped-def]
+    """(k, n) central difference of forces (k, n) of states (k, n) by one of their coordinates."""
+    above, below = x.copy(), x.copy()
+    above[:, place] += step
+    below[:, place] -= step
+    taken = above[:, place] - below[:, place]  # what rounding leaves of two steps
+    return np.asarray((forces(above) - forces(below)) / taken[:, None])
+
+
+def steps_of(metres: Array, size: float, stiffness: Array) -> Array:
+    """(n,) steps of differences of coordinates and of rates [m/s per m of the coordinate].
+
+    Parameters
+    ----------
+    metres, size, stiffness
+        As of `erls.equations.linearization.difference_steps`.
+    """
+    return _ROUGHER * difference_steps(metres, size, stiffness)

@@ -1,0 +1,59 @@
+"""How far the mesh of a solid is from a fine one, as its stress tells.
+
+Stress of the exact solution is continuous, that of elements is not. What averaging at the nodes changes, in energy,
+estimates the error of a mode's energy, and so of its squared frequency (O. C. Zienkiewicz & J. Z. Zhu, Int. J. Numer.
+Methods Eng. 24 (1987) 337-357): ω² of the mesh is (1 - η²)⁻¹ times the true one, η² the error's share of the energy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fe_import.elements.solid_stress import SolidStress
+from fe_import.errors import Cause, FEImportError
+from fe_import.modal.model import HealthCheck
+from fe_import.model import Array, FEModel
+
+_MODES = 3  # elastic, the lowest: the first may be one of several that are nearly equal
+_MOST = 1 - 1e-6  # share of the energy; beyond, the figure would be infinite
+
+
+def check_mesh_error(
+    model: FEModel, source: SolidStress, shapes: Array, omega: Array, limit: float, where: str
+) -> tuple[HealthCheck, ...]:
+    """Estimated error of the lowest elastic frequencies, the largest as a check.
+
+    Parameters
+    ----------
+    model : FEModel
+    source : SolidStress
+        Its elements.
+    shapes : (d, m) array
+        Modes, the six rigid-body ones first.
+    omega : (m,) array
+        [rad/s]
+    limit : float
+        Beyond it the check fails.
+    where : str
+
+    Raises
+    ------
+    FEImportError
+        ``MESH``: beyond it with linear elements, which lock.
+    """
+    if len(omega) <= 6:
+        return ()
+    error, energy = source.energy_of_error(shapes[:, 6 : 6 + _MODES], model.dof_map)
+    share = np.minimum(error / energy, _MOST)
+    worst = float((1 / np.sqrt(1 - share) - 1).max())
+    locking = [b.type for b in source.mesh.blocks if not b.element.midpoints and not b.element.incompatible]
+    if worst > limit and locking:
+        raise FEImportError(
+            Cause.MESH,
+            f"{' and '.join(locking)} elements are too stiff on this mesh: error of the first frequencies, estimated",
+            where=f"{where}: solid.mesh_error",
+            value=float(f"{worst:.2g}"),
+            limit=limit,
+            remedy="set raise_order = true in [solid], refine the mesh, or accept the error with a larger mesh_error",
+        )
+    return (HealthCheck("error of the first frequencies by the mesh, as jumps of stress tell", worst, limit),)

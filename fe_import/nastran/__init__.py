@@ -1,0 +1,1 @@
+"""Bulk data of Nastran: cards, grid points with their coordinate systems."""
