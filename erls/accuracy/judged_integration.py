@@ -104,8 +104,9 @@ def judged_integration(run: ChainRun, watched: Watched, others: float) -> Integr
     mechanism = run.formulation.mechanism
     elastic = any(link.elastic_modes for link in mechanism.links)
     followed = settings.output_step is None and wrong_table(s, settings.integrator) is not None
+    tied = mechanism.loops or mechanism.sticks  # it knows neither loops nor switches
     astray = mechanism.touches or (elastic and sudden(run))  # by sudden forces
-    if followed and not mechanism.loops and not astray:
+    if followed and not tied and not astray:
         found = integration_error(run, watched)
     smooth = not elastic and not sudden(run)  # then nothing is unresolved, and the equation right
     if found is not None and found.whole and (smooth or found.total <= max(expected(run), others)):

@@ -7,7 +7,7 @@ follow from time.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
+from erls.equations.dry_friction import DryFriction, Settled, dry_friction, settled
 from erls.equations.formulation import ContactSeries, FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization
 from erls.equations.neighbours import small_motions
@@ -69,6 +70,11 @@ class SerialFormulation(TreeFormulation):
     def compiled(self) -> CompiledSystem:
         """The equations."""
 
+    @cached_property
+    def dry(self) -> DryFriction | None:
+        """Friction that sticks, which the compiled equations leave out; None without any."""
+        return dry_friction(self.mechanism, self.free_joints)
+
     @property
     def size(self) -> int:
         """Number of independent coordinates."""
@@ -80,7 +86,7 @@ class SerialFormulation(TreeFormulation):
         return self.mechanism.breakpoints
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
-        """(n,) forces out of balance on the independent coordinates."""
+        """(n,) forces out of balance on the independent coordinates; friction that sticks is left out."""
         return residual(self.compiled, t, y, v, a)
 
     def mass_matrix(self, t: float, y: Array) -> Array:
@@ -109,11 +115,29 @@ class SerialFormulation(TreeFormulation):
         SimulationError
             The mass matrix is not positive definite; names the coordinate.
         """
-        force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
+        if self.dry is not None:
+            return self.settled(t, y, v, np.zeros(len(self.dry.places))).accelerations
+        return self._solver(t, y)(-self.residual(t, y, v, np.zeros(0)))
+
+    def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
+        """Which joints stick, and accelerations, by the set-valued law of friction; see `dry_friction.settled`.
+
+        Raises
+        ------
+        SimulationError
+            As `acceleration`.
+        """
+        assert self.dry is not None
+        return settled(self._solver(t, y), -self.residual(t, y, v, np.zeros(0)), v, self.dry, released)
+
+    def _solver(self, t: float, y: Array) -> Callable[[Array], Array]:
+        """M⁻¹ of forces."""
+        mass = self.mass_matrix(t, y)
         try:
-            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
+            factor = la.cho_factor(mass, check_finite=False)
         except la.LinAlgError:
             raise singular_mass(self, t, mass, self.elastic_name) from None
+        return lambda forces: np.asarray(la.cho_solve(factor, forces, check_finite=False))
 
     def acceleration_series(self, t: Array, y: Array, v: Array) -> Array:
         """(k, n) accelerations at k times, solved for together.
@@ -126,8 +150,10 @@ class SerialFormulation(TreeFormulation):
         forces = residual_series(self.compiled, t, y, v, np.zeros((len(t), 0)))
         masses = mass_series(self.compiled, t, y)
         try:
-            lower = np.linalg.cholesky(masses)
+            lower = None if self.dry is not None else np.linalg.cholesky(masses)
         except np.linalg.LinAlgError:  # one of them: the method for one names what is wrong with it
+            lower = None
+        if lower is None:
             return np.array([self.acceleration(*at) for at in zip(t.tolist(), y, v, strict=True)]).reshape(y.shape)
         half = np.linalg.solve(lower, -forces[..., None])
         return np.asarray(np.linalg.solve(lower.swapaxes(1, 2), half)[..., 0])
@@ -185,10 +211,14 @@ class SerialFormulation(TreeFormulation):
 
     def neighbours(self, t: float, y: Array, v: Array) -> TreeNeighbours:
         """States beside one, with the accelerations of the equations of motion."""
-        return TreeNeighbours(self, t, y, v, self.acceleration(t, y, v))
+        if self.dry is None:
+            return TreeNeighbours(self, t, y, v, self.acceleration(t, y, v))
+        found = self.settled(t, y, v, np.zeros(len(self.dry.places)))
+        stuck = tuple(self.dry.places[found.modes == 0.0].tolist())
+        return TreeNeighbours(self, t, y, v, found.accelerations, stuck)
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
-        """Small motions about a state, with the accelerations of the equations of motion."""
+        """Small motions about a state, with the accelerations of the equations of motion; joints that stick rest."""
         return small_motions(self.neighbours(t, y, v))
 
     @cached_property
@@ -240,6 +270,9 @@ class SerialFormulation(TreeFormulation):
             force[:, k] = np.einsum("tij,tj->ti", turn, push)
             moment[:, k] = np.einsum("tij,tj->ti", turn, wrench[:, 3:] - cross_all(place, push))
             effort[:, k] = (whole if joint.drive.prescribed else given)[:, 0]
+        if self.dry is not None:
+            joints = self.free_joints[self.dry.places]
+            effort[:, joints] += self.dry.given(v, np.column_stack([left[3 * k + 1] for k in joints.tolist()]))
         return ReactionSeries(force, moment, effort)
 
     def joint_accelerations(self) -> list[Array]:

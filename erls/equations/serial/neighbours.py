@@ -20,13 +20,16 @@ from erls.mechanism.joint_types import Freedom
 
 @dataclass(frozen=True)
 class TreeNeighbours:
-    """Of a state with coordinates ``y``, rates ``v`` and accelerations ``a``, (n,) each."""
+    """Of a state with coordinates ``y``, rates ``v`` and accelerations ``a``, (n,) each; friction holds those at the
+    places ``stuck``.
+    """
 
     equations: TreeFormulation
     time: float
     y: Array
     v: Array
     a: Array
+    stuck: tuple[int, ...] = ()
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -74,8 +77,8 @@ class TreeNeighbours:
 
     @property
     def multipliers(self) -> Array:
-        """None."""
-        return np.zeros(0)
+        """Friction that sticks is left out of the forces."""
+        return np.zeros(len(self.stuck))
 
     def forces(self, x: Array, w: Array, b: Array) -> Array:
         """See `Neighbours`."""
@@ -88,12 +91,12 @@ class TreeNeighbours:
         return self.equations.mass_matrix(self.time, self.y)
 
     def rows(self) -> Array:
-        """None."""
-        return np.zeros((0, len(self.y)))
+        """Joints that stick."""
+        return np.eye(len(self.y))[list(self.stuck)]
 
     def violation(self) -> Array:
         """None."""
-        return np.zeros(0)
+        return np.zeros(len(self.stuck))
 
     def states(self, x: Array, w: Array, b: Array) -> States:
         """See `Neighbours`."""
