@@ -62,9 +62,9 @@ class PartlyLoaded(NodalSystem):
         self, t: float, q: Nodes, v: Array, a: Array, multipliers: Array, material: bool = False
     ) -> tuple[Matrix, Matrix]:
         """(n, n) twice; stiffness of the joints' forces in full."""
-        parts = [s.stiffness_and_damping(0.0, q, v, a, multipliers, material) for s in (super(), self._bare)]
-        stiffness, damping = (t * whole + (1 - t) * bare for whole, bare in zip(*parts, strict=True))
-        return stiffness, damping
+        whole = super().stiffness_and_damping(0.0, q, v, a, multipliers, material)
+        bare = self._bare.stiffness_and_damping(0.0, q, v, a, multipliers, material)
+        return t * whole[0] + (1 - t) * bare[0], t * whole[1] + (1 - t) * bare[1]
 
     def constraint(self, t: float, q: Nodes) -> Array:
         """(m,)"""

@@ -1,6 +1,6 @@
 """Hard cases: one record each, by subject; `CASES` are the rows of the table, in its order."""
 
-from hard_cases import drives, flexible, invariance, loops, pendulums, tops
+from hard_cases import drives, flexible, invariance, loops, pendulums, stability, tops
 from hard_cases.case import FORMULATIONS, Case
 
 CASES: tuple[Case, ...] = (
@@ -9,6 +9,7 @@ CASES: tuple[Case, ...] = (
     *flexible.CASES,
     *drives.CASES,
     *loops.CASES,
+    *stability.CASES,
     *invariance.CASES,
 )
 ROWS = tuple((case, formulation) for case in CASES for formulation in FORMULATIONS)

@@ -14,6 +14,27 @@ from hard_cases.truths import top
 _NODES = {"pin": [0.0, 0.0, 0.0], "nose": [0.0, 0.0, 0.3], "side": [0.2, 0.0, 0.0]}
 
 
+def spinning(
+    spin: Sequence[float],
+    duration: float,
+    inertia: Sequence[float],
+    mass: float = 1.0,
+    centre: Sequence[float] = (0.0, 0.0, 0.0),
+    gravity: Sequence[float] = (0.0, 0.0, 0.0),
+    simulation: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    """The scene of a rigid body pinned at a point; inertia about its centre of mass."""
+    body = {"mass": mass, "centre_of_mass": list(centre), "inertia": list(inertia), "points": _NODES}
+    starts = {f"turn_{axis}": {"initial": {"rate": float(rate)}} for axis, rate in zip("xyz", spin, strict=True)}
+    return {
+        "gravity": list(gravity),
+        "simulation": {"duration": duration, **(simulation or {})},
+        "joints": [{"name": "ball", "type": "spherical", "dh": {"convention": "modified"}, "coordinates": starts}],
+        "links": [{"name": "top", "rigid": body}],
+        "points": [{"name": node, "link": "top", "node": node} for node in ("nose", "side")],
+    }
+
+
 def _top(
     name: str,
     inertia: Sequence[float],
@@ -24,23 +45,14 @@ def _top(
     gravity: Sequence[float] = (0.0, 0.0, 0.0),
     **more: Any,
 ) -> Case:
-    """A rigid body pinned at a point; inertia about its centre of mass."""
     middle = np.array(centre)
     about_pin = np.array(inertia) + mass * (middle @ middle - middle**2)  # the centre lies on a principal axis
-    body = {"mass": mass, "centre_of_mass": list(centre), "inertia": list(inertia), "points": _NODES}
-    starts = {f"turn_{axis}": {"initial": {"rate": float(rate)}} for axis, rate in zip("xyz", spin, strict=True)}
-    scene = {
-        "gravity": list(gravity),
-        "simulation": {"duration": duration, **more.pop("simulation", {})},
-        "joints": [{"name": "ball", "type": "spherical", "dh": {"convention": "modified"}, "coordinates": starts}],
-        "links": [{"name": "top", "rigid": body}],
-        "points": [{"name": node, "link": "top", "node": node} for node in ("nose", "side")],
-    }
 
     def places(t: Array) -> Array:
         turned = top(about_pin.tolist(), spin, duration, (mass * middle).tolist(), gravity)(t)
         return np.stack([turned @ _NODES["nose"], turned @ _NODES["side"]], axis=1)
 
+    scene = spinning(spin, duration, inertia, mass, centre, gravity)
     return Case(name, scene, closed(places, "Euler's equations, DOP853 to 1e-13", 1e-10), **more)
 
 
@@ -49,8 +61,8 @@ def _tilted(degrees: float, g: float = 9.81) -> list[float]:
     return [g * float(np.sin(np.radians(degrees))), 0.0, -g * float(np.cos(np.radians(degrees)))]
 
 
-_SLEEPING = {"inertia": (0.01, 0.01, 0.005), "mass": 1.0, "centre": (0.0, 0.0, 0.1)}
-_CRITICAL = 2 * np.sqrt(9.81 * 0.1 * (0.01 + 0.1**2)) / 0.005  # 2 √(m g s J₁) / J₃: below it a sleeping top falls
+SLEEPING = {"inertia": (0.01, 0.01, 0.005), "mass": 1.0, "centre": (0.0, 0.0, 0.1)}
+CRITICAL = 2 * np.sqrt(9.81 * 0.1 * (0.01 + 0.1**2)) / 0.005  # 2 √(m g s J₁) / J₃: below it a sleeping top falls
 
 CASES = of_subject(
     "tops",
@@ -63,17 +75,17 @@ CASES = of_subject(
         ),
         _top(
             "sleeping top above its critical spin",
-            spin=(0.0, 0.0, 1.1 * _CRITICAL),
+            spin=(0.0, 0.0, 1.1 * CRITICAL),
             duration=5.0,
             gravity=_tilted(0.01),
-            **_SLEEPING,
+            **SLEEPING,
         ),
         _top(
             "sleeping top below its critical spin",
-            spin=(0.0, 0.0, 0.8 * _CRITICAL),
+            spin=(0.0, 0.0, 0.8 * CRITICAL),
             duration=3.0,
             gravity=_tilted(0.01),
-            **_SLEEPING,
+            **SLEEPING,
         ),
         _top(
             "top of Bruels, Arnold and Cardona",
