@@ -297,10 +297,16 @@ def fine(by: str, good: Callable[[Case], Case], best: Callable[[Case], Case]) ->
         The case as these have it; what formulation it is must stand in its changes.
     """
 
+    known: dict[float, tuple[Array, float]] = {}  # by the time up to which they are: the same for all formulations
+
     def truth(made: Made) -> Off:
-        one, two = (made.other(better(dataclasses.replace(made.case, also={}))) for better in (good, best))
-        exact = made.places(two)
-        return Off(apart(made.places(), exact), apart(made.places(one), exact), by)
+        if made.until not in known:
+            one, two = (
+                made.places(made.other(better(dataclasses.replace(made.case, also={})))) for better in (good, best)
+            )
+            known[made.until] = two, apart(one, two)
+        exact, doubt = known[made.until]
+        return Off(apart(made.places(), exact), doubt, by)
 
     return truth
 
