@@ -1,7 +1,8 @@
 """Random scenes: what their runs state of their accuracy against what they are off.
 
     python benchmarks/random_scenes.py [--seeds 0:2000] [--json rows.jsonl] [--workers 2] [--again]
-        [--parts all|integration|statement] [--nodal-every 0] [--write-references] [--only-table] [--commands]
+        [--parts all|integration|statement] [--references FOLDER] [--nodal-every 0] [--write-references]
+        [--only-table] [--commands]
 
 Scenes, references and what parts of an error are: tests/erls/random_scenes.py and random_references.py. Rows go to the
 file as they come, one JSON object a line; seeds that stand there are not run again, so that Ctrl-C loses nothing. A
@@ -13,7 +14,8 @@ stated over actual (floor 1e-7 m), verdicts, refusals and failures by cause, the
 class of scene; of each integrator the actual error of integration over the tolerance. ``--write-references`` writes
 the actual errors to tests/data/random_scenes.csv, by which tests judge the first seeds; ``--nodal-every 10`` judges
 each tenth scene by beam elements too, in up to ``--nodal-budget`` seconds. References take nearly all of the time:
-``--again --parts statement`` runs the scenes again, and holds what is stated now against those that stand in the file.
+with ``--references`` their places are kept in a folder, and ``--again`` runs the scenes alone, and holds them against
+what is there; ``--again --parts statement`` holds what is stated now against the actual errors in the file of the rows.
 
 What the statement costs is printed against the run within one process, which knows its links and has its kernels; with
 ``--commands``, which does nothing else, against what a user waits for: `erls simulate SCENE` as a process of its own,
@@ -210,6 +212,7 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--parts", choices=("all", "integration", "statement"), default="all", help="which references")
     parser.add_argument("--again", action="store_true", help="also seeds that stand in the file")
+    parser.add_argument("--references", type=Path, help="folder in which places of references are kept")
     parser.add_argument("--nodal-every", type=int, default=0, help="of so many scenes one is judged by beam elements")
     parser.add_argument("--nodal-budget", type=float, default=120.0, help="for each of these, in seconds")
     parser.add_argument("--hang", type=float, default=900.0, help="seconds without an answer")
@@ -228,8 +231,9 @@ def main() -> int:
         return 0
     known = rows_of(given.json)
     by_beams = set(seeds[:: given.nodal_every]) if given.nodal_every else set()
+    same = {"parts": given.parts, "kept": None if given.references is None else str(given.references)}
     tasks = [
-        {"seed": k, "parts": given.parts, "nodal_s": given.nodal_budget if k in by_beams else 0.0}
+        {"seed": k, **same, "nodal_s": given.nodal_budget if k in by_beams else 0.0}
         for k in seeds
         if given.again or k not in known
     ]

@@ -6,16 +6,17 @@ their joints hold shows in rates that are not those of the angles (`erls.accurac
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from erls.accuracy.looked_at import LookedAt
 from erls.accuracy.panels import within_legs
 from erls.equations.loops.closed_chain import ClosedChain
-from erls.equations.nodal.equations import Nodal
 from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.equations.nodal.equations import Nodal
 
 
 class Drift(NamedTuple):
@@ -38,8 +39,9 @@ class Drift(NamedTuple):
 
 def constraint_drift(look: LookedAt) -> Drift | None:
     """Of a run; None where its coordinates cannot break a constraint."""
-    found = _LOOKS.get(type(look.formulation))
-    return None if found is None else found(look)
+    if look.nodal is not None:
+        return _of_nodes(look.nodal, look)
+    return _of_loops(look.formulation, look) if isinstance(look.formulation, ClosedChain) else None
 
 
 def _at(look: LookedAt) -> IntArray:
@@ -48,10 +50,9 @@ def _at(look: LookedAt) -> IntArray:
     return np.unique(np.concatenate([chosen.first, chosen.last, [len(look.solution.t) - 1]]))
 
 
-def _of_loops(look: LookedAt) -> Drift:
+def _of_loops(chain: ClosedChain, look: LookedAt) -> Drift:
     """Of closing joints: all conditions, those that follow from others included."""
-    chain, s = look.formulation, look.solution
-    assert isinstance(chain, ClosedChain)
+    s = look.solution
     t, knots = within_legs(s.t), _at(look)
     gaps, _ = chain.whole.watched(t[knots], s.y[knots])
     worst, speed = int(knots[np.argmax(gaps)]), 0.0
@@ -61,11 +62,9 @@ def _of_loops(look: LookedAt) -> Drift:
     return Drift(float(gaps.max()), speed, chain.rows.names[int(np.abs(chain.openings(found)).argmax())])
 
 
-def _of_nodes(look: LookedAt) -> Drift:
+def _of_nodes(nodal: Nodal, look: LookedAt) -> Drift:
     """Of joints between nodes; angles count by the size of the mechanism."""
-    nodal, s, opening, speed, worst = look.formulation, look.solution, 0.0, 0.0, ""
-    assert isinstance(nodal, Nodal)
-    system = nodal.system
+    s, system, opening, speed, worst = look.solution, nodal.system, 0.0, 0.0, ""
     metres = np.where(system.rows.c.any(axis=1), 1.0, look.mechanism.reach)
     for k, t in zip(_at(look).tolist(), within_legs(s.t)[_at(look)].tolist(), strict=True):
         q, velocity = nodal.configuration(s.y[k], s.v[k])
@@ -75,6 +74,3 @@ def _of_nodes(look: LookedAt) -> Drift:
             opening, worst = float(gaps.max(initial=0.0)), system.constraint_names[int(gaps.argmax())]
         speed = max(speed, float(rates.max(initial=0.0)))
     return Drift(opening, speed, worst)
-
-
-_LOOKS: dict[type, Callable[[LookedAt], Drift]] = {ClosedChain: _of_loops, Nodal: _of_nodes}

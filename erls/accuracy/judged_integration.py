@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from erls.accuracy.constrained_integration import constrained_integration_error
 from erls.accuracy.error_over_time import ErrorOverTime
 from erls.accuracy.integration import SUDDEN, IntegrationError, expected, integration_error, sudden
 from erls.accuracy.second_run import second_run_error
@@ -122,6 +121,8 @@ def judged_integration(run: ChainRun, watched: Watched, others: float) -> Integr
 
 def _of_companion(run: ChainRun, none: dict[str, float | None]) -> Integrated:
     """Of generalized-α, from a run with larger steps."""
+    from erls.accuracy.constrained_integration import constrained_integration_error  # here: it imports nodal elements
+
     known = constrained_integration_error(run)
     if isinstance(known, str):
         return Integrated(np.zeros(0), np.zeros(0), none, none, known)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -12,8 +12,7 @@ from erls.accuracy.panels import Panels, panels_of
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.formulation import Ffr
 from erls.equations.formulation import Formulation
-from erls.equations.loops.closed_chain import ClosedChain
-from erls.equations.nodal.equations import Nodal
+from erls.equations.registry import TREES
 from erls.equations.substructures import solved
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.integrate.alpha_rules import Formulas, Rules
@@ -24,6 +23,9 @@ from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
 from erls.scene.integrators import FIXED_STEP, INTEGRATORS
 from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.equations.nodal.equations import Nodal
 
 SLACK = 10.0
 """What audits grant beyond the error that a run states: that error is one of points, by norms that integrators take at
@@ -62,6 +64,12 @@ class LookedAt:
         return solved(self.run.formulation)
 
     @property
+    def nodal(self) -> Nodal | None:
+        """The same where its coordinates are frames of nodes."""
+        of_modes = self.run.scene.record.simulation.formulation in TREES
+        return None if of_modes else cast("Nodal", self.formulation)  # by its name: runs import what they need
+
+    @property
     def mechanism(self) -> Mechanism:
         """The mechanism of these equations."""
         return self.formulation.mechanism
@@ -82,9 +90,9 @@ class LookedAt:
         of frames of nodes, their places.
         """
         s = self.solution
-        if not isinstance(self.formulation, Nodal):
+        if self.nodal is None:
             return metre_scales(cast(SecondOrderSystem, self.formulation)), s.y, s.v, s.a
-        own = (12 * np.arange(self.formulation.system.count)[:, None] + np.arange(3)).ravel()
+        own = (12 * np.arange(self.nodal.system.count)[:, None] + np.arange(3)).ravel()
         y, v, a = (np.ascontiguousarray(x[:, own]) for x in (s.y, s.v, s.a))
         return np.ones(len(own)), y, v, a
 

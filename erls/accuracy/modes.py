@@ -20,7 +20,6 @@ from erls.accuracy.configurations import configurations
 from erls.accuracy.finer_links import finer_links, lumped
 from erls.accuracy.integration import sudden
 from erls.accuracy.left_out_vibrations import left_out_vibrations
-from erls.accuracy.mesh_of_beams import mesh_error
 from erls.accuracy.slow_answer import slow_answer, start_of_loops
 from erls.accuracy.slow_motion import parted
 from erls.equations.registry import TREES
@@ -51,6 +50,8 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
         return 0.0, ""
     try:
         if run.scene.record.simulation.formulation not in TREES:
+            from erls.accuracy.mesh_of_beams import mesh_error  # here: it imports nodal elements
+
             return mesh_error(run)
         finer = finer_links(run.scene, run.formulation.mechanism, moving.mechanism)
     except FEImportError as problem:
@@ -62,11 +63,12 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
     duration = run.end - float(run.solution.t[0])
     places = configurations(compared, motion)
     start = motion.start if run.formulation.mechanism.static_start else None
-    static, drift = slow_answer(compared, motion.slow, places, duration, start)
+    jumps = sudden(run)
+    static, drift = slow_answer(compared, motion.slow, places, duration, start, jumps)
     if compared.tied is not None and start is not None:
         static = static + start_of_loops(compared, start)
     off, follows = left_out_vibrations(compared, motion, places, duration)
     parts = static + _SUDDEN * follows + off + drift
-    margin = _MARGIN_SUDDEN if sudden(run) else _MARGIN
+    margin = _MARGIN_SUDDEN if jumps else _MARGIN
     error = float(margin * parts.max(initial=0.0))
     return (error, "; ".join(finer.notes)) if np.isfinite(error) else (None, "motion without bound")

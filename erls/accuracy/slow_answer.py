@@ -24,7 +24,12 @@ _PENALTY = 1e8  # of opened loops against stiffness
 
 
 def slow_answer(
-    compared: Compared, motion: Motion, places: Sequence[Configuration], duration: float, start: Motion | None
+    compared: Compared,
+    motion: Motion,
+    places: Sequence[Configuration],
+    duration: float,
+    start: Motion | None,
+    sudden: bool = False,
 ) -> tuple[Array, Array]:
     """(p,) largest displacement of each point by the answer to slow loads, and by the drift of free joints [m].
 
@@ -41,6 +46,8 @@ def slow_answer(
         Of the run [s].
     start : Motion or None
         State at the start of a run whose links are deformed as they bear it at rest; None where they start undeformed.
+    sudden : bool
+        Whether friction or limits of motors act.
     """
     found, ways = unbalanced(compared, motion), ways_of_joints(compared, motion)
     free, whole = compared.free, compared.whole
@@ -63,7 +70,7 @@ def slow_answer(
         answer = _answer_of_loops(compared, motion, duration, found, ways)
         largest = 2 * answer
     if free and len(motion.t) > 1:
-        drift[:, :free] = joint_drift(compared, motion, found, answer, ways)
+        drift[:, :free] = joint_drift(compared, motion, found, answer, borne[0], ways, sudden)
     times = np.tile(motion.t, 3)
     still, bent, drifted = np.split(
         compared.moves(times, np.concatenate([y, y + largest, y + drift]), np.tile(v, (3, 1))), 3

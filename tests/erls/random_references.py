@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from random_kept import Kept, KeptReferences
 from random_scenes import RandomScene, random_scene
 from random_statements import FLOOR
 
@@ -42,6 +43,7 @@ from erls.simulation.chains import run_chain
 from fe_import.errors import ReportedError
 
 MOST_STEPS, MOST_CALLS, MOST_NODAL_CALLS = 25_000, 150_000, 40_000
+PER_BALANCE = 20  # evaluations of all modes in one of those that follow statically
 MORE = 3  # times as much may references take
 TIGHTER, TIGHT = 100.0, 30.0
 _TIMES, _EVERY = 201, 20
@@ -89,7 +91,10 @@ def limited_run(scene: Scene, more: float = 1.0, verdict: bool = False) -> Chain
     verdict : bool
         Whether it states its accuracy.
     """
-    calls = MOST_NODAL_CALLS if scene.record.simulation.formulation == "nodal" else MOST_CALLS
+    settings = scene.record.simulation
+    calls = MOST_NODAL_CALLS if settings.formulation == "nodal" else MOST_CALLS
+    if settings.bandwidth is not None:
+        calls //= PER_BALANCE
     limits = {"calls": round(more * calls), "steps": round(more * MOST_STEPS)}
     asked = Limited(None, lambda text: None, None, False, None, verdict, **limits)
     return run_chain(scene, asked)
@@ -118,8 +123,9 @@ ALL_EFFECTS = {**ALL_MODES, "effects": "all", "gauge": None, "body_frame": None}
 class Judge:
     """Runs of one scene and its references; what failed is None."""
 
-    def __init__(self, scene: RandomScene, folder: Path) -> None:
+    def __init__(self, scene: RandomScene, folder: Path, kept: Path | None = None) -> None:
         self.scene, self.folder = scene, folder
+        self.kept = KeptReferences(kept, scene.seed)
         self.path = scene.write(folder / "own")
         self.names = tuple(point["name"] for point in scene.tables["points"])
         self.problems: dict[str, str] = {}
@@ -131,18 +137,27 @@ class Judge:
 
     def reference(self, name: str, scene: RandomScene, end: float) -> Array | None:
         """Places of a better run, None where it failed."""
+        found = self.kept.find(scene, end)
+        if found is None:
+            found = self._made(name, scene, end)
+            self.kept.keep(scene, found)
+        if found.problem:
+            self.problems[name] = found.problem
+        return found.places
+
+    def _made(self, name: str, scene: RandomScene, end: float) -> Kept:
         try:
             run = limited_run(load_chain(scene.write(self.folder / name)), MORE)
         except ReportedError as problem:
-            self.problems[name] = f"{type(problem).__name__}: {problem.cause}"
-            return None
+            return Kept(end, None, f"{type(problem).__name__}: {problem.cause}")
         if run.end < end:
-            self.problems[name] = f"an event ends it at {run.end:.6g} s"
-            return None
-        return self.places(run, end)
+            return Kept(end, None, f"an event ends it at {run.end:.6g} s")
+        return Kept(end, self.places(run, end), "")
 
 
-def judge(seed: int, parts: str = "all", nodal_s: float = 0.0, work: float = 1.0) -> dict[str, Any]:
+def judge(
+    seed: int, parts: str = "all", nodal_s: float = 0.0, work: float = 1.0, kept: str | None = None
+) -> dict[str, Any]:
     """Run a random scene and its references.
 
     Parameters
@@ -154,6 +169,8 @@ def judge(seed: int, parts: str = "all", nodal_s: float = 0.0, work: float = 1.0
         Time that a reference of beam elements may take [s]; none is made unless given.
     work : float
         Of the limits of work, what the run itself may take.
+    kept : str or None
+        Folder of references that outlast this call.
 
     Returns
     -------
@@ -164,7 +181,7 @@ def judge(seed: int, parts: str = "all", nodal_s: float = 0.0, work: float = 1.0
     row: dict[str, Any] = {"seed": seed, "labels": scene.labels, "outcome": "ran"}
     try:
         with tempfile.TemporaryDirectory() as folder:
-            _judged(Judge(scene, Path(folder)), row, parts, nodal_s, work)
+            _judged(Judge(scene, Path(folder), Path(kept) if kept else None), row, parts, nodal_s, work)
     except (SceneError, SimulationError, ReportedError) as problem:
         kind = "failed" if isinstance(problem, SimulationError) else "refused"
         row |= {"outcome": f"{kind}: {problem.cause}", "message": str(problem).replace(folder, "")[:400]}
@@ -176,7 +193,7 @@ def judge(seed: int, parts: str = "all", nodal_s: float = 0.0, work: float = 1.0
 def _judged(judge: Judge, row: dict[str, Any], parts: str, nodal_s: float, work: float) -> None:
     scene, loaded = judge.scene, load_chain(judge.path)
     run = limited_run(loaded, work, verdict=True)
-    end = run.end if run.end >= loaded.record.simulation.duration else _UNTIL * run.end
+    end = judge.kept.end(run.end if run.end >= loaded.record.simulation.duration else _UNTIL * run.end)
     own = judge.places(run, end)
     row |= {"steps": run.solution.work.steps, "evaluations": run.solution.work.rhs_calls, "wall_s": run.wall_s}
     row |= {"tolerance": loaded.record.simulation.tolerance, "end": end, "warnings": len(run.warnings)}

@@ -257,11 +257,16 @@ def test_windows_see_the_slow_motion_through_a_quick_vibration() -> None:
     assert np.allclose(place[:, 0], 0.3 + 0.5 * middles + middles**2, rtol=0, atol=1e-3)
 
 
-def one_way(stiffness: float, damping: float, push: float, ways: list[Any] | None) -> Any:
-    """Equations of joints of unit mass that an answer of 1 on a last coordinate pushes, as `joint_drift` asks them."""
+def one_way(
+    stiffness: float, damping: float, push: float, ways: list[Any] | None, turn: float = 0.0, carry: float = 0.0
+) -> Any:
+    """Equations of joints of unit mass that an answer of 1 on a last coordinate pushes, as `joint_drift` asks them;
+    its rate takes momentum ``turn``, and ``carry`` (1 + t) is what both share of the mass.
+    """
 
     def forces(t: Any, y: Any, v: Any, a: Any, *_: Any) -> Any:
-        return stiffness * y + damping * v + a + push * y[:, -1:]
+        shared = carry * ((1 + t)[:, None] * a[:, -1:] + v[:, -1:])
+        return stiffness * y + damping * v + a + push * y[:, -1:] + turn * v[:, -1:] + shared
 
     free = 1 if ways is None else 2
     link = SimpleNamespace(mechanism=SimpleNamespace(rotation_vector_places=()))
@@ -289,8 +294,25 @@ def test_drift_is_that_of_an_oscillator(stiffness: float, damping: float, loop: 
     joints = np.zeros((len(t), compared.free))
     rows = np.zeros((len(t), 1, n) if loop else (len(t), 0, n))
     found = Unbalanced(still, joints, joints, rows, np.zeros(rows.shape[:2]))
-    drift = joint_drift(compared, motion, found, answer, [way] * len(t) if loop else None)
+    drift = joint_drift(compared, motion, found, answer, answer[0], [way] * len(t) if loop else None)
     roots = np.roots([1.0, damping, stiffness]).astype(complex)
     c = np.linalg.solve(np.array([[1.0, 1.0], roots]), [1.0, 0.0])
     exact = -3.0 / stiffness * (1 - (c[0] * np.exp(roots[0] * t) + c[1] * np.exp(roots[1] * t)).real)
     assert np.abs(drift - exact[:, None]).max() < (0.06 if loop else 0.02) * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("carry", [0.0, 0.4])
+@pytest.mark.parametrize(("borne", "rate"), [(0.0, 0.0), (1.0, 0.0), (0.5, 2.0)])
+def test_links_that_are_stretched_take_momentum_from_joints(borne: float, rate: float, carry: float) -> None:
+    """A free joint of unit mass whose momentum is ė + g δ + c (1 + t) δ̇, from rest: by δ that comes at once, and grows
+    evenly, ė = -g (δ - δ₀) - c (1 + t) δ̇, and e jumps by -c Δδ; Newmark's method is exact for such parabolas.
+    """
+    t = np.linspace(0.0, 1.5, 61)
+    compared = one_way(0.0, 0.0, 0.0, None, 3.0, carry)
+    still, answer = np.zeros((len(t), 2)), np.zeros((len(t), 2))
+    answer[:, -1] = 1.0 + rate * t
+    found = Unbalanced(still, still[:, :1], still[:, :1], np.zeros((len(t), 0, 2)), np.zeros((len(t), 0)))
+    motion = Motion(t, (still, still, still), (still, still, still))
+    drift = joint_drift(compared, motion, found, answer, np.array([0.0, borne]), None)
+    exact = -3.0 * ((1.0 - borne) * t + rate * t**2 / 2) - carry * (1.0 - borne + rate * (t + t**2 / 2))
+    assert drift[:, 0] == pytest.approx(exact, rel=0, abs=1e-9)

@@ -23,12 +23,8 @@ FAULTY = (879, 1216)
 
 WORK = 0.15
 STORED = ROOT / "tests/data/random_scenes.csv"
-UNCOVERED = frozenset({174, 199, 270, 285})
-"""Seeds whose stated total is below the actual one: 1.3 % of all, where 1 % is aimed at.
-
-In 174 and 285 friction decides what becomes of a small disturbance; in 199, that spins fast, and in 270 joints drift
-farther than is found.
-"""
+UNCOVERED = frozenset({174, 285})
+"""Seeds whose stated total is below the actual one: friction decides what becomes of a small disturbance."""
 
 
 def _stored() -> Mapping[int, dict[str, str]]:
@@ -67,7 +63,7 @@ def _check_statement(row: dict[str, Any]) -> None:
 
 
 def test_few_statements_are_too_low() -> None:
-    assert len(UNCOVERED) <= len(SEEDS) / 75
+    assert len(UNCOVERED) <= len(SEEDS) / 100
 
 
 def test_a_seed_gives_the_same_scene() -> None:
