@@ -26,6 +26,7 @@ class Cause(enum.StrEnum):
     REDUNDANT_CONSTRAINTS = "redundant constraints"
     INCONSISTENT_START = "start that does not fulfil the constraints"
     LOOP_OPEN = "loop cannot be closed"
+    CHANGE_POINT = "loop may go on in two ways"
     NO_EQUILIBRIUM = "no static equilibrium"
     UNSTABLE_START = "unstable static equilibrium"
     NEWTON_FAILED = "Newton iteration did not converge"
@@ -43,6 +44,7 @@ _NUMERICAL = {
     Cause.SINGULAR_MASS,
     Cause.INCONSISTENT_START,
     Cause.LOOP_OPEN,
+    Cause.CHANGE_POINT,
     Cause.NO_EQUILIBRIUM,
     Cause.NEWTON_FAILED,
     Cause.NOT_FINITE,

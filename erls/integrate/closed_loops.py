@@ -1,18 +1,25 @@
-"""Integration of chains with loops: constrained coordinates for generalized-α, decaying errors for the others."""
+"""Integration of chains with loops: constrained coordinates for generalized-α, decaying errors for the others.
+
+Where the conditions nearly lose rank, errors decay by forces that grow without bound, and what rounding leaves of a
+violation, over the distance to that place, becomes one of the rates. There the others give way to generalized-α, which
+keeps positions to the conditions themselves: its steps pass a change point, and fail at a dead point.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from erls.equations.loops.branching import AT, Kind, singular_at
 from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.loops.failures import ends_singular
 from erls.equations.loops.tied import OPEN
 from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Integrator, Observer, Options, Solution
+from erls.integrate.base import Integrator, Observer, Options, Solution, StopRun, Work
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.integrate.memory import time_of
@@ -23,8 +30,11 @@ if TYPE_CHECKING:
     from erls.equations.stepped import Stepped
 
 NEAR = 0.05  # of the smallest singular value at the start: a run that fails nearer than this to a dead point died of it
-AT = 1e-3  # of the same: adaptive steps would shrink for ever
-_ITS_OWN = (Cause.INTERRUPTED, Cause.OUT_OF_MEMORY, Cause.SINGULAR_MASS, Cause.RUNAWAY)
+CLOSE, PAST = 0.1, 0.2  # of the same: generalized-α takes over below, and gives back above
+_STEPS = 8  # of generalized-α, at the least, while the mechanism moves by that share of its size
+_FINER = 1e-3  # local error of these steps, of what is wanted of the run: energy is kept to a millionth
+_ITS_OWN = (Cause.INTERRUPTED, Cause.OUT_OF_MEMORY, Cause.SINGULAR_MASS, Cause.RUNAWAY, Cause.CHANGE_POINT)
+_WATCHED = (Cause.LOOP_OPEN, Cause.CHANGE_POINT)  # raised at a knot, others of the same look may lie behind it
 
 
 class TiedCoordinates:
@@ -100,7 +110,7 @@ class TiedCoordinates:
 
 
 def loop_integrator(name: str) -> Integrator:
-    """The integrator of that name for a `ClosedChain`; failures near a dead point name the loop."""
+    """The integrator of that name for a `ClosedChain`; failures where a loop is singular name it."""
 
     def integrate(
         system: SecondOrderSystem,
@@ -111,33 +121,85 @@ def loop_integrator(name: str) -> Integrator:
         observer: Observer | None = None,
     ) -> Solution:
         assert isinstance(system, ClosedChain)
-        solution: Solution
         if name == "generalized_alpha" and len(system.kept):
-            settings = ConstrainedOptions(
-                options.step,
-                options.rtol,
-                options.atol,
-                options.spectral_radius,
-                options.newton_tolerance,
-                output_step=options.output_step,
-                keeper=options.keeper,
+            solution: Solution = lie_generalized_alpha(
+                TiedCoordinates(system), times, y, v, _tied_options(options), observer
             )
-            solution = lie_generalized_alpha(TiedCoordinates(system), times, y, v, settings, observer)
         else:
-            watch = Watch(system, observer, time_of(options.keeper))
-            solution = integrator_named(name)(system, times, y, v, options, watch)
-            if solution.failure is not None and solution.failure.cause == Cause.LOOP_OPEN:
-                solution = _first(solution, watch.good)
+            solution = _in_stretches(integrator_named(name), system, times, y, v, options, observer)
         failure = solution.failure
         if failure is None or failure.cause in _ITS_OWN:
             return solution
-        return replace(solution, failure=_dead_point(system, solution) or failure)
+        return replace(solution, failure=_singular(system, solution) or failure)
 
     return integrate
 
 
+def _tied_options(options: Options) -> ConstrainedOptions:
+    """Of generalized-α in constrained coordinates."""
+    return ConstrainedOptions(
+        options.step,
+        options.rtol,
+        options.atol,
+        options.spectral_radius,
+        options.newton_tolerance,
+        output_step=options.output_step,
+        keeper=options.keeper,
+    )
+
+
+def _in_stretches(
+    method: Integrator,
+    chain: ClosedChain,
+    times: tuple[float, float],
+    y: Array,
+    v: Array,
+    options: Options,
+    observer: Observer | None,
+) -> Solution:
+    """By a method, and by generalized-α wherever the conditions are close to losing rank.
+
+    Checkpoints end with the first stretch: a run that is resumed makes the others anew.
+    """
+    parts: list[Solution] = []
+    t, near = times[0], False
+    while True:
+        watch = Watch(chain, observer, time_of(options.keeper), near, tuple(parts))
+        if near:
+            speed = float(np.linalg.norm(chain.metres * v))
+            largest = CLOSE * chain.reach / (_STEPS * speed) if speed > 0 else None
+            tied = replace(_tied_options(options), step=largest, error_tolerance=_FINER * options.tolerance)
+            found: Solution = lie_generalized_alpha(TiedCoordinates(chain), (t, times[1]), y, v, tied, watch)
+        else:
+            found = method(chain, (t, times[1]), y, v, options, watch)
+        if watch.turned or (found.failure is not None and found.failure.cause in _WATCHED):
+            found = _first(found, watch.good)
+        parts.append(found)
+        if not watch.turned or watch.good >= times[1]:
+            return joined(parts)
+        t, near, options = watch.good, not near, replace(options, keeper=None)
+        y, v = chain.closed(t, found.y[-1], found.v[-1])
+
+
+def joined(parts: Sequence[Solution]) -> Solution:
+    """Stretches of one run."""
+    first, last = parts[0], parts[-1]
+    if len(parts) == 1:
+        return first
+    t, y, v, a = (np.concatenate([getattr(part, name) for part in parts]) for name in ("t", "y", "v", "a"))
+    work, halved = Work(), first.halved
+    for part in parts:
+        for each in fields(Work):
+            setattr(work, each.name, getattr(work, each.name) + getattr(part.work, each.name))
+    for part in parts[1:]:
+        halved = halved.and_then(part.halved)
+    warnings = tuple(dict.fromkeys(text for part in parts for text in part.warnings))
+    return Solution(t, y, v, a, work, last.failure, warnings, first.choice, halved=halved)
+
+
 class Watch:
-    """An observer that refuses steps at which a loop has come apart or locks; within a step a trial may.
+    """An observer that refuses steps at which a loop has come apart, and ends a stretch where conditions are close to
+    losing rank, or no longer are; within a step a trial may.
 
     Parameters
     ----------
@@ -146,41 +208,65 @@ class Watch:
         Told of what is not refused.
     since : float or None
         Time up to which a run that goes on was looked at.
+    near : bool
+        Whether conditions are close to losing rank.
+    before : tuple of Solution
+        Earlier stretches.
     """
 
-    def __init__(self, chain: ClosedChain, observer: Observer | None, since: float | None = None) -> None:
+    def __init__(
+        self,
+        chain: ClosedChain,
+        observer: Observer | None,
+        since: float | None = None,
+        near: bool = False,
+        before: tuple[Solution, ...] = (),
+    ) -> None:
         self.chain, self.observer = chain, observer
         self.good = -np.inf if since is None else since
         """Time of the first knot that was refused, or of the last one that was looked at."""
+        self.turned = False
+        """Whether the stretch ends there."""
+        self._near, self._before = near, before
 
     def __call__(self, t: float, knots: Callable[[], Solution]) -> Sequence[float] | None:
         found = knots()
         suspects, last = self._suspects(found), float(found.t[-1])
-        for k in suspects:
+        for k, turns in suspects:
             self.good = float(found.t[k])
             try:
-                self._refuse(self.good, found.y[k], found.v[k])
+                self._refuse(found, k)
             except SimulationError as problem:
                 problem.whole = (self.good,)
                 raise
+            if turns:
+                keep = self._tell(self.good, _first(found, self.good))
+                self.turned = True
+                raise StopRun(self.good, *(keep or ()))
         self.good = last
-        return None if self.observer is None else self.observer(t, knots)
+        return self._tell(t, found)
 
-    def _suspects(self, found: Solution) -> list[int]:
-        """Numbers of new knots that are open or lock."""
+    def _tell(self, t: float, found: Solution) -> Sequence[float] | None:
+        return None if self.observer is None else self.observer(t, lambda: joined([*self._before, found]))
+
+    def _refuse(self, found: Solution, k: int) -> None:
+        """Raise where a loop has come apart, or where rounding decides how it goes on."""
+        chain, t, y = self.chain, float(found.t[k]), found.y[k]
+        closure = chain.closure(t, y, found.v[k])
+        chain.refuse_open(t, closure)
+        value, start = chain.stiffest(closure)[0], chain.stiffest_at_start
+        if value < AT * start and (at := singular_at(chain, t, y)).kind == Kind.STIFF:
+            raise ends_singular(t, at, value, start)
+
+    def _suspects(self, found: Solution) -> list[tuple[int, bool]]:
+        """Numbers of new knots that are open, or singular, or end the stretch, and whether they do that."""
         chain = self.chain
         first = int(np.searchsorted(found.t, self.good))
         gaps, stiffest = chain.loops.watched(found.t[first:], found.y[first:])
-        suspect = (gaps > OPEN * chain.reach) | (stiffest < AT * chain.stiffest_at_start)
-        return [first + int(k) for k in np.flatnonzero(suspect)]
-
-    def _refuse(self, t: float, y: Array, v: Array) -> None:
-        chain = self.chain
-        closure = chain.closure(t, y, v)
-        chain.refuse_open(t, closure)
-        here = chain.stiffest(closure)
-        if here[0] < AT * chain.stiffest_at_start:
-            raise chain.locked(t, here)
+        share = stiffest / chain.stiffest_at_start
+        turns = share > PAST if self._near else share < CLOSE
+        suspect = (gaps > OPEN * chain.reach) | (share < AT) | turns
+        return [(first + int(k), bool(turns[k])) for k in np.flatnonzero(suspect)]
 
 
 def _first(solution: Solution, time: float) -> Solution:
@@ -190,10 +276,12 @@ def _first(solution: Solution, time: float) -> Solution:
     return replace(solution, **arrays) if knots else solution
 
 
-def _dead_point(chain: ClosedChain, solution: Solution) -> SimulationError | None:
-    """A failed run that ended where a loop locks."""
+def _singular(chain: ClosedChain, solution: Solution) -> SimulationError | None:
+    """A failed run that ended where a loop is singular."""
     t, y, v = float(solution.t[-1]), solution.y[-1], solution.v[-1]
     if not (np.isfinite(y).all() and np.isfinite(v).all()):
         return None
-    here = chain.stiffest(chain.closure(t, y, v))
-    return chain.locked(t, here) if here[0] < NEAR * chain.stiffest_at_start else None
+    value = chain.stiffest(chain.closure(t, y, v))[0]
+    if not value < NEAR * chain.stiffest_at_start:
+        return None
+    return ends_singular(t, singular_at(chain, t, y), value, chain.stiffest_at_start)

@@ -45,6 +45,8 @@ class Mechanism:
         Whether the motion starts from static equilibrium with the joints held, instead of undeformed.
     allow_unstable : bool
         Whether that equilibrium may be unstable.
+    elastic_assembly : bool
+        Whether flexible links may be bent for loops to close.
     loops : tuple of Loop
         Joints that close it.
     loads : tuple of PointLoad
@@ -62,6 +64,7 @@ class Mechanism:
     gravity: Array
     static_start: bool = False
     allow_unstable: bool = False
+    elastic_assembly: bool = False
     loops: tuple[Loop, ...] = ()
     loads: tuple[PointLoad, ...] = ()
     effects: frozenset[str] = ALL

@@ -48,6 +48,7 @@ OPTIONS: dict[tuple[Record, str], Collection[str]] = {
     (joints.Loop, "type"): HOLDING_TYPES,
     (links.MeshPose, "frame"): check.FRAMES,
     (chain.Initial, "deformation"): check.DEFORMATIONS,
+    (chain.Initial, "assemble"): check.ASSEMBLIES,
     (chain.Load, "axes"): check.AXES,
     (chain.Event, "direction"): check.DIRECTIONS,
     (Connection, "type"): HOLDING_TYPES,

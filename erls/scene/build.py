@@ -114,8 +114,9 @@ def build_mechanism(
         points=tuple(replace(point, link=int(whole.numbers[point.link])) for point in points),
         loads=tuple(build_loads(scene, links, points, whole.numbers)),
         gravity=np.array(record.gravity),
-        static_start=record.initial.deformation == "static",
+        static_start=record.initial.deformation == "static" or record.initial.assemble == "elastic",
         allow_unstable=record.initial.allow_unstable,
+        elastic_assembly=record.initial.assemble == "elastic",
         bandwidth=record.simulation.bandwidth,
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")

@@ -135,10 +135,14 @@ class Initial(Record, frozen=True):
         ``zero``: undeformed; ``static``: in static equilibrium with the joints held.
     allow_unstable : bool
         Whether a static start may lie on an unstable equilibrium, with links loaded beyond buckling; refused otherwise.
+    assemble : str
+        ``rigid``: undeformed links must close the loops; ``elastic``: flexible ones are bent into place, and start in
+        static equilibrium.
     """
 
     deformation: str = "zero"
     allow_unstable: bool = False
+    assemble: str = "rigid"
 
 
 class SceneRecord(SceneTables, frozen=True, kw_only=True):

@@ -18,6 +18,7 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
+ASSEMBLIES = ("rigid", "elastic")
 AXES = ("world", "link")  # of loads
 # on one coordinate
 _ACTING = ("coordinate", "coordinate_deg", "drive", "stiffness", "rest", "rest_deg", "damping", "friction", "motor")
@@ -40,6 +41,9 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     check_tables(scene, file)
     check_settings(scene.simulation, f"{file}: simulation")
     choose(scene.initial.deformation, DEFORMATIONS, f"{file}: initial.deformation", SceneError)
+    choose(scene.initial.assemble, ASSEMBLIES, f"{file}: initial.assemble", SceneError)
+    if scene.initial.assemble == "elastic":
+        _check_assembly(scene, f"{file}: initial.assemble")
     if not scene.joints:
         raise bad(f"{file}: joints", "a scene needs at least one joint", None, "add [[joints]]")
     if len(scene.joints) != len(scene.links):
@@ -83,6 +87,16 @@ def check_scene(scene: SceneRecord, file: str) -> None:
                 _check_feed_forward(coordinate, f"{file}: joints[{k}].coordinates.{name}")
         for k, loop in enumerate(scene.loops):
             _check_feed_forward(loop, f"{file}: loops[{k}]")
+
+
+def _check_assembly(scene: SceneRecord, place: str) -> None:
+    message = remedy = ""
+    if not scene.loops:
+        message, remedy = "there is no loop to close", "remove it, or add [[loops]]"
+    elif scene.simulation.formulation == "nodal":
+        message, remedy = "'nodal' assembles rigid links", "use formulation = 'erls' or 'ffr', or remove it"
+    if message:
+        raise bad(place, message, scene.initial.assemble, remedy)
 
 
 _BORNE = {"point": ("force", "moment"), "link": ("force_per_length", "force_per_mass"), "mass": ("force_per_mass",)}

@@ -19,6 +19,7 @@ from erls.simulation.simulate import simulate
 
 LENGTHS, GROUND = (0.15, 0.45, 0.35), 0.5
 MASSES = (0.3, 0.9, 0.7)
+PARALLELOGRAM, PARALLELOGRAM_MASSES = (0.2, 0.5, 0.2), (0.3, 0.9, 0.3)
 FORMULATIONS: dict[str, dict[str, Any]] = {
     "erls": {"formulation": "erls"},
     "minimum-norm": {"formulation": "erls", "gauge": "minimum-norm"},
@@ -68,6 +69,20 @@ def four_bar(**changes: Any) -> dict[str, Any]:
         "points": points,
         "loops": loops,
     }
+    return scenes.merged(data, changes)
+
+
+def parallelogram(**changes: Any) -> dict[str, Any]:
+    """A rigid one, released at 60 deg; all links are in line twice in each turn."""
+    names, starts = ("crank", "coupler", "rocker"), (60.0, -60.0, -120.0)
+    data = four_bar()
+    data["joints"] = [joint(f"j{k}", *pair) for k, pair in enumerate(zip(PARALLELOGRAM, starts, strict=True))]
+    data["links"] = [
+        {"name": name, "rigid": bar(length, mass), "mesh_pose": {"frame": "joint"}}
+        for name, length, mass in zip(names, PARALLELOGRAM, PARALLELOGRAM_MASSES, strict=True)
+    ]
+    data["loops"] = [{"name": "closing", "link": "rocker", "node": "tip", "position": [PARALLELOGRAM[1], 0.0, 0.0]}]
+    data["points"] = [{"name": "end", "link": "coupler", "node": "tip"}]
     return scenes.merged(data, changes)
 
 

@@ -162,20 +162,7 @@ def test_power_of_a_load_that_is_forgotten_is_told(monkeypatch: pytest.MonkeyPat
     assert breaches(run) == {"energy"}
 
 
-PARALLELOGRAM: dict[str, Any] = {
-    "simulation": {"duration": 2.0},
-    "joints": [
-        loop_scenes.joint(f"j{k}", length, angle)
-        for k, (length, angle) in enumerate(((0.2, 60.0), (0.5, -60.0), (0.2, -120.0)))
-    ],
-    "links": [
-        {"name": name, "rigid": loop_scenes.bar(length, mass), "mesh_pose": {"frame": "joint"}}
-        for name, length, mass in (("crank", 0.2, 0.3), ("coupler", 0.5, 0.9), ("rocker", 0.2, 0.3))
-    ],
-    "base": {"rotation_deg": [90.0, 0.0, 0.0]},
-    "loops": [{"name": "closing", "link": "rocker", "node": "tip", "position": [0.5, 0.0, 0.0]}],
-    "points": [{"name": "end", "link": "coupler", "node": "tip"}],
-}
+PARALLELOGRAM = {**loop_scenes.parallelogram(), "simulation": {"duration": 2.0}}
 
 
 def _ended(path: Path) -> ChainRun:
@@ -189,8 +176,8 @@ def _ended(path: Path) -> ChainRun:
 
 
 def test_a_parallelogram_at_its_change_point(tmp_path: Path) -> None:
-    """All links in line: conditions of the loop lose rank, and their forces, which grow without bound, feed energy or
-    take it. That is told, and so is half of the energy that is lost there in a run that says to be 2 mm off.
+    """All links in line: conditions of the loop lose rank. Energy that is won or lost there is told, and so is half of
+    it in a run that says to be 2 mm off.
     """
     run = _ended(scenes.write_toml(tmp_path / "scene.toml", PARALLELOGRAM))
     energy = run.energy(run.times)

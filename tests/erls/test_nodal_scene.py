@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import loop_scenes
 import numpy as np
 import pytest
 import scenes
@@ -291,3 +292,14 @@ def test_a_damaged_description_in_a_run_file(tmp_path: Path) -> None:
         write_strings(file, "descriptions", ("{",), "broken")
     with pytest.raises(ReportedError, match="not JSON"):
         load_run(tmp_path / "run.h5")
+
+
+def test_static_start_of_one_rigid_link(tmp_path: Path) -> None:
+    """One node alone, which has no extent to measure corrections by: it starts where it was put, and swings."""
+    data = loop_scenes.four_bar(initial={"deformation": "static"})
+    data |= {"joints": data["joints"][:1], "links": data["links"][:1], "points": data["points"][:2], "loops": []}
+    run = loop_scenes.run(tmp_path, data, "nodal", duration=0.01)
+    np.testing.assert_allclose(run.joint_angle("j0", 0.0), np.radians(60.0), atol=1e-12)
+    inertia = loop_scenes.MASSES[0] * loop_scenes.LENGTHS[0] / 3  # of the bar, over its length
+    fall = 9.81 * loop_scenes.MASSES[0] / 2 * np.cos(np.radians(60.0)) / inertia * 0.01**2 / 2
+    assert np.radians(60.0) - float(run.joint_angle("j0", 0.01)) == pytest.approx(fall, rel=1e-3)  # the angle changes

@@ -20,7 +20,7 @@ from erls.equations.formulation import Energy, LoopForce, Reaction, State
 from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.rows import Closure, applied
-from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity
+from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity, stays_open
 from erls.equations.loops.static import closed_equilibrium
 from erls.equations.loops.tied import OPEN, Tied
 from erls.equations.serial.equilibrium import elastic_on_diagonal
@@ -101,7 +101,12 @@ class ClosedChain(Tied):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know about the loops."""
-        return (*warnings_of(self.redundant), *assembled_warning(self.start, ASSEMBLED * self.reach))
+        assembled = assembled_warning(self.start, ASSEMBLED * self.reach, self._force_at_start)
+        return (*warnings_of(self.redundant), *assembled)
+
+    def _force_at_start(self) -> float:
+        """Largest force of a closing joint there [N]."""
+        return max(float(np.linalg.norm(found.force)) for found in self.loop_forces(0.0, *self.initial_state()))
 
     def refuse_open(self, t: float, found: Closure) -> None:
         """Raise when a loop has come apart.
@@ -205,8 +210,22 @@ class ClosedChain(Tied):
 
     @cached_property
     def _static(self) -> tuple[Array, Bearing]:
-        """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness."""
-        return closed_equilibrium(self, self.exact, self._closed_start, self.start.held)
+        """Static equilibrium with the joints held that the loops leave free, and what loads leave of the stiffness.
+
+        Raises
+        ------
+        SimulationError
+            LOOP_OPEN where no link gives way in a direction that undeformed links leave open, beside what
+            `closed_equilibrium` raises.
+        """
+        gap = self.start.gap if self.start.gap > ASSEMBLED * self.reach else 0.0
+        y, bearing = closed_equilibrium(self, self.exact, self._closed_start, self.start.held, gap)
+        if gap:
+            gaps = np.abs(self.openings(self.closure(0.0, y, np.zeros(self.size))))
+            worst = int(np.argmax(gaps))
+            if gaps[worst] > ASSEMBLED * self.reach:
+                raise stays_open(self, f"no link gives way: {self.rows.names[worst]} stays open", float(gaps[worst]))
+        return y, bearing
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
         """Small motions about a closed state on the ways that the loops leave, with their forces as they are there."""

@@ -34,7 +34,7 @@ class Start:
     held, following : int arrays
         Free joints, by their place in y, that keep their initial coordinates, and those that close the loops.
     gap : float
-        What stays open [m]: dimensions that do not fit to the last digit, in a direction in which nothing moves.
+        What undeformed links leave open [m]: dimensions that do not fit, in a direction in which no joint moves.
     where : str
         Its loop and direction; empty where that is rounding.
     """
@@ -47,7 +47,8 @@ class Start:
 
 
 def find_start(chain: Tied) -> Start:
-    """Close the loops on the undeformed chain, to rounding or else as well as may be within the assembly tolerance.
+    """Close the loops on the undeformed chain, to rounding or else as well as may be: within the assembly tolerance, or
+    as far as flexible links may be bent.
 
     Raises
     ------
@@ -73,16 +74,26 @@ def find_start(chain: Tied) -> Start:
                 return _start(chain, y)
             if gap < best.gap:
                 best = Start(y, every, every, gap, where)
-    if best.gap <= ASSEMBLED * chain.reach:
+    bent = chain.mechanism.elastic_assembly and chain.size > count
+    if best.gap <= ASSEMBLED * chain.reach or (bent and best.gap < chain.reach):
         return _start(chain, best.y, best.gap, best.where)
-    raise SimulationError(
+    raise stays_open(chain, f"the links do not reach: {best.where} stays open", best.gap)
+
+
+def stays_open(chain: Tied, message: str, gap: float) -> SimulationError:
+    """Links do not close a loop."""
+    remedy = (
+        "check lengths, position and axis of the loop, and start nearer to a closed position: joints.initial.position"
+    )
+    if chain.mechanism.elastic_assembly:
+        remedy += "; initial.assemble = 'elastic' needs flexible links whose modes give way in this direction"
+    return SimulationError(
         Cause.LOOP_OPEN,
-        f"the links do not reach: {best.where} stays open",
+        message,
         where="loops",
-        value=f"{best.gap:.3g} m",
+        value=f"{gap:.3g} m",
         limit=f"{ASSEMBLED * chain.reach:.3g} m",
-        remedy="check lengths, position and axis of the loop, and start nearer to a closed position: "
-        "joints.initial.position",
+        remedy=remedy,
     )
 
 

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from erls.equations.loops.compiled import CompiledLoops
 
 
-def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArray) -> tuple[Array, Bearing]:
+def closed_equilibrium(
+    chain: Tied, loops: CompiledLoops, y: Array, held: IntArray, gap: float
+) -> tuple[Array, Bearing]:
     """(n,) equilibrium under gravity, springs and drives, and what loads leave of the stiffness.
 
     Parameters
@@ -28,6 +30,8 @@ def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArr
         Loops closed, links undeformed.
     held : int array
         Free joints, by their place in y, whose physical angles keep their values.
+    gap : float
+        What undeformed links leave open [m], for messages; 0 where that is nothing to speak of.
 
     Raises
     ------
@@ -46,5 +50,7 @@ def closed_equilibrium(chain: Tied, loops: CompiledLoops, y: Array, held: IntArr
         both = found.violation[kept], turned
         return np.concatenate(both), np.concatenate([found.rows[kept][:, free], rows])
 
+    what = "no static equilibrium of the closed chain"
+    what += f", which undeformed links leave {gap:.3g} m open," if gap else ""
     given = chain.mechanism, forces, conditions, len(kept), *elastic_on_diagonal(chain.bare)
-    return equilibrium(Held(*given, chain.metres, chain.reach, "no static equilibrium of the closed chain"), y)
+    return equilibrium(Held(*given, chain.metres, chain.reach, what), y)

@@ -133,7 +133,9 @@ class LoadSteps:
 
     def __init__(self, system: NodalSystem, tangent: str, tolerance: float) -> None:
         self.system, self.tangent, self.metres = system, tangent, metre_scales(system)
-        self.goal = tolerance * float(np.linalg.norm(np.ptp(system.start.poses[:, :3, 3], axis=0)).clip(1e-300))
+        extent = float(np.linalg.norm(np.ptp(system.start.poses[:, :3, 3], axis=0)))
+        levers = self.metres.reshape(-1, 6)[:, 3:]
+        self.goal = tolerance * (extent or float(levers.max(initial=1e-300)))  # one node alone has no extent
         self.rest = np.zeros(system.size)
         self.iterations = self.factorizations = self.cuts = 0
         self.size = 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from erls.run.watches.base import Watch
+from erls.run.watches.change_points import ChangePoints
 from erls.run.watches.deflection_range import DeflectionRange
 from erls.run.watches.events import Events
 from erls.run.watches.growing_disturbances import GrowingDisturbances
@@ -23,6 +24,7 @@ WATCHES: tuple[type[Watch], ...] = (
     SecondOrderData,
     GrowingDisturbances,
     LoopConditions,
+    ChangePoints,
     Events,
     Runaway,
     Integration,
