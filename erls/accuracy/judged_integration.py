@@ -104,7 +104,8 @@ def judged_integration(run: ChainRun, watched: Watched, others: float) -> Integr
     mechanism = run.formulation.mechanism
     elastic = any(link.elastic_modes for link in mechanism.links)
     followed = settings.output_step is None and wrong_table(s, settings.integrator) is not None
-    if followed and not mechanism.loops and not (elastic and sudden(run)):  # sudden forces lead it astray there
+    tied = mechanism.loops or mechanism.sticks  # it knows neither loops nor switches
+    if followed and not tied and not (elastic and sudden(run)):  # sudden forces lead it astray there
         found = integration_error(run, watched)
     smooth = not elastic and not sudden(run)  # then nothing is unresolved, and the equation right
     if found is not None and found.whole and (smooth or found.total <= max(expected(run), others)):

@@ -12,6 +12,7 @@ from erls.accuracy.panels import Panels, panels_of
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.formulation import Ffr
 from erls.equations.formulation import Formulation
+from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.registry import TREES
 from erls.equations.substructures import solved
 from erls.equations.system import SecondOrderSystem, metre_scales

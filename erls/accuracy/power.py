@@ -41,7 +41,8 @@ def known_power(tree: SerialFormulation, t: Array, y: Array, v: Array) -> Array:
     system, out = tree.compiled, np.empty((len(t), 2))
     powers = function_in("erls.equations.serial.joint_powers", "joint_powers")()
     powers(system.reals, system.integers, system.scratch, contiguous(t), contiguous(y), contiguous(v), out)
-    return np.asarray(out.sum(axis=1)) + tree.load_power(t, y, v)
+    rubbed = 0.0 if tree.dry is None else tree.dry.power(v)
+    return np.asarray(out.sum(axis=1)) + tree.load_power(t, y, v) + rubbed
 
 
 def motor_power(tree: SerialFormulation, t: Array, y: Array, v: Array, a: Array) -> Array:

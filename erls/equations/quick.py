@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from erls.equations.serial.formulation import SerialFormulation
 from erls.maths.so3 import Array
 
 
@@ -47,5 +48,6 @@ class Quick:
 
 
 def quick(system: Any) -> Any:
-    """The system itself, or its compiled form."""
-    return system if system.compiled is None else Quick(system)
+    """The system itself, or its compiled form where that is all of it."""
+    whole = system.compiled is None or (isinstance(system, SerialFormulation) and system.dry is not None)
+    return system if whole else Quick(system)

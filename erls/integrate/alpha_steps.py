@@ -85,7 +85,8 @@ class Steps:
             self._make_room(start)
         memory = self._memory
         self._start[:], memory.v[:], memory.a[:], memory.alg[:] = start, v, a, a[: len(v)]
-        self.part = 0
+        self.part, self._reached = 0, (0, alpha.DONE)
+        self._stood = np.zeros(0)
 
     def stand(self, *at: float) -> None:
         """Where a walk stands, in numbers of its own, as it asks for its next steps."""

@@ -12,8 +12,9 @@ import numpy as np
 
 from erls.equations.system import MovingSystem, SecondOrderSystem
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Halved, Leg, Observer, Solution, StopRun, Work, legs
+from erls.integrate.base import Halved, Leg, Observer, Options, Solution, StopRun, Work, legs
 from erls.integrate.memory import Keeper, Keeping, Memory, Method, taken, unfit
+from erls.integrate.switching import Switch, Switching, switching_of
 from erls.integrate.thinning import thinned
 from erls.maths.so3 import Array
 
@@ -39,15 +40,24 @@ class Recorder:
         legs (`erls.integrate.thinning`), so that memory stays flat however many steps there are; None keeps all.
     beside : int
         Numbers to keep beside y, v, a of each knot.
+    switching : Switching or None
+        Looks for switches in new knots; those after one are dropped, and a `Switch` is raised.
     """
 
     def __init__(
-        self, size: int, observer: Observer | None, capacity: int = 1024, apart: float | None = None, beside: int = 0
+        self,
+        size: int,
+        observer: Observer | None,
+        capacity: int = 1024,
+        apart: float | None = None,
+        beside: int = 0,
+        switching: Switching | None = None,
     ) -> None:
         self.work = Work()
         self.warnings: list[str] = []
         self.halved = Halved()
         self._size, self._observer, self._apart, self.beside = size, observer, apart, beside
+        self.switching, self._told = switching, 0.0
         self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
         self._begun = 0.0
         self._reserve: Array | None = np.empty(_RESERVE)  # address space only, as nobody writes to it
@@ -92,6 +102,19 @@ class Recorder:
         self._tell(t)
 
     def _add(self, t: Array, rows: Array, steps: int) -> None:
+        if self.switching is None:
+            self._keep(t, rows, steps)
+            return
+        count, knot, switch = self.switching.first(t, rows[:, : 3 * self._size].reshape(len(t), 3, self._size))
+        t, rows = t[:count], rows[:count]
+        if switch is not None and knot is not None:
+            t, rows = np.append(t, switch.t), np.concatenate([rows, knot.reshape(1, -1)])
+        self._keep(t, rows, steps if switch is None else 1)
+        if switch is not None:
+            self._look(switch.t)  # nothing is offered: the steps stand beyond it
+            raise switch
+
+    def _keep(self, t: Array, rows: Array, steps: int) -> None:
         knots, before, (times, states) = self._kept
         if self._apart is None:
             self._store(t, rows, steps, (times, states))
@@ -99,6 +122,16 @@ class Recorder:
             self._kept = knots, before + steps, (np.concatenate([times, t]), np.concatenate([states, rows]))
 
     def _tell(self, t: float) -> None:
+        if self.switching is not None and t < self.switching.leg.end:  # steps come one by one
+            now = time.perf_counter()
+            if now - self._told < _PAUSE:
+                return
+            self._told = now
+        self._look(t)
+        self._offer()
+
+    def _look(self, t: float) -> None:
+        """Tell the observer, and drop what need not be kept."""
         whole: Sequence[float] | None = ()
         try:
             if self._observer is not None:
@@ -111,7 +144,6 @@ class Recorder:
             raise
         finally:
             self._thin(whole or ())
-        self._offer()
 
     def _thin(self, whole: Sequence[float]) -> None:
         """Drop what need not be kept, once the observer has seen it."""
@@ -157,6 +189,7 @@ class Recorder:
             "recorder.rows": self._rows[:knots],
             "recorder.waiting.t": times,
             "recorder.waiting.rows": rows,
+            **({} if self.switching is None else self.switching.memory()),
         }
 
     def restore(self, memory: Memory) -> None:
@@ -173,6 +206,8 @@ class Recorder:
             raise unfit("recorder.rows", (len(t), len(rows)))
         self._kept = 0, 0, (t[:0], rows[:0])
         self._store(t, rows, steps, (waiting, more))
+        if self.switching is not None:
+            self.switching.restore(memory)
 
     @property
     def steps(self) -> int:
@@ -210,16 +245,25 @@ class Recorder:
         return t, rows
 
 
+def recorder_for(
+    system: SecondOrderSystem, observer: Observer | None, options: Options, capacity: int = 1024
+) -> Recorder:
+    """The record of a run of a system, with what looks for its switches."""
+    return Recorder(system.size, observer, capacity, options.output_step, switching=switching_of(system))
+
+
 class Pace:
     """How many steps to make in one go: what takes about 50 ms; one where functions are called from Python.
 
     As a context it measures the steps that were asked for last. ``single``: whether the first steps of an observed run
-    are made one by one. Each call takes up to a millisecond, and a run by steps of high order a few in all.
+    are made one by one. Each call takes up to a millisecond, and a run by steps of high order a few in all. So are all
+    steps after which a switch may drop others: what comes after them must not depend on how many there were.
     """
 
     def __init__(self, recorder: Recorder, compiled: bool, single: bool) -> None:
         self._single = _SINGLE if single and recorder.observed else 0
-        self._recorder, self._steps, self._largest = recorder, _FIRST, LARGEST_CHUNK if compiled else 1
+        many = compiled and recorder.switching is None
+        self._recorder, self._steps, self._largest = recorder, _FIRST, LARGEST_CHUNK if many else 1
         self._asked, self._begun = 1, 0.0
 
     def size(self) -> int:
@@ -267,6 +311,20 @@ def integrate_legs(
         Of what the run needs to go on, and what it goes on from.
     """
 
+    switching = recorder.switching
+
+    def stand(leg: Leg, y: Array, v: Array) -> None:
+        recorder.work.rhs_calls += 1
+        a = system.acceleration(leg.first, y, v) if switching is None else switching.stand(leg, y, v)
+        if not np.isfinite(a).all():
+            raise not_finite(leg.start, a)
+        recorder.begin(leg.start, y, v, a)
+        if method is None:  # every motion is prescribed and no link deforms
+            recorder.append(leg.end, y, v, a)
+            recorder.accept(leg.end)
+        elif leg.end > leg.start:
+            method.begin(leg, y, v, a)
+
     def go(walk: list[Leg]) -> None:
         y, v = start
         keeping = None if method is None else Keeping(keeper, recorder, method)
@@ -274,18 +332,16 @@ def integrate_legs(
             if keeping is not None and keeping.passed(number):
                 continue
             if keeping is None or not keeping.resumes(number):
-                recorder.work.rhs_calls += 1
-                a = system.acceleration(leg.first, y, v)
-                if not np.isfinite(a).all():
-                    raise not_finite(leg.start, a)
-                recorder.begin(leg.start, y, v, a)
-                if method is None:  # every motion is prescribed and no link deforms
-                    recorder.append(leg.end, y, v, a)
-                    recorder.accept(leg.end)
-                elif leg.end > leg.start:
-                    method.begin(leg, y, v, a)
-            if method is not None and leg.end > leg.start:
-                y, v = method.finish(leg)
+                stand(leg, y, v)
+            elif switching is not None:
+                leg = switching.leg
+            while method is not None and leg.end > leg.start:
+                try:
+                    y, v = method.finish(leg)
+                    break
+                except Switch as switch:
+                    leg = Leg(switch.t, leg.end, switch.t, leg.last)
+                    stand(leg, switch.y, switch.v)
 
     method = method if system.size else None
     start = np.array(y, dtype=float), np.array(v, dtype=float)

@@ -19,11 +19,13 @@ made when the iterations beyond those that a fresh one needed add up to that cos
 
 from __future__ import annotations
 
+import numpy as np
+
 from erls.equations.system import SecondOrderSystem, metre_scales
-from erls.integrate.alpha_rules import Rules, Words
+from erls.integrate.alpha_rules import Formulas, Rules, Words
 from erls.integrate.alpha_steps import Steps, equal_steps
 from erls.integrate.base import Leg, Observer, Options, Solution
-from erls.integrate.driver import Recorder, integrate_legs
+from erls.integrate.driver import Recorder, integrate_legs, recorder_for
 from erls.maths.so3 import Array
 
 _REFRESH_COST, _OWN_REFRESH_COST = 4.0, 1.0
@@ -46,8 +48,10 @@ def generalized_alpha(
     step = options.step or min((times[1] - times[0]) / 1000, 1e-3)
     capacity = int(min((times[1] - times[0]) / step, 1e6)) + 2 if times[1] > times[0] else 2
     capacity = 1024 if options.output_step else capacity + 2 * len(system.breakpoints)
-    recorder = Recorder(system.size, observer, capacity, options.output_step)
-    method = _Equal(_steps(system, options, recorder), step, recorder) if system.size else None
+    recorder = recorder_for(system, observer, options, capacity)
+    if recorder.switching is not None:
+        recorder.switching.coarse = True
+    method = _Equal(system, _steps(system, options, recorder), step, options, recorder) if system.size else None
     return integrate_legs(system, times, y, v, recorder, method, options.keeper)
 
 
@@ -56,19 +60,32 @@ class _Equal:
 
     Parameters
     ----------
+    system : SecondOrderSystem
     steps : Steps
     step : float
         [s]
+    options : Options
     recorder : Recorder
     """
 
-    def __init__(self, steps: Steps, step: float, recorder: Recorder) -> None:
-        self._steps, self._step, self._recorder = steps, step, recorder
+    def __init__(
+        self, system: SecondOrderSystem, steps: Steps, step: float, options: Options, recorder: Recorder
+    ) -> None:
+        self._system, self._steps, self._step, self._recorder = system, steps, step, recorder
+        self._beta = Formulas.of(Rules(options.spectral_radius, 0.0), step).beta
         self.resumable, self.memory, self.restore = steps.resumable, steps.memory, steps.restore
 
     def begin(self, leg: Leg, y: Array, v: Array, a: Array) -> None:
         """Stand at the start of a leg."""
-        self._steps.begin(y, v, a)
+        self._steps.begin(y, v, a if self._recorder.switching is None else self._seen(leg, y, v, a))
+
+    def _seen(self, leg: Leg, y: Array, v: Array, a: Array) -> Array:
+        """(n,) accelerations as steps see them, (M + β h² K)⁻¹ M a: the same to second order in the step; those of
+        vibrations that it does not resolve, which would excite them at every switch, are left out.
+        """
+        stiffness, _ = self._system.stiffness_and_damping(leg.first, y, v)
+        mass = self._system.mass_matrix(leg.first, y)
+        return np.asarray(np.linalg.solve(mass + self._beta * self._step**2 * stiffness, mass @ a))
 
     def finish(self, leg: Leg) -> tuple[Array, Array]:
         """Equal steps over the rest of a leg."""

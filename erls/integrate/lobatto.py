@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, Observer, Options, Solution
-from erls.integrate.driver import Pace, Recorder, integrate_legs, not_finite
+from erls.integrate.driver import Pace, Recorder, integrate_legs, not_finite, recorder_for
 from erls.integrate.memory import Memory, flat, recall
 from erls.maths.jit import plain
 from erls.maths.so3 import Array
@@ -63,7 +63,7 @@ def lobatto(
 
     A system in compiled form runs in a compiled loop, whose observer is called some 20 times per second.
     """
-    recorder = Recorder(system.size, observer, apart=options.output_step)
+    recorder = recorder_for(system, observer, options)
     if system.size == 0:  # nothing to integrate
         return integrate_legs(system, times, y, v, recorder, None)
     run = _Run(system, times, options, recorder)

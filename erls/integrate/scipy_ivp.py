@@ -28,7 +28,7 @@ import numpy as np
 from erls.equations.system import SecondOrderSystem, metre_scales
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Integrator, Leg, Observer, Options, Solution, hermite
-from erls.integrate.driver import Recorder, integrate_legs, not_finite
+from erls.integrate.driver import Recorder, integrate_legs, not_finite, recorder_for
 from erls.integrate.memory import Memory, taken
 from erls.maths.so3 import Array
 
@@ -125,7 +125,7 @@ def scipy_method(name: str) -> Integrator:
         options: Options,
         observer: Observer | None = None,
     ) -> Solution:
-        recorder = Recorder(system.size, observer, apart=options.output_step)
+        recorder = recorder_for(system, observer, options)
         run = _Run(method, system, options, recorder)
         if math.isfinite(method.stable_to):
             recorder.warnings.extend(_warn_of_stiffness(name, system, times, np.asarray(y), np.asarray(v)))

@@ -110,6 +110,11 @@ class Mechanism:
         return tuple(k - int(prescribed[k]) for k in self.rotation_vectors)
 
     @property
+    def sticks(self) -> bool:
+        """Whether friction holds any joint of the tree where it rests."""
+        return any(joint.forces.sticks for joint in self.joints)
+
+    @property
     def reach(self) -> float:
         """Size of the largest link [m]."""
         return max(1e-3, *(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in self.links))

@@ -13,6 +13,8 @@ from erls.mechanism.drives import Drive
 from erls.mechanism.joint_types import Freedom
 from fe_import.model import InterfaceNode
 
+FRICTION_LAWS = ("smooth", "stick")
+
 
 @dataclass(frozen=True)
 class JointForces:
@@ -25,9 +27,14 @@ class JointForces:
     damping : float
         Viscous.
     friction : float
-        Coulomb friction, made smooth: ``friction`` · tanh(rate / ``transition_rate``).
+        Coulomb friction of a joint that slides.
     transition_rate : float
-        Rate at which friction reaches 76 % of its size.
+        Rate at which smooth friction, ``friction`` · tanh(rate / ``transition_rate``), reaches 76 % of its size.
+    law : str
+        A member of ``FRICTION_LAWS``: ``smooth``, or ``stick``, by which a joint at rest holds up to ``static`` and one
+        that slides feels ``friction`` against its rate.
+    static : float
+        At least ``friction``; 0 where friction is smooth.
     """
 
     stiffness: float = 0.0
@@ -35,25 +42,33 @@ class JointForces:
     damping: float = 0.0
     friction: float = 0.0
     transition_rate: float = 0.01
+    law: str = "smooth"
+    static: float = 0.0
+
+    @property
+    def sticks(self) -> bool:
+        """Whether friction holds the joint where it rests."""
+        return self.law == "stick" and self.static > 0.0
 
     def force(self, angle: float, rate: float) -> float:
         """Force on the joint coordinate."""
         result = -self.stiffness * (angle - self.rest) - self.damping * rate
         if self.friction:
-            result -= self.friction * math.tanh(rate / self.transition_rate)
+            reached = math.tanh(rate / self.transition_rate) if self.law == "smooth" else float(np.sign(rate))
+            result -= self.friction * reached
         return result
 
     def gains(self, rate: float) -> tuple[float, float]:
         """-∂force/∂angle and -∂force/∂rate."""
         slope = 0.0
-        if self.friction:
+        if self.friction and self.law == "smooth":
             slope = self.friction / self.transition_rate / math.cosh(min(abs(rate) / self.transition_rate, 300)) ** 2
         return self.stiffness, self.damping + slope
 
     @property
     def active(self) -> bool:
         """Whether any force can arise."""
-        return bool(self.stiffness or self.damping or self.friction)
+        return bool(self.stiffness or self.damping or self.friction or self.sticks)
 
 
 @dataclass(frozen=True)

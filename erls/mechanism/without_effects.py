@@ -81,7 +81,7 @@ def _joint_without(joint: _Acting, off: Set[str]) -> _Acting:
     if "joint_damping" in off:
         forces = replace(forces, damping=0.0)
     if "joint_friction" in off:
-        forces = replace(forces, friction=0.0)
+        forces = replace(forces, friction=0.0, static=0.0)
     return replace(joint, forces=forces, rotor_inertia=0.0 if "motor_inertia" in off else joint.rotor_inertia)
 
 

@@ -51,18 +51,25 @@ class JointInitial(Record, frozen=True):
 
 
 class Friction(Record, frozen=True):
-    """Coulomb friction, smooth around zero: ``force`` · tanh(rate / ``transition_rate``).
+    """Coulomb friction: smooth around zero, ``force`` · tanh(rate / ``transition_rate``), or with exact sticking.
 
     Attributes
     ----------
     force : float
-        Friction at large rates [N m or N].
-    transition_rate : float
-        Rate at which it reaches 76 % of that [rad/s or m/s].
+        Friction while it slides; of smooth friction, at large rates [N m or N].
+    law : str
+        ``smooth``; or ``stick``: ``force`` against the rate while it slides, and whatever holds the joint where it
+        rests, up to ``static_force``. When a joint comes to rest and when it breaks away is located in time.
+    transition_rate : float, optional
+        Rate at which smooth friction reaches 76 % of ``force`` [rad/s or m/s]; 0.01 unless given.
+    static_force : float, optional
+        What a joint that sticks holds at most [N m or N]; ``force`` unless given, and not less.
     """
 
     force: float
-    transition_rate: float = 0.01
+    law: str = "smooth"
+    transition_rate: float | None = None
+    static_force: float | None = None
 
 
 class Motor(Record, frozen=True):

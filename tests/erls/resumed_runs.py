@@ -22,15 +22,16 @@ def equal(one: Solution, other: Solution, work: bool = True) -> bool:
 
 
 def chunks_of(numbers: random.Random, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps in chunks that have nothing to do with how fast they are."""
+    """Steps in chunks that have nothing to do with how fast they are; those that come one by one still do."""
     size = Pace.size
 
     def drawn(self: Pace) -> int:
         size(self)
-        self._asked = numbers.randint(1, 5)
+        self._asked = min(numbers.randint(1, 5), self._largest)
         return self._asked
 
     monkeypatch.setattr(Pace, "size", drawn)
+    monkeypatch.setattr("erls.integrate.driver._PAUSE", 0.0)  # all are looked at
 
 
 def l_scene(folder: Path, **changes: Any) -> Path:

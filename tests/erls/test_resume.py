@@ -52,6 +52,11 @@ HALVED: dict[str, Any] = {
     "joints": [{**PIN, "friction": {"force": 0.5, "transition_rate": 0.01}}],
     "links": TOP["links"],
 }
+STICKS: dict[str, Any] = {  # five times, and for good
+    "simulation": {"duration": 1.2, "integrator": "lobatto"},
+    "joints": [{**PIN, "stiffness": 20.0, "friction": {"force": 0.5, "static_force": 0.7, "law": "stick"}}],
+    "links": TOP["links"],
+}
 CASES: dict[str, tuple[Path | dict[str, Any], list[str]]] = {
     "lobatto": (L, ["duration=0.3"]),
     "stored output": (L, ["duration=0.3", "output_step=0.004"]),
@@ -63,6 +68,9 @@ CASES: dict[str, tuple[Path | dict[str, Any], list[str]]] = {
     "change point": (parallelogram(), ["duration=0.3", "integrator=lobatto"]),
     "rotation vectors": (TOP, []),
     "rk45": (TOP, ["integrator=rk45", "rtol=1e-9", "atol=1e-10"]),
+    "sticking": (STICKS, []),
+    "sticking, equal steps": (STICKS, ["integrator=generalized_alpha", "step=5e-3"]),
+    "sticking, dop853": (STICKS, ["integrator=dop853", "output_step=0.01"]),
     "dop853": (TOP, ["integrator=dop853", "rtol=1e-9", "atol=1e-10"]),
     "nodal": (L, ["duration=0.02", "step=1e-3", "formulation=nodal"]),
     "absolute": (L, ["duration=0.02", "step=1e-3", "formulation=ffr", "coordinates=absolute"]),

@@ -7,6 +7,7 @@ follow from time.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -14,8 +15,9 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
+from erls.equations.dry_friction import DryFriction, Settled, dry_friction, settled
 from erls.equations.formulation import FrameMotion, Reaction, TreeFormulation
-from erls.equations.linearization import Linearization, derivatives, difference_steps
+from erls.equations.linearization import Linearization, derivatives, difference_steps, restricted, ways_left
 from erls.equations.serial.equilibrium import elastic_on_diagonal, held_equilibrium, size_of
 from erls.equations.serial.loads import load_powers
 from erls.equations.serial.records import Serial
@@ -65,6 +67,11 @@ class SerialFormulation(TreeFormulation):
     def compiled(self) -> CompiledSystem:
         """The equations."""
 
+    @cached_property
+    def dry(self) -> DryFriction | None:
+        """Friction that sticks, which the compiled equations leave out; None without any."""
+        return dry_friction(self.mechanism, self.free_joints)
+
     @property
     def size(self) -> int:
         """Number of independent coordinates."""
@@ -76,7 +83,7 @@ class SerialFormulation(TreeFormulation):
         return self.mechanism.breakpoints
 
     def residual(self, t: float, y: Array, v: Array, a: Array) -> Array:
-        """(n,) forces out of balance on the independent coordinates."""
+        """(n,) forces out of balance on the independent coordinates; friction that sticks is left out."""
         return residual(self.compiled, t, y, v, a)
 
     def mass_matrix(self, t: float, y: Array) -> Array:
@@ -105,11 +112,29 @@ class SerialFormulation(TreeFormulation):
         SimulationError
             The mass matrix is not positive definite; names the coordinate.
         """
-        force, mass = self.residual(t, y, v, np.zeros(0)), self.mass_matrix(t, y)
+        if self.dry is not None:
+            return self.settled(t, y, v, np.zeros(len(self.dry.places))).accelerations
+        return self._solver(t, y)(-self.residual(t, y, v, np.zeros(0)))
+
+    def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
+        """Which joints stick, and accelerations, by the set-valued law of friction; see `dry_friction.settled`.
+
+        Raises
+        ------
+        SimulationError
+            As `acceleration`.
+        """
+        assert self.dry is not None
+        return settled(self._solver(t, y), -self.residual(t, y, v, np.zeros(0)), v, self.dry, released)
+
+    def _solver(self, t: float, y: Array) -> Callable[[Array], Array]:
+        """M⁻¹ of forces."""
+        mass = self.mass_matrix(t, y)
         try:
-            return np.asarray(la.cho_solve(la.cho_factor(mass, check_finite=False), -force, check_finite=False))
+            factor = la.cho_factor(mass, check_finite=False)
         except la.LinAlgError:
             raise singular_mass(self, t, mass, self.elastic_name) from None
+        return lambda forces: np.asarray(la.cho_solve(factor, forces, check_finite=False))
 
     def acceleration_series(self, t: Array, y: Array, v: Array) -> Array:
         """(k, n) accelerations at k times, solved for together.
@@ -122,8 +147,10 @@ class SerialFormulation(TreeFormulation):
         forces = residual_series(self.compiled, t, y, v, np.zeros((len(t), 0)))
         masses = mass_series(self.compiled, t, y)
         try:
-            lower = np.linalg.cholesky(masses)
+            lower = None if self.dry is not None else np.linalg.cholesky(masses)
         except np.linalg.LinAlgError:  # one of them: the method for one names what is wrong with it
+            lower = None
+        if lower is None:
             return np.array([self.acceleration(*at) for at in zip(t.tolist(), y, v, strict=True)]).reshape(y.shape)
         half = np.linalg.solve(lower, -forces[..., None])
         return np.asarray(np.linalg.solve(lower.swapaxes(1, 2), half)[..., 0])
@@ -161,7 +188,7 @@ class SerialFormulation(TreeFormulation):
         return held_equilibrium(self, self.undeformed_start()[0], self.free_joints)
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
-        """Small motions about a state, with the accelerations of the equations of motion."""
+        """Small motions about a state, with the accelerations of the equations of motion; joints that stick rest."""
         a = self.acceleration(t, y, v)
         stiffness, _ = elastic_on_diagonal(self)
         steps = difference_steps(metre_scales(self), size_of(self.mechanism), stiffness)
@@ -171,7 +198,11 @@ class SerialFormulation(TreeFormulation):
 
         slope = derivatives(lambda many: forces(many, np.tile(v, (len(many), 1))), y, steps)
         damping = derivatives(lambda many: forces(np.tile(y, (len(many), 1)), many), v, steps)
-        return Linearization(self.mass_matrix(t, y), damping, slope, np.eye(self.size))
+        rows = np.zeros((0, self.size))
+        if self.dry is not None:
+            modes = self.settled(t, y, v, np.zeros(len(self.dry.places))).modes
+            rows = np.eye(self.size)[self.dry.places[modes == 0.0]]
+        return restricted(self.mass_matrix(t, y), damping, slope, ways_left(rows, np.ones(self.size)))
 
     @cached_property
     def stability(self) -> Stability:
@@ -222,12 +253,16 @@ class SerialFormulation(TreeFormulation):
                 wrenches[i, k], along[0, i, k], along[1, i, k] = wrench, whole[0], given[0]
         force, moment = np.empty((len(t), count, 3)), np.empty((len(t), count, 3))
         prescribed = np.array([joint.drive.prescribed for joint in self.mechanism.joints], dtype=bool)
+        effort = np.where(prescribed, along[0], along[1])
+        if self.dry is not None:
+            joints = self.free_joints[self.dry.places]
+            effort[:, joints] += self.dry.given(v, along[0][:, joints])
         for k, link in enumerate(self.mechanism.links):
             place = inboard_place(link, states.modal[k])
             turn, push = states.poses[k][:, :3, :3], wrenches[:, k, :3]
             force[:, k] = np.einsum("tij,tj->ti", turn, push)
             moment[:, k] = np.einsum("tij,tj->ti", turn, wrenches[:, k, 3:] - cross_all(place, push))
-        return ReactionSeries(force, moment, np.where(prescribed, along[0], along[1]))
+        return ReactionSeries(force, moment, effort)
 
     def reactions_at(self, t: float, y: Array, v: Array, a: Array) -> list[Reaction]:
         """Joint reactions that give these accelerations."""

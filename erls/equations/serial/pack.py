@@ -32,6 +32,8 @@ from erls.mechanism.links import Link, node_shape6
 from erls.mechanism.loops import LoopEnd
 from erls.mechanism.thermal import elastic_rest
 
+_SUDDEN = 1e-12  # rate that counts as rest, of friction on a motion that is prescribed
+
 
 def step_parts(before: Array, freedom: Freedom, after: Array) -> Array:
     """(4, 12) parts of the pose before · joint · after: constant, with cosine and sine of the coordinate, and with the
@@ -58,6 +60,9 @@ def force_record(
     put into memory.
     """
     gain, rate_gain = drive.gains
+    friction, transition = forces.friction, forces.transition_rate
+    if forces.law == "stick":  # of a coordinate that is free others take care (`erls.equations.dry_friction`)
+        friction, transition = friction if drive.prescribed else 0.0, _SUDDEN
     return Joint(
         place=-1,
         component=-1,
@@ -68,8 +73,8 @@ def force_record(
         stiffness=forces.stiffness,
         rest=forces.rest,
         damping=forces.damping,
-        friction=forces.friction,
-        transition=forces.transition_rate,
+        friction=friction,
+        transition=transition,
         rotor=rotor_inertia,
         gain=gain,
         rate_gain=rate_gain,

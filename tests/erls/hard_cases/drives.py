@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import scipy.optimize
 
 from erls.errors import Cause
 from erls.maths.so3 import Array
@@ -65,41 +66,82 @@ def _controlled(name: str, proportional: float, derivative: float, limit: float 
     return Case(name, scene, closed(places, "own equation, Radau to 1e-12", 1e-9), **more)
 
 
-def _sliding(
-    name: str, friction: float, transition: float, pulled: float = 0.0, speed: float = 0.0, **more: Any
-) -> Case:
-    """A block of 1 kg on a rail under smooth friction, thrown at 1 m/s, or pulled by a spring whose end moves on."""
-    duration = 1.0 if not pulled else 4.0
-    start = 0.0 if pulled else 1.0
+_MOVED, _PULL, _SPEED = 4.0, 20.0, 0.1  # s, N/m, m/s: a block behind a spring whose end moves steadily
+
+
+def _block(friction: dict[str, Any], thrown: float = 0.0, **simulation: Any) -> dict[str, Any]:
+    """A block of 1 kg on a rail, thrown, or pulled by the spring."""
     body = {"mass": 1.0, "inertia": [1e-3] * 3, "points": {"middle": [0.0, 0.0, 0.0]}}
-    joint: dict[str, Any] = {
-        "name": "rail",
-        "type": "prismatic",
-        "dh": {"convention": "standard"},
-        "initial": {"rate": start},
-        "friction": {"force": friction, "transition_rate": transition},
-    }
-    if pulled:
-        times = [-1.0, 0.0, duration, duration + 1]
-        values, rates = [speed * t for t in times], [speed, speed]
+    joint: dict[str, Any] = {"name": "rail", "type": "prismatic", "dh": {"convention": "standard"}}
+    joint |= {"initial": {"rate": thrown}, "friction": friction}
+    if not thrown:
+        times = [-1.0, 0.0, _MOVED, _MOVED + 1]
+        values, rates = [_SPEED * t for t in times], [_SPEED, _SPEED]
         motion = {"shape": "table", "times": times, "values": values, "rates": rates}
-        joint["drive"] = {"type": "pd", "motion": motion, "proportional_gain": pulled, "derivative_gain": 0.0}
-    scene = {
+        joint["drive"] = {"type": "pd", "motion": motion, "proportional_gain": _PULL, "derivative_gain": 0.0}
+    return {
         "gravity": [0.0, 0.0, 0.0],
-        "simulation": {"duration": duration},
+        "simulation": {"duration": 1.0 if thrown else _MOVED, **simulation},
         "joints": [joint],
         "links": [{"name": "block", "rigid": body}],
         "points": [{"name": "block", "link": "block", "node": "middle"}],
     }
 
+
+def _along(distance: Array) -> Array:
+    """(k, 1, 3) along the rail."""
+    return np.stack([0 * distance, 0 * distance, distance], axis=1)[:, None]
+
+
+def _smooth(name: str, force: float, transition: float, thrown: float = 0.0, **more: Any) -> Case:
+    """Under smooth friction."""
+    pull, duration = (0.0, 1.0) if thrown else (_PULL, _MOVED)
+
     def rate_of(t: float, x: Array) -> Array:
-        return np.array([x[1], pulled * (speed * t - x[0]) - friction * np.tanh(x[1] / transition)])
+        return np.array([x[1], pull * (_SPEED * t - x[0]) - force * np.tanh(x[1] / transition)])
 
     def places(t: Array) -> Array:
-        found = integrated(rate_of, [0.0, start], duration, stiff=True)(t)[0]
-        return np.stack([0 * t, 0 * t, found], axis=1)[:, None]
+        return _along(integrated(rate_of, [0.0, thrown], duration, stiff=True)(t)[0])
 
+    scene = _block({"force": force, "transition_rate": transition}, thrown)
     return Case(name, scene, closed(places, "own equation, Radau to 1e-12", 1e-8), **more)
+
+
+def _slips(force: float, static: float) -> Callable[[Array], Array]:
+    """Places (k,) of the pulled block that sticks, and slips on ẍ = k (V t - x) - F from rest to rest."""
+    rate, at, place = np.sqrt(_PULL), 0.0, 0.0
+    phases = []
+    while at < _MOVED:
+        begins = max((static / _PULL + place) / _SPEED, at)
+        ahead = place - _SPEED * begins + force / _PULL  # of where spring and friction balance
+
+        def speed(t: float, ahead: float = ahead) -> float:
+            return float(_SPEED - ahead * rate * np.sin(rate * t) - _SPEED * np.cos(rate * t))
+
+        lasts = float(scipy.optimize.brentq(speed, 1e-3 / rate, 2 * np.pi / rate - 1e-12))
+        phases.append((begins, begins + lasts, place, ahead))
+        at, s = begins + lasts, rate * lasts
+        place = _SPEED * at - force / _PULL + ahead * np.cos(s) - _SPEED / rate * np.sin(s)
+    ends = [phase[2] for phase in phases] + [place]
+
+    def places(t: Array) -> Array:
+        result = np.zeros_like(t)
+        for number, (begins, until, _, ahead) in enumerate(phases):
+            s = rate * (t - begins)
+            moving = _SPEED * t - force / _PULL + ahead * np.cos(s) - _SPEED / rate * np.sin(s)
+            result = np.where(t > begins, np.where(t < until, moving, ends[number + 1]), result)
+        return result
+
+    return places
+
+
+_STICKS = {"nodal": "refuses exact sticking, and names the smooth law"}
+
+
+def _stick(name: str, places: Callable[[Array], Array], force: float, static: float, thrown: float = 0.0) -> Case:
+    """Under Coulomb's law, exactly; to 1e-6 m where integration aims at a tenth of it."""
+    scene = _block({"force": force, "static_force": static, "law": "stick"}, thrown, tolerance=1e-6)
+    return Case(name, scene, closed(lambda t: _along(places(t)), "closed form", 1e-9), not_here=_STICKS)
 
 
 def _step(start: float, value: float, end: float | None = None) -> dict[str, Any]:
@@ -143,8 +185,16 @@ CASES = of_subject(
         _controlled("controller, gains 1e12 and 1e6", 1e12, 1e6, fast=("erls", "ffr")),
         _controlled("controller, gain 1e6, no damping", 1e6, 0.0),
         _controlled("controller at its limit", 200.0, 10.0, 0.5),
-        _sliding("a block that slides to rest", 2.0, 1e-2, fast=("erls",)),
-        _sliding("a block that slides to rest, transition 1e-6 m/s", 2.0, 1e-6),
-        _sliding("stick-slip of a block on a spring, smooth law", 1.0, 1e-3, 20.0, 0.1),
+        _smooth("a block that slides to rest", 2.0, 1e-2, 1.0, fast=("erls",)),
+        _smooth("a block that slides to rest, transition 1e-6 m/s", 2.0, 1e-6, 1.0),
+        _stick(
+            "a block that slides to rest, and sticks",
+            lambda t: np.minimum(t, 0.5) * (1 - np.minimum(t, 0.5)),
+            2.0,
+            2.0,
+            1.0,
+        ),
+        _smooth("stick-slip of a block on a spring, smooth law", 1.0, 1e-3),
+        _stick("stick-slip of a block on a spring, exact sticking", _slips(0.6, 1.0), 0.6, 1.0),
     ],
 )
