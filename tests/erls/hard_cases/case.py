@@ -200,6 +200,10 @@ def judged(case: Case, formulation: str) -> dict[str, Any]:
     dict
         ``subject``, ``case``, ``formulation``, ``outcome``, ``stated``, ``off``, ``doubt``, ``by``, ``measures``,
         ``problem`` (empty: the row passes) and ``wall_s``: plain numbers and texts.
+
+    Raises
+    ------
+    KeyboardInterrupt
     """
     row: dict[str, Any] = {"subject": case.subject, "case": case.name, "formulation": formulation}
     row |= dict.fromkeys(("stated", "off", "doubt")) | {"by": "", "measures": [], "problem": ""}
@@ -221,6 +225,8 @@ def judged(case: Case, formulation: str) -> dict[str, Any]:
             elif case.truth is not None:
                 row |= _held(case, formulation, run, Path(name))
     except ReportedError as problem:
+        if problem.cause == Cause.INTERRUPTED:  # nothing that could be judged
+            raise KeyboardInterrupt from None
         kind = "refused" if problem.exit_code == 2 else "ends"
         row |= {"outcome": f"{kind}: {problem.cause}"}
         if problem.cause != wanted:
