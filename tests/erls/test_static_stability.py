@@ -126,6 +126,18 @@ def test_beams_follow_the_branch_on_the_given_side(tmp_path: Path) -> None:
     assert sides[0] == pytest.approx(-sides[1], rel=1e-6)
 
 
+def test_beams_on_joints_with_springs(tmp_path: Path) -> None:
+    """An arm on a joint with a spring: what is left of the stiffness, held, is that of the arm clamped."""
+    spring = {"name": "clamp", "dh": {"convention": "standard"}, "stiffness": 5.0}
+    left = []
+    for joint in (None, spring):
+        path = _column(tmp_path, 0.5, 20.0)
+        scene = scenes.read_toml(path)
+        joints = scene["joints"] if joint is None else [joint]
+        left.append(_started(scenes.write_toml(path, {**scene, "joints": joints}), "nodal").stability.stiffness_left)
+    assert left[1] == pytest.approx(left[0], rel=1e-9)
+
+
 def test_unstable_start_runs_where_it_is_allowed(tmp_path: Path) -> None:
     """Straight at 1.2 times: it starts with what Greenhill leaves, -0.2 within 2 %; disturbances grow."""
     run = erls.simulate(load_scene(_column(tmp_path, 1.2, allow_unstable=True), ["simulation.duration=3.0"]))

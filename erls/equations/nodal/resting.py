@@ -12,7 +12,7 @@ with a positive stiffness (`erls.equations.serial.equilibrium` does the same of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -56,14 +56,14 @@ class PartlyLoaded(NodalSystem):
 
     def residual(self, t: float, q: Nodes, v: Array, a: Array) -> Array:
         """(n,)"""
-        return t * super().residual(0.0, q, v, a) + (1 - t) * self._bare.residual(0.0, q, v, a)
+        return t * super().residual(0.0, q, v, a) + (1 - t) * self._bare.residual(0.0, _of_beams(q, self._bare), v, a)
 
     def stiffness_and_damping(
         self, t: float, q: Nodes, v: Array, a: Array, multipliers: Array, material: bool = False
     ) -> tuple[Matrix, Matrix]:
         """(n, n) twice; stiffness of the joints' forces in full."""
         whole = super().stiffness_and_damping(0.0, q, v, a, multipliers, material)
-        bare = self._bare.stiffness_and_damping(0.0, q, v, a, multipliers, material)
+        bare = self._bare.stiffness_and_damping(0.0, _of_beams(q, self._bare), v, a, multipliers, material)
         return t * whole[0] + (1 - t) * bare[0], t * whole[1] + (1 - t) * bare[1]
 
     def constraint(self, t: float, q: Nodes) -> Array:
@@ -73,6 +73,11 @@ class PartlyLoaded(NodalSystem):
     def constraint_matrix(self, t: float, q: Nodes) -> Matrix:
         """(m, n)"""
         return super().constraint_matrix(0.0, q)
+
+
+def _of_beams(q: Nodes, bare: NodalSystem) -> Nodes:
+    """The same configuration of a system that has no joints with forces and no springs."""
+    return replace(q, turned=bare.start.turned, wound=bare.start.wound)
 
 
 class Resting(NamedTuple):
@@ -191,7 +196,8 @@ class _Stiffness:
         ways = ways_left(dense(system.constraint_matrix(t, q)), 1 / metre_scales(system))
         if not ways.shape[1]:
             return Bearing(1.0, "")
-        elastic = dense(self.bare.stiffness_and_damping(0.0, q, rest, rest, 0 * multipliers, material=True)[0])
+        bent = _of_beams(q, self.bare)
+        elastic = dense(self.bare.stiffness_and_damping(0.0, bent, rest, rest, 0 * multipliers, material=True)[0])
         loaded = ways.T @ dense(system.stiffness_and_damping(t, q, rest, rest, multipliers)[0]) @ ways
         unloaded = ways.T @ elastic @ ways
         unloaded = (unloaded + unloaded.T) / 2
@@ -200,8 +206,8 @@ class _Stiffness:
         except np.linalg.LinAlgError:  # some ways bend no link
             unloaded[np.diag_indices(len(unloaded))] += _UNHELD * np.diag(unloaded).max()
             left, shape = stiffness_left(loaded, unloaded)
-        bent = ways @ shape
-        energy = (bent * (elastic @ bent)).reshape(-1, 6).sum(axis=1)
+        moved = ways @ shape
+        energy = (moved * (elastic @ moved)).reshape(-1, 6).sum(axis=1)
         by_link = [float(energy[nodes].sum()) for nodes in self.chain.nodes]
         return Bearing(left, self.mechanism.links[int(np.argmax(by_link))].name)
 
