@@ -115,9 +115,11 @@ def _over_some(look: LookedAt, chosen: Panels) -> EnergyBalance:
     power = power.reshape(count, width)
     begins = np.arange(count) * width + np.argmax(chosen.nodes == chosen.first[:, None], axis=1)
     ends = np.concatenate([begins, np.arange(count) * width + width - 1])
-    energies = energy_series(stored, t[ends], y[ends], v[ends])
+    first = _states(look, look.panels.first[:1])  # the sample may lie where all is at rest again
+    whence = energy_series(stored, first.t, first.y, first.v)
+    energies = np.concatenate([energy_series(stored, t[ends], y[ends], v[ends]), whence])
     totals = energies.sum(axis=1)
-    off = totals[count:] - totals[:count] - (chosen.weights * power).sum(axis=1)
+    off = totals[count : 2 * count] - totals[:count] - (chosen.weights * power).sum(axis=1)
     even = np.isin(look.picked, look.even)
     whole = float(look.panels.lengths.sum() / chosen.lengths[even].sum())
     worst, summed = float(off[np.abs(off).argmax()]), _of_all(off[even], whole)

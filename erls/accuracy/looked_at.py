@@ -12,6 +12,7 @@ from erls.accuracy.panels import Panels, panels_of
 from erls.equations.erls.formulation import Erls
 from erls.equations.ffr.formulation import Ffr
 from erls.equations.formulation import Formulation
+from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.registry import TREES
 from erls.equations.substructures import solved
 from erls.equations.system import SecondOrderSystem, metre_scales
@@ -114,19 +115,30 @@ class LookedAt:
     @cached_property
     def error(self) -> float:
         """Of the integration [m]: as stated; else the tolerance of the scene, or what the method's own formula for the
-        truncation of a step adds up to.
+        truncation of a step adds up to. Loops close what is reported, and so take out errors of the coordinates that
+        are integrated and looked at here: of these it is the larger of the two.
         """
         settings, size = self.run.scene.record.simulation, self.mechanism.reach
         options, fixed = options_of(settings), settings.integrator == FIXED_STEP
+        steps = fixed and options.step is not None and (self.integration is None or self.loops)
+        truncated = self._truncated(settings.spectral_radius) if steps else 0.0
         if self.integration is not None:
-            found = self.integration
-        elif fixed and options.step is not None:
-            found = truncation(self.solution.t, self._watched[3] * self.metres, settings.spectral_radius)
+            found = max(self.integration, truncated)
+        elif steps:
+            found = truncated
         elif fixed or INTEGRATORS[settings.integrator].follows_tolerance:
             found = options.tolerance
         else:
             found = _GROWTH * (settings.rtol * size + settings.atol) * self.solution.work.steps
         return float(np.clip(found, _LEAST * size, _MOST * size))
+
+    @property
+    def loops(self) -> bool:
+        """Whether loops are closed again at each state that is reported."""
+        return isinstance(self.formulation, ClosedChain)
+
+    def _truncated(self, spectral_radius: float) -> float:
+        return truncation(self.solution.t, self._watched[3] * self.metres, spectral_radius)
 
     @cached_property
     def drift(self) -> Array:

@@ -11,6 +11,7 @@ from erls.equations.formulation import Formulation
 from erls.equations.linearization import Linearization, roots
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
 
 _NEAR = 0.1  # of the size of the mechanism: an equilibrium that is farther away says little of the motion
 LARGEST = 600
@@ -48,8 +49,8 @@ class Stability:
     softest_link : str
         Where least is left; empty without flexible links.
     root : complex or None
-        Rightmost root of s² M + s (C + G) + K with the joints released [1/s]; None where nothing can move, or the
-        system has more than `LARGEST` coordinates.
+        Rightmost root of s² M + s (C + G) + K with the joints released [1/s]; None where nothing can move, the system
+        has more than `LARGEST` coordinates, or the start is `tumbling`.
     distance : float
         Of an equilibrium with the joints released, by the acceleration and the root [m]; infinite where that is none.
     size : float
@@ -100,8 +101,20 @@ class Started(Protocol):
         """Of its static start."""
 
 
+def tumbling(mechanism: Mechanism, v: Array) -> bool:
+    """Whether rotation vectors turn at a start (n,): what is constant along that motion is not so in them.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    v : (n,) array
+        Rates of independent coordinates, those of joints first.
+    """
+    return any(v[k : k + 3].any() for k in mechanism.rotation_vector_places)
+
+
 def stability_of(
-    bearing: Bearing, motions: Linearization, acceleration: Array, metres: Array, size: float
+    bearing: Bearing, motions: Linearization | None, acceleration: Array, metres: Array, size: float
 ) -> Stability:
     """Of a static start with the joints released.
 
@@ -109,8 +122,8 @@ def stability_of(
     ----------
     bearing : Bearing
         With the joints held.
-    motions : Linearization
-        Small motions with the joints released.
+    motions : Linearization or None
+        Small motions with the joints released, where they have constant coefficients.
     acceleration : (n,) array
         Of the start.
     metres : (n,) array
@@ -119,7 +132,7 @@ def stability_of(
         Of the mechanism [m].
     """
     root, distance = None, np.inf
-    if 0 < motions.size <= LARGEST:
+    if motions is not None and 0 < motions.size <= LARGEST:
         root = complex(roots(motions)[0])
         if root.real > 0:
             distance = float(np.abs(metres * acceleration).max()) / abs(root) ** 2

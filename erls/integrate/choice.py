@@ -31,6 +31,9 @@ TIED_STEPS = "erls.integrate.stepping.generalized_alpha"
 INTEGRATION_SHARE = 0.1
 """Of the error that a run is wanted to keep in all, what integration aims at."""
 
+_ITERATED = 1e-7
+"""Of the same: where iterations of equal steps end at the latest; of the usual tolerance, where they always end."""
+
 IMPACT_SHARE = 1e-3
 """Of what it aims at elsewhere, where contacts or stops act: an error of the place within an impact is one of the speed
 after it. Measured on a bouncing ball: `docs/trust.md`."""
@@ -208,12 +211,18 @@ def compile_kernels(formulation: Formulation, settings: Simulation) -> None:
 
 
 def options_of(settings: Simulation) -> Options:
-    """What the settings say to an integrator; steps that follow a tolerance are not given."""
+    """What the settings say to an integrator; steps that follow a tolerance are not given.
+
+    Iterations of equal steps end the earlier the larger the tolerance is, and never later than is usual: who asks for
+    more digits gets them, whatever the units.
+    """
+    equal = settings.integrator == FIXED_STEP and settings.step is not None
     return Options(
         None if INTEGRATORS[settings.integrator].follows_tolerance else settings.step,
         settings.rtol,
         settings.atol,
         settings.spectral_radius,
+        min(Options.newton_tolerance, _ITERATED * settings.tolerance) if equal else Options.newton_tolerance,
         tolerance=INTEGRATION_SHARE * settings.tolerance,
         output_step=output_step(settings),
     )

@@ -12,6 +12,7 @@ import json
 import platform
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import NamedTuple
@@ -185,6 +186,7 @@ def key_of(scene: SceneFile) -> str:
     return _digest(msgspec.json.encode(scene.record))
 
 
+@cache
 def made_with() -> str:
     """Versions and machine: what the last bits of a run depend on."""
     names = ("erls", "numpy", "scipy", "numba")

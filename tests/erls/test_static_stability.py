@@ -13,6 +13,7 @@ import erls
 from erls.equations.linearization import Linearization, roots, stiffness_left, ways_left
 from erls.equations.registry import formulate
 from erls.equations.serial.formulation import SerialFormulation
+from erls.equations.stability import Started
 from erls.errors import Cause, SimulationError
 from erls.report.tables import chain_report
 from erls.run.chain.places import point_position
@@ -53,32 +54,40 @@ def _column(folder: Path, times: float, tilt_deg: float = 0.0, **initial: Any) -
     return scenes.write_toml(folder / "scene.toml", scene)
 
 
-def _equations(path: Path, formulation: str = "erls", *changes: str) -> SerialFormulation:
+def _started(path: Path, formulation: str = "erls", *changes: str) -> Any:
+    """Equations that know their static start."""
     scene = load_scene(path, [f"simulation.formulation={formulation}", *changes])
     assert isinstance(scene, Scene)
     found = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
+    assert isinstance(found, Started)
+    return found
+
+
+def _equations(path: Path) -> SerialFormulation:
+    found = _started(path)
     assert isinstance(found, SerialFormulation)
     return found
 
 
-@pytest.mark.parametrize("formulation", ["erls", "ffr"])
+@pytest.mark.parametrize("formulation", ["erls", "ffr", "nodal"])
 def test_column_loses_its_stiffness_at_greenhills_weight(tmp_path: Path, formulation: str) -> None:
     """What is left is linear in the weight, zero within 1 % of it; 1 % less bears, 1 % more is refused."""
-    left = [_equations(_column(tmp_path, times), formulation).stability.stiffness_left for times in (0.5, 0.9)]
+    left = [_started(_column(tmp_path, times), formulation).stability.stiffness_left for times in (0.5, 0.9)]
     crossing = 0.5 + 0.4 * left[0] / (left[0] - left[1])
     assert crossing == pytest.approx(1.0, abs=1e-2)
-    assert _equations(_column(tmp_path, 0.99), formulation).stability.stiffness_left > 0
+    assert _started(_column(tmp_path, 0.99), formulation).stability.stiffness_left > 0
     with pytest.raises(SimulationError, match="link 'column' buckles") as caught:
-        _equations(_column(tmp_path, 1.01), formulation).initial_state()
+        _started(_column(tmp_path, 1.01), formulation).initial_state()
     assert caught.value.cause == Cause.UNSTABLE_START
 
 
-@pytest.mark.parametrize("formulation", ["erls", "ffr"])
-@pytest.mark.parametrize("tilt_deg", [0.0, 1.0])
+@pytest.mark.parametrize(
+    ("formulation", "tilt_deg"), [("erls", 0.0), ("erls", 1.0), ("ffr", 0.0), ("ffr", 1.0), ("nodal", 0.0)]
+)
 def test_far_beyond_buckling_is_refused(tmp_path: Path, formulation: str, tilt_deg: float) -> None:
     """30 times: neither straight nor bent against its tilt; exit code 2, and how far beyond."""
     with pytest.raises(SimulationError, match="link 'column' buckles") as caught:
-        _equations(_column(tmp_path, 30.0, tilt_deg), formulation).initial_state()
+        _started(_column(tmp_path, 30.0, tilt_deg), formulation).initial_state()
     assert caught.value.cause == Cause.UNSTABLE_START
     assert caught.value.exit_code == 2
     assert caught.value.where == "initial.deformation"
@@ -95,6 +104,38 @@ def test_tilted_column_bends_with_its_tilt(tmp_path: Path) -> None:
     upright, sagging = (point_position(equations.mechanism, s, 0)[0] for s in (stiff, bent))
     assert abs(upright) == pytest.approx(np.sin(np.radians(1.0)))
     assert sagging / upright > 1.1
+
+
+def test_beams_follow_the_branch_on_the_given_side(tmp_path: Path) -> None:
+    """Tilted by 1° under 1.2 times what a straight one buckles at, they hang over to that side, with stiffness left,
+    and swing; so does one of the other side, to its own.
+    """
+    tips = []
+    for tilt_deg in (1.0, -1.0):
+        path = _column(tmp_path, 1.2, tilt_deg)
+        table = scenes.read_toml(tmp_path / "column.toml")
+        table["materials"]["m"]["youngs_modulus"] = 1e3  # a thick one: slender ones are not followed that far
+        table["sections"]["s"] |= {"inertia_y": 1e-3, "inertia_z": 4e-3, "torsion_constant": 2e-3}
+        scenes.write_toml(tmp_path / "column.toml", table)
+        equations = _started(path, "nodal", "simulation.elements_per_member=4")
+        tips.append(equations.state(0.0, *equations.initial_state()))
+        assert equations.stability.stiffness_left > 0.1
+        assert equations.stability.root.real == 0.0
+    sides = [point_position(equations.mechanism, tip, 0)[0] for tip in tips]
+    assert sides[0] > 0.3
+    assert sides[0] == pytest.approx(-sides[1], rel=1e-6)
+
+
+def test_beams_on_joints_with_springs(tmp_path: Path) -> None:
+    """An arm on a joint with a spring: what is left of the stiffness, held, is that of the arm clamped."""
+    spring = {"name": "clamp", "dh": {"convention": "standard"}, "stiffness": 5.0}
+    left = []
+    for joint in (None, spring):
+        path = _column(tmp_path, 0.5, 20.0)
+        scene = scenes.read_toml(path)
+        joints = scene["joints"] if joint is None else [joint]
+        left.append(_started(scenes.write_toml(path, {**scene, "joints": joints}), "nodal").stability.stiffness_left)
+    assert left[1] == pytest.approx(left[0], rel=1e-9)
 
 
 def test_unstable_start_runs_where_it_is_allowed(tmp_path: Path) -> None:
@@ -130,7 +171,7 @@ def _bar(angle_deg: float, **joint: Any) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("formulation", ["erls", "ffr"])
+@pytest.mark.parametrize("formulation", ["erls", "ffr", "nodal"])
 def test_inverted_pendulum_is_told_with_its_root(tmp_path: Path, formulation: str) -> None:
     """√(3 g / 2 L), to 1e-8, differences of 1e-6; the run stands, and says so. Hanging, the root is imaginary."""
     exact = np.sqrt(1.5 * G / BAR)
@@ -170,13 +211,16 @@ def test_roots_of_a_controlled_joint(tmp_path: Path, stiff: float, damped: float
     np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(exact), rtol=1e-8)
 
 
-@pytest.mark.parametrize("formulation", ["erls", "ffr"])
+@pytest.mark.parametrize("formulation", ["erls", "ffr", "nodal"])
 def test_beck_column_flutters(formulation: str) -> None:
-    """Under a force that follows, at 20.05 EI / L², of which the scene has 0.9: roots pair up within 2 %."""
+    """Under a force that follows, at 20.05 EI / L², of which the scene has 0.9: roots pair up within 2 %, of 20 beam
+    elements too.
+    """
     found = []
     for share in (0.98, 1.02):
-        change = f"loads.0.force=[{-2105.0 / 0.9 * share}, 0.0, 0.0]"
-        equations = _equations(scenes.ROOT / "data/beck/column.toml", formulation, change)
+        changes = f"loads.0.force=[{-2105.0 / 0.9 * share}, 0.0, 0.0]", "simulation.elements_per_member=20"
+        path = scenes.ROOT / "data/beck/column.toml"
+        equations = _started(path, formulation, *changes[: 2 if formulation == "nodal" else 1])
         assert equations.stability.root is not None
         found.append(equations.stability.root)
     assert found[0].real < 1e-6 * abs(found[0])

@@ -37,7 +37,7 @@ from erls.equations.serial.state_series import (
     single_energy,
     state_series,
 )
-from erls.equations.stability import Bearing, Stability, stability_of
+from erls.equations.stability import Bearing, Stability, stability_of, tumbling
 from erls.errors import SimulationError
 from erls.maths.so3 import Array, cross_all
 from fe_import.model import IntArray
@@ -260,7 +260,8 @@ class ClosedChain(Tied):
         """Of the static start."""
         y, v = self.initial_state()
         a = self._accelerate(self.exact, 0.0, y, v)
-        return stability_of(self._static[1], self.linearized(0.0, y, v), a, self.metres, self.reach)
+        motions = None if tumbling(self.mechanism, v) else self.linearized(0.0, y, v)
+        return stability_of(self._static[1], motions, a, self.metres, self.reach)
 
     def start_velocity(self, y: Array) -> Array:
         """(n,) rates at a closed start that keep it closed."""

@@ -8,6 +8,7 @@ end to the other without force follows from the frames as built, and from how fa
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,6 +100,12 @@ class Beams:
         result: Array = built.copy()
         result[:, :3] *= 1 + self.expansion[:, None]
         return result
+
+    def without_weight(self) -> Beams:
+        """The same beams where nothing pulls them down."""
+        found = copy(self)
+        found.gravity = np.zeros(3)
+        return found
 
     def sections_at(self, poses: Array, bent: Array, elements: IntArray, fractions: Array) -> Array:
         """(p, 4, 4) sections of elements (p,), at these fractions (p,) of their lengths, at node poses (k, 4, 4)."""

@@ -18,6 +18,7 @@ from erls.equations.consistency import consistent_acceleration, consistent_veloc
 from erls.equations.formulation import ContactSeries, Energy, LoopForce, Reaction, State
 from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.loops.failures import warnings_of
+from erls.equations.neighbours import small_motions
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain, Seat, build_chain
 from erls.equations.nodal.joints import GROUND
@@ -26,9 +27,10 @@ from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nod
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import link_parts
 from erls.equations.nodal.redundant import smallest_multipliers
+from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
-from erls.equations.nodal.statics import solve_statics
-from erls.errors import SimulationError
+from erls.equations.serial.equilibrium import size_of
+from erls.equations.stability import LARGEST, Stability, stability_of
 from erls.maths import motion_maps as motions
 from erls.maths import rotation_maps as rotations
 from erls.maths.saddle import Matrix
@@ -124,9 +126,9 @@ class Nodal:
         Raises
         ------
         SimulationError
-            NO_EQUILIBRIUM, when the start is to be static.
+            NO_EQUILIBRIUM, UNSTABLE_START, when the start is to be static.
         """
-        q = self._equilibrium() if self.mechanism.static_start else self.system.start
+        q = self.system.at(self._resting.q.poses) if self.mechanism.static_start else self.system.start
         rates = [joint.rate for joint in self.mechanism.joints] if self._start is None else self._start.rates
         v = np.zeros((self.system.count, 6))
         moving: list[Array] = []  # links, in the world's axes, about its origin
@@ -164,20 +166,24 @@ class Nodal:
         ]
         return names_of_nodes(owners)
 
-    def _equilibrium(self) -> Nodes:
+    @cached_property
+    def _resting(self) -> Resting:
         """At rest under gravity, and what acts in joints, with joints held; those that follow loops are not."""
         positions, held = [joint.position for joint in self.mechanism.joints], range(len(self.mechanism.joints))
         if self._start is not None:
             positions = self._start.positions.tolist()
-        resting = self.chain.resting({k: positions[k] for k in (held if self._start is None else self._start.held)})
-        failure: SimulationError | None = None
-        for tangent in ("full", "material"):  # the second converges from farther away
-            found = solve_statics(resting, resting.start, tangent=tangent, end=0.0)
-            if found.failure is None:
-                return self.system.at(found.path[-1].q.poses)
-            failure = found.failure
-        assert failure is not None
-        raise failure
+        chosen = held if self._start is None else self._start.held
+        return resting(self.chain, self.mechanism, {k: positions[k] for k in chosen})
+
+    @cached_property
+    def stability(self) -> Stability:
+        """Of the static start."""
+        y, v = self.initial_state()
+        near = self.neighbours(0.0, y, v)
+        motions = small_motions(near) if self.system.size - self.system.constraints <= LARGEST else None
+        return stability_of(
+            self._resting.bearing, motions, near.acceleration, near.metres, size_of(self.mechanism)
+        )
 
     def state(self, t: float, y: Array, v: Array) -> State:
         """Positions of all nodes; link frames at the inboard nodes, modal coordinates as near as modes come."""

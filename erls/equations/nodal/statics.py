@@ -91,7 +91,7 @@ def solve_statics(
     if tangent not in TANGENTS:
         remedy = f"must be one of {', '.join(TANGENTS)}"
         raise SceneError(Cause.BAD_FIELD, "there is no such tangent", where="tangent", value=tangent, remedy=remedy)
-    solver = _Solver(system, tangent, tolerance)
+    solver = LoadSteps(system, tangent, tolerance)
     at, q, multipliers = 0.0, start, np.zeros(system.constraints)
     found: list[Equilibrium] = []
     step, used = end / steps, 0
@@ -122,8 +122,14 @@ def solve_statics(
     return Statics(tuple(found), solver.factorizations, solver.cuts, failure)
 
 
-class _Solver:
-    """Newton's method at one load parameter after another."""
+class LoadSteps:
+    """Newton's method at one load parameter after another.
+
+    Parameters
+    ----------
+    system, tangent, tolerance
+        As of `solve_statics`.
+    """
 
     def __init__(self, system: NodalSystem, tangent: str, tolerance: float) -> None:
         self.system, self.tangent, self.metres = system, tangent, metre_scales(system)

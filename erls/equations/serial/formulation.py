@@ -27,7 +27,7 @@ from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
 from erls.equations.series import mass_series, residual_series
-from erls.equations.stability import Bearing, Stability, stability_of
+from erls.equations.stability import Bearing, Stability, stability_of, tumbling
 from erls.equations.system import metre_scales
 from erls.maths.records import python_reader
 from erls.maths.se3 import pose
@@ -226,7 +226,8 @@ class SerialFormulation(TreeFormulation):
         """Of the static start."""
         y, v = self.initial_state()
         a, size = self.acceleration(0.0, y, v), size_of(self.mechanism)
-        return stability_of(self._static[1], self.linearized(0.0, y, v), a, metre_scales(self), size)
+        motions = None if tumbling(self.mechanism, v) else self.linearized(0.0, y, v)
+        return stability_of(self._static[1], motions, a, metre_scales(self), size)
 
     def frames(self, t: float, y: Array, v: Array) -> list[FrameMotion]:
         """Frames that the loops of the mechanism hold; see `TreeFormulation`."""

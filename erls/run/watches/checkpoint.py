@@ -11,8 +11,8 @@ from erls.integrate.memory import Memory, time_of
 from erls.run.checkpoints import Checkpoints, Part
 from erls.run.watches.base import NOTHING, Finding, Knots, Started, Watch
 
-FIRST_S, LEAST_S = 0.5, 1.0
-"""Work before the first checkpoint, and between two of them at the least [s]."""
+FIRST_S, LEAST_S = 1.0, 1.0
+"""Work before the first checkpoint, which takes a tenth of that, and between two of them at the least [s]."""
 
 _SHARE, _WAITING = 0.02, 0.1  # of the time of a run: what checkpoints may cost, and wait for disks and other processes
 

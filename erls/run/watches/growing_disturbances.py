@@ -16,8 +16,8 @@ class GrowingDisturbances(Watch):
 
     @staticmethod
     def concerns(plan: Plan) -> bool:
-        """Static starts of links that are linear in their own frames."""
-        return plan.modal and plan.mechanism.static_start
+        """Static starts."""
+        return plan.mechanism.static_start
 
     def begins(self, begun: Begun) -> Finding:
         """A disturbance that at least doubles within the run."""

@@ -1,0 +1,136 @@
+"""Loops: redundant conditions, dead points, change points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import loop_scenes
+import numpy as np
+
+from erls.errors import Cause
+from erls.maths.so3 import Array
+from hard_cases.case import Case, closed, energy_kept, of_subject
+from hard_cases.truths import swinging
+
+_G = 9.81
+_LINK, _BAR, _LENGTH = 0.3, 0.9, 0.2  # kg, kg, m: two legs and the bar of a parallelogram
+
+
+def _flat(*points: Array) -> Array:
+    """(k, points, 3) in the plane of x and z, of complex numbers (k,)."""
+    return np.stack([np.stack([p.real, 0 * p.real, p.imag], axis=1) for p in points], axis=1)
+
+
+def _crank(t: Array) -> Array:
+    return np.radians(60.0 + 720.0 * np.asarray(t))
+
+
+def _four_bar(t: Array) -> Array:
+    first, second, third = loop_scenes.LENGTHS
+    angles = _crank(t), *loop_scenes.four_bar_angles(_crank(t))
+    places, root = [], 0 * t + 0j
+    for length, angle in zip((first, second, third), angles, strict=True):
+        places += [root + length / 2 * np.exp(1j * angle), root + length * np.exp(1j * angle)]
+        root = places[-1]
+    return _flat(*places)
+
+
+def _slider_crank(t: Array) -> Array:
+    first, second, _ = loop_scenes.LENGTHS
+    pin = first * np.exp(1j * _crank(t))
+    slider = pin.real + np.sqrt(second**2 - pin.imag**2) + 0j
+    return _flat(pin / 2, pin, (pin + slider) / 2, slider, slider)
+
+
+def _parallelogram(degrees: float, third: bool = False, **simulation: Any) -> dict[str, Any]:
+    """Legs of the same length at an angle from the horizontal, let go at rest; a third leg follows from the others."""
+    joints = [
+        loop_scenes.joint(f"j{k}", length, angle)
+        for k, (length, angle) in enumerate(((_LENGTH, degrees), (0.5, -degrees), (_LENGTH, degrees - 180.0)))
+    ]
+    links = [
+        {"name": name, "rigid": loop_scenes.bar(length, mass), "mesh_pose": {"frame": "joint"}}
+        for name, length, mass in (("leg", _LENGTH, _LINK), ("bar", 0.5, _BAR), ("other", _LENGTH, _LINK))
+    ]
+    loops = [{"name": "closing", "link": "other", "node": "tip", "position": [0.5, 0.0, 0.0]}]
+    if third:
+        branch = {"position": [0.25, 0.0, 0.0]}
+        joints.append(loop_scenes.joint("j3", _LENGTH, degrees - 180.0, on="bar", at="middle", branch=branch))
+        body = loop_scenes.bar(_LENGTH, _LINK)
+        links.append({"name": "third", "rigid": body, "mesh_pose": {"frame": "joint"}})
+        loops.append({"name": "third", "link": "third", "node": "tip", "position": [0.25, 0.0, 0.0]})
+    return {
+        "gravity": [0.0, 0.0, -_G],
+        "simulation": {"duration": 2.0, **simulation},
+        "base": {"rotation_deg": [90.0, 0.0, 0.0]},
+        "joints": joints,
+        "links": links,
+        "loops": loops,
+        "points": [{"name": "end", "link": "bar", "node": "tip"}],
+    }
+
+
+def _translated(degrees: float, legs: int) -> Any:
+    """The bar stays level, and circles as a pendulum."""
+    moment = _LENGTH * (legs * _LINK / 2 + _BAR)
+    inertia = _LENGTH**2 * (legs * _LINK / 3 + _BAR)
+    swing = swinging(np.radians(90.0 + degrees), np.sqrt(_G * moment / inertia))
+
+    def places(t: Array) -> Array:
+        return _flat(0.5 + _LENGTH * np.exp(1j * (swing(t) - np.pi / 2)))
+
+    return places
+
+
+def _driven(data: dict[str, Any], start: float, rate: float) -> dict[str, Any]:
+    return loop_scenes.driven(data, loop_scenes.steady(start, rate))
+
+
+def _rocker_first(rate: float) -> dict[str, Any]:
+    """The four-bar from its other end: what drives the rocker meets a dead point at 88°."""
+    first, second, third = loop_scenes.LENGTHS
+    joints = [
+        loop_scenes.joint(f"j{k}", length, angle)
+        for k, (length, angle) in enumerate(((third, 80.0), (second, -100.0), (first, -40.0)))
+    ]
+    links = [
+        {"name": name, "rigid": loop_scenes.bar(length, 0.5), "mesh_pose": {"frame": "joint"}}
+        for name, length in (("rocker", third), ("coupler", second), ("crank", first))
+    ]
+    ends = {"points": [], "loops": [{"name": "pivot", "link": "crank", "node": "tip", "position": [0.5, 0.0, 0.0]}]}
+    return _driven({**loop_scenes.four_bar(), "joints": joints, "links": links, **ends}, 80.0, rate)
+
+
+def _swung(name: str, degrees: float, kept: float, legs: int = 2, **more: Any) -> Case:
+    """Energy is kept to a share of what is exchanged."""
+    truth = closed(_translated(degrees, legs), "elliptic function", 0.0, energy_kept(kept))
+    return Case(name, _parallelogram(degrees, legs == 3, **more.pop("simulation", {})), truth, **more)
+
+
+_TURNED = _driven(loop_scenes.four_bar(), 60.0, 720.0)
+_LOCKED = {"erls": Cause.LOOP_OPEN, "ffr": Cause.LOOP_OPEN, "nodal": Cause.NEWTON_FAILED}
+CASES = of_subject(
+    "loops",
+    [
+        Case(
+            "planar four-bar, redundant conditions",
+            _TURNED,
+            closed(_four_bar, "closed form", 1e-9),
+            fast=("erls", "ffr"),
+        ),
+        Case(
+            "slider-crank through both dead centres",
+            _driven(loop_scenes.slider_crank(), 60.0, 720.0),
+            closed(_slider_crank, "closed form", 1e-9),
+            fast=("erls",),
+        ),
+        Case(
+            "a drive that meets a dead point", _rocker_first(180.0), ends=_LOCKED, told="pivot|j2", fast=("erls", "ffr")
+        ),
+        _swung("parallelogram that swings", -60.0, 1e-4),
+        _swung("parallelogram with a third leg", -60.0, 1e-4, legs=3),
+        _swung("parallelogram through its change point, adaptive", 60.0, 1e-6, simulation={"tolerance": 1e-6}),
+        _swung("parallelogram through its change point, steps of 1 ms", 60.0, 1e-4, simulation={"step": 1e-3}),
+        _swung("parallelogram through its change point, steps of 0.1 ms", 60.0, 1e-6, simulation={"step": 1e-4}),
+    ],
+)
