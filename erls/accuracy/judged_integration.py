@@ -104,11 +104,12 @@ def judged_integration(run: ChainRun, watched: Watched, others: float) -> Integr
     mechanism = run.formulation.mechanism
     elastic = any(link.elastic_modes for link in mechanism.links)
     followed = settings.output_step is None and wrong_table(s, settings.integrator) is not None
+    smooth = not elastic and not sudden(run)  # then nothing is unresolved, and the equation right
     tied = mechanism.loops or mechanism.sticks  # it knows neither loops nor switches
     astray = mechanism.touches or (elastic and sudden(run))  # by sudden forces
+    astray = astray or (smooth and bool(mechanism.rotation_vectors))  # what a fast top gathers is too even for it
     if followed and not tied and not astray:
         found = integration_error(run, watched)
-    smooth = not elastic and not sudden(run)  # then nothing is unresolved, and the equation right
     if found is not None and found.whole and (smooth or found.total <= max(expected(run), others)):
         return _with_forces(run, found)
     second = second_run_error(run, watched)

@@ -123,13 +123,17 @@ def _first_long(solution: Solution, places: Sequence[int]) -> int | None:
 
 
 def _up_to(solution: Solution, last: int) -> Solution:
-    """The knots up to one."""
+    """The knots up to one, and their share of the work: how many more were made is a matter of when it was looked at."""
     count = len(solution.t)
     parts: dict[str, Any] = {}
     for field in fields(solution):
         value = getattr(solution, field.name)
         if isinstance(value, np.ndarray) and len(value) == count:
             parts[field.name] = value[: last + 1]
+    if last < count - 1:
+        made, kept = (np.count_nonzero(np.diff(t)) for t in (solution.t, solution.t[: last + 1]))
+        share = kept / max(made, 1)
+        parts["work"] = Work(**{f.name: round(share * getattr(solution.work, f.name)) for f in fields(Work)})
     return replace(solution, **parts)
 
 
