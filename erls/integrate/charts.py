@@ -123,7 +123,7 @@ def _first_long(solution: Solution, places: Sequence[int]) -> int | None:
 
 
 def _up_to(solution: Solution, last: int) -> Solution:
-    """The knots up to one, and their share of the work: how many more were made is a matter of when it was looked at."""
+    """The knots up to one, and their share of the work: how many more were made depends on when it was looked at."""
     count = len(solution.t)
     parts: dict[str, Any] = {}
     for field in fields(solution):
