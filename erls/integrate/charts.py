@@ -131,7 +131,7 @@ def _up_to(solution: Solution, last: int) -> Solution:
         if isinstance(value, np.ndarray) and len(value) == count:
             parts[field.name] = value[: last + 1]
     if last < count - 1:
-        made, kept = (np.count_nonzero(np.diff(t)) for t in (solution.t, solution.t[: last + 1]))
+        made, kept = (int(np.count_nonzero(np.diff(t))) for t in (solution.t, solution.t[: last + 1]))
         share = kept / max(made, 1)
         parts["work"] = Work(**{f.name: round(share * getattr(solution.work, f.name)) for f in fields(Work)})
     return replace(solution, **parts)
