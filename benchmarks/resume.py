@@ -34,6 +34,7 @@ SCENES = (
 )
 KINDS = ("killed", "memory", "disk")
 _ROOM = 2**22  # bytes that memory may still grow by
+_LONGEST = 60.0  # s: a library that is refused memory may wait for it for ever; then the process is killed
 PROCESS = """
 import sys, threading, time
 import erls.integrate.driver as driver
@@ -41,16 +42,17 @@ from erls.cli.main import main
 
 def squeeze():
     import os, resource
-    time.sleep({squeezed})
+    time.sleep(squeezed)
     pages = int(open("/proc/self/statm").read().split()[0])
     room = pages * os.sysconf("SC_PAGE_SIZE") + {room}
     resource.setrlimit(resource.RLIMIT_AS, (room, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
-if {squeezed} is not None:
+squeezed, largest = {squeezed}, {largest}
+if squeezed is not None:
     threading.Thread(target=squeeze, daemon=True).start()
-if {largest} is not None:
+if largest is not None:
     import resource
-    resource.setrlimit(resource.RLIMIT_FSIZE, ({largest}, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (largest, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
 made, add, accept = [0], driver.Recorder._add, driver.Recorder.accept
 
 def added(self, t, rows, steps):
@@ -98,7 +100,7 @@ def simulated(scene: Path, changes: list[str], output: Path, *more: str, stop: S
     begun = time.perf_counter()
     running = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, encoding="utf-8")
     try:
-        said = running.communicate(timeout=at if kind == "killed" else None)[1].splitlines()
+        said = running.communicate(timeout=at if kind == "killed" else _LONGEST)[1].splitlines()
     except subprocess.TimeoutExpired:
         running.kill()
         running.communicate()
