@@ -110,7 +110,8 @@ def _tree(mechanism: Mechanism, settings: Simulation) -> Integrate:
     integrate = integrator_named(settings.integrator)
     if not mechanism.sticks:
         return integrate
-    share = _STICKING if any(link.elastic_modes for link in mechanism.links) else 1.0
+    if any(link.elastic_modes for link in mechanism.links):
+        integrate = _aimed(integrate, _STICKING)
 
     def integrated(
         system: Rubbing,
@@ -121,8 +122,7 @@ def _tree(mechanism: Mechanism, settings: Simulation) -> Integrate:
         observer: Observer | None = None,
     ) -> Solution:
         moving = system if system.dry is None else Sticking(system)  # None: their motions are prescribed
-        aimed = replace(options, tolerance=share * options.tolerance)
-        return integrate(moving, times, y, v, aimed, observer)
+        return integrate(moving, times, y, v, options, observer)
 
     return integrated
 
@@ -165,12 +165,12 @@ def integrator(mechanism: Mechanism, settings: Simulation) -> Integrate:
     if kind in ("pieces", "nodal"):
         return found
     if mechanism.touches and kind != "absolute":
-        found = _for_impacts(found)
+        found = _aimed(found, IMPACT_SHARE)
     return in_charts(found, mechanism.rotation_vector_places) if mechanism.rotation_vectors else found
 
 
-def _for_impacts(integrate: Integrate) -> Integrate:
-    """The same with `IMPACT_SHARE`."""
+def _aimed(integrate: Integrate, share: float) -> Integrate:
+    """The same at a share of the tolerance."""
 
     def integrated(
         system: Formulation,
@@ -179,10 +179,8 @@ def _for_impacts(integrate: Integrate) -> Integrate:
         v: Array,
         options: Options,
         observer: Observer | None = None,
-        **more: Any,
     ) -> Solution:
-        tight = replace(options, tolerance=IMPACT_SHARE * options.tolerance)
-        return integrate(system, times, y, v, tight, observer, **more)
+        return integrate(system, times, y, v, replace(options, tolerance=share * options.tolerance), observer)
 
     return integrated
 
