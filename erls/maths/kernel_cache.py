@@ -78,7 +78,16 @@ class _SealedFiles(IndexDataCacheFile):  # type: ignore[misc]  # Numba has no an
 
 
 class _Folder(UserProvidedCacheLocator):  # type: ignore[misc]
-    """The folder of `numba.config.CACHE_DIR` and no other one, which would know nothing of what a function calls."""
+    """The folder of `numba.config.CACHE_DIR` and no other one, which would know nothing of what a function calls.
+
+    Its name tells the source (`erls.maths.jit.folder`), so that it does not matter where that lies: a second checkout
+    or environment compiles nothing anew.
+    """
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """A part of the path that is the same wherever a package is installed."""
+        return os.path.basename(os.path.dirname(os.path.abspath(py_file)))
 
     def ensure_cache_path(self) -> None:
         """Where it cannot be made, or is not writable, there may still be code to read; who writes is told."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Callable
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
@@ -96,3 +97,27 @@ def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: list
         patched.setattr(os, "replace", full)
         patched.setattr(os, "makedirs", full)
         assert sum(_compiled(patched, tmp_path).stats.cache_hits.values()) == 1
+
+
+def test_code_is_found_wherever_the_source_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two checkouts of the same source share what is compiled: the folder is named by content."""
+    for place in ("one", "two"):
+        source = tmp_path / place / "package" / "numbers.py"
+        source.parent.mkdir(parents=True)
+        source.write_text("def thrice(x):\n    return 3.0 * x\n", encoding="utf-8")
+    hits = [_hits_of(tmp_path / place / "package" / "numbers.py", tmp_path, monkeypatch) for place in ("one", "two")]
+    assert hits == [0, 1]
+
+
+def _hits_of(source: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> int:
+    from numba import float64
+
+    specification = spec_from_file_location("numbers_of_test", source)
+    assert specification is not None
+    assert specification.loader is not None
+    module = module_from_spec(specification)
+    specification.loader.exec_module(module)
+    monkeypatch.setattr(jit, "folder", lambda module: folder / "kernels")
+    made: Any = jit.kernel(float64(float64), counted=False)(module.thrice)
+    assert made(2.0) == 6.0
+    return sum(made.stats.cache_hits.values())
