@@ -253,6 +253,7 @@ SUMMED: Any = None
 ENERGIES: Any = None
 KNOT: Any = None
 ACTING: Any = None
+COMPLEX_MATRIX: Any = None
 TANGENTS: Any = None
 if ENABLED:
     from numba import types as _t

@@ -12,7 +12,7 @@ from erls.equations.nodal.beam_tangents import STEP
 from erls.equations.nodal.contact_forces import press
 from erls.equations.nodal.contract import TANGENTS, Model, Work, read_layout, read_model, read_work
 from erls.maths.jit import kernel, part
-from erls.maths.vectors import cross, times, unit, vector
+from erls.maths.vectors import cross, unit, vector
 from erls.maths.views import vector_at
 
 _TWIST, _RATE, _FORCE = range(3)  # rows of complex memory

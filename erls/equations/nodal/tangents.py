@@ -30,18 +30,20 @@ class Exact(NamedTuple):
     pairs: int
 
 
-_EXACT: Any = None
+EXACT: Any = None
+EXACT_BLOCKS: Any = None
 if ENABLED:
     from numba import types as _t
 
-    _EXACT = _t.void(_t.NamedUniTuple(_t.int64, 2, Exact), *TANGENTS.args)
+    EXACT = _t.NamedUniTuple(_t.int64, 2, Exact)
+    EXACT_BLOCKS = _t.void(EXACT, *TANGENTS.args)
 
 
-@kernel(_EXACT, counted=False)
+@kernel(EXACT_BLOCKS, counted=False)
 def exact_blocks(
     exact: Exact, reals: Array, integers: IntArray, scratch: Array, poses: Array, motion: Array
 ) -> None:
-    """As `erls.equations.nodal.blocks.blocks`; ``poses`` (k, 12) and ``motion`` (3, n) are memory of complex numbers."""
+    """As `erls.equations.nodal.blocks.blocks`; ``poses`` (k, 12) and ``motion`` (3, n) are complex memory."""
     known = read_layout(reals, integers, integers[len(integers) - 1])
     call_blocks(known.blocks, reals, integers, scratch, BEAMS_APART)
     if exact.beams >= 0:
