@@ -30,10 +30,8 @@ from erls.simulation.chains import models_of
 from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
 
-LINEAR = 1e-10
-"""Of a derivative: what the third order of steps makes of it; a square root makes 1e-7."""
-ROUNDING = 1e-13
-"""Of forces."""
+_LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
+_ROUNDING = 1e-13  # of forces
 
 
 @dataclass(frozen=True)
@@ -96,13 +94,14 @@ class Difference:
             return self
         inner = Difference(self.parameter, tuple(replace(v, weight=0.75 * v.weight) for v in self.variants[1:3]))
         forces = [np.abs(variant.forces(sample)).max(initial=0.0) for variant in self.variants]
-        rounding = ROUNDING * max(forces) * inner.variants[1].weight
+        rounding = _ROUNDING * max(forces) * inner.variants[1].weight
         whole, less = (one.of(lambda variant: variant.forces(sample)) for one in (self, inner))
-        return inner if np.abs(whole - less).max() <= LINEAR * np.abs(whole).max() + rounding else self
+        return inner if np.abs(whole - less).max() <= _LINEAR * np.abs(whole).max() + rounding else self
 
     def of(self, what: Callable[[Variant], Array]) -> Array:
-        """The derivative of what an array depends on."""
-        return np.asarray(sum(variant.weight * what(variant) for variant in self.variants))
+        """The derivative of what an array depends on: exactly zero where it does not."""
+        first = what(self.variants[0])  # weights add up to zero
+        return np.asarray(sum(variant.weight * (what(variant) - first) for variant in self.variants[1:]))
 
 
 def _alike(one: CompiledSystem, other: CompiledSystem) -> bool:
