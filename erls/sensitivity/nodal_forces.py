@@ -1,8 +1,9 @@
 """What forces and conditions of nodal systems change with parameters, at the knots of a run.
 
-Constants of a system lie in one array; a parameter moves it along a line, as far as derivatives go. Forces are linear in
-stiffness and inertia of sections, in bodies and in loads, whatever dimensions do to these: one evaluation at the far end
-of the line and that of the run itself tell the derivative to rounding. Else forces at other values of the parameter do.
+Constants of a system lie in one array; a parameter moves it along a line, as far as derivatives go. Forces are linear
+in stiffness and inertia of sections, in bodies and in loads, whatever dimensions do to these: one evaluation at the far
+end of the line and that of the run itself tell the derivative to rounding. Else forces at other values of the parameter
+do.
 """
 
 from __future__ import annotations

@@ -147,7 +147,7 @@ class _Resting:
     def __init__(self, held: NodalSystem, q: Nodes) -> None:
         self._held, self._q, rest = held, q, np.zeros(held.size)
         rows, force = held.constraint_matrix(0.0, q), held.residual(0.0, q, rest, rest)
-        self._multipliers = -np.linalg.lstsq(dense(rows).T, force, rcond=None)[0]
+        self._multipliers: Array = -np.linalg.lstsq(dense(rows).T, force, rcond=None)[0].astype(float)
         stiffness, _ = held.exact_stiffness_and_damping(0.0, q, rest, rest, self._multipliers)
         self._saddle = _saddle(stiffness, rows, metre_scales(held))
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from complex_runs import RICHARDSON, STEP, summed
 
 from erls.equations.nodal import blocks, sums
 from erls.equations.nodal.layout import Flat
@@ -26,10 +27,8 @@ from erls.scene.build import build_mechanism
 from erls.sensitivity.parameters import Parameter, scene_with
 from erls.simulation.chains import models_of
 
-STEP = 1e-30
 ENOUGH = 20  # iterations at the most
 _SETTLED = 1e-15  # of the largest: corrections
-_RICHARDSON = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ def given(run: ChainRun, parameter: Parameter, step: float) -> Given:
     start = base.configuration(run.solution.y[0], run.solution.v[0])[0]
     times = _times(run)
     parts = []
-    for at, weight in _RICHARDSON:
+    for at, _ in RICHARDSON:
         scene = scene_with(run.scene, parameter, parameter.value + at * step)
         mechanism = build_mechanism(scene, lambda text: None, *models_of(run)).mechanism
         other: Any = formulate(mechanism, run.scene.record.simulation)
@@ -58,9 +57,7 @@ def given(run: ChainRun, parameter: Parameter, step: float) -> Given:
         moved = motions.log(motions.inverse(start.poses) @ q.poses).ravel()
         reals = np.where(np.isfinite(other.system.flat.reals), other.system.flat.reals, 0.0)
         parts.append((reals, other.system.samples(times), moved, v))
-    weights = [weight / step for _, weight in _RICHARDSON]
-    first = parts[0]  # weights add up to zero, so that what does not change makes no rounding
-    return Given(*(sum(w * (p[i] - first[i]) for w, p in zip(weights, parts, strict=True)) for i in range(4)))
+    return Given(*(summed(part, step) for part in zip(*parts, strict=True)))
 
 
 def _times(run: ChainRun) -> np.ndarray:

@@ -47,7 +47,6 @@ from erls.maths.vectors import (
     Vector,
     add,
     back_product,
-    cross,
     dot,
     minus,
     nine,

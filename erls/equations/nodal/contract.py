@@ -189,8 +189,8 @@ class Layout(NamedTuple):
     forces, remember, knot, blocks, weighted : int
         Addresses of the functions of `erls.equations.nodal.sums`, `outputs` and `blocks`.
     beam_forces, bend_beams, beam_derivatives, beam_energies : int
-        Those of `beam_forces` and `beam_derivatives`; of this and of the next three kinds -1, and nothing of them is compiled, where there are
-        none.
+        Those of `beam_forces` and `beam_derivatives`; of this and of the next three kinds -1, and nothing of them is
+        compiled, where there are none.
     actuator_forces, turn_actuators, actuator_derivatives, actuator_energies, store_actuators : int
         Those of `actuator_forces`.
     contact_forces, contact_derivatives, contact_energies : int

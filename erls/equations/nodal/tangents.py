@@ -59,4 +59,4 @@ def addresses(beams: int, pairs: int) -> Exact:
 
 def room(nodes: int) -> tuple[Array, Array]:
     """Memory of complex numbers."""
-    return np.zeros((nodes, 12), dtype=complex), np.zeros((3, 6 * nodes), dtype=complex)  # type: ignore[return-value]
+    return np.zeros((nodes, 12), dtype=complex), np.zeros((3, 6 * nodes), dtype=complex)
