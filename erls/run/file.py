@@ -36,7 +36,7 @@ _OUTPUT_TIMES = 1001
 S = TypeVar("S", bound=SceneFile)
 
 
-def write_run(
+def save_run(
     path: Path | str, run: Run, status: str = "", beside: Callable[[h5py.Group], None] | None = None
 ) -> None:
     """Write a run, completely or not at all.
