@@ -22,6 +22,7 @@ from erls.cli.files import info, view
 from erls.cli.linearize import linearize
 from erls.cli.reduce import reduce
 from erls.cli.simulate import simulate
+from erls.cli.starting import examples, new, schema
 from erls.cli.streams import StdoutLost, prepare_streams
 from erls.cli.studies import study
 from erls.cli.terminal import print_json, tell
@@ -42,9 +43,11 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-for command in (reduce, simulate, info, view, compare, effects, linearize):
+for command in (reduce, simulate, info, view, compare, effects, linearize, new, schema):
     app.command(command)
-app.command(study)
+for group in (study, examples):
+    app.command(group)
+app.register_install_completion_command(help="Install completion for the shell in use.")
 
 
 def _report(error: ReportedError, as_json: bool) -> None:
