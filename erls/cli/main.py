@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except StdoutLost as problem:
         failure, as_json = _of_stdout(problem), False
     except (MemoryError, ImportError, OSError) as problem:
-        failure = _of_memory(problem)
+        failure = _of_memory(problem) or _of_extra(problem)
         if failure is None:
             raise
     if failure is not None:
@@ -123,6 +123,13 @@ def _of_stdout(problem: StdoutLost) -> ReportedError | None:
     from erls.files.output import not_writable
 
     return not_writable("stdout", problem.strerror, "free disk space, or send it elsewhere")
+
+
+def _of_extra(problem: Exception) -> ReportedError | None:
+    """The error where an extra of the installation is missing."""
+    from erls.files.optional import missing_package
+
+    return missing_package(problem)
 
 
 def _of_memory(problem: Exception) -> ReportedError | None:

@@ -272,7 +272,7 @@ class LinearModel:
         SceneError
             BAD_FIELD: the package is not there.
         """
-        control = optional_package("control", "control", "LinearModel.control")
+        control = optional_package("control", "LinearModel.control")
         own = ([c.name for c in self.inputs], [c.name for c in self.outputs], self.states)
         inputs, outputs, states = ([name.replace(".", "_") for name in names] for names in own)
         return control.ss(self.A, self.B, self.C, self.D, inputs=inputs, outputs=outputs, states=states)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from erls.errors import Cause, SceneError
-from erls.files.optional import optional_package
+from erls.files.optional import optional_package, require_package
 from erls.maths.so3 import Array
 
 if TYPE_CHECKING:
@@ -36,13 +36,13 @@ def columns(run: Run, times: ArrayLike | None) -> dict[str, Array]:
 def data_frame(run: Run, times: ArrayLike | None) -> Any:
     """As `Run.to_pandas` says."""
     axis, *rest = columns(run, times).items()
-    pandas = optional_package("pandas", "tables", "Run.to_pandas")
+    pandas = optional_package("pandas", "Run.to_pandas")
     return pandas.DataFrame(dict(rest), index=pandas.Index(axis[1], name=axis[0]))
 
 
 def dataset(run: Run, times: ArrayLike | None) -> Any:
     """As `Run.to_xarray` says."""
-    xarray = optional_package("xarray", "tables", "Run.to_xarray")
+    xarray = optional_package("xarray", "Run.to_xarray")
     (name, along), *rest = quantities(columns(run, times))
     variables = {
         found: ((name, "axis")[: part.values.ndim], part.values, {"units": part.unit}) for found, part in rest
@@ -63,6 +63,7 @@ def plot(run: Run, patterns: tuple[str, ...], times: ArrayLike | None, axes: Any
             message, remedy = "the table of the run has no such column", "name one of these, or a pattern such as hip.*"
             raise SceneError(Cause.BAD_REFERENCE, message, where="plot", value=pattern, limit=names, remedy=remedy)
     if axes is None:
+        require_package("matplotlib", "Run.plot")
         import matplotlib.pyplot as plt
 
         _, axes = plt.subplots()

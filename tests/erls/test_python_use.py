@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import pickle
+import re
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,6 +16,7 @@ import numpy as np
 import pytest
 from body_scenes_data import STRIP, body_scene
 from matplotlib.figure import Figure
+from scenes import ROOT
 
 import erls
 import fe_import
@@ -147,11 +151,45 @@ def test_plots_show_what_is_asked(runs: dict[str, Run]) -> None:
     assert refused.value.cause == Cause.BAD_REFERENCE
 
 
-@pytest.mark.parametrize(("name", "method"), [("pandas", "to_pandas"), ("xarray", "to_xarray")])
+@pytest.mark.parametrize(
+    ("name", "method", "extra"),
+    [("pandas", "to_pandas", "tables"), ("xarray", "to_xarray", "tables"), ("matplotlib", "plot", "report")],
+)
 def test_a_package_that_is_not_there_is_named(
-    name: str, method: str, runs: dict[str, Run], monkeypatch: pytest.MonkeyPatch
+    name: str, method: str, extra: str, runs: dict[str, Run], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With what installs it."""
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(SceneError, match=rf"{name}.*erls\[tables\]"):
-        getattr(runs["chain"], method)(TIMES)
+    with pytest.raises(SceneError, match=rf"{name}.*erls\[{extra}\]"):
+        getattr(runs["chain"], method)()
+
+
+LIGHT = """
+import sys
+from erls.cli.main import main
+from erls.files.optional import EXTRAS
+for name in EXTRAS:
+    sys.modules[name] = None
+scene = "data/robot/two_link.toml"
+for arguments in (
+    ["simulate", scene, "-o", "r.run.h5", "--set", "simulation.duration=0.01"],
+    ["view", "r.run.h5", "-o", "r.csv"],
+    ["view", "r.run.h5", "-o", "r.png"],
+    ["study", "modes", scene, "-o", "m.html"],
+    ["linearize", "data/robot/flexible_joint.toml"],
+):
+    print("exit code", main(arguments), flush=True)
+"""
+
+
+def test_the_light_installation_does_without_extras(tmp_path: Path) -> None:
+    """It simulates and writes tables; pictures and pages name what brings them, before any work is done."""
+    program = LIGHT.replace("data/", f"{ROOT}/data/")
+    found = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True,
+        capture_output=True, check=True,
+    )  # fmt: skip
+    assert re.findall(r"exit code (\d)", found.stdout) == ["0", "0", "2", "2", "0"]
+    assert found.stderr.count("pip install 'erls[view]'") == 1
+    assert found.stderr.count("pip install 'erls[report]'") == 1
+    assert not (tmp_path / "m.html").exists()
