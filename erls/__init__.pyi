@@ -12,6 +12,7 @@ from .sensitivity.sensitivities import sensitivities as sensitivities
 from .simulation.batch import simulate_many as simulate_many
 from .simulation.simulate import simulate as simulate
 from .simulation.stepper import stepper as stepper
+from .studies.sweep.sweep import sweep as sweep
 from .view import show as show
 from .view import write_view as write_view
 

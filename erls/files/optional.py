@@ -17,6 +17,7 @@ EXTRAS = {
     "pandas": "tables",
     "xarray": "tables",
     "control": "control",
+    "distributed": "studies",
 }
 """The extra of the installation that brings a package, by its name on import."""
 

@@ -17,7 +17,7 @@ from erls.maths.so3 import Array
 if TYPE_CHECKING:
     from erls.run.record import Run
 
-_HEAD = re.compile(r"(?P<name>.*) \[(?P<unit>.*)\]")
+HEAD = re.compile(r"(?P<name>.*) \[(?P<unit>.*)\]")
 _ROWS = 1001
 
 
@@ -82,7 +82,7 @@ def plot(run: Run, patterns: tuple[str, ...], times: ArrayLike | None, axes: Any
 
 def quantities(table: dict[str, Array]) -> Iterator[tuple[str, Quantity]]:
     """Columns by name, three that are a vector as one."""
-    heads = {head: _HEAD.fullmatch(head) for head in table}
+    heads = {head: HEAD.fullmatch(head) for head in table}
     named = {match["name"]: Quantity(table[head], match["unit"]) for head, match in heads.items() if match}
     for name, found in named.items():
         base, _, part = name.rpartition(".")
