@@ -23,6 +23,7 @@ from erls.equations.system import metre_scales
 from erls.integrate.base import Leg, legs
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
+from erls.sensitivity.forces import force_derivative
 from erls.sensitivity.schemes import Scheme
 from erls.sensitivity.tangents import Evaluation, Knots, Tangents, steps_of
 from erls.sensitivity.variants import Difference
@@ -137,7 +138,7 @@ class Equations:
         self.evaluation = Evaluation.of(system.compiled, steps, len(run.solution.t))
         self.system = system
         sample = self._sample()
-        self.differences = [one.thinned(run, sample, self.evaluation) if one.acts else None for one in differences]
+        self.derivatives = [force_derivative(system.compiled, one, sample, self.evaluation) for one in differences]
 
     @cached_property
     def walks(self) -> list[Walk]:
@@ -168,7 +169,7 @@ class Equations:
 
     def forces(self, knots: Knots) -> Array:
         """(k, n, p) ∂R/∂p."""
-        found = np.zeros((*knots.y.shape, len(self.differences)))
+        found = np.zeros((*knots.y.shape, len(self.derivatives)))
         for k, force in self.each_force(knots):
             found[..., k] = force
         return found
@@ -176,9 +177,9 @@ class Equations:
     def each_force(self, knots: Knots) -> Iterator[tuple[int, Array]]:
         """Numbers of the parameters on which forces depend, with (k, n) ∂R/∂p of each."""
         known: dict[int, Array] = {}
-        for k, one in enumerate(self.differences):
+        for k, one in enumerate(self.derivatives):
             if one is not None:
-                yield k, one.forces(knots, self.evaluation, known)
+                yield k, one.at(knots, self.evaluation, known)
 
     def knots(self, walk: Walk, rows: IntArray) -> Knots:
         """Some of a leg, at the times at which forces were asked for."""

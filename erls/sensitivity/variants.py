@@ -23,14 +23,10 @@ from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism, link_model
 from erls.sensitivity.parameters import Parameter, description_with, scene_with
-from erls.sensitivity.tangents import Evaluation, Knots
 from erls.simulation.chains import models_of
 from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
 
-_LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
-_ROUNDING = 1e-13  # of forces
-_EXACT = 4e-15  # the same where what is left out is not of third order but of second
 
 
 @dataclass(frozen=True)
@@ -52,14 +48,6 @@ class Variant:
     apart: float
     formulation: Any
     turn: Array | None = None
-
-    def forces(self, knots: Knots, evaluation: Evaluation) -> Array:
-        """(k, n) forces out of balance, in the coordinates of the run."""
-        t, y, v, a = knots
-        if self.turn is None:
-            return evaluation.forces(self.formulation.compiled, knots)
-        turned = Knots(t, *(x @ self.turn.T for x in (y, v, a)))
-        return np.asarray(evaluation.forces(self.formulation.compiled, turned) @ self.turn)
 
     def placed(self, y: Array) -> Array:
         """(..., n) coordinates of the run in those of the variant."""
@@ -89,47 +77,6 @@ class Difference:
         first, *others = (variant.formulation.compiled for variant in self.variants)
         turned = any(variant.turn is not None for variant in self.variants)
         return turned or not all(_alike(first, other) for other in others)
-
-    def thinned(self, run: ChainRun, sample: Knots, evaluation: Evaluation) -> Difference:
-        """The same with fewer variants where forces depend on the parameter in a simple way, as some knots show.
-
-        Where they are linear in it two are enough, of which one is the run itself. Where nothing of it shows at those
-        knots, nothing is known of the others.
-        """
-        first, second = [variant for variant in self.variants[::2] if variant.apart][:2]
-        here = Variant(0.0, 0.0, run.formulation)
-        found = [variant.forces(sample, evaluation) for variant in (here, first, second)]
-        one, other = ((x - found[0]) / variant.apart for x, variant in zip(found[1:], (first, second), strict=True))
-        rounding = _EXACT * max(np.abs(x).max(initial=0.0) for x in found) / min(abs(first.apart), abs(second.apart))
-        largest = np.abs(one).max(initial=0.0)
-        if largest > 1e3 * rounding and np.abs(one - other).max() <= _LINEAR * largest + rounding:
-            far = max(first, second, key=lambda variant: abs(variant.apart))
-            ends = replace(far, weight=1 / far.apart), replace(here, weight=-1 / far.apart)
-            return Difference(self.parameter, ends)
-        return self._inner(sample, evaluation)
-
-    def _inner(self, sample: Knots, evaluation: Evaluation) -> Difference:
-        """The two variants on either side of the run, if they are enough."""
-        if len(self.variants) != len(STENCILS[0]):
-            return self
-        inner = Difference(self.parameter, tuple(replace(v, weight=0.75 * v.weight) for v in self.variants[1:3]))
-        found = [variant.forces(sample, evaluation) for variant in self.variants]
-        rounding = _ROUNDING * max(np.abs(x).max(initial=0.0) for x in found) * inner.variants[1].weight
-        whole = sum(v.weight * x for v, x in zip(self.variants, found, strict=True))
-        less = sum(v.weight * x for v, x in zip(inner.variants, found[1:3], strict=True))
-        return inner if np.abs(whole - less).max() <= _LINEAR * np.abs(whole).max() + rounding else self
-
-    def forces(self, knots: Knots, evaluation: Evaluation, known: dict[int, Array]) -> Array:
-        """(k, n) ∂R/∂p at knots; ``known`` keeps forces of the run itself, for all who ask at the same knots."""
-        total = np.zeros_like(knots.y)
-        for variant in self.variants:
-            if variant.apart:
-                total += variant.weight * variant.forces(knots, evaluation)
-                continue
-            if 0 not in known:
-                known[0] = variant.forces(knots, evaluation)
-            total += variant.weight * known[0]
-        return total
 
     def of(self, what: Callable[[Variant], Array]) -> Array:
         """The derivative of what an array depends on."""
