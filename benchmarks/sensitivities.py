@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import erls
-from erls.sensitivity.forward import Equations, differentiated
+from erls.sensitivity.equations import Equations
+from erls.sensitivity.forward import differentiated
 from erls.sensitivity.parameters import parameters_of
 from erls.sensitivity.sensitivities import scheme_of
 from erls.sensitivity.variants import differences
@@ -57,7 +58,7 @@ def main(path: Path) -> None:
             differentiated(run, found, scheme_of(run))
             spent_s = time.process_time() - begun
             own = run.solution.work.rhs_calls / knots
-            each = [one.variants for one in Equations(run, found).differences if one is not None]
+            each = [one.variants for one in Equations(run, found, scheme_of(run)).differences if one is not None]
             told = f"{own:8.1f} {4 * n + sum(map(len, each)):8d}"
             print(f"{n:11d} {knots:6d} {len(given):11d} {packing_s / run_s:15.2f} {spent_s / run_s:19.1f} {told}")
 

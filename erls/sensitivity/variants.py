@@ -18,20 +18,16 @@ import numpy as np
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.nodal.equations import Nodal
 from erls.equations.registry import formulate
-from erls.equations.series import residual_series
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism, link_model
 from erls.sensitivity.parameters import Parameter, description_with, scene_with
-from erls.sensitivity.tangents import Knots
 from erls.simulation.chains import models_of
 from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
 
-_LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
-_ROUNDING = 1e-13  # of forces
 
 
 @dataclass(frozen=True)
@@ -42,22 +38,17 @@ class Variant:
     ----------
     weight : float
         In the derivative [1/unit of the parameter].
+    apart : float
+        Of the parameter from its value in the run.
     formulation : Formulation
     turn : (n, n) array or None
         T, of all coordinates; None where they are the same.
     """
 
     weight: float
+    apart: float
     formulation: Any
     turn: Array | None = None
-
-    def forces(self, knots: Knots) -> Array:
-        """(k, n) forces out of balance, in the coordinates of the run."""
-        t, y, v, a = knots
-        if self.turn is None:
-            return residual_series(self.formulation.compiled, t, y, v, a)
-        turned = (x @ self.turn.T for x in (y, v, a))
-        return np.asarray(residual_series(self.formulation.compiled, t, *turned) @ self.turn)
 
     def placed(self, y: Array) -> Array:
         """(..., n) coordinates of the run in those of the variant."""
@@ -87,16 +78,6 @@ class Difference:
         first, *others = (variant.formulation.compiled for variant in self.variants)
         turned = any(variant.turn is not None for variant in self.variants)
         return turned or not all(_alike(first, other) for other in others)
-
-    def thinned(self, sample: Knots) -> Difference:
-        """The same with fewer variants where forces depend linearly on the parameter, as some knots show."""
-        if len(self.variants) != len(STENCILS[0]):
-            return self
-        inner = Difference(self.parameter, tuple(replace(v, weight=0.75 * v.weight) for v in self.variants[1:3]))
-        forces = [np.abs(variant.forces(sample)).max(initial=0.0) for variant in self.variants]
-        rounding = _ROUNDING * max(forces) * inner.variants[1].weight
-        whole, less = (one.of(lambda variant: variant.forces(sample)) for one in (self, inner))
-        return inner if np.abs(whole - less).max() <= _LINEAR * np.abs(whole).max() + rounding else self
 
     def of(self, what: Callable[[Variant], Array]) -> Array:
         """The derivative of what an array depends on: exactly zero where it does not."""
@@ -143,7 +124,7 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float
         found = held(models, base.mechanism.links[number].model, f"parameter {parameter.key}")
         turns = [_of_all(base, number, turn[6:, 6:]) for turn in found]
     result = []
-    for (_, weight), mechanism, turn in zip(stencil, mechanisms, turns, strict=True):
+    for (at, weight), mechanism, turn in zip(stencil, mechanisms, turns, strict=True):
         formulation: Any = formulate(mechanism, run.scene.record.simulation)
         if nodal:
             _refuse_others(formulation, base, parameter)
@@ -157,7 +138,7 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float
                 value=parameter.value,
                 remedy="name another field, or smooth the profile that it belongs to",
             )
-        result.append(Variant(weight / step, formulation, turn))
+        result.append(Variant(weight / step, at * step, formulation, turn))
     return result
 
 

@@ -1,0 +1,124 @@
+"""Derivatives of the forces of a run by a parameter, at its knots.
+
+∂R/∂p is a sum of forces R of equations at other values of p. Fewer than fourth order takes are enough where R is linear
+in p, as a look at some knots shows: two on either side, or one beside the run itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from erls.equations.compiled_system import CompiledSystem
+from erls.maths.so3 import Array
+from erls.sensitivity.tangents import Evaluation, Knots
+from erls.sensitivity.variants import Difference
+
+_LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
+_ROUNDING = 1e-13  # of forces
+_EXACT = 4e-15  # the same where what is left out is not of third order but of second
+_SEEN = 1e3  # times rounding: less is nothing
+
+
+class Term(NamedTuple):
+    """Forces at another value.
+
+    Attributes
+    ----------
+    weight : float
+        In the derivative [1/unit of the parameter].
+    apart : float
+        Of the parameter from its value in the run; 0 of the run itself.
+    system : CompiledSystem
+    turn : (n, n) array or None
+        As of `erls.sensitivity.variants.Variant`.
+    """
+
+    weight: float
+    apart: float
+    system: CompiledSystem
+    turn: Array | None = None
+
+    def forces(self, knots: Knots, evaluation: Evaluation) -> Array:
+        """(k, n) forces out of balance, in the coordinates of the run."""
+        t, y, v, a = knots
+        if self.turn is None:
+            return evaluation.forces(self.system, knots)
+        turned = Knots(t, *(x @ self.turn.T for x in (y, v, a)))
+        return np.asarray(evaluation.forces(self.system, turned) @ self.turn)
+
+
+@dataclass(frozen=True)
+class ForceDerivative:
+    """∂R/∂p as a sum of terms."""
+
+    terms: tuple[Term, ...]
+
+    def at(self, knots: Knots, evaluation: Evaluation, known: dict[int, Array]) -> Array:
+        """(k, n) at knots; ``known`` keeps forces of the run itself, for all who ask at the same knots."""
+        total = np.zeros_like(knots.y)
+        for term in self.terms:
+            if term.apart:
+                total += term.weight * term.forces(knots, evaluation)
+                continue
+            if 0 not in known:
+                known[0] = term.forces(knots, evaluation)
+            total += term.weight * known[0]
+        return total
+
+
+def force_derivative(
+    base: CompiledSystem, difference: Difference, sample: Knots, evaluation: Evaluation
+) -> ForceDerivative | None:
+    """By a parameter, with as few terms as some knots let it have; None where forces do not depend on it.
+
+    Parameters
+    ----------
+    base : CompiledSystem
+        Of the run.
+    difference : Difference
+    sample : Knots
+    evaluation : Evaluation
+    """
+    if not difference.acts:
+        return None
+    terms = [Term(one.weight, one.apart, one.formulation.compiled, one.turn) for one in difference.variants]
+    found = [term.forces(sample, evaluation) for term in terms]
+    linear = _linear(base, terms, found, sample, evaluation)
+    return ForceDerivative(linear or _inner(terms, found))
+
+
+def _linear(
+    base: CompiledSystem, terms: list[Term], found: list[Array], sample: Knots, evaluation: Evaluation
+) -> tuple[Term, ...] | None:
+    """Two terms, of which one is the run itself, where they are enough.
+
+    Where nothing of the parameter shows at these knots, nothing is known of the others.
+    """
+    here = Term(0.0, 0.0, base)
+    forces = here.forces(sample, evaluation)
+    chosen = [k for k in range(0, len(terms), 2) if terms[k].apart][:2]
+    first, second = (terms[k] for k in chosen)
+    one, other = ((found[k] - forces) / terms[k].apart for k in chosen)
+    rounding = _EXACT * max(_largest(forces), _largest(found[chosen[0]])) / min(abs(first.apart), abs(second.apart))
+    if _largest(one) <= _SEEN * rounding or _largest(one - other) > _LINEAR * _largest(one) + rounding:
+        return None
+    far = max(first, second, key=lambda term: abs(term.apart))
+    return far._replace(weight=1 / far.apart), here._replace(weight=-1 / far.apart)
+
+
+def _inner(terms: list[Term], found: list[Array]) -> tuple[Term, ...]:
+    """The two terms on either side of the run, if they are enough."""
+    if terms[0].apart >= 0 or terms[-1].apart <= 0:
+        return tuple(terms)
+    inner = tuple(term._replace(weight=0.75 * term.weight) for term in terms[1:3])
+    rounding = _ROUNDING * max(map(_largest, found)) * abs(inner[1].weight)
+    whole = sum(term.weight * x for term, x in zip(terms, found, strict=True))
+    less = sum(term.weight * x for term, x in zip(inner, found[1:3], strict=True))
+    return inner if _largest(whole - less) <= _LINEAR * _largest(whole) + rounding else tuple(terms)
+
+
+def _largest(x: Array) -> float:
+    return float(np.abs(x).max(initial=0.0))
