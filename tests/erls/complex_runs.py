@@ -52,7 +52,7 @@ def given(run: ChainRun, parameter: Parameter, step: float) -> Given:
 
 
 def summed(values: Sequence[np.ndarray], step: float) -> np.ndarray:
-    """Derivative from values at steps of `RICHARDSON`: none of what does not change, since its weights add up to zero."""
+    """Derivative from values at steps of `RICHARDSON`: none of what does not change, as its weights add up to zero."""
     weights = [weight / step for _, weight in RICHARDSON]
     return np.asarray(sum(w * (value - values[0]) for w, value in zip(weights, values, strict=True)))
 
