@@ -6,7 +6,7 @@ in p, as a look at some knots shows: two on either side, or one beside the run i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.maths.so3 import Array
 from erls.sensitivity.tangents import Evaluation, Knots
 from erls.sensitivity.variants import Difference
+from fe_import.derivatives import STENCILS, STEP
 
 _LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
 _ROUNDING = 1e-13  # of forces
@@ -84,10 +85,32 @@ def force_derivative(
     """
     if not difference.acts:
         return None
-    terms = [Term(one.weight, one.apart, one.formulation.compiled, one.turn) for one in difference.variants]
+    terms = _along_constants(base, difference)
+    if terms is None:
+        terms = [Term(one.weight, one.apart, one.formulation.compiled, one.turn) for one in difference.variants]
     found = [term.forces(sample, evaluation) for term in terms]
     linear = _linear(base, terms, found, sample, evaluation)
     return ForceDerivative(linear or _inner(terms, found))
+
+
+def _along_constants(base: CompiledSystem, difference: Difference) -> list[Term] | None:
+    """Terms of fourth order by constants alone, where these are linear in the parameter; None where they are not."""
+    first, second = difference.few
+    systems = [first.formulation.compiled, second.formulation.compiled]
+    alike = all(np.array_equal(system.integers, base.integers) for system in systems)
+    if first.turn is not None or not alike:
+        return None
+    here, one, other = base.reals, *(system.reals for system in systems)
+    same = (one == here) & (other == here)  # infinite ones, too
+    with np.errstate(invalid="ignore"):
+        slope = np.where(same, 0.0, (other - one) / (second.apart - first.apart))
+        off = np.where(same, 0.0, one - first.apart * slope - here)
+    if (np.abs(off) > _EXACT * np.abs(here)).any():
+        return None
+    step = STEP * difference.parameter.size
+    return [
+        Term(weight / step, at * step, replace(base, reals=here + at * step * slope)) for at, weight in STENCILS[0]
+    ]
 
 
 def _linear(

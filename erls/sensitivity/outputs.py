@@ -54,14 +54,9 @@ def value_of(output: Output, run: ChainRun, name: str) -> Array:
 
 def own_derivative(output: Output, name: str, run: ChainRun, difference: Difference, value: Array) -> Array:
     """What a parameter changes of an output whose ``value`` is known, the motion held; in the shape of the output."""
-    ends = {0, len(difference.variants) - 1}
-    found = {k: value_of(output, difference.variants[k].run(run), name) for k in ends}
-    if all(np.array_equal(x, value) for x in found.values()):
+    if all(np.array_equal(value_of(output, one.run(run), name), value) for one in difference.few):
         return np.zeros_like(value)
-    every = enumerate(difference.variants)
-    return np.asarray(
-        sum(one.weight * (found[k] if k in found else value_of(output, one.run(run), name)) for k, one in every)
-    )
+    return difference.of(lambda variant: value_of(output, variant.run(run), name))
 
 
 def derivative_of(

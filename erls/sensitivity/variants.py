@@ -65,19 +65,47 @@ class Variant:
         return replace(run, formulation=self.formulation, solution=moved)
 
 
-@dataclass(frozen=True)
 class Difference:
-    """A derivative by a parameter, as a sum over variants."""
+    """A derivative by a parameter, as a sum over variants, which are made when they are asked for.
 
-    parameter: Parameter
-    variants: tuple[Variant, ...]
+    Parameters
+    ----------
+    run : ChainRun
+    parameter : Parameter
+    stencil : Stencil
+        Where, and with which weights.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        The first two that are made will not do; others are refused when they are asked for.
+    """
+
+    def __init__(self, run: ChainRun, parameter: Parameter, stencil: Stencil) -> None:
+        self.parameter = parameter
+        self._run, self._stencil = run, stencil
+        self._made: dict[int, Variant] = {}
+        if parameter.within:  # shapes of all are held together
+            self._get(tuple(range(len(stencil))))
+        self.few = self._get((0, 2) if stencil[0][0] else (1, 3))
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """All of them."""
+        return self._get(tuple(range(len(self._stencil))))
 
     @property
     def acts(self) -> bool:
         """Whether the equations of motion depend on it: a start alone may."""
-        first, *others = (variant.formulation.compiled for variant in self.variants)
-        turned = any(variant.turn is not None for variant in self.variants)
-        return turned or not all(_alike(first, other) for other in others)
+        first, second = (variant.formulation.compiled for variant in self.few)
+        return any(variant.turn is not None for variant in self.few) or not _alike(first, second)
+
+    def _get(self, numbers: tuple[int, ...]) -> tuple[Variant, ...]:
+        missing = [k for k in numbers if k not in self._made]
+        if missing:
+            made = _variants(self._run, self.parameter, [self._stencil[k] for k in missing])
+            self._made |= dict(zip(missing, made, strict=True))
+        return tuple(self._made[k] for k in numbers)
 
     def of(self, what: Callable[[Variant], Array]) -> Array:
         """The derivative of what an array depends on: exactly zero where it does not."""
@@ -103,18 +131,19 @@ def differences(run: ChainRun, parameters: Sequence[Parameter]) -> list[Differen
 
 
 def _difference(run: ChainRun, parameter: Parameter) -> Difference:
-    step, problems = STEP * parameter.size, []
+    problems = []
     for stencil in STENCILS:
         try:
-            return Difference(parameter, tuple(_variants(run, parameter, stencil, step)))
+            return Difference(run, parameter, stencil)
         except ReportedError as problem:
             problems.append(problem)
     raise problems[0]
 
 
-def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float) -> list[Variant]:
-    """At the values of a stencil."""
+def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, float]]) -> list[Variant]:
+    """At the values of a stencil, or some of them."""
     base: Any = run.formulation
+    step = STEP * parameter.size
     mechanisms = [_mechanism(run, parameter, parameter.value + at * step) for at, _ in stencil]
     turns: list[Array | None] = [None] * len(stencil)
     nodal = isinstance(base, Nodal)
