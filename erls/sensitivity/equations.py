@@ -127,18 +127,22 @@ class Equations:
         By each parameter.
     scheme : Scheme
         Of the method that made the run.
+    moving : SecondOrderSystem, optional
+        What that method integrated, where it was not the formulation itself.
     """
 
-    def __init__(self, run: ChainRun, differences: Sequence[Difference], scheme: Scheme) -> None:
+    def __init__(
+        self, run: ChainRun, differences: Sequence[Difference], scheme: Scheme, moving: Any = None
+    ) -> None:
         self.solution, self.scheme = run.solution, scheme
         system: Any = run.formulation
         tree: Any = getattr(system, "bare", system)  # under the loops
         stiffness, _ = elastic_on_diagonal(tree)
         steps = steps_of(metre_scales(system), size_of(system.mechanism), stiffness)
-        self.evaluation = Evaluation.of(system.compiled, steps, len(run.solution.t))
-        self.system = system
+        self.system = system if moving is None else moving
+        self.evaluation = Evaluation.of(self.system.compiled, steps, len(run.solution.t))
         sample = self._sample()
-        self.derivatives = [force_derivative(system.compiled, one, sample, self.evaluation) for one in differences]
+        self.derivatives = [force_derivative(self.system.compiled, one, sample, self.evaluation) for one in differences]
 
     @cached_property
     def walks(self) -> list[Walk]:
@@ -148,11 +152,12 @@ class Equations:
         whole = legs(self.system, (float(t[0]), float(t[-1])))
         return [Walk(first, end, leg) for first, end, leg in zip(ends[:-1], ends[1:], whole, strict=False)]
 
-    def stretches(self, walk: Walk) -> list[tuple[int, int]]:
-        """First knot of each stretch of whole steps of a leg, and the one after its last."""
+    def stretches(self, walk: Walk, between: tuple[int, int] | None = None) -> list[tuple[int, int]]:
+        """First knot of each stretch of whole steps of a leg, or of a part of it, and the one after its last."""
+        begun, last = between or (walk.first + 1, walk.end)
         n, nodes = int(self.system.size), self.scheme.count
         some = max(1, _ROOM // (max(3, nodes * nodes) * n * n + 1) // nodes) * nodes
-        return [(first, min(first + some, walk.end)) for first in range(walk.first + 1, walk.end, some)]
+        return [(first, min(first + some, last)) for first in range(begun, last, some)]
 
     def stretch(self, walk: Walk, first: int, end: int) -> Stretch:
         """Linearized."""

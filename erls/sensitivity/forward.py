@@ -8,7 +8,7 @@ import numpy as np
 
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
-from erls.sensitivity.equations import Equations, Stretch, solve
+from erls.sensitivity.equations import Equations, Stretch, Walk, solve
 from erls.sensitivity.schemes import Scheme
 from erls.sensitivity.start import start_derivatives
 from erls.sensitivity.variants import Difference
@@ -39,10 +39,18 @@ def differentiated(run: ChainRun, differences: Sequence[Difference], scheme: Sch
         right = equations.forces(knots)[0] + damping @ state[1] + stiffness @ state[0]
         state[2] = state[3] = -np.linalg.solve(mass, right)
         result[walk.first] = state[:3]
-        for first, end in equations.stretches(walk):
-            stretch = equations.stretch(walk, first, end)
-            state = _steps(stretch, equations.forces(stretch.knots), state, result[first:end])
+        state = stepped(equations, walk, (walk.first + 1, walk.end), state, result)
     return result
+
+
+def stepped(
+    equations: Equations, walk: Walk, between: tuple[int, int], state: Array, result: Array
+) -> Array:
+    """(4, n, p) derivatives at the end of some steps of a leg; those at their knots go into ``result``."""
+    for first, end in equations.stretches(walk, between):
+        stretch = equations.stretch(walk, first, end)
+        state = _steps(stretch, equations.forces(stretch.knots), state, result[first:end])
+    return state
 
 
 def _steps(stretch: Stretch, forces: Array, state: Array, out: Array) -> Array:

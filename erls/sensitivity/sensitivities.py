@@ -151,9 +151,10 @@ def _askings(
     if method == "forward":
         return None
     chosen = method == "adjoint"
-    if _of_nodes(run):
+    if _of_nodes(run) or _eventful(run):
         if chosen:
-            raise _refusal("nodal runs by the adjoint method", "method", "take 'auto' or 'forward'")
+            what = "nodal runs" if _of_nodes(run) else "runs with contacts, stops or joints that stick"
+            raise _refusal(f"{what} by the adjoint method", "method", "take 'auto' or 'forward'")
         return None
     few = sum(value.size for value in values.values()) < parameters and parameters > _FEW
     if not chosen and not few:
@@ -222,7 +223,18 @@ def _motion(run: ChainRun, differences: Sequence[Difference]) -> tuple[Array, Ar
         from erls.sensitivity import nodal_forward  # here: most runs need none of it
 
         return nodal_forward.differentiated(run, differences), nodal_forward.metres_of(formulation)
-    return forward.differentiated(run, differences, scheme_of(run)), metre_scales(formulation)
+    metres = metre_scales(formulation)
+    if _eventful(run):
+        from erls.sensitivity import eventful  # here: most runs need none of it
+
+        return eventful.differentiated(run, differences, scheme_of(run)), metres
+    return forward.differentiated(run, differences, scheme_of(run)), metres
+
+
+def _eventful(run: ChainRun) -> bool:
+    """Whether forces change at times that parameters move."""
+    mechanism = run.formulation.mechanism
+    return mechanism.sticks or mechanism.touches
 
 
 def scheme_of(run: ChainRun) -> Scheme:
@@ -264,6 +276,9 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
         raise _refusal("the minimum-norm gauge", f"{where}.gauge", "use the joint-angle gauge")
     if mechanism.rotation_vectors and kind != "nodal":
         raise _refusal("coordinates that are rotation vectors", f"{scene.path}: joints", "use universal joints")
+    if kind == "nodal" and mechanism.touches:
+        remedy = "use formulation erls or ffr, which differentiate through them"
+        raise _refusal("nodal runs with contacts or stops", f"{where}.formulation", remedy)
     if kind == "loops" and settings.integrator == FIXED_STEP:
         remedy = "use integrator auto or lobatto, whose equations hold the forces of loops"
         raise _refusal("generalized-alpha with loops", f"{where}.integrator", remedy)
