@@ -138,7 +138,8 @@ class Equations:
         system: Any = run.formulation
         tree: Any = getattr(system, "bare", system)  # under the loops
         stiffness, _ = elastic_on_diagonal(tree)
-        steps = steps_of(metre_scales(system), size_of(system.mechanism), stiffness)
+        size = size_of(system.mechanism) or float(system.mechanism.reach)  # of a point that slides
+        steps = steps_of(metre_scales(system), size, stiffness)
         self.system = system if moving is None else moving
         self.evaluation = Evaluation.of(self.system.compiled, steps, len(run.solution.t))
         sample = self._sample()

@@ -74,6 +74,7 @@ class Modes:
     def __init__(self, run: ChainRun) -> None:
         formulation: Any = run.formulation
         self._made: dict[int, tuple[Any, Sticking]] = {}
+        self._now = np.zeros(0)
         sticks = formulation.mechanism.sticks and formulation.dry is not None
         self.system: Any = self.of(formulation) if sticks else formulation
         self.sticking: Sticking | None = self.system if sticks else None
@@ -82,7 +83,10 @@ class Modes:
         """Equations with modes over those of a formulation."""
         key = id(formulation)
         if key not in self._made:
-            self._made[key] = formulation, Sticking(formulation)
+            made = Sticking(formulation)
+            if len(self._now):
+                made.modes[:] = self._now
+            self._made[key] = formulation, made
         return self._made[key][1]
 
     def differences(self, given: Sequence[Difference]) -> list[Difference]:
@@ -90,7 +94,8 @@ class Modes:
         return [StuckDifference(one, self.of) for one in given] if self.sticking is not None else list(given)
 
     def set(self, modes: Array) -> None:
-        """In all equations."""
+        """In all equations, those to come included."""
+        self._now = modes
         for _, one in self._made.values():
             one.modes[:] = modes
 
