@@ -13,11 +13,12 @@ import scipy.linalg as la
 from erls.equations.linearization import Linearization, small_modes
 from erls.errors import Cause, SceneError, SimulationError
 from erls.files.optional import optional_package
-from erls.linear.inputs import checked
+from erls.linear.channels import checked
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 _ZERO = 1e-9  # of the fastest pole: a real part that rounding and differences may leave
+_INSTANT = 1e-5  # of a pole: the same in a state that moves, where rates of directions are right to 1e-7
 _SAME = 1e-6  # of a pole: distance of a zero that lies on it
 _FAR = 1e4  # times the fastest pole: a zero at infinity
 
@@ -219,9 +220,18 @@ class LinearModel:
 
     @property
     def unstable(self) -> tuple[Mode, ...]:
-        """Modes that grow."""
-        fastest = float(np.abs(self.poles).max(initial=0.0))
-        return tuple(mode for mode in self.modes if mode.pole.real > _ZERO * fastest)
+        """Modes that grow, by more than noise."""
+        return tuple(mode for mode in self.modes if mode.pole.real > 0 and not self.noise(mode.pole))
+
+    def noise(self, pole: complex) -> bool:
+        """Whether the real part of a pole is no more than what rounding and differences make: it neither grows nor
+        decays, as far as the model tells.
+        """
+        return abs(pole.real) <= max(_ZERO * self._fastest, 0.0 if self.steady else _INSTANT * abs(pole))
+
+    @cached_property
+    def _fastest(self) -> float:
+        return float(np.abs(self.poles).max(initial=0.0))
 
     def part(
         self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
@@ -241,20 +251,23 @@ class LinearModel:
         return found[0], found[1]
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Array:
-        """(k,) complex transmission zeros [1/s] between as many inputs as outputs, all unless given.
+        """(k,) complex transmission zeros [1/s] between inputs and outputs, all unless given.
 
-        At a zero s the pencil [A - s, B; C, D] is singular. Left out are those on poles, of modes that these inputs do
+        At a zero s the pencil [A - s, B; C, D] loses rank: some motion of the inputs is not seen at any of the outputs,
+        or some combination of the outputs is not moved by any of the inputs. More of one than of the other have few
+        zeros or none. Left out are those on poles, of modes that these inputs do
         not move or these outputs do not see, and those beyond 1e4 times the fastest pole, which count as infinite.
 
         Raises
         ------
         SceneError
-            BAD_FIELD: not as many inputs as outputs; BAD_REFERENCE: there is no such input or output.
+            BAD_FIELD: no inputs, or no outputs; BAD_REFERENCE: there is no such input or output.
         """
         own, seen = self.part(inputs, outputs)
-        if len(own) != len(seen) or not len(own):
-            message, remedy = "zeros are those of as many outputs as inputs", "name inputs and outputs, one each"
-            raise SceneError(Cause.BAD_FIELD, message, where="inputs", value=len(own), limit=len(seen), remedy=remedy)
+        if not len(own) or not len(seen):
+            message, remedy = "zeros are those from inputs to outputs", "name one of each at least"
+            where = "outputs" if len(own) else "inputs"
+            raise SceneError(Cause.BAD_FIELD, message, where=where, value=0, limit=1, remedy=remedy)
         found = transmission_zeros(self.A, self.B[:, own], self.C[seen], self.D[np.ix_(seen, own)])
         return _without(found, self.poles)
 
@@ -291,7 +304,41 @@ def _without(zeros: Array, poles: Array) -> Array:
 
 
 def transmission_zeros(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """(k,) finite zeros of the pencil [A - s, B; C, D], in rising order of size."""
+    """(k,) finite zeros of the pencil [A - s, B; C, D], in rising order of size; of any shape.
+
+    Where there are more outputs than inputs, or fewer, the longer side is combined into as many as the shorter one has,
+    at random and twice: zeros of the whole are those that both squares have, and what is only in one of them is made by
+    the combination (A. Emami-Naeini and P. Van Dooren, Automatica 18 (1982) 415-430, who call it squaring down).
+    """
+    inputs, outputs = b.shape[1], c.shape[0]
+    if inputs == outputs:
+        return _square_zeros(a, b, c, d)
+    mixed = np.random.default_rng(0).standard_normal((2, min(inputs, outputs), max(inputs, outputs)))
+    size = max(float(np.abs(np.linalg.eigvals(a)).max(initial=0.0)), 1e-300)
+    found = []
+    for one in mixed:
+        units = _units(a, b, c, d)
+        if outputs > inputs:
+            found.append(_square_zeros(a, b, one @ (c * units[1][:, None]), one @ (d * units[1][:, None])))
+        else:
+            found.append(_square_zeros(a, (b * units[0]) @ one.T, c, (d * units[0]) @ one.T))
+    kept, left = [], found[1].tolist()
+    for zero in found[0].tolist():
+        near = [k for k, other in enumerate(left) if abs(zero - other) <= _SAME * max(abs(zero), _SAME * size)]
+        if near:
+            left.pop(near[0])
+            kept.append(zero)
+    return np.array(kept, dtype=complex)
+
+
+def _units(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
+    """(r,) and (p,) factors of inputs and outputs that make them alike."""
+    columns, rows = np.abs(np.vstack([b, d])).max(axis=0), np.abs(np.hstack([c, d])).max(axis=1)
+    return 1 / np.where(columns > 0, columns, 1.0), 1 / np.where(rows > 0, rows, 1.0)
+
+
+def _square_zeros(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """Of as many inputs as outputs."""
     n, r = len(a), b.shape[1]
     if not n:
         return np.zeros(0, dtype=complex)
