@@ -138,8 +138,9 @@ def _inner(terms: list[Term], found: list[Array]) -> tuple[Term, ...]:
         return tuple(terms)
     inner = tuple(term._replace(weight=0.75 * term.weight) for term in terms[1:3])
     rounding = _ROUNDING * max(map(_largest, found)) * abs(inner[1].weight)
-    whole = sum(term.weight * x for term, x in zip(terms, found, strict=True))
-    less = sum(term.weight * x for term, x in zip(inner, found[1:3], strict=True))
+    weights = np.array([term.weight for term in terms])
+    whole = np.tensordot(weights, np.array(found), 1)
+    less = 0.75 * np.tensordot(weights[1:3], np.array(found[1:3]), 1)
     return inner if _largest(whole - less) <= _LINEAR * _largest(whole) + rounding else tuple(terms)
 
 
