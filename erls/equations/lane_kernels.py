@@ -1,7 +1,7 @@
-"""Loops over states for equations in eightfold numbers (`erls.maths.lanes`), to be compiled with those of a formulation.
+"""Loops over states in eightfold numbers (`erls.maths.lanes`), to be compiled with the equations of a formulation.
 
-A formulation has a module of its own for them, whose source, with all that it imports, tells compiled code on disk
-apart: ``forces, tangents = lane_kernels(__name__, residual)``.
+Each has a module of its own for them, whose source, with all that it imports, tells compiled code on disk apart:
+``forces, tangents = lane_kernels(__name__, residual)``.
 """
 
 from __future__ import annotations
@@ -10,9 +10,21 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
+from numba import types
+
+from erls.equations.compiled_system import INTEGERS, MATRIX, REALS
 from erls.maths.jit import any_scalar, kernel
+from erls.maths.lanes import as_duals, as_lanes
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
+
+residual: Any = None  # that of a formulation takes its place
+_STACK = types.float64[:, :, ::1]
+_CONSTANTS = REALS, INTEGERS, MATRIX
+_KINDS = {
+    "_forces": types.void(*_CONSTANTS, MATRIX, _STACK, _STACK, _STACK, _STACK, INTEGERS),
+    "_tangents": types.void(*_CONSTANTS, _STACK, MATRIX, REALS, MATRIX, MATRIX, MATRIX, _STACK, _STACK),
+}
 
 
 def _forces(
@@ -52,20 +64,12 @@ def _tangents(
                     found[i, j % n] = own[3, i, 1 + j - first]
 
 
-def lane_kernels(module: str, residual: Any) -> tuple[Callable[..., None], Callable[..., None]]:
-    """``forces`` and ``tangents`` of a formulation, for its module of that name."""
-    from numba import types
+def lane_kernels(module: str, own: Any) -> tuple[Callable[..., None], Callable[..., None]]:
+    """``forces`` and ``tangents`` of a formulation, for its module of that name; ``own`` is its residual."""
+    names = {**globals(), "__name__": module, "residual": any_scalar(own)}
 
-    from erls.equations.compiled_system import INTEGERS, MATRIX, REALS
-    from erls.maths.lanes import as_duals, as_lanes
+    def made(function: Any) -> Callable[..., None]:
+        name = function.__name__
+        return kernel(_KINDS[name], counted=False)(FunctionType(function.__code__, names, name))
 
-    stack = types.float64[:, :, ::1]
-    constants = REALS, INTEGERS, MATRIX
-    forces = types.void(*constants, MATRIX, stack, stack, stack, stack, INTEGERS)
-    tangents = types.void(*constants, stack, MATRIX, REALS, MATRIX, MATRIX, MATRIX, stack, stack)
-    names = {"__name__": module, "residual": any_scalar(residual), "as_lanes": as_lanes, "as_duals": as_duals}
-    made = [
-        kernel(kind, counted=False)(FunctionType(function.__code__, {**globals(), **names}, function.__name__))
-        for function, kind in ((_forces, forces), (_tangents, tangents))
-    ]
-    return made[0], made[1]
+    return made(_forces), made(_tangents)

@@ -34,7 +34,8 @@ WIDTH = 8
 WAYS = WIDTH - 1
 """Directions of a `dual`."""
 _ALIGNED = 8 * WIDTH  # bytes: where arrays of such numbers begin
-_ONE, _VECTOR, _WHOLE, _PLACE = ir.DoubleType(), ir.VectorType(ir.DoubleType(), WIDTH), ir.IntType(WIDTH), ir.IntType(32)
+_ONE, _WHOLE, _PLACE = ir.DoubleType(), ir.IntType(WIDTH), ir.IntType(32)
+_VECTOR = ir.VectorType(_ONE, WIDTH)
 _NOTHING = ir.Constant(_VECTOR, [0.0] * WIDTH)
 _OF_ONE = ir.FunctionType(_VECTOR, [_VECTOR])
 _VERSION = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:12]  # compiled code on disk goes by names of types
@@ -44,7 +45,7 @@ class Apart(ArithmeticError):
     """Eight states go different ways."""
 
 
-class _Eight(numba_types.Type):  # type: ignore[misc]  # not a Number, which Numba takes for one of NumPy's
+class _Eight(numba_types.Type):  # not a Number, which Numba takes for one of NumPy's
     def __init__(self) -> None:
         super().__init__(name=f"{type(self).__name__}{WIDTH}-{_VERSION}")
 
@@ -96,16 +97,16 @@ def _ways(builder: Any, x: Any) -> Any:
     return _with_value(builder, x, _ONE(0.0))
 
 
-@lower_cast(types.Float, LanesType)
-@lower_cast(types.Integer, LanesType)
-@lower_cast(types.IntegerLiteral, LanesType)
+@lower_cast(types.Float, LanesType)  # type: ignore[untyped-decorator]
+@lower_cast(types.Integer, LanesType)  # type: ignore[untyped-decorator]
+@lower_cast(types.IntegerLiteral, LanesType)  # type: ignore[untyped-decorator]
 def _lanes_of_one(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
     return _spread(builder, context.cast(builder, value, given, types.float64))
 
 
-@lower_cast(types.Float, DualType)
-@lower_cast(types.Integer, DualType)
-@lower_cast(types.IntegerLiteral, DualType)
+@lower_cast(types.Float, DualType)  # type: ignore[untyped-decorator]
+@lower_cast(types.Integer, DualType)  # type: ignore[untyped-decorator]
+@lower_cast(types.IntegerLiteral, DualType)  # type: ignore[untyped-decorator]
 def _constant(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
     return _with_value(builder, _NOTHING, context.cast(builder, value, given, types.float64))
 
@@ -194,7 +195,8 @@ def _product(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 def _scaled(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     """Of a constant and a dual."""
-    return builder.fmul(*(arg if kind == dual else _spread(builder, arg) for kind, arg in zip(sig.args, args, strict=True)))
+    both = zip(sig.args, args, strict=True)
+    return builder.fmul(*(arg if kind == dual else _spread(builder, arg) for kind, arg in both))
 
 
 def _quotient(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -219,9 +221,6 @@ def _chain(function: Any, slope: Any) -> Any:
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         at = _value(builder, args[0])
         found = _called(context, builder, function, [at])
-
-        def both(x: float, f: float) -> Any:
-            return slope(x, f)
 
         steep = context.compile_internal(builder, slope, signature(*[types.float64] * 3), [at, found])
         return _with_value(builder, builder.fmul(_spread(builder, steep), args[0]), found)
@@ -300,14 +299,14 @@ for _kind in (LanesType, DualType):
     infer_getattr(type(f"{_kind.__name__}Parts", (_Parts,), {"key": _kind}))
 
 
-@lower_getattr(LanesType, "real")
-@lower_getattr(DualType, "real")
+@lower_getattr(LanesType, "real")  # type: ignore[untyped-decorator]
+@lower_getattr(DualType, "real")  # type: ignore[untyped-decorator]
 def _real(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
-@lower_getattr(LanesType, "imag")
-@lower_getattr(DualType, "imag")
+@lower_getattr(LanesType, "imag")  # type: ignore[untyped-decorator]
+@lower_getattr(DualType, "imag")  # type: ignore[untyped-decorator]
 def _imaginary(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return _NOTHING
 

@@ -1,11 +1,13 @@
 """Derivatives of the forces of a run by a parameter, at its knots.
 
-∂R/∂p is a sum of forces R of equations at other values of p. Fewer than fourth order takes are enough where R is linear
-in p, as a look at some knots shows: two on either side, or one beside the run itself.
+∂R/∂p is a sum of forces R of equations at other values of p, or with constants c + Δp dc/dp, of which R is a simpler
+function: linear in inertia, in loads, in gains. Fewer terms than fourth order takes are enough then, as a look at some
+knots shows: two on either side, or one beside the run itself.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,8 +20,7 @@ from erls.sensitivity.variants import Difference
 from fe_import.derivatives import STENCILS, STEP
 
 _LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
-_ROUNDING = 1e-13  # of forces
-_EXACT = 4e-15  # the same where what is left out is not of third order but of second
+_ROUNDING = 4e-15  # of the forces that balance each other, and of constants
 _SEEN = 1e3  # times rounding: less is nothing
 
 
@@ -88,58 +89,72 @@ def force_derivative(
     terms = _along_constants(base, difference)
     if terms is None:
         terms = [Term(one.weight, one.apart, one.formulation.compiled, one.turn) for one in difference.variants]
+    here = Term(0.0, 0.0, base)
     found = [term.forces(sample, evaluation) for term in terms]
-    linear = _linear(base, terms, found, sample, evaluation)
-    return ForceDerivative(linear or _inner(terms, found))
+    balanced = here.forces(sample._replace(a=np.zeros_like(sample.a)), evaluation)
+    rounding = _ROUNDING * _largest(balanced) / min(abs(term.apart) for term in terms if term.apart)
+    linear = _linear([here, *terms], [here.forces(sample, evaluation), *found], rounding)
+    return ForceDerivative(linear or _inner(terms, found, rounding))
 
 
 def _along_constants(base: CompiledSystem, difference: Difference) -> list[Term] | None:
-    """Terms of fourth order by constants alone, where these are linear in the parameter; None where they are not."""
-    first, second = difference.few
-    systems = [first.formulation.compiled, second.formulation.compiled]
-    alike = all(np.array_equal(system.integers, base.integers) for system in systems)
-    if first.turn is not None or not alike:
+    """Terms of fourth order with constants c + Δp dc/dp: forces are simpler functions of constants than of parameters.
+
+    None where equations of another kind, or in other coordinates, stand at other values.
+    """
+    slope = _slope(base, difference)
+    if slope is None:
         return None
-    here, one, other = base.reals, *(system.reals for system in systems)
+    step = STEP * difference.parameter.size
+    moved = [(weight / step, at * step) for at, weight in STENCILS[0]]
+    return [Term(weight, apart, replace(base, reals=base.reals + apart * slope)) for weight, apart in moved]
+
+
+def _slope(base: CompiledSystem, difference: Difference) -> Array | None:
+    """dc/dp: from two variants where constants are linear in the parameter, as they show, or from all."""
+    first, second = difference.few
+    found = [one.formulation.compiled for one in (first, second)]
+    if first.turn is not None or not _of_one_kind(base, found):
+        return None
+    here, one, other = base.reals, *(system.reals for system in found)
     same = (one == here) & (other == here)  # infinite ones, too
     with np.errstate(invalid="ignore"):
         slope = np.where(same, 0.0, (other - one) / (second.apart - first.apart))
         off = np.where(same, 0.0, one - first.apart * slope - here)
-    if (np.abs(off) > _EXACT * np.abs(here)).any():
+    if (np.abs(off) <= _ROUNDING * np.abs(here)).all():
+        return np.asarray(slope)
+    every = [variant.formulation.compiled for variant in difference.variants]
+    if not _of_one_kind(base, every):
         return None
-    step = STEP * difference.parameter.size
-    return [
-        Term(weight / step, at * step, replace(base, reals=here + at * step * slope)) for at, weight in STENCILS[0]
-    ]
+    weights = [variant.weight for variant in difference.variants]
+    return np.asarray(sum(w * np.where(same, 0.0, x.reals) for w, x in zip(weights, every, strict=True)))
 
 
-def _linear(
-    base: CompiledSystem, terms: list[Term], found: list[Array], sample: Knots, evaluation: Evaluation
-) -> tuple[Term, ...] | None:
-    """Two terms, of which one is the run itself, where they are enough.
+def _of_one_kind(base: CompiledSystem, systems: Sequence[CompiledSystem]) -> bool:
+    return all(np.array_equal(system.integers, base.integers) for system in systems)
+
+
+def _linear(terms: list[Term], found: list[Array], rounding: float) -> tuple[Term, ...] | None:
+    """Two terms where they are enough, of which one is the run itself, the first one here.
 
     Where nothing of the parameter shows at these knots, nothing is known of the others.
     """
-    here = Term(0.0, 0.0, base)
-    forces = here.forces(sample, evaluation)
-    chosen = [k for k in range(0, len(terms), 2) if terms[k].apart][:2]
-    first, second = (terms[k] for k in chosen)
-    one, other = ((found[k] - forces) / terms[k].apart for k in chosen)
-    rounding = _EXACT * max(_largest(forces), _largest(found[chosen[0]])) / min(abs(first.apart), abs(second.apart))
+    first, second = [k for k in range(1, len(terms), 2) if terms[k].apart][:2]
+    one, other = ((found[k] - found[0]) / terms[k].apart for k in (first, second))
     if _largest(one) <= _SEEN * rounding or _largest(one - other) > _LINEAR * _largest(one) + rounding:
         return None
-    far = max(first, second, key=lambda term: abs(term.apart))
-    return far._replace(weight=1 / far.apart), here._replace(weight=-1 / far.apart)
+    far = max(terms[first], terms[second], key=lambda term: abs(term.apart))
+    return far._replace(weight=1 / far.apart), terms[0]._replace(weight=-1 / far.apart)
 
 
-def _inner(terms: list[Term], found: list[Array]) -> tuple[Term, ...]:
+def _inner(terms: list[Term], found: list[Array], rounding: float) -> tuple[Term, ...]:
     """The two terms on either side of the run, if they are enough."""
     if terms[0].apart >= 0 or terms[-1].apart <= 0:
         return tuple(terms)
     inner = tuple(term._replace(weight=0.75 * term.weight) for term in terms[1:3])
-    rounding = _ROUNDING * max(map(_largest, found)) * abs(inner[1].weight)
-    whole = sum(term.weight * x for term, x in zip(terms, found, strict=True))
-    less = sum(term.weight * x for term, x in zip(inner, found[1:3], strict=True))
+    weights = np.array([term.weight for term in terms])
+    whole = np.tensordot(weights, np.array(found), 1)
+    less = 0.75 * np.tensordot(weights[1:3], np.array(found[1:3]), 1)
     return inner if _largest(whole - less) <= _LINEAR * _largest(whole) + rounding else tuple(terms)
 
 

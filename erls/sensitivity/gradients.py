@@ -8,7 +8,8 @@ asks two are moved together: places at hundred times cost as much as one.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from erls.errors import Cause, SceneError
 from erls.integrate.base import hermite, knots_after
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
-from erls.sensitivity.outputs import Output, value_of
+from erls.sensitivity.outputs import EVALUATIONS, Output, value_of
 
 _AGREES = 1e-5  # of a derivative along a motion that is made up: what an output asks of a run by other ways is more
 
@@ -83,7 +84,7 @@ class Asking:
     @property
     def evaluations(self) -> int:
         """Of the output, that `by_knots` takes."""
-        return 4 * len(self.groups) * len(self.parts) * self.run.solution.y.shape[1]
+        return EVALUATIONS * len(self.groups) * len(self.parts) * len(self.steps)
 
     def by_knots(self) -> dict[int, Array]:
         """(3, n, c) derivatives of the c components by the states at some knots, by number.
@@ -96,20 +97,20 @@ class Asking:
         s = self.run.solution
         n, count = s.y.shape[1], self.value.size
         found = np.zeros((len(self.times), 2, n, count))
+        result: dict[int, Array] = {}
         for group in self.groups:
             for part in self.parts:
-                whole = slopes(lambda x, g=group, p=part: self._moved_together(x, g, p), np.eye(n), self.steps)
+                whole = slopes(partial(self._moved_together, group=group, part=part), np.eye(n), self.steps)
                 for time in group:
                     own = self.depends[time]
                     found[time, part][:, own] = whole.T[:, own]
-        result: dict[int, Array] = {}
         for time, by_state in enumerate(found):
             right = int(knots_after(s.t, self.times[time : time + 1])[0])
             knots = np.array([right - 1, right])
             weights = _weights(s.t[knots], float(np.clip(self.times[time], s.t[0], s.t[-1])))
             for side, knot in enumerate(knots.tolist()):
                 seed = np.einsum("po,pnc->onc", weights[:, side], by_state)
-                result[knot] = result.get(knot, 0.0) + seed
+                result[knot] = result[knot] + seed if knot in result else seed
         self._check(result)
         return result
 
@@ -144,7 +145,7 @@ class Asking:
             for group, own in zip(groups, taken, strict=True):
                 if not (own & self.depends[time]).any():
                     group.append(time)
-                    own |= self.depends[time]
+                    own[self.depends[time]] = True
                     break
             else:
                 groups.append([time])
@@ -184,8 +185,6 @@ class Asking:
             )
 
     def _as_whole(self, y: Array, v: Array, a: Array) -> Array:
-        from dataclasses import replace
-
         moved = replace(self.run, solution=replace(self.run.solution, y=y, v=v, a=a))
         return value_of(self.output, moved, self.name).ravel()
 
@@ -193,5 +192,6 @@ class Asking:
 def _weights(ends: Array, t: float) -> Array:
     """(2, 2, 3) of y, v, a at two knots in (y, v) between them: result, knot, what of it."""
     units = np.eye(6).reshape(6, 2, 3)  # a coordinate for each
-    y, v = hermite(ends, *(units[:, :, k].T for k in range(3)), np.array([t]))
+    by_y, by_v, by_a = (units[:, :, k].T for k in range(3))
+    y, v = hermite(ends, by_y, by_v, by_a, np.array([t]))
     return np.stack([y[0], v[0]]).reshape(2, 2, 3)

@@ -93,9 +93,9 @@ def sensitivities(
         Keys as ``--set`` takes them; behind ``links.NAME.model`` they go on in the description of that link. With a
         mapping, about how large a change of each would be large: its own size unless given, which zero has not.
     method : str, optional
-        ``"forward"``: all states of the run by each parameter, for outputs of any size. ``"adjoint"``: backward over the
-        run, for few outputs by many parameters; outputs must ask the run at fixed times. ``"auto"``: the one that asks
-        outputs less often. Both agree to 1e-9.
+        ``"forward"``: all states of the run by each parameter, for outputs of any size. ``"adjoint"``: backward over
+        the run, for few outputs by many parameters; outputs must ask the run at fixed times. ``"auto"``: the one that
+        asks outputs less often. Both agree to 1e-9.
     tell : callable, optional
         Told about each preparation that takes time.
 
@@ -195,18 +195,19 @@ def _adjoint(
     if not askings:
         return derivatives
     run = askings[0][0].run
-    places = np.cumsum([0, *(asking.value.size for asking, _ in askings)])
-    n, count = run.solution.y.shape[1], int(places[-1])
+    ends = np.cumsum([asking.value.size for asking, _ in askings]).tolist()
+    columns = [slice(end - asking.value.size, end) for end, (asking, _) in zip(ends, askings, strict=True)]
+    n = run.solution.y.shape[1]
     seeds: dict[int, Array] = {}
-    for (_, own), first, end in zip(askings, places[:-1].tolist(), places[1:].tolist(), strict=True):
-        for knot, seed in own.items():
-            seeds.setdefault(knot, np.zeros((3, n, count)))[..., first:end] += seed
+    for (_, by_knots), own in zip(askings, columns, strict=True):
+        for knot, seed in by_knots.items():
+            seeds.setdefault(knot, np.zeros((3, n, ends[-1])))[..., own] += seed
     found = differences(run, keys)
-    through = gradients(run, found, scheme, seeds, count)
+    through = gradients(run, found, scheme, seeds, ends[-1])
     for one, row in zip(found, through, strict=True):
-        for (asking, _), first, end in zip(askings, places[:-1].tolist(), places[1:].tolist(), strict=True):
-            own = own_derivative(asking.output, asking.name, run, one, asking.value)
-            derivatives[asking.name][one.parameter.key] = own + row[first:end].reshape(asking.value.shape)
+        for (asking, _), own in zip(askings, columns, strict=True):
+            held = own_derivative(asking.output, asking.name, run, one, asking.value)
+            derivatives[asking.name][one.parameter.key] = held + row[own].reshape(asking.value.shape)
     return derivatives
 
 

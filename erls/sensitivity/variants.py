@@ -29,7 +29,6 @@ from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
 
 
-
 @dataclass(frozen=True)
 class Variant:
     """The equations at another value.
