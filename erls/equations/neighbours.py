@@ -124,7 +124,7 @@ class Linearizable(Protocol):
 
 @runtime_checkable
 class Spinnable(Protocol):
-    """A formulation whose coordinates are never at rest where a joint turns, and that knows steady motions of its own."""
+    """A formulation whose coordinates are never at rest where a joint turns, but that knows its steady motions."""
 
     def spinning(self, joint: str, speed: float) -> Neighbours:
         """Of a steady motion about or along a joint [rad/s or m/s], seen from axes that go along."""

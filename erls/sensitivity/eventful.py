@@ -4,13 +4,14 @@ forces are smooth, by steps of their own (`erls.sensitivity.passages`) where a b
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from erls.equations.system import metre_scales
 from erls.maths.so3 import Array
+from erls.mechanism.contacts import Stops
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.equations import Equations, Walk
 from erls.sensitivity.forward import stepped
@@ -60,11 +61,13 @@ def differentiated(run: ChainRun, differences: Sequence[Difference], scheme: Sch
     return result
 
 
-def _pressed(run: ChainRun, margin: float) -> Array:
+def _pressed(run: ChainRun, margin: float) -> Any:
     """(k,) whether a contact or a stop acts at each knot, or within a margin [m or rad] of it."""
     s, mechanism = run.solution, run.formulation.mechanism
     found = np.asarray((run.formulation.contact_series(s.t, s.y, s.v).gap < margin).any(axis=1))
-    ends = [(joint.forces.stops, run.joint_coordinate, joint.name) for joint in mechanism.joints]
+    ends: list[tuple[Stops | None, Callable[[str, Array], Array], str]] = [
+        (joint.forces.stops, run.joint_coordinate, joint.name) for joint in mechanism.joints
+    ]
     free = [(loop.freedom, loop.name) for loop in mechanism.loops]
     ends += [(freedom.forces.stops, run.loop_coordinate, name) for freedom, name in free if freedom is not None]
     for stops, coordinate, name in ends:

@@ -178,7 +178,7 @@ class Modes:
             )
         result = state.copy()
         for k, difference in enumerate(differences):
-            change = difference.of(lambda variant: np.array(left(variant.formulation, t, y, v)))  # type: ignore[arg-type]
+            change = difference.of(lambda variant: np.array(left(variant.formulation, t, y, v)))
             share = passage.share(state[..., k])
             if share:
                 moved = [left(self.sticking, t, y + x * state[0, :, k], v + x * state[1, :, k]) for x in (share, -share)]

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.nodal.equations import Nodal
-from erls.equations.registry import formulate
+from erls.equations.registry import formulate, system_of
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -145,7 +144,7 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, 
     step = STEP * parameter.size
     mechanisms = [_mechanism(run, parameter, parameter.value + at * step) for at, _ in stencil]
     turns: list[Array | None] = [None] * len(stencil)
-    nodal = isinstance(base, Nodal)
+    nodal = system_of(base.mechanism, run.scene.record.simulation) == "nodal"
     if parameter.within and parameter.link is not None and not nodal:
         number = base.mechanism.bodies[parameter.link]
         models = [mechanism.links[number].model for mechanism in mechanisms]
@@ -158,7 +157,7 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, 
             _refuse_others(formulation, base, parameter)
         elif mechanism.loops:
             formulation.kept = base.kept  # of rows that follow from one another, any others would do as well
-        if _times(formulation) != _times(base):
+        if _times(formulation, nodal) != _times(base, nodal):
             raise SceneError(
                 Cause.BAD_FIELD,
                 "times at which forces jump depend on this parameter: derivatives through them are not known yet",
@@ -170,14 +169,13 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, 
     return result
 
 
-def _times(formulation: Any) -> tuple[float, ...]:
+def _times(formulation: Any, nodal: bool) -> tuple[float, ...]:
     """At which forces jump."""
-    of: Any = formulation.system if isinstance(formulation, Nodal) else formulation
-    found: tuple[float, ...] = of.breakpoints
+    found: tuple[float, ...] = (formulation.system if nodal else formulation).breakpoints
     return found
 
 
-def _refuse_others(formulation: Nodal, base: Nodal, parameter: Parameter) -> None:
+def _refuse_others(formulation: Any, base: Any, parameter: Parameter) -> None:
     """Refuse nodes, elements or conditions of another number or order."""
     if formulation.chain.left_out != base.chain.left_out:
         message = "which conditions of a loop follow from the others depends on this parameter"

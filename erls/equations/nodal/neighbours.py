@@ -153,8 +153,8 @@ class NodalNeighbours:
 class SpinningNeighbours(NodalNeighbours):
     """Of nodes in steady motion along a screw ξ, seen from axes that go with them.
 
-    Of q(t) = exp(t ξ) q the twists in the axes of the nodes, Ad(q⁻¹) ξ, are constant, and so are the conditions of their
-    joints: displacements x of the nodes have equations with constant coefficients.
+    Of q(t) = exp(t ξ) q the twists in the axes of the nodes, Ad(q⁻¹) ξ, are constant, and so are the conditions of
+    their joints: displacements x of the nodes have equations with constant coefficients.
 
     Attributes
     ----------
