@@ -168,11 +168,10 @@ class Modes:
         rows = slice(piece.first, piece.end)
         highest = float(np.abs(self.sticking.left(s.t[rows], s.y[rows], s.v[rows], s.a[rows])[:, joint]).max())
         if not abs(falling) * length > _GRAZES * highest:
-            name = self.sticking.dry.names[joint]
+            name, does = self.sticking.dry.names[joint], "comes to rest" if piece.modes[joint] else "breaks away"
             raise SceneError(
                 Cause.BAD_FIELD,
-                f"joint {name!r} only just {'comes to rest' if piece.modes[joint] else 'breaks away'} at t = {t:.9g} s: "
-                "when it does so has no derivative",
+                f"joint {name!r} only just {does} at t = {t:.9g} s: when it does so has no derivative",
                 where=f"joint {name}: friction",
                 remedy="end the run before, or change what makes it do so only just",
             )

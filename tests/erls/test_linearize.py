@@ -15,7 +15,7 @@ from body_scenes_data import PENDULUM, STRIP, body_scene
 import erls
 from erls.errors import Cause, SceneError, SimulationError
 from erls.linear.diagrams import campbell
-from erls.linear.model import transmission_zeros
+from erls.linear.zeros import transmission_zeros
 from erls.linear.response import frequency_response
 
 G = 9.81

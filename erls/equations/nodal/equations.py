@@ -8,7 +8,7 @@ integrator found with them: the rates of the nodes' twists and the multipliers.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -21,31 +21,22 @@ from erls.equations.loops.failures import warnings_of
 from erls.equations.neighbours import small_motions
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain, build_chain
-from erls.equations.nodal.joints import GROUND
 from erls.equations.nodal.link_state import LinkView
-from erls.equations.nodal.neighbours import (
-    NodalNeighbours,
-    SpinningNeighbours,
-    names_of_nodes,
-    nodal_neighbours,
-    twists_along,
-)
+from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import link_parts
 from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
 from erls.equations.nodal.seat import Seat
+from erls.equations.nodal.spinning import SpinningNeighbours, spinning_neighbours
 from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
 from erls.equations.stability import LARGEST, Stability, stability_of
-from erls.errors import Cause, SceneError
-from erls.maths import motion_maps as motions
 from erls.maths import rotation_maps as rotations
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.joint_types import Z
 
 
 class Nodal:
@@ -155,26 +146,8 @@ class Nodal:
         return nodal_neighbours(self.system, t, q, velocity, _stored, self._names)
 
     def spinning(self, joint: str, speed: float) -> SpinningNeighbours:
-        """States beside a steady motion about or along a joint [rad/s or m/s], undeformed; what it bears goes along.
-
-        Raises
-        ------
-        SceneError
-            BAD_FIELD: the joint does not stand on the ground.
-        """
-        number = [each.name for each in self.mechanism.joints].index(joint)
-        seat, freedom = self.chain.seats[number], self.mechanism.joints[number].freedom
-        if seat.inner != GROUND:
-            message = "nodes go along steadily with a joint on the ground alone: the loads of what bears it would turn"
-            remedy = "use formulation = 'erls' or 'ffr', or a joint on the ground"
-            raise SceneError(Cause.BAD_FIELD, message, where=f"joint {joint!r}", value="nodal", remedy=remedy)
-        q, going = self.system.start, np.zeros(self.system.count, dtype=bool)
-        for link in self.mechanism.carried(number):
-            going[self.chain.nodes[link]] = True
-        screw = motions.adjoint(seat.frames(q)[0]) @ replace(freedom, axis=Z).screw * speed
-        rest = np.zeros(self.system.size), np.zeros(self.system.constraints)
-        known = self.system, 0.0, q, twists_along(q, screw, going), *rest
-        return SpinningNeighbours(*known, _stored, self._names, screw, going)
+        """States beside a steady motion about or along a joint [rad/s or m/s]: see `spinning_neighbours`."""
+        return spinning_neighbours(self.mechanism, self.chain, joint, speed, _stored, self._names)
 
     @property
     def _names(self) -> tuple[str, ...]:

@@ -19,7 +19,6 @@ from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
-from erls.maths import motion_maps as motions
 from erls.maths.saddle import dense
 from erls.maths.so3 import Array
 
@@ -147,54 +146,6 @@ class NodalNeighbours:
     def of(self, formulation: Formulation) -> NodalNeighbours:
         """See `Neighbours`."""
         return replace(self, system=formulation.system)  # type: ignore[attr-defined]  # of nodes like this one
-
-
-@dataclass(frozen=True)
-class SpinningNeighbours(NodalNeighbours):
-    """Of nodes in steady motion along a screw ξ, seen from axes that go with them.
-
-    Of q(t) = exp(t ξ) q the twists in the axes of the nodes, Ad(q⁻¹) ξ, are constant, and so are the conditions of
-    their joints: displacements x of the nodes have equations with constant coefficients.
-
-    Attributes
-    ----------
-    screw : (6,) array
-        In the world.
-    going : (k,) bool array
-        Nodes that go along; the others rest.
-    """
-
-    screw: Array
-    going: Array
-
-    @property
-    def speed(self) -> Array:
-        """See `Neighbours`."""
-        return np.zeros_like(self.v)
-
-    @property
-    def acceleration(self) -> Array:
-        """See `Neighbours`."""
-        return np.zeros_like(self.v)
-
-    @property
-    def driven(self) -> tuple[float, float]:
-        """See `Neighbours`: what goes along moves as prescribed."""
-        return float(np.linalg.norm(self.v.reshape(-1, 6)[:, :3], axis=1).max()), 0.0
-
-    def later(self, tau: float) -> SpinningNeighbours:
-        """See `Neighbours`: the same, seen from those axes."""
-        return self
-
-    def at_rest(self, x: Array, multipliers: Array) -> SpinningNeighbours:
-        """See `Neighbours`: at rest as seen from those axes."""
-        q = self.system.compose(self.q, x)
-        return replace(self, q=q, v=twists_along(q, self.screw, self.going), multipliers=multipliers)
-
-
-def twists_along(q: Nodes, screw: Array, going: Array) -> Array:
-    """(n,) twists of nodes that go along a screw of the world, in their own axes; the others rest."""
-    return np.asarray((motions.adjoint_inverse(q.poses) @ screw * going[:, None]).ravel())
 
 
 def nodal_neighbours(
