@@ -20,7 +20,7 @@ from erls.sensitivity.variants import Difference
 from fe_import.derivatives import STENCILS, STEP
 
 _LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
-_ROUNDING = 4e-15  # of the forces that balance each other, and of constants
+_ROUNDING = 4e-15  # of forces out of balance, and of constants
 _SEEN = 1e3  # times rounding: less is nothing
 
 
@@ -91,8 +91,7 @@ def force_derivative(
         terms = [Term(one.weight, one.apart, one.formulation.compiled, one.turn) for one in difference.variants]
     here = Term(0.0, 0.0, base)
     found = [term.forces(sample, evaluation) for term in terms]
-    balanced = here.forces(sample._replace(a=np.zeros_like(sample.a)), evaluation)
-    rounding = _ROUNDING * _largest(balanced) / min(abs(term.apart) for term in terms if term.apart)
+    rounding = _ROUNDING * max(map(_largest, found)) / min(abs(term.apart) for term in terms if term.apart)
     linear = _linear([here, *terms], [here.forces(sample, evaluation), *found], rounding)
     return ForceDerivative(linear or _inner(terms, found, rounding))
 
