@@ -1,4 +1,4 @@
-"""What derivatives of a run cost, in runs, the run included: against parameters and coordinates, with the counts behind.
+"""What derivatives of a run cost, in runs, the run included: against parameters and coordinates, with their counts.
 
 ``python benchmarks/sensitivities.py [SCENE]``; processor time, so that other work on the machine counts less. With
 ``--memory`` what the adjoint method takes beside a run of 1e5 steps.
@@ -36,8 +36,8 @@ KEYS = [
 ]
 OUTPUT: dict[str, Callable[[Any], Any]] = {"height": lambda run: run.position("end3", run.end)[2]}
 HEADER = (
-    "coordinates  knots  parameters  method   whole | run  tangents  equations at other values  their forces  rest"
-    " | evaluations a knot: run, tangents, parameters; equations made"
+    "coordinates  knots  parameters  method   whole | run  tangents   packing   forces     rest"
+    " | evaluations a knot: run, tangents, by parameters"
 )
 
 
@@ -78,7 +78,8 @@ def costs(run: Any, run_s: float, count: int, method: Any) -> str:
 
 def memory() -> None:
     """Of the adjoint of 1e5 steps of an L with 18 coordinates."""
-    scene: Any = erls.load_scene(DATA / "l_shape" / "steel_tall.toml", ["simulation.step=1e-5", "simulation.duration=1.0"])
+    settings = ["simulation.step=1e-5", "simulation.duration=1.0"]
+    scene: Any = erls.load_scene(DATA / "l_shape" / "steel_tall.toml", settings)
     run: Any = erls.simulate(scene, verdict=False)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     own = sum(x.nbytes for x in (run.solution.t, run.solution.y, run.solution.v, run.solution.a))

@@ -16,7 +16,7 @@ from erls.equations.series import residual_series
 from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
 
-WORTH = 50_000
+WORTH = 20_000
 """Evaluations for which eightfold numbers are worth their compilation."""
 
 _KERNELS = {

@@ -53,7 +53,7 @@ def gradients(run: ChainRun, differences: Sequence[Difference], scheme: Scheme, 
         y, v, a, algorithmic = state
         if walk.first in seeds:
             y, v, a = (x + seed for x, seed in zip((y, v, a), seeds[walk.first], strict=True))
-        found = -np.linalg.solve(mass.T, a + algorithmic)
+        found = -solve(mass, a + algorithmic, True, float(knots.t[0]))
         for k, force in equations.each_force(knots):
             total[k] += force[0] @ found
         state = np.stack([y + stiffness.T @ found, v + damping.T @ found, 0 * y, 0 * y])
@@ -84,7 +84,8 @@ def _steps_back(stretch: Stretch, seeds: Seeds, state: Array, multipliers: Array
                 asked[:, i] = seed
         by_y, by_v, by_a = asked.reshape(3, count, -1)
         right = by_a + added[step].T @ flat + (h * h * scheme.places.T) @ by_y + (h * scheme.rates.T) @ by_v
-        found = -solve(stretch.blocks[step], right.reshape(count * n, columns), True).reshape(nodes)
+        t = float(stretch.knots.t[rows.start])
+        found = -solve(stretch.blocks[step], right.reshape(count * n, columns), True, t).reshape(nodes)
         multipliers[rows] = found
         by_y = by_y + (stiffness[rows].swapaxes(1, 2) @ found).reshape(count, -1)
         by_v = by_v + (damping[rows].swapaxes(1, 2) @ found).reshape(count, -1)

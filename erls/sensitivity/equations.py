@@ -20,6 +20,7 @@ from scipy.linalg import lapack
 
 from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
 from erls.equations.system import metre_scales
+from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, legs
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
@@ -102,17 +103,22 @@ class Stretch:
         return slice(step * self.scheme.count, (step + 1) * self.scheme.count)
 
 
-def solve(block: Array, right: Array, transposed: bool) -> Array:
-    """(m, c) solution x of B x = b, or of Bᵀ x = b.
+def solve(block: Array, right: Array, transposed: bool, t: float) -> Array:
+    """(m, c) solution x of B x = b, or of Bᵀ x = b; the matrix is overwritten.
 
     Raises
     ------
-    numpy.linalg.LinAlgError
-        The matrix is singular.
+    SimulationError
+        NOT_FINITE: the matrix is singular; ``t`` says when.
     """
     factors, pivots, status = lapack.dgetrf(block.T, overwrite_a=True)  # of the transpose, which lies column by column
     if status:
-        raise np.linalg.LinAlgError("the linearized equations of a step are singular")
+        raise SimulationError(
+            Cause.NOT_FINITE,
+            "the motion has no derivative here: the linearized equations of a step are singular",
+            where=f"t = {t:.9g} s",
+            remedy="look for a coordinate that nothing moves or holds there, or take smaller steps",
+        )
     found, _ = lapack.dgetrs(factors, pivots, right, trans=0 if transposed else 1)
     return np.asarray(found)
 

@@ -37,7 +37,7 @@ def differentiated(run: ChainRun, differences: Sequence[Difference], scheme: Sch
         knots = equations.knots(walk, np.array([walk.first]))
         mass, damping, stiffness = (x[0] for x in equations.tangents(knots))
         right = equations.forces(knots)[0] + damping @ state[1] + stiffness @ state[0]
-        state[2] = state[3] = -np.linalg.solve(mass, right)
+        state[2] = state[3] = -solve(mass, right, False, float(knots.t[0]))
         result[walk.first] = state[:3]
         state = stepped(equations, walk, (walk.first + 1, walk.end), state, result)
     return result
@@ -68,7 +68,8 @@ def _steps(stretch: Stretch, forces: Array, state: Array, out: Array) -> Array:
             flat = rescaled @ flat
         y, v = to_y[step] @ flat, to_v[step] @ flat
         right = forces[rows] + damping[rows] @ v.reshape(nodes) + stiffness[rows] @ y.reshape(nodes)
-        a = -solve(stretch.blocks[step], right.reshape(count * n, columns), False).reshape(count, -1)
+        t = float(stretch.knots.t[rows.start])
+        a = -solve(stretch.blocks[step], right.reshape(count * n, columns), False, t).reshape(count, -1)
         y += (h * h * scheme.places) @ a
         v += (h * scheme.rates) @ a
         for k, x in enumerate((y, v, a)):

@@ -12,6 +12,7 @@ import numpy as np
 from erls.equations.registry import system_of
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
+from erls.maths.jit import announcing
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
@@ -135,8 +136,12 @@ def sensitivities(
         run = simulate(loaded, tell=tell, verdict=False)
     refuse_run(run)
     values = {name: value_of(output, run, name) for name, output in outputs.items()}
-    askings = _askings(run, outputs, values, len(keys), method)
-    derivatives = _forward(run, outputs, values, keys) if askings is None else _adjoint(askings, keys, scheme_of(run))
+    with announcing(tell):
+        askings = _askings(run, outputs, values, len(keys), method)
+        if askings is None:
+            derivatives = _forward(run, outputs, values, keys)
+        else:
+            derivatives = _adjoint(askings, keys, scheme_of(run))
     at = {one.key: one.value for one in keys}
     return Sensitivities(run, at, values, derivatives, "forward" if askings is None else "adjoint")
 

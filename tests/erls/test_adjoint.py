@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import erls
-from erls.errors import SceneError
+from erls.errors import SceneError, SimulationError
 from erls.run.chain.run import ChainRun
 from erls.sensitivity import equations
 from erls.sensitivity.adjoint import gradients
@@ -150,6 +150,15 @@ def test_refusals() -> None:
     with pytest.raises(SceneError, match="by other ways"):
         erls.sensitivities(run, {"end": lambda run: run.solution.y[-1, 0]}, ["gravity.2"], "adjoint")
     assert erls.sensitivities(run, {}, ["gravity.2"], "adjoint").derivatives == {}
+
+
+def test_singular_steps() -> None:
+    """Neither way is a matrix taken for another, nor a singular one for any."""
+    block, right = np.array([[2.0, 1.0], [0.0, 4.0]]), np.array([[1.0], [2.0]])
+    np.testing.assert_allclose(block @ equations.solve(block.copy(), right, False, 0.0), right, rtol=1e-15)
+    np.testing.assert_allclose(block.T @ equations.solve(block.copy(), right, True, 0.0), right, rtol=1e-15)
+    with pytest.raises(SimulationError, match=r"t = 0\.5 s.*singular"):
+        equations.solve(np.zeros((2, 2)), right, False, 0.5)
 
 
 def test_no_coordinates() -> None:
