@@ -28,7 +28,7 @@ def transmission_zeros(a: Array, b: Array, c: Array, d: Array) -> Array:
 
     Where there are more outputs than inputs, or fewer, the longer side is combined into as many as the shorter one has,
     at random and twice: zeros of the whole are those that both squares have, and what is only in one of them is made by
-    the combination (A. Emami-Naeini and P. Van Dooren, Automatica 18 (1982) 415-430, who call it squaring down).
+    the combination. (For other ways: A. Emami-Naeini and P. Van Dooren, Automatica 18 (1982) 415-430.)
     """
     inputs, outputs = b.shape[1], c.shape[0]
     if inputs == outputs:

@@ -127,7 +127,7 @@ def changes_of(run: ChainRun, differences: Sequence[Difference], motion: _Motion
     known, scratch = Residuals(system), system.flat.scratch.copy()
     slopes = [slope_of(known, difference) for difference in differences]
     model = system.model
-    exact = addresses(len(model.beam_nodes), len(model.actuator_nodes) + len(model.contact_nodes))
+    exact = addresses(len(model.beam_nodes), len(model.actuator_nodes))
     memory = np.zeros(system.flat.factors), *room(system.count)
     chunk = max(1, _ROOM // (count * (n + m) + 1))
     for part in motion.walks:

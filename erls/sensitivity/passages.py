@@ -93,7 +93,10 @@ class Passage:
         def slope(t: float, z: Array) -> Array:
             return self._slope(min(max(t, leg.first), leg.last), z, n, shape)
 
-        solver = DOP853(slope, float(times[0]), start, float(times[-1]), rtol=_RTOL, atol=tolerances)
+        first = float(times[1] - times[0])
+        solver = DOP853(
+            slope, float(times[0]), start, float(times[-1]), first_step=first, rtol=_RTOL, atol=tolerances
+        )
         found, known = np.empty((len(times) - 1, 3, *shape)), 0
         while known < len(found):
             told = solver.step()
@@ -111,7 +114,10 @@ class Passage:
     def _slope(self, t: float, z: Array, n: int, shape: tuple[int, ...]) -> Array:
         y, v = z[:n], z[n : 2 * n]
         changes = z[2 * n :].reshape(2, *shape)
-        a = self._system.acceleration(t, y, v)
+        try:
+            a = self._system.acceleration(t, y, v)
+        except SimulationError:  # a step too far, which is rejected
+            return np.full_like(z, np.nan)
         return np.concatenate([v, a, changes[1].ravel(), self.gains(t, y, v, a, changes).ravel()])
 
     def gains(self, t: float, y: Array, v: Array, a: Array, changes: Array) -> Array:

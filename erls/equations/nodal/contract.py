@@ -288,4 +288,4 @@ call_contact_forces = caller(FORCES, "erls.equations.nodal.contact_forces:contac
 call_contact_derivatives = caller(BLOCKS, "erls.equations.nodal.contact_forces:contact_derivatives")
 call_contact_energies = caller(ENERGIES, "erls.equations.nodal.contact_forces:contact_energies")
 call_beam_tangents = caller(TANGENTS, "erls.equations.nodal.beam_tangents:beam_tangents")
-call_pair_tangents = caller(TANGENTS, "erls.equations.nodal.pair_tangents:pair_tangents")
+call_actuator_tangents = caller(TANGENTS, "erls.equations.nodal.actuator_tangents:actuator_tangents")
