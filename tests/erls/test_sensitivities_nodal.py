@@ -143,6 +143,12 @@ LOOP = [
             },
         ),
         (
+            ROBOT,
+            [*COARSE, "simulation.duration=0.02", "simulation.step=1e-3", 'joints.0.type="spherical"'],
+            {"links.upper_arm.model.sections.bar.width": 0.01, "joints.0.dh.a": 0.02},
+            {"end": lambda run: run.position("end2", [0.01, 0.02])},
+        ),
+        (
             FOUR_BAR / "flexible.toml",
             LOOP,
             {"links.coupler.model.sections.bar.width": 0.003, "joints.1.dh.a": 0.02, "gravity.2": 9.81},
@@ -152,7 +158,7 @@ LOOP = [
             },
         ),
     ],
-    ids=["chain", "loop"],
+    ids=["chain", "spherical", "loop"],
 )
 def test_differences_of_tightened_runs(
     path: Path, overrides: list[str], keys: dict[str, float], outputs: dict[str, Callable[[ChainRun], Any]]
