@@ -144,7 +144,13 @@ LOOP = [
         ),
         (
             ROBOT,
-            [*COARSE, "simulation.duration=0.02", "simulation.step=1e-3", 'joints.0.type="spherical"'],
+            [
+                *COARSE,
+                "simulation.duration=0.02",
+                "simulation.step=1e-3",
+                'joints.0.type="spherical"',
+                'joints.0.drive={type="free"}',
+            ],
             {"links.upper_arm.model.sections.bar.width": 0.01, "joints.0.dh.a": 0.02},
             {"end": lambda run: run.position("end2", [0.01, 0.02])},
         ),
