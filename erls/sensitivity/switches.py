@@ -177,10 +177,12 @@ class Modes:
             )
         result = state.copy()
         for k, difference in enumerate(differences):
-            change = difference.of(lambda variant: np.array(left(variant.formulation, t, y, v)))
-            share = passage.share(state[..., k])
+            change = difference.of(
+                lambda one: np.array(left(one.formulation, t, one.placed(y), one.placed(v)))
+            )
+            share, (place, rate) = passage.share(state[..., k]), state[..., k]
             if share:
-                moved = [left(self.sticking, t, y + x * state[0, :, k], v + x * state[1, :, k]) for x in (share, -share)]
+                moved = [left(self.sticking, t, y + x * place, v + x * rate) for x in (share, -share)]
                 change = change + (moved[0] - moved[1]) / (2 * share)
             result[1, :, k] -= (before - later) * (float(change) / falling)
         result[1, self.sticking.dry.places[after.modes == 0.0]] = 0.0
