@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,7 +118,7 @@ class Modes:
         ends = [0, *(np.flatnonzero(np.diff(t) == 0) + 1).tolist(), len(t)]
         whole = legs(self.system, (float(t[0]), float(t[-1])))
         found = []
-        for first, end in zip(ends[:-1], ends[1:], strict=True):
+        for first, end in pairwise(ends):
             leg = next((leg for leg in whole if leg.start <= t[first] < leg.end), whole[-1] if whole else None)
             if leg is None:
                 continue

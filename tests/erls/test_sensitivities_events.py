@@ -153,7 +153,7 @@ def test_refusals(tmp_path: Path) -> None:
     """A spring that pulls only just enough; the adjoint method; contacts of nodes."""
     run = _pulled(tmp_path, 5.0 / STIFFNESS * (1 + 1e-7), duration=0.6)
     own = {"x": lambda run: run.joint_coordinate("slide", 0.6)}
-    with pytest.raises(SceneError, match="only just breaks away at t = 0.49"):
+    with pytest.raises(SceneError, match=r"only just breaks away at t = 0\.49"):
         erls.sensitivities(run, own, ["joints.0.friction.force"])
     with pytest.raises(SceneError, match="that stick by the adjoint method"):
         erls.sensitivities(run, own, ["joints.0.friction.force"], "adjoint")
