@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fe_import.abaqus.parse import Deck
+from fe_import.abaqus.parse import Deck, Statement
+from fe_import.abaqus.statements import Unused, numbers
 
 USED = ("MATERIAL", "ELASTIC", "DENSITY", "SOLID SECTION")
 
@@ -30,38 +31,52 @@ class DeckMaterials:
 
 def deck_materials(deck: Deck) -> DeckMaterials:
     """Materials of all solid sections."""
-    result, found, name = DeckMaterials(), dict[str, dict[str, list[float]]](), ""
+    result = DeckMaterials()
     try:
-        for statement in deck.statements:
-            if statement.name == "MATERIAL":
-                name = statement.options.get("NAME", "").upper()
-                found[name] = {}
-            elif statement.name in ("ELASTIC", "DENSITY") and name:
-                found[name][statement.name] = _constants(statement.options, statement.rows)
         for options in deck.solid_sections:
             material = options.get("MATERIAL", "").upper()
             if options.get("ORIENTATION") or options.get("COMPOSITE"):
-                raise _Lack("a section has an orientation or layers")
-            elastic, density = (found.get(material, {}).get(key, []) for key in ("ELASTIC", "DENSITY"))
-            if len(elastic) < 2 or not density:
-                raise _Lack(f"material {material!r} lacks *ELASTIC or *DENSITY")
-            result.constants[material] = (elastic[0], elastic[1], density[0])
+                raise Unused("a section has an orientation or layers")
+            result.constants[material] = isotropic(deck, material)
             result.sections.append((options["ELSET"].upper(), material))
-    except (_Lack, ValueError) as reason:
+    except (Unused, ValueError) as reason:
         result.lack = str(reason)
     if not deck.solid_sections:
         result.lack = "it has no *SOLID SECTION"
     return result
 
 
-class _Lack(Exception):
-    """Why materials cannot be used."""
+def isotropic(deck: Deck, name: str) -> tuple[float, float, float]:
+    """Young's modulus, Poisson's ratio and density of a material (capitals).
+
+    Raises
+    ------
+    Unused
+        It lacks them, or is of another kind.
+    """
+    given = _statements(deck, name)
+    elastic, density = (_constants(given[k]) if k in given else [] for k in ("ELASTIC", "DENSITY"))
+    if len(elastic) < 2 or not density:
+        raise Unused(f"material {name!r} lacks *ELASTIC or *DENSITY")
+    return elastic[0], elastic[1], density[0]
 
 
-def _constants(options: dict[str, str], rows: list[list[str]]) -> list[float]:
-    kind = options.get("TYPE", "ISO").upper()
+def _statements(deck: Deck, material: str) -> dict[str, Statement]:
+    """What stands behind the *MATERIAL of that name, by keyword."""
+    found: dict[str, Statement] = {}
+    name = None
+    for statement in deck.statements:
+        if statement.name == "MATERIAL":
+            name = statement.options.get("NAME", "").upper()
+        elif statement.name in ("ELASTIC", "DENSITY") and name == material:
+            found[statement.name] = statement
+    return found
+
+
+def _constants(statement: Statement) -> list[float]:
+    kind = statement.options.get("TYPE", "ISO").upper()
     if kind not in ("ISO", "ISOTROPIC"):
-        raise _Lack(f"a material is elastic of type {kind}, which is not followed")
-    if len(rows) != 1:
-        raise _Lack("a material changes with temperature")
-    return [float(text.upper().replace("D", "E")) for text in rows[0] if text]
+        raise Unused(f"a material is elastic of type {kind}, which is not followed")
+    if len(statement.rows) != 1:
+        raise Unused("a material changes with temperature")
+    return numbers(statement.rows[0])

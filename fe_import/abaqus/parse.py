@@ -26,7 +26,7 @@ _LARGEST_LABEL = 999_999_999
 
 
 STATEMENTS = (
-    *("MATERIAL", "ELASTIC", "DENSITY", "MASS", "ROTARY INERTIA", "SPRING"),
+    *("MATERIAL", "ELASTIC", "DENSITY", "MASS", "ROTARY INERTIA", "SPRING", "BEAM SECTION", "BEAM GENERAL SECTION"),
     *("EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING"),
 )
 
@@ -68,6 +68,10 @@ class Deck:
     types : dict of ElementType
     kinds : dict of str
         Label of an element -> its type.
+    orientation_nodes : dict of int
+        Label of a beam -> the further node that its direction 1 points at, where it has one.
+    normals : set of int
+        Labels of nodes that are given a normal.
     node_sets, element_sets : SetTable
     surfaces : dict
         Name -> whether it is made of nodes, and its data lines.
@@ -84,6 +88,8 @@ class Deck:
     elements: dict[str, dict[int, list[int]]] = field(default_factory=dict)
     types: dict[str, ElementType] = field(default_factory=dict)
     kinds: dict[int, str] = field(default_factory=dict)
+    orientation_nodes: dict[int, int] = field(default_factory=dict)
+    normals: set[int] = field(default_factory=set)
     node_sets: SetTable = field(default_factory=SetTable)
     element_sets: SetTable = field(default_factory=SetTable)
     surfaces: dict[str, tuple[bool, list[list[str]]]] = field(default_factory=dict)
@@ -159,6 +165,8 @@ def _nodes(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
         position = tuple(reader.real(f) for f in (*fields[1:4], "", "", "")[:3])
         if deck.points.setdefault(label, position) != position:
             raise reader.fault(f"node {label} stands twice, at different positions")
+        if any(map(reader.real, fields[4:])):
+            deck.normals.add(label)
         labels.append(label)
     if options.get("NSET"):
         deck.node_sets.add(options["NSET"], labels)
@@ -180,6 +188,8 @@ def _elements(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
         if not fields:
             continue
         label, *nodes = map(reader.integer, fields)
+        if known.dimension == 1 and len(nodes) > known.nodes:
+            deck.orientation_nodes[label] = nodes[-1]
         nodes = nodes[: known.nodes]
         if known.nodes == 27:
             nodes = in_mesh_order(nodes)

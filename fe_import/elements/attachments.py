@@ -1,4 +1,4 @@
-"""What a mesh file attaches to a solid: point masses, springs, rigid bodies, averages, linear equations. Data only.
+"""What a mesh file attaches to a solid: masses, springs, beams, rigid bodies, averages, linear equations. Data only.
 
 Components are 0 ... 5: displacements, then rotations, along the axes of the mesh. ``keyword`` is that of the file.
 """
@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fe_import.elements.frame import FrameElement
 from fe_import.model import Array, IntArray
 
 Terms = tuple[tuple[int, int, float], ...]  # node, component, coefficient
@@ -36,6 +37,32 @@ class AttachedSpring:
 
 
 @dataclass(frozen=True)
+class AttachedBeam:
+    """A straight beam between points at ``offsets`` (2, 3) from two nodes, which turn with it.
+
+    Attributes
+    ----------
+    keyword : str
+    material : str
+        Its name in the file.
+    element : FrameElement
+        With the numbers of the nodes; its length is that between the points.
+    offsets : (2, 3) array
+    released : tuple of int
+        Local components that its ends do not pass on: 0 ... 5 of the first, 6 ... 11 of the second.
+    line_mass : float
+        Nonstructural mass per length, without rotary inertia.
+    """
+
+    keyword: str
+    material: str
+    element: FrameElement
+    offsets: Array
+    released: tuple[int, ...] = ()
+    line_mass: float = 0.0
+
+
+@dataclass(frozen=True)
 class LinearEquation:
     """Σ coefficient · component = 0; the first term follows from the others where it can."""
 
@@ -45,11 +72,12 @@ class LinearEquation:
 
 @dataclass(frozen=True)
 class RigidBody:
-    """Nodes that follow a reference node, which has rotations."""
+    """Nodes that follow a reference node, which has rotations, in some of their components (a node may lack these)."""
 
     keyword: str
     reference: int
     nodes: IntArray
+    components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
 
 
 @dataclass(frozen=True)
@@ -62,13 +90,15 @@ class AverageNode:
     weights: Array
 
 
-Attachment = AttachedMass | AttachedSpring | LinearEquation | RigidBody | AverageNode
+Attachment = AttachedMass | AttachedSpring | AttachedBeam | LinearEquation | RigidBody | AverageNode
 
 
 def nodes_of(item: Attachment) -> list[int]:
     """All nodes that an attachment names."""
     if isinstance(item, AttachedMass):
         return [item.node]
+    if isinstance(item, AttachedBeam):
+        return list(item.element.nodes)
     if isinstance(item, (RigidBody, AverageNode)):
         return [item.reference, *item.nodes.tolist()]
     return [node for node, _, _ in item.terms]
@@ -78,6 +108,9 @@ def renumbered(item: Attachment, new: Callable[[int], int]) -> Attachment:
     """The same with other numbers of nodes."""
     if isinstance(item, AttachedMass):
         return replace(item, node=new(item.node))
+    if isinstance(item, AttachedBeam):
+        first, second = item.element.nodes
+        return replace(item, element=replace(item.element, nodes=(new(first), new(second))))
     if isinstance(item, (RigidBody, AverageNode)):
         nodes = np.array([new(n) for n in item.nodes.tolist()], dtype=np.int64)
         return replace(item, reference=new(item.reference), nodes=nodes)
@@ -85,9 +118,13 @@ def renumbered(item: Attachment, new: Callable[[int], int]) -> Attachment:
 
 
 def needs_rotations(item: Attachment) -> list[int]:
-    """Nodes that turn: they lead or average others, carry inertia or an arm, or their rotation is named."""
+    """Nodes that turn: they lead or average others, carry inertia, an arm or a beam, or are named."""
     if isinstance(item, AttachedMass):
         return [item.node] if item.inertia.any() or item.offset.any() else []
+    if isinstance(item, AttachedBeam):
+        held = [not set(item.released) >= {k + 3, k + 4, k + 5} for k in (0, 6)]
+        ends = zip(item.element.nodes, held, item.offsets, strict=True)
+        return [node for node, passes, offset in ends if passes or offset.any()]
     if isinstance(item, (RigidBody, AverageNode)):
         return [item.reference]
     return [node for node, component, _ in item.terms if component > 2]

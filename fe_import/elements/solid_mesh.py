@@ -81,6 +81,8 @@ class SolidMesh:
         What stands in the file and is not part of the link, and how often.
     further_nodes : (k, 3) array
         Of no element, which attachments need.
+    further_names : dict of int
+        Name -> the one further node of a set.
     attachments : tuple of Attachment
         Further nodes have negative numbers: those of the mesh and these in one array, counted from its end.
     materials : MeshMaterials
@@ -94,6 +96,7 @@ class SolidMesh:
     lost_sets: dict[str, str] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     further_nodes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    further_names: dict[str, int] = field(default_factory=dict)
     attachments: tuple[Attachment, ...] = ()
     materials: MeshMaterials = field(default_factory=MeshMaterials)
 

@@ -71,6 +71,7 @@ def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:
         if name in attached.reasons:
             text += f" ({attached.reasons[name]})"
         used = name in attached.whole and name not in attached.reasons
+        used |= name in USED[:3] and "BEAM SECTION" in attached.whole
         return LeftOut(name, count, deck.places[name], "" if used else text, used)
 
     found = [entry(name, count, loss(name)) for name, count in deck.keywords.items() if not is_read(name)]

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.elements.attachments import (
+    AttachedBeam,
     AttachedMass,
     AttachedSpring,
     Attachment,
@@ -26,6 +27,7 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.interfaces.averaged import Items, average
 from fe_import.interfaces.dependence import Dependence, arm
 from fe_import.model import Array, IntArray
+from fe_import.models.attached_beams import beam_matrices
 
 _NONE = 1e-10  # of an equation's coefficients: what is left of one that follows from others
 _RIGID = 1e-9  # of the size of a motion: an equation that resists it
@@ -64,7 +66,7 @@ def attached_nodes(mesh: SolidMesh) -> AttachedNodes:
 
 
 def attached_matrices(mesh: SolidMesh, where: AttachedNodes) -> tuple[sp.csc_array, sp.csc_array]:
-    """(rows, rows) mass and stiffness of point masses and springs."""
+    """(rows, rows) mass and stiffness of point masses, springs and beams."""
     mass, stiffness = _Entries(), _Entries()
     for item in mesh.attachments:
         if isinstance(item, AttachedMass):
@@ -77,6 +79,11 @@ def attached_matrices(mesh: SolidMesh, where: AttachedNodes) -> tuple[sp.csc_arr
         elif isinstance(item, AttachedSpring):
             rows, coefficients = _form(item.terms, where)
             stiffness.add(rows, item.stiffness * np.outer(coefficients, coefficients))
+        elif isinstance(item, AttachedBeam):
+            dofs = where.dof_map[list(item.element.nodes)].ravel()
+            present = np.ix_(dofs >= 0, dofs >= 0)  # a node of a solid does not turn where the beam's end is pinned
+            for entries, block in zip((mass, stiffness), beam_matrices(item), strict=True):
+                entries.add(dofs[dofs >= 0], block[present])
     return mass.matrix(where.rows), stiffness.matrix(where.rows)
 
 
@@ -130,8 +137,9 @@ def _followed(state: Dependence, item: Attachment, where: AttachedNodes, source:
         motion = np.zeros((len(others), 6, 6))
         motion[:, :3] = arm(where.nodes[others] - where.nodes[item.reference])
         motion[:, 3:, 3:] = np.eye(3)
-        rows = where.dof_map[others].ravel()
-        leaders, values = where.dof_map[item.reference], motion.reshape(-1, 6)[rows >= 0]
+        chosen = list(item.components)
+        rows = where.dof_map[others][:, chosen].ravel()
+        leaders, values = where.dof_map[item.reference], motion[:, chosen].reshape(-1, 6)[rows >= 0]
         followers = rows[rows >= 0]
     elif isinstance(item, AverageNode):
         members = Items.of_nodes(where.dof_map[item.nodes, :3], where.nodes[item.nodes], item.weights)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.description.link import LinkFile
-from fe_import.description.records import LinkDescription, Solid
+from fe_import.description.records import Interface, LinkDescription, Solid
 from fe_import.elements.attachments import AttachedSpring, needs_rotations
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
@@ -19,8 +19,9 @@ from fe_import.files.toml import choose
 from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.mesh.read import read_mesh
-from fe_import.model import FEModel
+from fe_import.model import Array, FEModel
 from fe_import.models.attached import attached_constraints, attached_matrices, attached_nodes
+from fe_import.models.hinges import check_hinges
 
 
 def solid_model(link: LinkFile) -> FEModel:
@@ -54,7 +55,7 @@ def solid_model(link: LinkFile) -> FEModel:
     lame = np.empty((mesh.count, 2))
     for material in materials:
         lame[slice(None) if material.elements is None else material.elements] = material.lame
-    faces = _faces(description, mesh, where)
+    faces = _faces(description, solid, mesh, where)
     if mesh.attachments:
         places = attached_nodes(mesh)
         added, springs = attached_matrices(mesh, places)
@@ -63,12 +64,15 @@ def solid_model(link: LinkFile) -> FEModel:
         coupled = couple_interfaces(places.nodes, faces, where, places.dof_map, places.rows, constraints)
     else:
         coupled = couple_interfaces(mesh.nodes, faces, where)
+    stiffness = coupled.extended(stiffness)
+    if mesh.attachments:
+        check_hinges(mesh, places, coupled, stiffness)
     return FEModel(
         name=description.name,
         nodes=coupled.nodes,
         dof_map=coupled.dof_map,
         mass=coupled.extended(mass),
-        stiffness=coupled.extended(stiffness),
+        stiffness=stiffness,
         interface_nodes=coupled.interface_nodes,
         independent=coupled.independent,
         coupling=coupled.coupling,
@@ -146,18 +150,22 @@ def _materials_of_mesh(mesh: SolidMesh, where: str) -> list[SolidMaterial]:
     return [SolidMaterial(*found.constants[name], mesh.element_sets[key]) for key, name in found.sections]
 
 
-def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[InterfaceFace]:
+def _faces(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[InterfaceFace]:
     result = []
+    names = _named_nodes(solid, mesh, where)
     for k, interface in enumerate(link.interfaces):
         place = f"{where}: interfaces[{k}]"
-        if interface.node or not interface.face:
+        if bool(interface.node) == bool(interface.face):
             raise FEImportError(
                 Cause.INTERFACE,
-                "an interface of a solid link sits on a face",
+                "an interface of a solid link sits on a face, or on a node that turns",
                 where=place,
                 value=interface.node or None,
-                remedy="give face = SET",
+                remedy="give face = SET, or node = NAME for a node of a beam or of a rigid body",
             )
+        if interface.node:
+            result.append(_node(interface, mesh, names, place))
+            continue
         position = None if interface.position is None else np.asarray(interface.position, dtype=float)
         try:
             weights = interface.weights or ("area" if interface.coupling == "averaged" else "uniform")
@@ -170,12 +178,34 @@ def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[Interface
     return result
 
 
+def _node(interface: Interface, mesh: SolidMesh, names: dict[str, int], place: str) -> InterfaceFace:
+    """An interface on a node: of ``solid.nodes``, or the only one of a set of the mesh."""
+    count = len(mesh.nodes) + len(mesh.further_nodes)
+    alone = {name: int(own[0]) for name, own in mesh.node_sets.items() if len(own) == 1}
+    known = {**alone, **{name: count + k for name, k in mesh.further_names.items()}, **names}
+    choose(interface.node, sorted(known), f"{place}.node")
+    for field in ("position", "weights"):
+        if getattr(interface, field):
+            message, remedy = f"an interface on a node has no {field}", "remove the field, or couple a face"
+            raise FEImportError(Cause.INTERFACE, message, where=f"{place}.{field}", remedy=remedy)
+    if interface.coupling != "rigid":
+        message, remedy = "an interface on a node couples no others", "remove the field, or couple a face"
+        raise FEImportError(Cause.INTERFACE, message, where=f"{place}.coupling", remedy=remedy)
+    node = known[interface.node]
+    return InterfaceFace(interface.name, np.array([node]), _positions(mesh)[node], "node")
+
+
+def _positions(mesh: SolidMesh) -> Array:
+    return np.vstack([mesh.nodes, mesh.further_nodes])
+
+
 def _named_nodes(solid: Solid, mesh: SolidMesh, where: str) -> dict[str, int]:
-    """Mesh nodes nearest to the named positions."""
+    """Nodes of the mesh, and of what is attached to it, nearest to the named positions."""
     result = {}
-    limit = 0.05 * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    nodes = _positions(mesh)
+    limit = 0.05 * float(np.linalg.norm(np.ptp(nodes, axis=0)))
     for name, position in solid.nodes.items():
-        distance = np.linalg.norm(mesh.nodes - np.asarray(position), axis=1)
+        distance = np.linalg.norm(nodes - np.asarray(position), axis=1)
         nearest = int(distance.argmin())
         if not distance[nearest] <= limit:
             raise FEImportError(

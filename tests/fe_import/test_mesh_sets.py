@@ -212,7 +212,7 @@ LOSSES = {  # lines of the deck, what the message counts, what the link may be w
     ),
     "beams": (
         ["*ELEMENT, TYPE=B31, ELSET=B", "9, 7, 17", "*BEAM SECTION, ELSET=B, SECTION=RECT", "1., 1."],
-        "beams: 1 BEAM SECTION",
+        "beams (it lacks MATERIAL): 1 BEAM SECTION",
         ["BEAM SECTION"],
     ),
     "trusses": (
