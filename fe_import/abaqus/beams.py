@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -29,7 +30,8 @@ from fe_import.errors import FEImportError
 from fe_import.model import Array
 
 _ALONG = 1e-6  # sine of the angle between a beam and its direction 1
-_SHAPES = {"RECT": 2, "CIRC": 1, "PIPE": 2, "BOX": 6}  # numbers that a section needs
+_OF_ABAQUS = ("PART", "INSTANCE", "ASSEMBLY", "PREPRINT")  # unknown to CalculiX
+_SHAPES = {"RECT": 2, "CIRC": 2, "PIPE": 2, "BOX": 6}  # numbers that a section needs
 
 
 def beam_section(deck: Deck, statement: Statement, served: set[int]) -> Iterator[Attachment]:
@@ -54,13 +56,17 @@ def beam_section(deck: Deck, statement: Statement, served: set[int]) -> Iterator
         shape, material = statement.options.get("SECTION", "GENERAL").upper(), option(statement, "ELSET").upper()
         (density,) = numbers([option(statement, "DENSITY")])
         young, shear = (*numbers(rows[2] if len(rows) > 2 else []), 0.0, 0.0)[:2]
-        if not (young > 0 and shear > 0 and -1 < (nu := young / (2 * shear) - 1)):
+        if not (young > 0 and shear > 0 and (nu := young / (2 * shear) - 1) > -1):
             raise Unused("E and G, on its third line, must be positive")
     if not density > 0:
         raise Unused("a density must be positive")
     if not rows or len(rows) > 3:
         raise Unused("it has another number of lines than are followed")
     given = numbers(rows[0])
+    if shape == "CIRC" and len(given) == 1:
+        if not any(deck.keywords[name] for name in _OF_ABAQUS):
+            raise Unused("one number is a radius to Abaqus, a diameter to CalculiX: write two diameters")
+        given = [2 * given[0], 2 * given[0]]
     constants, sizes, turns = _section(shape, given, min(max(nu, -0.99), 0.499))
     direction = np.array(numbers(rows[1])[:3]) if len(rows) > 1 and any(rows[1]) else None
     if direction is not None and direction.shape != (3,):
@@ -83,7 +89,7 @@ def beam_section(deck: Deck, statement: Statement, served: set[int]) -> Iterator
             if toward not in deck.points:
                 raise Unused("the further node of a beam is not there")
             direction = np.subtract(deck.points[toward], deck.points[nodes[0]])
-        for first, second in zip(nodes[:-1], nodes[1:], strict=True):
+        for first, second in pairwise(nodes):
             start, end = np.array(deck.points[first]), np.array(deck.points[second])
             axes = _axes(start, end, direction, turns)
             length = float(np.linalg.norm(end - start))
@@ -119,8 +125,6 @@ def _section(shape: str, given: list[float], nu: float) -> tuple[SectionConstant
         raise Unused(f"a section {shape}")
     while len(given) > _SHAPES[shape] and not given[-1]:
         given = given[:-1]
-    if shape == "CIRC" and len(given) == 2 and given[0] == given[1]:
-        given = [given[0] / 2]  # CalculiX: two thicknesses; Abaqus: a radius
     if len(given) != _SHAPES[shape]:
         raise Unused(f"a section {shape} of {len(given)} numbers")
     section: Section
@@ -131,8 +135,10 @@ def _section(shape: str, given: list[float], nu: float) -> tuple[SectionConstant
             raise Unused("a box with walls of different thickness")
         section, sizes = RectangularTube(*given[:3]), (given[0], given[1])
     else:
-        section = Circular(2 * given[0]) if shape == "CIRC" else Tubular(2 * given[0], given[1])
-        sizes = (2 * given[0], 2 * given[0])
+        if shape == "CIRC" and given[0] != given[1]:
+            raise Unused("an ellipse")
+        section = Circular(given[0]) if shape == "CIRC" else Tubular(2 * given[0], given[1])
+        sizes = (given[0], given[0]) if shape == "CIRC" else (2 * given[0], 2 * given[0])
     try:
         return section_constants(section, nu, "saint-venant", ""), sizes, shape in ("CIRC", "PIPE")
     except FEImportError as problem:

@@ -212,8 +212,8 @@ class Interface(_Record, frozen=True):
     name : str
         What scenes call it.
     node : str
-        A named node; of a solid one that turns (of a beam, of a rigid body of its mesh file), also by the set that holds
-        it alone. Give this or ``face``.
+        A named node; of a solid one that turns (of a beam, of a rigid body of its mesh file), or the set that holds it
+        alone. Give this or ``face``.
     face : str
         A node or face set of the mesh.
     coupling : str

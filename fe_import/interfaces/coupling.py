@@ -31,7 +31,8 @@ class Coupling:
     Attributes
     ----------
     nodes : (n + i + a, 3) array
-        The model's nodes, then one per interface that is none of them, then auxiliary nodes of large averaged faces [m].
+        The model's nodes, then one per interface that is none of them, then auxiliary nodes of large averaged faces
+        [m].
     dof_map : (n + i + a, 6) int array
         Row of each nodal component, -1 where a node lacks it.
     coupling : (d, f) sparse CSC
@@ -81,8 +82,8 @@ def couple_interfaces(
     ------
     FEImportError
         ``INTERFACE``: nodes that do not exist, too few, collinear or too close ones, a position far from the face,
-        rigid faces that share a node, averaged ones with none left of their own, a node that does not turn or follows, too many nodes to average, faulty
-        weights, or two interfaces of one name.
+        rigid faces that share a node, averaged ones with none left of their own, a node that does not turn or that
+        follows, too many nodes to average, faulty weights, or two interfaces of one name.
     """
     faces = checked_faces(nodes, faces, source)
     n = len(nodes)
@@ -95,7 +96,8 @@ def couple_interfaces(
     new = [k for k, face in enumerate(faces) if face.coupling != "node"]
     i = len(new)
     added = start + np.arange(6 * (i + sum(map(len, auxiliary)))).reshape(-1, 6)
-    own_nodes = np.array([n + new.index(k) if k in new else int(f.nodes[0]) for k, f in enumerate(faces)])
+    places = [n + new.index(k) if k in new else int(f.nodes[0]) for k, f in enumerate(faces)]
+    own_nodes = np.array(places, dtype=np.int64)
     interface_rows = np.vstack([dof_map, added[:i]])[own_nodes]
     patch_rows = np.split(added[i:], np.cumsum([len(a) for a in auxiliary])[:-1])
 

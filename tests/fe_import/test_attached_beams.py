@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.linalg
-from link_files import SOLID, dense, frame_link, merged, solid_link, write_toml
+from link_files import SOLID, dense, frame_link, solid_link
 
-from fe_import.description.link import LinkFile, load_link
+from fe_import.description.link import LinkFile
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
@@ -103,11 +102,11 @@ def test_a_frame_in_a_deck(tmp_path):
     x, y, z = ROOT
     shift[:3, 3:] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]  # motion of the origin per motion of ROOT: θ × (0 - ROOT)
     along = TIP - ROOT
-    one = np.array([0.1, 0.2, 1.0])
+    two = np.cross(along, [0.1, 0.2, 1.0]).tolist()
     frame = {
         "nodes": {"root": ROOT.tolist(), "elbow": (ROOT + along / 2).tolist(), "tip": TIP.tolist()},
         "members": [
-            {"from": a, "to": b, "elements": 3, "material": "m", "section": "s", "local_z": np.cross(along, one).tolist()}
+            {"from": a, "to": b, "elements": 3, "material": "m", "section": "s", "local_z": two}
             for a, b in (("root", "elbow"), ("elbow", "tip"))
         ],
     }
@@ -120,3 +119,128 @@ def test_a_frame_in_a_deck(tmp_path):
     expected = scipy.linalg.eigh(stiffness, mass, eigvals_only=True)[6:]
     found = scipy.linalg.eigh(found_stiffness, found_mass, eigvals_only=True)[6:]
     np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+X_AXIS = (ROOT, ROOT + np.array([0.5, 0.0, 0.0]))
+G = E / (2 * (1 + NU))
+SECTIONS = {  # type, its line, area, moments about directions 1 and 2, torsion constant; directions 1, 2 are y, z
+    "circle": ("CIRC", "0.03, 0.03", np.pi * 0.015**2, np.pi / 4 * 0.015**4, np.pi / 4 * 0.015**4),
+    "tube": ("PIPE", "0.02, 0.003", np.pi * (0.02**2 - 0.017**2), *(2 * [np.pi / 4 * (0.02**4 - 0.017**4)])),
+    "box": (
+        *("BOX", "0.04, 0.06, 0.004, 0.004, 0.004, 0.004", 0.04 * 0.06 - 0.032 * 0.052),
+        *((0.04 * 0.06**3 - 0.032 * 0.052**3) / 12, (0.06 * 0.04**3 - 0.052 * 0.032**3) / 12),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+def test_sections(tmp_path, name):
+    """Stretch, and the bending moments that the two directions take, closed forms to 1e-9."""
+    shape, line, area, about_1, about_2 = SECTIONS[name]
+    lines = [*beam_nodes(2, *X_AXIS), *beam_elements(2), *section(line, "0., 1., 0.", shape=shape)]
+    found = tip_flexibility(on_rigid_box(tmp_path, *lines))
+    expected = 0.5 / (E * np.array([area, about_1, about_2]))
+    np.testing.assert_allclose([found[0, 0], found[4, 4], found[5, 5]], expected, rtol=1e-9)
+
+
+def test_a_general_section(tmp_path):
+    """Its own constants, modulus and density; no factor of shear but 1, as Abaqus has it."""
+    lines = [*beam_nodes(2, *X_AXIS), *beam_elements(2)]
+    lines += ["*BEAM GENERAL SECTION, ELSET=BEAMS, DENSITY=5000.", "2e-4, 3e-9, 0., 2e-9, 4e-9", "0., 1., 0."]
+    model = on_rigid_box(tmp_path, *lines, "6e10, 2e10")
+    found = np.diag(tip_flexibility(model))
+    bend = [0.5**3 / 3 / (6e10 * i) + 0.5 / (2e10 * 2e-4) for i in (2e-9, 3e-9)]
+    expected = [0.5 / (6e10 * 2e-4), *bend, 0.5 / (2e10 * 4e-9), 0.5 / (6e10 * 3e-9), 0.5 / (6e10 * 2e-9)]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    rigid = model.rigid_body_modes()[:, 0]
+    assert rigid @ model.mass @ rigid == pytest.approx(0.3 * 0.02 * 0.03 * RHO + 5000 * 2e-4 * 0.5, rel=1e-12)
+
+
+@pytest.mark.parametrize("way", ["default", "further node", "round along the default"])
+def test_directions(tmp_path, way):
+    """Direction 1 is that of the section's second line, (0, 0, -1) without it, that of a further node before both."""
+    nodes = beam_nodes(1, *X_AXIS)
+    lines, rows = beam_elements(1), ["0.01, 0.02"]
+    if way == "further node":
+        nodes += ["*NODE", "9500, 0.3, 0.01, 5."]
+        lines, rows = ["*ELEMENT, TYPE=B31, ELSET=BEAMS", "9000, 9000, 9001, 9500"], ["0.01, 0.02", "0., 1., 0."]
+    if way == "round along the default":
+        nodes = beam_nodes(1, ROOT, ROOT + np.array([0.0, 0.0, 0.5]))
+        round_one = [*nodes, *beam_elements(1), *section("0.02, 0.02", shape="CIRC")]
+        found = np.diag(tip_flexibility(on_rigid_box(tmp_path, *round_one)))
+        np.testing.assert_allclose(found[3:5], 0.5 / (E * np.pi / 64 * 0.02**4), rtol=1e-9)
+        return
+    found = np.diag(tip_flexibility(on_rigid_box(tmp_path, *nodes, *lines, *section(*rows))))
+    thin = 0.02 * 0.01**3 / 12  # direction 1 is z or -z: the section is thin along z
+    np.testing.assert_allclose(found[4:], [0.5 / (E * thin), 0.5 / (E * 0.01 * 0.02**3 / 12)], rtol=1e-9)
+
+
+def test_offsets(tmp_path):
+    """Shares of the thickness against the directions, as CalculiX places its sections: the pull bends the beam."""
+    lines = [*beam_nodes(2, *X_AXIS), *beam_elements(2), *section("0.01, 0.02", "0., 1., 0.")]
+    lines = [line + ", OFFSET1=0.5, OFFSET2=-0.25" if "BEAM SECTION" in line else line for line in lines]
+    model = on_rigid_box(tmp_path, *lines)
+    rigid = model.rigid_body_modes()
+    box, beam = 0.3 * 0.02 * 0.03 * RHO, 0.01 * 0.02 * 0.5 * RHO
+    moments = rigid.T @ model.mass @ rigid
+    centre = np.array([-moments[1, 5], moments[0, 5]]) / -moments[0, 0]  # x and y of the centre of mass
+    assert moments[0, 0] == pytest.approx(box + beam, rel=1e-12)
+    expected = (box * np.array([0.15, 0.01]) + beam * np.array([0.55, 0.01 - 0.005])) / (box + beam)
+    np.testing.assert_allclose(centre, expected, rtol=1e-9)
+    assert moments[0, 4] / moments[0, 0] == pytest.approx((box * 0.015 + beam * 0.02) / (box + beam), rel=1e-9)
+    found = tip_flexibility(model)
+    thin, tall = 0.02 * 0.01**3 / 12, 0.01 * 0.02**3 / 12
+    stretched = 0.5 / E * (1 / 2e-4 + 0.005**2 / thin + 0.005**2 / tall)
+    assert found[0, 0] == pytest.approx(stretched, rel=1e-9)
+
+
+FAULTS = {
+    "alone": (section("0.01, 0.02"), Cause.MESH, "turn freely about the 1 nodes that they share"),
+    "along": (section("0.01, 0.02", "1., 0., 0."), Cause.NOT_USED, "direction 1 of a section lies along its beam"),
+    "sizes": (section("0.01"), Cause.NOT_USED, "a section RECT of 1 numbers"),
+    "one number": (section("0.01", shape="CIRC"), Cause.NOT_USED, "a radius to Abaqus, a diameter to CalculiX"),
+    "ellipse": (section("0.01, 0.02", shape="CIRC"), Cause.NOT_USED, "an ellipse"),
+    "thick": (section("0.01, 0.02", shape="PIPE"), Cause.NOT_USED, "the wall is thicker"),
+    "walls": (section("1., 1., .1, .2, .1, .2", shape="BOX"), Cause.NOT_USED, "walls of different thickness"),
+    "shape": (section("1., 1., .1, .2, .1, .2", shape="I"), Cause.NOT_USED, "a section I"),
+    "material": (["*BEAM SECTION, ELSET=BEAMS, MATERIAL=NONE, SECTION=RECT", "1., 1."], Cause.NOT_USED, "'NONE' lacks"),
+    "words": (section("a, b"), Cause.NOT_USED, "could not convert"),
+    "infinite": (section("1., inf"), Cause.NOT_USED, "not finite"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_beams_that_cannot_be_used(tmp_path, name):
+    """On one node of the solid, whose place the message tells; or with the reason."""
+    lines, cause, words = FAULTS[name]
+    corner = [beam_elements(1)[0], "9000, 1, 9001"]
+    tip = ["*NODE", "9001, -0.5, 0., 0.", "*NSET, NSET=TIP", "9001,"]
+    with pytest.raises(FEImportError) as caught:
+        build_model(deck_link(tmp_path, *tip, *corner, *lines, interfaces=SOLID["interfaces"][1:]))
+    assert caught.value.cause is cause
+    assert words in str(caught.value)
+
+
+def test_a_beam_on_the_clamped_face(tmp_path):
+    """On a node of a rigid face it is clamped too: no hinge, and the health report is sound."""
+    corner = [beam_elements(1)[0], "9000, 1, 9001"]
+    tip = ["*NODE", "9001, -0.5, 0., 0.", "*NSET, NSET=TIP", "9001,"]
+    modal = reduce_link(deck_link(tmp_path, *tip, *corner, *section("0.01, 0.02")))
+    assert all(check.ok for check in modal.health)
+    assert modal.provenance["source: attached"] == "1 BEAM SECTION"
+    assert "attaches" in modal.provenance["second_order"]
+    assert {"MATERIAL", "ELASTIC", "DENSITY"}.isdisjoint(modal.provenance.get("left out", ""))
+
+
+def test_an_interface_needs_a_node_that_turns(tmp_path):
+    lines = [*beam_nodes(1), *beam_elements(1), *RECT, "*RIGID BODY, NSET=X1, REF NODE=9000", "*NSET, NSET=ONE", "1,"]
+    for node, words in (("ONE", "does not turn"), ("NONE", "unknown name"), ("TIP", None)):
+        link = deck_link(tmp_path, *lines, interfaces=[{"name": "hand", "node": node}])
+        if words is None:
+            assert build_model(link).interface_nodes[0].coupling == "node"
+            continue
+        with pytest.raises(FEImportError, match=words):
+            build_model(link)
+    link = deck_link(tmp_path, *lines, interfaces=[{"name": "hand", "node": "TIP", "coupling": "averaged"}])
+    with pytest.raises(FEImportError, match="couples no others"):
+        build_model(link)
