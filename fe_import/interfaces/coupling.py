@@ -102,7 +102,8 @@ def couple_interfaces(
     patch_rows = np.split(added[i:], np.cumsum([len(a) for a in auxiliary])[:-1])
 
     state = Dependence.free(start + added.size) if state is None else state.extended(added.size)
-    for k in sorted(range(len(faces)), key=lambda k: faces[k].coupling != "rigid"):  # what is rigid follows its own node only
+    order = sorted(range(len(faces)), key=lambda k: faces[k].coupling != "rigid")
+    for k in order:  # what is rigid follows its own node only
         face, points = faces[k], nodes[faces[k].nodes]
         if face.coupling == "node":
             _check_node(face, interface_rows[k], state, source)

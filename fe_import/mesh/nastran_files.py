@@ -101,7 +101,7 @@ def _read(path: Path, name: str, first: Path, lines: list[tuple[str, str]], with
 
 
 def _case_control(lines: list[tuple[str, str]]) -> tuple[int, dict[int, str], set[int] | None]:
-    """Number of lines before the bulk data, the sets that stand there, and the sets of MPC that it selects, if it is."""
+    """Number of lines before the bulk data, sets that stand there, and the sets of MPC that it selects, if it is."""
     begins = [k for k, (line, _) in enumerate(lines) if _BEGIN.match(line)]
     for k in begins:
         match = _BEGIN.match(lines[k][0])

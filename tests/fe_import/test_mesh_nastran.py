@@ -89,7 +89,7 @@ LOSSES = {  # cards, what the message says, names to ignore
     "spline": (["RSPLINE,90,.1,7,17,123,27,"], "constraints between nodes: 1 RSPLINE", ["RSPLINE"]),
     "springs": (["CELAS2,90,1.+5,7,1", "CBUSH,91,5,7,17"], "(a spring to the ground", ["CELAS2", "CBUSH"]),
     "supports": (["SPC1,1,123,7"], "supports (a link is free", ["SPC1"]),
-    "beams": (["CBAR,90,3,7,17,0.,0.,1.", "PBAR,3,1,.1,.1,.1,.1"], "beams or bars (a beam without length, or with", ["CBAR"]),
+    "beams": (["CBAR,90,3,7,17,0.,0.,1.", "PBAR,3,1,.1,.1,.1,.1"], "beams or bars (a beam without length", ["CBAR"]),
     "shells": (["CTRIA3,90,3,7,17,27", "PSHELL,3,1,.1"], "shells: 1 CTRIA3", ["CTRIA3"]),
     "supports of a point": (["GRID,901,,0.,0.,0.,,123"], "1 PS of GRID", ["PS of GRID"]),
     "matrices": (["DMIG,K2GG,0,6,2,0"], "given as matrices: 1 DMIG", ["DMIG"]),
