@@ -11,6 +11,7 @@ import contextlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from fe_import.abaqus.elements import ElementType, element_type, in_mesh_order
@@ -27,7 +28,7 @@ _LARGEST_LABEL = 999_999_999
 
 STATEMENTS = (
     *("MATERIAL", "ELASTIC", "DENSITY", "MASS", "ROTARY INERTIA", "SPRING", "BEAM SECTION", "BEAM GENERAL SECTION"),
-    *("EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING"),
+    *("EQUATION", "MPC", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING", "TIE", "TRANSFORM"),
 )
 
 
@@ -100,6 +101,11 @@ class Deck:
 
     def __post_init__(self) -> None:
         self.node_sets.nodes_of = self.nodes_of
+
+    @cached_property
+    def connectivity(self) -> dict[int, tuple[str, list[int]]]:
+        """Type and nodes of each element, once the deck is read."""
+        return {label: (kind, nodes) for kind, cells in self.elements.items() for label, nodes in cells.items()}
 
     def nodes_of(self, element_set: str) -> set[int]:
         """Labels of the nodes of an element set."""

@@ -82,15 +82,36 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class AverageNode:
-    """A reference node that moves as nodes do on average, with their weights."""
+    """A reference node that moves as nodes do on average, with their weights; None: by their shares of the area."""
 
     keyword: str
     reference: int
     nodes: IntArray
-    weights: Array
+    weights: Array | None
 
 
-Attachment = AttachedMass | AttachedSpring | AttachedBeam | LinearEquation | RigidBody | AverageNode
+@dataclass(frozen=True)
+class TiedNodes:
+    """Nodes that go with the faces on which they lie.
+
+    Attributes
+    ----------
+    keyword : str
+    nodes : (k,) int array
+    triangles, quadrilaterals : (t, 3), (q, 4) int arrays
+        Corners of the faces.
+    tolerance : float
+        Nodes farther away stay free; a share of the size of the face when 0.
+    """
+
+    keyword: str
+    nodes: IntArray
+    triangles: IntArray
+    quadrilaterals: IntArray
+    tolerance: float = 0.0
+
+
+Attachment = AttachedMass | AttachedSpring | AttachedBeam | LinearEquation | RigidBody | AverageNode | TiedNodes
 
 
 def nodes_of(item: Attachment) -> list[int]:
@@ -101,6 +122,8 @@ def nodes_of(item: Attachment) -> list[int]:
         return list(item.element.nodes)
     if isinstance(item, (RigidBody, AverageNode)):
         return [item.reference, *item.nodes.tolist()]
+    if isinstance(item, TiedNodes):
+        return [n for part in (item.nodes, item.triangles, item.quadrilaterals) for n in part.ravel().tolist()]
     return [node for node, _, _ in item.terms]
 
 
@@ -112,9 +135,15 @@ def renumbered(item: Attachment, new: Callable[[int], int]) -> Attachment:
         first, second = item.element.nodes
         return replace(item, element=replace(item.element, nodes=(new(first), new(second))))
     if isinstance(item, (RigidBody, AverageNode)):
-        nodes = np.array([new(n) for n in item.nodes.tolist()], dtype=np.int64)
-        return replace(item, reference=new(item.reference), nodes=nodes)
+        return replace(item, reference=new(item.reference), nodes=_all(item.nodes, new))
+    if isinstance(item, TiedNodes):
+        faces = _all(item.triangles, new), _all(item.quadrilaterals, new)
+        return replace(item, nodes=_all(item.nodes, new), triangles=faces[0], quadrilaterals=faces[1])
     return replace(item, terms=tuple((new(n), component, c) for n, component, c in item.terms))
+
+
+def _all(nodes: IntArray, new: Callable[[int], int]) -> IntArray:
+    return np.array([new(n) for n in nodes.ravel().tolist()], dtype=np.int64).reshape(nodes.shape)
 
 
 def needs_rotations(item: Attachment) -> list[int]:
@@ -127,4 +156,6 @@ def needs_rotations(item: Attachment) -> list[int]:
         return [node for node, passes, offset in ends if passes or offset.any()]
     if isinstance(item, (RigidBody, AverageNode)):
         return [item.reference]
+    if isinstance(item, TiedNodes):
+        return []
     return [node for node, component, _ in item.terms if component > 2]

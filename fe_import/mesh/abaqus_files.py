@@ -116,9 +116,7 @@ def _add_node_sets(deck: Deck, place: dict[int, int], mesh: RawMesh) -> None:
 
 
 def _add_surfaces(deck: Deck, place: dict[int, int], mesh: RawMesh) -> None:
-    connectivity = {
-        label: (kind, nodes) for kind, cells in deck.elements.items() for label, nodes in cells.items()
-    }
+    connectivity = deck.connectivity
     for shown, (by_nodes, rows) in deck.surfaces.items():
         try:
             members = surface_nodes(rows, deck.element_sets, connectivity, deck.node_sets, by_nodes)

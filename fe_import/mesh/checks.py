@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fe_import.elements.attachments import nodes_of
+from fe_import.elements.attachments import AttachedMass, TiedNodes, nodes_of
 from fe_import.elements.reference_cells import Tuples
 from fe_import.elements.solid_elements import SolidElement
 from fe_import.elements.solid_mesh import SolidMesh, element_faces
@@ -79,6 +79,14 @@ def _check_repeated_nodes(mesh: SolidMesh) -> None:
 def _check_coincident_nodes(mesh: SolidMesh) -> None:
     limit = COINCIDENT * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     pairs = cKDTree(mesh.nodes).query_pairs(limit, output_type="ndarray")
+    if len(pairs):  # a tie, an equation, a beam may join such nodes
+        tied, held = (np.zeros(len(mesh.nodes) + len(mesh.further_nodes), dtype=bool) for _ in range(2))
+        for item in mesh.attachments:
+            if isinstance(item, TiedNodes):
+                tied[item.nodes] = True
+            elif not isinstance(item, AttachedMass):
+                held[nodes_of(item)] = True
+        pairs = pairs[~(tied[pairs].any(axis=1) | held[pairs].all(axis=1))]
     if len(pairs):
         a, b = sorted(pairs[np.lexsort(pairs.T[::-1])[0]].tolist())
         raise _faulty(

@@ -55,12 +55,12 @@ def solid_model(link: LinkFile) -> FEModel:
     lame = np.empty((mesh.count, 2))
     for material in materials:
         lame[slice(None) if material.elements is None else material.elements] = material.lame
-    faces = _faces(description, solid, mesh, where)
+    faces, untied = _faces(description, solid, mesh, where), dict[str, int]()
     if mesh.attachments:
         places = attached_nodes(mesh)
         added, springs = attached_matrices(mesh, places)
         mass, stiffness = _sum(mass, added), _sum(stiffness, springs)
-        constraints = attached_constraints(mesh, places)
+        constraints, untied = attached_constraints(mesh, places)
         coupled = couple_interfaces(places.nodes, faces, where, places.dof_map, places.rows, constraints)
     else:
         coupled = couple_interfaces(mesh.nodes, faces, where)
@@ -83,7 +83,7 @@ def solid_model(link: LinkFile) -> FEModel:
         stress=solid_stress(mesh, lame),
         left_out={name: n for name, n in mesh.left_out.items() if not own or name not in mesh.materials.names},
         materials=mesh.materials.constants if own else {},
-        notes=_attached_notes(mesh),
+        notes=_attached_notes(mesh, untied),
         second_order_lack=_second_order_lack(mesh),
     )
 
@@ -94,9 +94,12 @@ def _sum(matrix: sp.csc_array, added: sp.csc_array) -> sp.csc_array:
     return (sp.csc_array((coo.data, coo.coords), shape=added.shape) + added).tocsc()
 
 
-def _attached_notes(mesh: SolidMesh) -> dict[str, str]:
+def _attached_notes(mesh: SolidMesh, untied: dict[str, int]) -> dict[str, str]:
     counts = Counter(item.keyword for item in mesh.attachments)
-    return {"attached": ", ".join(f"{count} {name}" for name, count in counts.items())} if counts else {}
+    if not counts:
+        return {}
+    free = {name: f" ({count} nodes beyond its tolerance stay free)" for name, count in untied.items()}
+    return {"attached": ", ".join(f"{count} {name}{free.get(name, '')}" for name, count in counts.items())}
 
 
 def _second_order_lack(mesh: SolidMesh) -> str:

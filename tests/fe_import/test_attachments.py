@@ -138,9 +138,12 @@ FAULTS = {
         "a spring to the ground",
     ),
     "distributing": (
-        ["*SURFACE, NAME=E, TYPE=NODE", "x1,", "*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=E", "*DISTRIBUTING"],
+        [
+            *("*SURFACE, NAME=E, TYPE=NODE", "x1,", "*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=E"),
+            "*DISTRIBUTING, WEIGHTING METHOD=LINEAR",
+        ],
         Cause.NOT_USED,
-        "couplings are used that are *KINEMATIC",
+        "weights of *DISTRIBUTING that fall with the distance",
     ),
     "mass without value": (["*ELEMENT, TYPE=MASS, ELSET=M", "9000, 1"], Cause.NOT_USED, "without a value"),
     "nonlinear": (
