@@ -47,7 +47,8 @@ def beam_section(deck: Deck, statement: Statement, served: set[int]) -> Iterator
         only(statement, "ELSET", "SECTION", "MATERIAL", "POISSON", "TEMPERATURE", "OFFSET1", "OFFSET2")
         shape, rows = option(statement, "SECTION").upper(), rows[:2]
         material = option(statement, "MATERIAL").upper()
-        young, nu, density = isotropic(deck, material)
+        found = isotropic(deck, material)
+        young, nu, density = found.youngs_modulus, found.poissons_ratio, found.density
         if not (young > 0 and -1 < nu < 0.5):
             raise Unused(f"material {material!r} is out of range")
         shear = young / (2 * (1 + nu))

@@ -43,10 +43,20 @@ def _axes(statement: Statement, position: Array) -> Array:
     if len(given) != 6 or kind not in ("R", "C"):
         raise Unused("a *TRANSFORM needs six numbers, and is rectangular or cylindrical")
     first, second = np.array(given[:3]), np.array(given[3:])
-    if kind == "R":
-        return rectangular(first, second)
+    return rectangular(first, second) if kind == "R" else cylindrical(first, second, position)
+
+
+def cylindrical(first: Array, second: Array, position: Array) -> Array:
+    """(3, 3) axes (columns) at a point: outward from the line through two points, around it, along it.
+
+    Raises
+    ------
+    Unused
+        A point on the line, or a line of one point.
+    """
     along, outward = second - first, position - first
-    return rectangular(outward - along * (along @ outward) / max(along @ along, 1e-300), np.cross(along, outward))
+    share = float(along @ outward) / max(float(along @ along), 1e-300)
+    return rectangular(outward - share * along, np.cross(along, outward))
 
 
 def rectangular(first: Array, second: Array) -> Array:

@@ -13,7 +13,6 @@ from fe_import.abaqus.materials import USED, deck_materials
 from fe_import.abaqus.parse import Deck, read_deck
 from fe_import.abaqus.sets import LostSet, indices, surface_nodes
 from fe_import.elements.attachments import renumbered
-from fe_import.elements.solid_mesh import MeshMaterials
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 
@@ -50,18 +49,11 @@ def read_abaqus(path: Path, name: str) -> RawMesh:
     _add_element_sets(deck, numbers, mesh)
     _add_node_sets(deck, place, mesh)
     _add_surfaces(deck, place, mesh)
-    mesh.materials = _materials(deck)
+    mesh.materials = deck_materials(deck)
     attached = attachments(deck)
     mesh.left_out += _left_out(deck, attached)
     mesh.attachments += [renumbered(i, place.__getitem__) for i in attached.items if i.keyword not in attached.reasons]
     return mesh
-
-
-def _materials(deck: Deck) -> MeshMaterials:
-    found = deck_materials(deck)
-    shown = deck.element_sets.names
-    sections = tuple((shown.get(name, name), material) for name, material in found.sections)
-    return MeshMaterials(found.constants, sections, found.lack, USED)
 
 
 def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:

@@ -9,7 +9,8 @@ import scipy.sparse as sp
 
 from fe_import.description.link import LinkFile
 from fe_import.description.records import Interface, LinkDescription, Solid
-from fe_import.elements.attachments import AttachedSpring, needs_rotations
+from fe_import.elements.attachments import AttachedBeam, AttachedSpring, needs_rotations
+from fe_import.elements.elasticity import turned_moduli
 from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
 from fe_import.elements.solid_orders import raised, with_incompatible_modes
@@ -52,9 +53,6 @@ def solid_model(link: LinkFile) -> FEModel:
         mesh = with_incompatible_modes(mesh)
     materials, own = _materials(description, solid, mesh, where), not (solid.material or solid.regions)
     mass, stiffness = assemble_solid(mesh, materials)
-    lame = np.empty((mesh.count, 2))
-    for material in materials:
-        lame[slice(None) if material.elements is None else material.elements] = material.lame
     faces, untied = _faces(description, solid, mesh, where), dict[str, int]()
     if mesh.attachments:
         places = attached_nodes(mesh)
@@ -80,9 +78,9 @@ def solid_model(link: LinkFile) -> FEModel:
         triangles=surface_triangles(mesh),
         kind="solid",
         source=where,
-        stress=solid_stress(mesh, lame),
+        stress=solid_stress(mesh, materials),
         left_out={name: n for name, n in mesh.left_out.items() if not own or name not in mesh.materials.names},
-        materials=mesh.materials.constants if own else {},
+        materials=_constants(mesh, own),
         notes=_attached_notes(mesh, untied),
         second_order_lack=_second_order_lack(mesh),
     )
@@ -141,7 +139,7 @@ def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str)
 
 def _materials_of_mesh(mesh: SolidMesh, where: str) -> list[SolidMaterial]:
     found = mesh.materials
-    lost = next((name for name, _ in found.sections if name not in mesh.element_sets), None)
+    lost = next((s.elements for s in found.sections if s.elements not in mesh.element_sets), None)
     if found.lack or lost is not None:
         reason = found.lack or f"its set {lost!r} holds no solid elements that could be followed"
         raise FEImportError(
@@ -150,7 +148,26 @@ def _materials_of_mesh(mesh: SolidMesh, where: str) -> list[SolidMaterial]:
             where=f"{where}: solid",
             remedy="give material = NAME for the whole mesh, or [[solid.regions]] for its element sets",
         )
-    return [SolidMaterial(*found.constants[name], mesh.element_sets[key]) for key, name in found.sections]
+    result = []
+    for section in found.sections:
+        m, elements = found.constants[section.material], mesh.element_sets[section.elements]
+        moduli = m.moduli
+        if moduli is not None and section.orientation:
+            moduli = turned_moduli(moduli, found.orientations[section.orientation](mesh.centres(elements)))
+        result.append(SolidMaterial(m.youngs_modulus, m.poissons_ratio, m.density, elements, moduli))
+    return result
+
+
+def _constants(mesh: SolidMesh, own: bool) -> dict[str, tuple[float, float, float]]:
+    """Young's modulus, Poisson's ratio and density of the materials of the file that are used: solids', beams'."""
+    found = mesh.materials.constants if own else {}
+    result = {name: (m.youngs_modulus, m.poissons_ratio, m.density) for name, m in found.items()}
+    for item in mesh.attachments:
+        if isinstance(item, AttachedBeam) and (item.element.density or not item.line_mass):
+            e = item.element
+            ratio = e.youngs_modulus / (2 * e.shear_modulus) - 1
+            result.setdefault(item.material, (e.youngs_modulus, ratio, e.density))
+    return result
 
 
 def _faces(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[InterfaceFace]:

@@ -225,10 +225,10 @@ def test_materials_of_a_deck(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("*ELASTIC", "*ELASTIC, TYPE=ORTHO"), "elastic of type ORTHO"),
+        (("*ELASTIC", "*ELASTIC, TYPE=TRACTION"), "elastic of type TRACTION"),
         (("7e10, .33", "7e10, .33\n6e10, .33, 100."), "changes with temperature"),
         (("*DENSITY\n2700.,", ""), "lacks *ELASTIC or *DENSITY"),
-        (("MATERIAL=alu", "MATERIAL=alu, ORIENTATION=O"), "orientation"),
+        (("MATERIAL=alu", "MATERIAL=alu, COMPOSITE"), "layers"),
         (("ELSET=all", "ELSET=none"), "'none' holds no solid elements".replace("'none'", "'NONE'")),
         (("*SOLID SECTION, ELSET=all, MATERIAL=alu", ""), "no *SOLID SECTION"),
     ],
