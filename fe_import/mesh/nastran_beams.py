@@ -23,6 +23,7 @@ from fe_import.elements.sections import (
 )
 from fe_import.errors import FEImportError
 from fe_import.mesh.nastran_bulk import Bulk, Unused, digits
+from fe_import.mesh.nastran_materials import elastic_constants
 from fe_import.model import Array
 from fe_import.nastran.cards import Card
 
@@ -86,19 +87,10 @@ def _material(owner: Card, bulk: Bulk) -> tuple[float, float, float]:
     card = bulk.materials.get(owner.integer(2))
     if card is None or card.name != "MAT1":
         raise Unused(f"material {owner.integer(2)} is no MAT1 of this file")
-    return shear_material(card)
-
-
-def shear_material(card: Card) -> tuple[float, float, float]:
-    """E, G and density of a MAT1, which needs two of E, G and Poisson's ratio."""
-    young, shear, ratio = (card.real(k) if card.field(k) else None for k in (2, 3, 4))
-    if young is None and shear is not None and ratio is not None:
-        young = 2 * shear * (1 + ratio)
-    if shear is None and young is not None and ratio is not None:
-        shear = young / (2 * (1 + ratio))
+    young, shear, _ = elastic_constants(card)
     density = card.real(5, 0.0)
-    if not (young and shear and min(young, shear) > 0 and density >= 0):
-        raise Unused(f"MAT1 {card.integer(1)} lacks E and G, or they are not positive")
+    if not (min(young, shear) > 0 and density >= 0):
+        raise Unused(f"MAT1 {card.integer(1)} has constants that are not positive")
     return young, shear, density
 
 

@@ -22,6 +22,7 @@ from fe_import.files.includes import included_name, resolved
 from fe_import.files.text import TextFile
 from fe_import.mesh.nastran_attachments import READERS, attached
 from fe_import.mesh.nastran_bulk import Bulk, Unused
+from fe_import.mesh.nastran_materials import solid_materials
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 from fe_import.model import IntArray
 from fe_import.nastran.cards import Card, read_cards
@@ -180,6 +181,7 @@ def _mesh(bulk: Bulk, cases: dict[int, str]) -> RawMesh:
     for entry in _counted(left_out):
         known = entry.name in used or (entry.name in READERS and entry.name not in reasons)
         mesh.left_out.append(replace(entry, loss="", used=entry.name in used) if known else entry)
+    mesh.materials = solid_materials(bulk, {n for shape in cells if dimensions[shape] == 3 for n in owners[shape]})
     _add_properties(mesh, [np.array(owners[shape]) for shape in cells])
     _add_sets(mesh, cards, cases, place)
     return mesh

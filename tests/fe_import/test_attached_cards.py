@@ -11,8 +11,10 @@ from solid_meshes import BAR, bulk
 
 from fe_import.description.link import load_link
 from fe_import.elements.attachments import AttachedBeam
+from fe_import.elements.elasticity import orthotropic_moduli, turned_moduli
 from fe_import.elements.frame import FrameElement, local_axes
 from fe_import.elements.sections import SectionConstants
+from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.read import read_mesh
 from fe_import.model import FEModel
@@ -288,3 +290,68 @@ def test_a_turned_mass(tmp_path):
         found.append(item)
     np.testing.assert_allclose(found[0].offset, found[1].offset, atol=1e-15)
     np.testing.assert_allclose(found[0].inertia, found[1].inertia, atol=1e-15)
+
+
+ORTHO = ["MAT11,5,1.4+11,1.+10,8.+9,.3,.25,.4,5.+9", ",4.+9,3.+9,1600."]
+WOOD = orthotropic_moduli((1.4e11, 1e10, 8e9), (0.3, 0.25, 0.4), (5e9, 4e9, 3e9))
+MAT9 = "MAT9,5," + ",".join(repr(float(WOOD[i, j])) for i in range(6) for j in range(i, 6)) + ",1600."
+
+
+def solid(folder: Path, *cards: str) -> FEModel:
+    """The bar of solids with the materials of its file."""
+    text = bulk(BAR, "SET1,5," + ",".join(str(10 * n + 7) for n in BAR.node_sets["x0"]), *cards)
+    (folder / "bar.bdf").write_text(text.replace("PSOLID,2,1\nMAT1,1,7.+10,,.33,2700.\n", ""))
+    hub = {"name": "hub", "face": "SET:5"}
+    table = merged(SOLID, {"solid": {"mesh": "bar.bdf", "material": ""}, "interfaces": [hub]})
+    return build_model(load_link(write_toml(folder / "link.toml", table)))
+
+
+def wrapped(card: str) -> list[str]:
+    name, *fields = card.split(",")
+    return [(name if at == 0 else "") + "," + ",".join(fields[at : at + 8]) for at in range(0, len(fields), 8)]
+
+
+def test_materials_of_bulk_data(tmp_path):
+    """MAT1 with E and G, MAT9 and MAT11 in a rectangular and a cylindrical system: as the same solids from here."""
+    found = solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,2.8+10,,2700.")
+    mesh = found.stress.mesh
+    expected = assemble_solid(mesh, [SolidMaterial(7e10, 0.25, 2700.0)])
+    count = expected[0].shape[0]
+    for matrix, same in zip((found.mass, found.stiffness), expected, strict=True):
+        assert abs(matrix[:count, :count] - same).max() <= 1e-12 * abs(same).max()
+    assert found.materials == {"MAT1:1": (7e10, pytest.approx(0.25), 2700.0)}
+    assert {"PSOLID", "MAT1"}.isdisjoint(found.left_out)
+    cylinder = ["CORD2C,6,,0.5,-2.,0.,0.5,-2.,1.", ",1.5,-2.,0."]
+    z = np.array([0.0, 2, 1]) / np.sqrt(5)
+    y = np.cross(z, [2.0, 1, 0])
+    y /= np.linalg.norm(y)
+    axes = {4: np.tile(np.stack([np.cross(y, z), y, z], axis=1), (mesh.count, 1, 1))}
+    outward = mesh.centres(np.arange(mesh.count)) * [1, 1, 0] - [0.5, -2, 0]
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    up = np.tile([0.0, 0, 1], (mesh.count, 1))
+    axes[6] = np.stack([outward, np.cross(up, outward), up], axis=2)
+    for cards, system in ((ORTHO, 4), (wrapped(MAT9), 4), (ORTHO, 6)):
+        model = solid(tmp_path, f"PSOLID,2,5,{system}", *cards, *TURNED, *cylinder)
+        wood = SolidMaterial(1.0, 0.0, 1600.0, None, turned_moduli(WOOD, axes[system]))
+        mesh = model.stress.mesh
+        mass, stiffness = assemble_solid(mesh, [wood])
+        assert abs(model.stiffness[:count, :count] - stiffness).max() <= 1e-11 * abs(stiffness).max()
+        assert abs(model.mass[:count, :count] - mass).max() <= 1e-12 * abs(mass).max()
+
+
+MATERIAL_FAULTS = {
+    "no property": ([], "property 2 is not there"),
+    "of shells": (["PSOLID,2,5", "MAT8,5,1.+10,1.+10,.3,1.+9"], "is no MAT1, MAT9 or MAT11"),
+    "no system": (["PSOLID,2,5", *ORTHO], "lacks the coordinate system of its material (CORDM)"),
+    "disagree": (["PSOLID,2,1", "MAT1,1,7.+10,2.8+10,.33,2700."], "not those of an isotropic solid"),
+    "one constant": (["PSOLID,2,1", "MAT1,1,7.+10,,,2700."], "lacks two of E, G"),
+    "not definite": (["PSOLID,2,5,0", "MAT9,5,1.,2."], "not positive definite"),
+}
+
+
+@pytest.mark.parametrize("name", MATERIAL_FAULTS)
+def test_materials_that_cannot_be_used(tmp_path, name):
+    cards, words = MATERIAL_FAULTS[name]
+    with pytest.raises(FEImportError, match="the materials of the mesh file cannot be used") as caught:
+        solid(tmp_path, *cards)
+    assert words in str(caught.value)
