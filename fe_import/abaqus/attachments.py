@@ -12,9 +12,9 @@ import numpy as np
 
 from fe_import.abaqus.beams import beam_section
 from fe_import.abaqus.constraints import coupling, equation, multi_point, of_a_coupling, rigid_body, tie
-from fe_import.abaqus.parse import Deck, Statement
+from fe_import.abaqus.deck import Deck, Statement
 from fe_import.abaqus.sets import LostSet
-from fe_import.abaqus.statements import Unused, component_of, elements_of, numbers, only
+from fe_import.abaqus.statements import Unused, component_of, elements_of, not_turned, numbers, only
 from fe_import.abaqus.transforms import along_axes, node_axes
 from fe_import.elements.attachments import (
     AttachedMass,
@@ -73,6 +73,7 @@ def _mass(deck: Deck, statement: Statement, served: set[int]) -> Iterator[Attach
 
 def _rotary_inertia(deck: Deck, statement: Statement, served: set[int]) -> Iterator[Attachment]:
     only(statement, "ELSET")
+    not_turned(deck, statement)
     (row,) = statement.rows
     xx, yy, zz, xy, xz, yz = (*numbers(row), 0.0, 0.0, 0.0, 0.0)[:6]
     inertia: Array = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -102,6 +103,7 @@ def _spring(deck: Deck, statement: Statement, served: set[int]) -> Iterator[Atta
             along /= np.linalg.norm(along)
             terms = [(node, c, sign * along[c]) for node, sign in zip(nodes, (-1, 1), strict=True) for c in range(3)]
         else:
+            not_turned(deck, statement)
             axes, components = node_axes(deck), [component_of(f) for f in rows[0]]
             ends = zip(nodes, components, (-1.0, 1.0), strict=True)
             terms = [term for node, c, sign in ends for term in along_axes(node, c, sign, axes)]

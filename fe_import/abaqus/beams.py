@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from fe_import.abaqus.deck import Deck, Statement
 from fe_import.abaqus.materials import isotropic
-from fe_import.abaqus.parse import Deck, Statement
 from fe_import.abaqus.statements import Unused, elements_of, numbers, only, option
 from fe_import.elements.attachments import AttachedBeam, Attachment
 from fe_import.elements.frame import FrameElement, local_axes
@@ -69,9 +69,12 @@ def beam_section(deck: Deck, statement: Statement, served: set[int]) -> Iterator
             raise Unused("one number is a radius to Abaqus, a diameter to CalculiX: write two diameters")
         given = [2 * given[0], 2 * given[0]]
     constants, sizes, turns = _section(shape, given, min(max(nu, -0.99), 0.499))
-    direction = np.array(numbers(rows[1])[:3]) if len(rows) > 1 and any(rows[1]) else None
-    if direction is not None and direction.shape != (3,):
-        raise Unused("direction 1 needs three numbers")
+    place, direction = deck.placement(statement), None
+    if len(rows) > 1 and any(rows[1]):
+        direction = np.array(numbers(rows[1])[:3])
+        if direction.shape != (3,):
+            raise Unused("direction 1 needs three numbers")
+        direction = place.rotation @ direction
     shares = numbers([statement.options.get(name, "") for name in ("OFFSET1", "OFFSET2")])
     if any(shares) and not sizes:
         raise Unused("offsets are a share of the thickness of RECT, CIRC, PIPE and BOX sections")
@@ -90,6 +93,8 @@ def beam_section(deck: Deck, statement: Statement, served: set[int]) -> Iterator
             if toward not in deck.points:
                 raise Unused("the further node of a beam is not there")
             direction = np.subtract(deck.points[toward], deck.points[nodes[0]])
+        if direction is None and place.turned and not turns:
+            raise Unused("a section without direction 1 in an instance that is turned")
         for first, second in pairwise(nodes):
             start, end = np.array(deck.points[first]), np.array(deck.points[second])
             axes = _axes(start, end, direction, turns)

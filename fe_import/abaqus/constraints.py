@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fe_import.abaqus.deck import Deck, Statement
 from fe_import.abaqus.elements import solid_type
-from fe_import.abaqus.parse import Deck, Statement
 from fe_import.abaqus.sets import surface_faces, surface_nodes
-from fe_import.abaqus.statements import Unused, component_of, numbers, only, option
+from fe_import.abaqus.statements import Unused, component_of, not_turned, numbers, only, option
 from fe_import.abaqus.transforms import along_axes, node_axes
 from fe_import.elements.attachments import Attachment, AverageNode, LinearEquation, RigidBody, TiedNodes
 from fe_import.model import IntArray
@@ -21,6 +21,7 @@ _ALL = (0, 1, 2, 3, 4, 5)
 def equation(deck: Deck, statement: Statement, served: set[int]) -> Iterator[Attachment]:
     """*EQUATION: nodes, not sets, in their axes of *TRANSFORM."""
     only(statement)
+    not_turned(deck, statement)
     axes = node_axes(deck)
     fields = [f for row in statement.rows for f in row]
     while fields:
@@ -124,6 +125,8 @@ def coupling(deck: Deck, statement: Statement, served: set[int]) -> Iterator[Att
         only(kind)
         if not held.issuperset(_DISPLACEMENTS):
             raise Unused("couplings are used that hold all displacements")
+        if len(held) in (4, 5):
+            not_turned(deck, statement)
         yield _body("COUPLING", reference, nodes, tuple(sorted(held)))
         return
     only(kind, "WEIGHTINGMETHOD", "COUPLING")

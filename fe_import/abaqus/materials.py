@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fe_import.abaqus.deck import Deck, Statement
 from fe_import.abaqus.orientations import orientation
-from fe_import.abaqus.parse import Deck, Statement
 from fe_import.abaqus.statements import Unused, numbers
 from fe_import.elements.elasticity import checked_moduli, largest_youngs_modulus, orthotropic_moduli
 from fe_import.elements.solid_mesh import MeshMaterial, MeshMaterials, MeshSection

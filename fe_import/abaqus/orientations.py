@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fe_import.abaqus.parse import Deck, Statement
+from fe_import.abaqus.deck import Deck, Statement
 from fe_import.abaqus.statements import Unused, numbers, only
 from fe_import.abaqus.transforms import cylindrical, rectangular
 from fe_import.model import Array
@@ -34,12 +34,18 @@ def orientation(deck: Deck, name: str) -> Callable[[Array], Array]:
         raise Unused(f"orientation {name} is neither rectangular nor cylindrical, by two points or three")
     first, second, origin = np.array(given[:3]), np.array(given[3:6]), np.array([*given[6:], 0.0, 0.0, 0.0][:3])
     turn = _turn(statement)
+    place = deck.placement(statement)
     if system == "RECTANGULAR":
-        axes = rectangular(first - origin, second - origin) @ turn
+        axes = place.rotation @ rectangular(first - origin, second - origin) @ turn
         return lambda points: np.tile(axes, (len(points), 1, 1))
     if not (second - first).any():
         raise Unused(f"orientation {name} has an axis of two points in one place")
-    return lambda points: np.stack([cylindrical(first, second, p) for p in points]) @ turn
+
+    def around(points: Array) -> Array:
+        own = np.stack([cylindrical(first, second, point) for point in place.in_part(points)])
+        return np.asarray(place.rotation @ own @ turn)
+
+    return around
 
 
 def _turn(statement: Statement) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fe_import.abaqus.parse import Deck, Statement
+from fe_import.abaqus.deck import Deck, Statement
 
 
 class Unused(Exception):
@@ -36,6 +36,12 @@ def only(statement: Statement, *names: str) -> None:
     further = [name for name in statement.options if name not in names]
     if further:
         raise Unused(f"parameter {further[0]} is not followed")
+
+
+def not_turned(deck: Deck, statement: Statement) -> None:
+    """Refuse what names directions in an instance that is turned."""
+    if deck.placement(statement).turned:
+        raise Unused("it names directions in an instance that is turned")
 
 
 def numbers(fields: list[str]) -> list[float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fe_import.abaqus.parse import Deck, Statement
+from fe_import.abaqus.deck import Deck, Statement
 from fe_import.abaqus.statements import Unused, numbers, only, option
 from fe_import.model import Array
 
@@ -23,9 +23,11 @@ def node_axes(deck: Deck) -> dict[int, Array]:
     for statement in deck.statements:
         if statement.name == "TRANSFORM":
             only(statement, "NSET", "TYPE")
+            place = deck.placement(statement)
             for node in deck.node_sets.members(option(statement, "NSET")):
                 if node in deck.points:
-                    result[node] = _axes(statement, np.array(deck.points[node]))
+                    own = _axes(statement, place.in_part(np.array(deck.points[node])))
+                    result[node] = np.asarray(place.rotation @ own)
     return result
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from fe_import.abaqus.attachments import Attached, attachments
+from fe_import.abaqus.deck import Deck
 from fe_import.abaqus.keywords import is_read, loss, loss_of_elements
 from fe_import.abaqus.materials import USED, deck_materials
-from fe_import.abaqus.parse import Deck, read_deck
+from fe_import.abaqus.parse import read_deck
 from fe_import.abaqus.sets import LostSet, indices, surface_nodes
 from fe_import.elements.attachments import renumbered
 from fe_import.errors import Cause, FEImportError
