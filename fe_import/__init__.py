@@ -2,9 +2,10 @@
 
 from typing import Any
 
-__all__ = ["load_link", "modal_derivatives", "read_modal_file", "reduce_link", "write_modal_file"]
+__all__ = ["link_from_skfem", "load_link", "modal_derivatives", "read_modal_file", "reduce_link", "write_modal_file"]
 
 _HOME = {
+    "link_from_skfem": "fe_import.scikit_fem",
     "load_link": "fe_import.description.link",
     "modal_derivatives": "fe_import.derivatives",
     "reduce_link": "fe_import.reduce",

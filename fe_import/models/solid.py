@@ -46,7 +46,13 @@ def solid_model(link: LinkFile) -> FEModel:
             value=solid.mesh,
             remedy="give a path that starts at the folder of the link description",
         )
-    mesh = read_mesh(path, solid.ignore)
+    return mesh_model(read_mesh(path, solid.ignore), description, where)
+
+
+def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEModel:
+    """The model of a checked mesh; see `solid_model`."""
+    solid = description.solid
+    assert solid is not None
     if solid.raise_order:
         mesh = raised(mesh)
     if solid.hex8 == "incompatible-modes":
