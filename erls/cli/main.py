@@ -22,6 +22,7 @@ from erls.cli.files import info, view
 from erls.cli.linearize import linearize
 from erls.cli.reduce import reduce
 from erls.cli.simulate import simulate
+from erls.cli.starting import examples, new, schema
 from erls.cli.streams import StdoutLost, prepare_streams
 from erls.cli.studies import study
 from erls.cli.terminal import print_json, tell
@@ -42,9 +43,11 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-for command in (reduce, simulate, info, view, compare, effects, linearize):
+for command in (reduce, simulate, info, view, compare, effects, linearize, new, schema):
     app.command(command)
-app.command(study)
+for group in (study, examples):
+    app.command(group)
+app.register_install_completion_command(help="Install completion for the shell in use.")
 
 
 def _report(error: ReportedError, as_json: bool) -> None:
@@ -94,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except StdoutLost as problem:
         failure, as_json = _of_stdout(problem), False
     except (MemoryError, ImportError, OSError) as problem:
-        failure = _of_memory(problem)
+        failure = _of_memory(problem) or _of_extra(problem)
         if failure is None:
             raise
     if failure is not None:
@@ -120,6 +123,13 @@ def _of_stdout(problem: StdoutLost) -> ReportedError | None:
     from erls.files.output import not_writable
 
     return not_writable("stdout", problem.strerror, "free disk space, or send it elsewhere")
+
+
+def _of_extra(problem: Exception) -> ReportedError | None:
+    """The error where an extra of the installation is missing."""
+    from erls.files.optional import missing_package
+
+    return missing_package(problem)
 
 
 def _of_memory(problem: Exception) -> ReportedError | None:

@@ -92,6 +92,15 @@ def lame_parameters(moduli: Array) -> tuple[Array, Array] | None:
     return (lam, mu) if np.all(same) else None
 
 
+def average_lame_parameters(moduli: Array) -> Array:
+    """(..., 2) λ and μ of (..., 6, 6) moduli, averaged over all directions (W. Voigt, 1887): exact where isotropic."""
+    along = moduli[..., [0, 1, 2], [0, 1, 2]].sum(axis=-1)
+    across = moduli[..., [0, 0, 1], [1, 2, 2]].sum(axis=-1)
+    shear = moduli[..., [3, 4, 5], [3, 4, 5]].sum(axis=-1)
+    mu = (along - across + 3 * shear) / 15
+    return np.stack([(along + 2 * across) / 9 - 2 / 3 * mu, mu], axis=-1)
+
+
 def stress_of_gradient(gradient: Array, moduli: Array) -> Array:
     """(e, q, 6, m) stress of displacement gradients (e, q, derivative, component, m), moduli (e, 6, 6)."""
     parts = [gradient[:, :, a, a] for a in range(3)]

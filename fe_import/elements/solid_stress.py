@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fe_import.elements.elasticity import stress_of_gradient
+from fe_import.elements.elasticity import average_lame_parameters, stress_of_gradient
 from fe_import.elements.reference_cells import HEXAHEDRON, TETRAHEDRON, WEDGE
 from fe_import.elements.solid import SolidMaterial, element_moduli
 from fe_import.elements.solid_assembly import chunks, motion_of_modes, slopes
@@ -45,6 +45,11 @@ class SolidStress:
     material: IntArray
     sets: Mapping[str, IntArray]
     quantity: str = "stress"
+
+    @property
+    def lame(self) -> Array:
+        """(elements, 2) λ and μ [Pa] of each element, averaged over all directions where they are not isotropic."""
+        return np.asarray(average_lame_parameters(self.moduli)[self.material])
 
     def moduli_of(self, numbers: IntArray) -> Array:
         """(e, 6, 6) of elements."""

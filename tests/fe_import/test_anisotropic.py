@@ -15,6 +15,7 @@ from solid_meshes import box
 from fe_import.description.link import load_link
 from fe_import.elements.elasticity import (
     PAIRS,
+    average_lame_parameters,
     checked_moduli,
     isotropic_moduli,
     lame_parameters,
@@ -56,6 +57,9 @@ def test_constants_of_a_material():
     np.testing.assert_allclose(same, expected, rtol=1e-12, atol=1e-3)
     assert lame_parameters(expected) is not None
     assert lame_parameters(WOOD) is None
+    np.testing.assert_allclose(average_lame_parameters(expected), SolidMaterial(7e10, 0.33, 1.0).lame, rtol=1e-12)
+    turned = turned_moduli(WOOD, random_rotation(5)[None])[0]
+    np.testing.assert_allclose(average_lame_parameters(turned), average_lame_parameters(WOOD), rtol=1e-12)
 
 
 def test_a_turned_material():

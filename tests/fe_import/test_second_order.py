@@ -222,7 +222,7 @@ def green_energy(model: FEModel, u: Array) -> float:
     slopes = np.einsum("kbq,eqba->eqak", element.shape_gradients(points), np.linalg.inv(jacobian))
     gradient = np.einsum("eqak,ekc->eqac", slopes, u[model.dof_map[mesh.only.elements, :3]])
     strain = (gradient + gradient.swapaxes(2, 3) + gradient @ gradient.swapaxes(2, 3)) / 2
-    lam, mu = solid.moduli[solid.material][:, 0, 1], solid.moduli[solid.material][:, 3, 3]
+    lam, mu = solid.lame.T
     density = lam[:, None] / 2 * np.einsum("eqaa->eq", strain) ** 2
     density += mu[:, None] * np.einsum("eqab,eqab->eq", strain, strain)
     return float(np.sum(density * weights * np.linalg.det(jacobian)))
