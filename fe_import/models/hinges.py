@@ -1,8 +1,9 @@
-"""Beams that turn where a solid holds them: nodes of solids pass on forces, but no moments.
+"""Beams and springs that turn where a solid holds them: nodes of solids pass on forces, but no moments.
 
-A motion of beams, everything else at rest, is resisted if it breaks a constraint or takes energy. Beams that share with
-a solid one node, or nodes on one line, turn about them unless something else holds them; so does a node whose beams are
-all pinned in one direction. The link would be a mechanism, and is refused here with the place.
+A motion of them, everything else at rest, is resisted if it breaks a constraint or takes energy. Beams that share with
+a solid one node, or nodes on one line, turn about them unless something else holds them; so do the nodes of a spring
+against turning, and a node whose beams are all pinned in one direction. The link would be a mechanism, and is refused
+here with the place.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from fe_import.elements.attachments import AttachedBeam
+from fe_import.elements.attachments import AttachedBeam, AttachedSpring, Attachment, needs_rotations, nodes_of
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.interfaces.coupling import Coupling
@@ -40,29 +41,28 @@ def check_hinges(mesh: SolidMesh, places: AttachedNodes, coupled: Coupling, stif
     FEImportError
         ``MESH``.
     """
-    beams = [item for item in mesh.attachments if isinstance(item, AttachedBeam)]
-    if not beams:
-        return
     count, solid = len(places.nodes), len(mesh.nodes)
-    ends = np.array([item.element.nodes for item in beams]) % count
-    label = connected_components(sp.coo_array((np.ones(len(ends)), ends.T), shape=(count, count)), directed=False)[1]
-    for own in np.unique(label[ends[:, 0]]):
+    turning = [(item, np.array(nodes_of(item)) % count) for item in mesh.attachments if _passes_moments(item)]
+    if not turning:
+        return
+    pairs = np.array([(nodes[0], node) for _, nodes in turning for node in nodes])
+    label = connected_components(sp.coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count)), directed=False)[1]
+    for own in np.unique(label[pairs[:, 0]]):
         nodes = np.flatnonzero(label == own)
         shared = nodes[nodes < solid]
-        if not _on_a_line(places.nodes[shared]):
-            continue
-        motions = _rigid_motions(places, nodes)
-        if not _resisted(motions, coupled, stiffness):
-            names = sorted({b.keyword for b, at in zip(beams, label[ends[:, 0]], strict=True) if at == own})
+        if _on_a_line(places.nodes[shared]) and not _resisted(_rigid_motions(places, nodes), coupled, stiffness):
+            names = sorted({item.keyword for item, at in turning if label[at[0]] == own})
+            at = f"the {len(shared)} nodes that they share with the solid, which pass on no moments"
             raise FEImportError(
                 Cause.MESH,
-                f"{', '.join(names)}: beams turn freely about the {len(shared)} nodes that they share with the solid, "
-                "which pass on no moments",
+                f"{', '.join(names)}: they turn freely about {at if len(shared) else 'nothing'}",
                 where=mesh.source,
-                value=", ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in places.nodes[shared[:2]]),
+                value=", ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in places.nodes[[*shared, *nodes][:2]]),
                 limit="three nodes, not on one line",
-                remedy="join the beam to a face by a rigid body or a coupling, or let it share more nodes",
+                remedy="join them to a face by a rigid body or a coupling, or let them share more nodes",
             )
+    beams = [item for item in mesh.attachments if isinstance(item, AttachedBeam)]
+    ends = np.array([item.element.nodes for item in beams], dtype=np.int64).reshape(-1, 2) % count
     pinned = {int(end) for item, own in zip(beams, ends, strict=True) if item.released for end in own}
     for node in sorted(pinned):
         rows = places.dof_map[node, 3:]
@@ -74,6 +74,12 @@ def check_hinges(mesh: SolidMesh, places: AttachedNodes, coupled: Coupling, stif
                 value="({:.6g}, {:.6g}, {:.6g})".format(*places.nodes[node]),
                 remedy="let one of the beams pass on the moment (pin flags)",
             )
+
+
+def _passes_moments(item: Attachment) -> bool:
+    if isinstance(item, AttachedSpring):
+        return bool(needs_rotations(item))
+    return isinstance(item, AttachedBeam)
 
 
 def _on_a_line(points: Array) -> bool:
@@ -89,7 +95,7 @@ def _rigid_motions(places: AttachedNodes, nodes: IntArray) -> tuple[IntArray, Ar
     full = np.zeros((len(nodes), 6, 6))
     full[:, :3] = arm(offsets)
     full[:, 3:, 3:] = np.eye(3)
-    full[:, :, 3:] /= np.linalg.norm(offsets, axis=1).max()
+    full[:, :, 3:] /= np.linalg.norm(offsets, axis=1).max() or 1.0
     rows = places.dof_map[nodes].ravel()
     return rows[rows >= 0], full.reshape(-1, 6)[rows >= 0]
 

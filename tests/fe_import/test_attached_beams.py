@@ -195,7 +195,7 @@ def test_offsets(tmp_path):
 
 
 FAULTS = {
-    "alone": (section("0.01, 0.02"), Cause.MESH, "turn freely about the 1 nodes that they share"),
+    "alone": (section("0.01, 0.02"), Cause.MESH, "turn freely about the 1 nodes that they share with the solid, which"),
     "along": (section("0.01, 0.02", "1., 0., 0."), Cause.NOT_USED, "direction 1 of a section lies along its beam"),
     "sizes": (section("0.01"), Cause.NOT_USED, "a section RECT of 1 numbers"),
     "one number": (section("0.01", shape="CIRC"), Cause.NOT_USED, "a radius to Abaqus, a diameter to CalculiX"),
