@@ -275,11 +275,11 @@ def test_a_bush_between_solids(tmp_path):
     """Against turning, between two nodes of solids: nothing holds these against turning together."""
     cards = ["CBUSH,912,7,7,17,1.,0.,0.,", "PBUSH,7,K,10.,20.,30.,40.,50.,60."]
     with pytest.raises(FEImportError, match="CBUSH: they turn freely about the 2 nodes") as caught:
-        solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.33,2700.", *cards)
+        solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.3,2700.", *cards)
     assert caught.value.cause is Cause.MESH
     along = ["CBUSH,912,7,7,17,1.,0.,0.,", "PBUSH,7,K,1.+6"]
-    model = solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.33,2700.", *along)
-    plain = solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.33,2700.")
+    model = solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.3,2700.", *along)
+    plain = solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.3,2700.")
     added = (model.stiffness - plain.stiffness).toarray()
     ends = BAR.nodes[[0, 1]]
     direction = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
