@@ -273,18 +273,19 @@ def test_a_node_without_moments(tmp_path):
 
 def test_a_bush_between_solids(tmp_path):
     """Against turning, between two nodes of solids: nothing holds these against turning together."""
-    cards = ["CBUSH,912,7,7,17,1.,0.,0.,", "PBUSH,7,K,10.,20.,30.,40.,50.,60."]
+    first, second = BAR.node_sets["x1"][:2].tolist()
+    direction = (BAR.nodes[second] - BAR.nodes[first]) / np.linalg.norm(BAR.nodes[second] - BAR.nodes[first])
+    bush = f"CBUSH,912,7,{10 * first + 7},{10 * second + 7},1.,0.,0.,"
+    cards = ["PSOLID,2,1", "MAT1,1,7.+10,,.3,2700."]
     with pytest.raises(FEImportError, match="CBUSH: they turn freely about the 2 nodes") as caught:
-        solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.3,2700.", *cards)
+        solid(tmp_path, *cards, bush, "PBUSH,7,K,10.,20.,30.,40.,50.,60.")
     assert caught.value.cause is Cause.MESH
-    along = ["CBUSH,912,7,7,17,1.,0.,0.,", "PBUSH,7,K,1.+6"]
-    model = solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.3,2700.", *along)
-    plain = solid(tmp_path, "PSOLID,2,1", "MAT1,1,7.+10,,.3,2700.")
-    added = (model.stiffness - plain.stiffness).toarray()
-    ends = BAR.nodes[[0, 1]]
-    direction = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    np.testing.assert_allclose(added[:3, :3], 1e6 * np.outer(direction, direction), atol=1e-3)
-    np.testing.assert_allclose(added[:3, 3:6], -added[:3, :3], atol=1e-3)
+    added = (solid(tmp_path, *cards, bush, "PBUSH,7,K,1.+6").stiffness - solid(tmp_path, *cards).stiffness).toarray()
+    rows = 3 * np.array([[first], [second]]) + np.arange(3)
+    expected = np.zeros_like(added)
+    block = 1e6 * np.outer(direction, direction)
+    expected[np.ix_(rows.ravel(), rows.ravel())] = np.block([[block, -block], [-block, block]])
+    np.testing.assert_allclose(added, expected, atol=1e-3)
 
 
 def test_a_turned_mass(tmp_path):
