@@ -44,7 +44,8 @@ def check_mesh_error(
     if len(omega) <= 6:
         return ()
     error, energy = source.energy_of_error(shapes[:, 6 : 6 + _MODES], model.dof_map)
-    share = np.minimum(error / energy, _MOST)
+    whole = np.maximum(energy, omega[6 : 6 + _MODES] ** 2 / 2)  # with that of beams and springs
+    share = np.minimum(error / whole, _MOST)
     worst = float((1 / np.sqrt(1 - share) - 1).max())
     locking = [b.type for b in source.mesh.blocks if not b.element.midpoints and not b.element.incompatible]
     if worst > limit and locking:
