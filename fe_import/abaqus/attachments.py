@@ -13,6 +13,7 @@ import numpy as np
 from fe_import.abaqus.beams import beam_section
 from fe_import.abaqus.constraints import coupling, equation, multi_point, of_a_coupling, rigid_body, tie
 from fe_import.abaqus.deck import Deck, Statement
+from fe_import.abaqus.materials import filling
 from fe_import.abaqus.sets import LostSet
 from fe_import.abaqus.statements import Unused, component_of, elements_of, not_turned, numbers, only
 from fe_import.abaqus.transforms import along_axes, node_axes
@@ -22,7 +23,10 @@ from fe_import.elements.attachments import (
     Attachment,
     nodes_of,
 )
+from fe_import.elements.solid_mesh import Filling
 from fe_import.model import Array
+
+_FILLING = "NONSTRUCTURAL MASS"
 
 
 @dataclass
@@ -30,6 +34,7 @@ class Attached:
     """What was understood: attachments by labels of nodes, keywords and types of elements whole, and why not others."""
 
     items: list[Attachment] = field(default_factory=list)
+    fillings: list[Filling] = field(default_factory=list)
     whole: set[str] = field(default_factory=set)
     reasons: dict[str, str] = field(default_factory=dict)
 
@@ -38,9 +43,12 @@ def attachments(deck: Deck) -> Attached:
     """Interpret the statements of a deck; sets may stand behind them."""
     result = Attached()
     served: set[int] = set()
-    statements = [statement for statement in deck.statements if statement.name in _READERS]
+    statements = [s for s in deck.statements if s.name in _READERS or s.name == _FILLING]
     for statement in statements:
         try:
+            if statement.name == _FILLING:
+                result.fillings.append(filling(deck, statement))
+                continue
             for item in _READERS[statement.name](deck, statement, served):
                 if any(node not in deck.points for node in nodes_of(item)):
                     raise Unused("it names a node that is not there")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fe_import.abaqus.deck import Deck, Statement
+from fe_import.abaqus.elements import solid_type
 from fe_import.abaqus.orientations import orientation
-from fe_import.abaqus.statements import Unused, numbers
+from fe_import.abaqus.statements import Unused, numbers, only, option
 from fe_import.elements.elasticity import checked_moduli, largest_youngs_modulus, orthotropic_moduli
-from fe_import.elements.solid_mesh import MeshMaterial, MeshMaterials, MeshSection
+from fe_import.elements.solid_mesh import Filling, MeshMaterial, MeshMaterials, MeshSection
 from fe_import.model import Array
 
 USED = ("MATERIAL", "ELASTIC", "DENSITY", "SOLID SECTION", "ORIENTATION")
@@ -41,6 +42,33 @@ def deck_materials(deck: Deck) -> MeshMaterials:
     except (Unused, ValueError) as reason:
         lack = str(reason)
     return MeshMaterials(constants, tuple(sections), orientations, lack, USED)
+
+
+def filling(deck: Deck, statement: Statement) -> Filling:
+    """*NONSTRUCTURAL MASS of solid elements: per volume, or in total.
+
+    Raises
+    ------
+    Unused
+        What is not followed.
+    """
+    only(statement, "ELSET", "UNITS", "DISTRIBUTION")
+    units = "".join(option(statement, "UNITS").upper().split())
+    shared = "".join(statement.options.get("DISTRIBUTION", "MASSPROPORTIONAL").upper().split())
+    if units not in ("TOTALMASS", "MASSPERVOLUME") or shared not in ("MASSPROPORTIONAL", "VOLUMEPROPORTIONAL"):
+        raise Unused("a nonstructural mass is used per volume or in total, in proportion to mass or volume")
+    (row,) = statement.rows
+    (value,) = numbers(row)
+    if not value > 0:
+        raise Unused("a nonstructural mass must be positive")
+    key = option(statement, "ELSET").upper()
+    members = deck.element_sets.members(key)
+    if any(solid_type(deck.kinds.get(label, "")) is None for label in members):
+        raise Unused("a nonstructural mass of other elements than solids")
+    name = deck.element_sets.names[key]
+    if units == "MASSPERVOLUME":
+        return Filling(name, density=value)
+    return Filling(name, total=value, by_mass=shared == "MASSPROPORTIONAL")
 
 
 def material(deck: Deck, name: str) -> MeshMaterial:

@@ -53,7 +53,9 @@ class SolidMaterial:
         return e * nu / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
 
 
-def assemble_solid(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> tuple[sp.csc_array, sp.csc_array]:
+def assemble_solid(
+    mesh: SolidMesh, materials: Sequence[SolidMaterial], fillings: Sequence[tuple[IntArray, float]] = ()
+) -> tuple[sp.csc_array, sp.csc_array]:
     """Consistent mass and stiffness of a free solid.
 
     Parameters
@@ -62,6 +64,8 @@ def assemble_solid(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> tuple
         Checked (``read_mesh``, ``check_mesh``), in m.
     materials : sequence of SolidMaterial
         Every element must have exactly one.
+    fillings : sequence of pairs
+        Elements, rising, and a density that adds to theirs.
 
     Returns
     -------
@@ -85,7 +89,17 @@ def assemble_solid(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> tuple
             pattern.add_masses(masses, nodes, element_masses(element, corners, material.density))
             own = moduli if moduli.ndim == 2 else moduli[np.searchsorted(elements, numbers)]
             pattern.add_stiffnesses(stiffnesses, nodes, element_stiffnesses(element, corners, own))
+    for elements, density in fillings:
+        for element, nodes, _ in chunks(mesh, elements):
+            pattern.add_masses(masses, nodes, element_masses(element, mesh.nodes[nodes], density))
     return pattern.mass(masses), pattern.stiffness(stiffnesses)
+
+
+def volume(mesh: SolidMesh, elements: IntArray) -> float:
+    """Of elements, rising."""
+    return sum(
+        float(element_masses(element, mesh.nodes[nodes], 1.0).sum()) for element, nodes, _ in chunks(mesh, elements)
+    )
 
 
 def element_moduli(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> tuple[Array, IntArray]:

@@ -65,6 +65,18 @@ class MeshSection:
 
 
 @dataclass(frozen=True)
+class Filling:
+    """Nonstructural mass in the elements of a set: ``density`` per volume, or ``total``, shared as their own mass is
+    (``by_mass``) or as their volume.
+    """
+
+    elements: str
+    density: float = 0.0
+    total: float = 0.0
+    by_mass: bool = True
+
+
+@dataclass(frozen=True)
 class MeshMaterials:
     """Materials that a mesh file brings.
 
@@ -78,6 +90,8 @@ class MeshMaterials:
         Why they cannot be used; empty when they can.
     names : tuple of str
         What of the file they are made of.
+    fillings : tuple of Filling
+        Nonstructural masses, whatever the materials are.
     """
 
     constants: dict[str, MeshMaterial] = field(default_factory=dict)
@@ -85,6 +99,7 @@ class MeshMaterials:
     orientations: dict[str, Callable[[Array], Array]] = field(default_factory=dict)
     lack: str = "it is none that brings materials"
     names: tuple[str, ...] = ()
+    fillings: tuple[Filling, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +51,8 @@ def read_abaqus(path: Path, name: str) -> RawMesh:
     _add_element_sets(deck, numbers, mesh)
     _add_node_sets(deck, place, mesh)
     _add_surfaces(deck, place, mesh)
-    mesh.materials = deck_materials(deck)
     attached = attachments(deck)
+    mesh.materials = replace(deck_materials(deck), fillings=tuple(attached.fillings))
     mesh.left_out += _left_out(deck, attached)
     mesh.attachments += [renumbered(i, place.__getitem__) for i in attached.items if i.keyword not in attached.reasons]
     return mesh

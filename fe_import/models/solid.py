@@ -11,7 +11,7 @@ from fe_import.description.link import LinkFile
 from fe_import.description.records import Interface, LinkDescription, Solid
 from fe_import.elements.attachments import AttachedBeam, AttachedSpring, needs_rotations
 from fe_import.elements.elasticity import turned_moduli
-from fe_import.elements.solid import SolidMaterial, assemble_solid
+from fe_import.elements.solid import SolidMaterial, assemble_solid, volume
 from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
 from fe_import.elements.solid_orders import raised, with_incompatible_modes
 from fe_import.elements.solid_stress import solid_stress
@@ -20,9 +20,11 @@ from fe_import.files.toml import choose
 from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.mesh.read import read_mesh
-from fe_import.model import Array, FEModel
+from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.attached import attached_constraints, attached_matrices, attached_nodes
 from fe_import.models.hinges import check_hinges
+
+FILLING = "NONSTRUCTURAL MASS"
 
 
 def solid_model(link: LinkFile) -> FEModel:
@@ -58,7 +60,7 @@ def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEM
     if solid.hex8 == "incompatible-modes":
         mesh = with_incompatible_modes(mesh)
     materials, own = _materials(description, solid, mesh, where), not (solid.material or solid.regions)
-    mass, stiffness = assemble_solid(mesh, materials)
+    mass, stiffness = assemble_solid(mesh, materials, _fillings(mesh, materials, where))
     faces, untied = _faces(description, solid, mesh, where), dict[str, int]()
     if mesh.attachments:
         places = attached_nodes(mesh)
@@ -161,6 +163,28 @@ def _materials_of_mesh(mesh: SolidMesh, where: str) -> list[SolidMaterial]:
         if moduli is not None and section.orientation:
             moduli = turned_moduli(moduli, found.orientations[section.orientation](mesh.centres(elements)))
         result.append(SolidMaterial(m.youngs_modulus, m.poissons_ratio, m.density, elements, moduli))
+    return result
+
+
+def _fillings(mesh: SolidMesh, materials: list[SolidMaterial], where: str) -> list[tuple[IntArray, float]]:
+    """Elements with nonstructural mass and its density."""
+    result: list[tuple[IntArray, float]] = []
+    for filling in () if FILLING in mesh.left_out else mesh.materials.fillings:
+        if filling.elements not in mesh.element_sets:
+            raise FEImportError(
+                Cause.NOT_USED,
+                f"{FILLING}: its set {filling.elements!r} holds no solid elements that could be followed",
+                where=where,
+                remedy=f'mend the set, or ignore = ["{FILLING}"] in [solid]',
+            )
+        elements = mesh.element_sets[filling.elements]
+        if not filling.total:
+            result.append((elements, filling.density))
+            continue
+        parts = [elements if m.elements is None else np.intersect1d(elements, m.elements) for m in materials]
+        shares = [m.density if filling.by_mass else 1.0 for m in materials]
+        whole = sum(share * volume(mesh, part) for share, part in zip(shares, parts, strict=True))
+        result += [(part, share * filling.total / whole) for share, part in zip(shares, parts, strict=True)]
     return result
 
 
