@@ -115,7 +115,7 @@ def _spring(deck: Deck, statement: Statement, served: set[int]) -> Iterator[Atta
             axes, components = node_axes(deck), [component_of(f) for f in rows[0]]
             ends = zip(nodes, components, (-1.0, 1.0), strict=True)
             terms = [term for node, c, sign in ends for term in along_axes(node, c, sign, axes)]
-        yield AttachedSpring("SPRING", stiffness, tuple(terms))
+        yield AttachedSpring("SPRING", ((stiffness, tuple(terms)),))
 
 
 _READERS: dict[str, Callable[[Deck, Statement, set[int]], Iterator[Attachment]]] = {

@@ -29,11 +29,10 @@ class AttachedMass:
 
 @dataclass(frozen=True)
 class AttachedSpring:
-    """Energy ½ ``stiffness`` (Σ coefficient · component)²."""
+    """Energy ½ Σ stiffness (Σ coefficient · component)², the outer sum over its ``forms``."""
 
     keyword: str
-    stiffness: float
-    terms: Terms
+    forms: tuple[tuple[float, Terms], ...]
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,13 @@ def nodes_of(item: Attachment) -> list[int]:
         return [item.reference, *item.nodes.tolist()]
     if isinstance(item, TiedNodes):
         return [n for part in (item.nodes, item.triangles, item.quadrilaterals) for n in part.ravel().tolist()]
-    return [node for node, _, _ in item.terms]
+    return [node for node, _, _ in _terms(item)]
+
+
+def _terms(item: AttachedSpring | LinearEquation) -> list[tuple[int, int, float]]:
+    if isinstance(item, LinearEquation):
+        return [*item.terms]
+    return [term for _, terms in item.forms for term in terms]
 
 
 def renumbered(item: Attachment, new: Callable[[int], int]) -> Attachment:
@@ -139,7 +144,13 @@ def renumbered(item: Attachment, new: Callable[[int], int]) -> Attachment:
     if isinstance(item, TiedNodes):
         faces = _all(item.triangles, new), _all(item.quadrilaterals, new)
         return replace(item, nodes=_all(item.nodes, new), triangles=faces[0], quadrilaterals=faces[1])
-    return replace(item, terms=tuple((new(n), component, c) for n, component, c in item.terms))
+    if isinstance(item, AttachedSpring):
+        return replace(item, forms=tuple((stiffness, _moved(terms, new)) for stiffness, terms in item.forms))
+    return replace(item, terms=_moved(item.terms, new))
+
+
+def _moved(terms: Terms, new: Callable[[int], int]) -> Terms:
+    return tuple((new(node), component, c) for node, component, c in terms)
 
 
 def _all(nodes: IntArray, new: Callable[[int], int]) -> IntArray:
@@ -158,4 +169,4 @@ def needs_rotations(item: Attachment) -> list[int]:
         return [item.reference]
     if isinstance(item, TiedNodes):
         return []
-    return [node for node, component, _ in item.terms if component > 2]
+    return [node for node, component, _ in _terms(item) if component > 2]

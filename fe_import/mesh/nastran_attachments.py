@@ -16,6 +16,7 @@ from fe_import.elements.attachments import (
     AverageNode,
     LinearEquation,
     RigidBody,
+    Terms,
 )
 from fe_import.elements.frame import local_axes
 from fe_import.mesh.nastran_beams import beam, orientation
@@ -155,10 +156,10 @@ def _spring(card: Card, bulk: Bulk) -> Attachment:
     terms: list[tuple[int, int, float]] = []
     for at, sign in ((3, -1.0), (5, 1.0)):
         terms += _along(card, card.integer(at), _component(card, at + 1), sign, bulk)
-    return AttachedSpring(card.name, _stiff(stiffness), tuple(terms))
+    return AttachedSpring(card.name, ((_stiff(stiffness), tuple(terms)),))
 
 
-def _bush(card: Card, bulk: Bulk) -> list[Attachment]:
+def _bush(card: Card, bulk: Bulk) -> Attachment:
     """Six springs, along and about its axes, between points that go with the two grid points."""
     if not card.field(4):
         raise Unused("a bush to the ground; a link is free")
@@ -179,7 +180,7 @@ def _bush(card: Card, bulk: Bulk) -> list[Attachment]:
         elif kind == "M" and any(given):
             raise Unused("a bush with a mass")
     place = start + card.real(9, 0.5) * (end - start)
-    found: list[Attachment] = []
+    forms: list[tuple[float, Terms]] = []
     for k, stiffness in enumerate(values):
         along = axes[:, k % 3]
         terms: list[tuple[int, int, float]] = []
@@ -189,8 +190,8 @@ def _bush(card: Card, bulk: Bulk) -> list[Attachment]:
                 shares = np.concatenate([np.zeros(3), along])
             terms += [(node, c, sign * float(share)) for c, share in enumerate(shares) if share]
         if stiffness:
-            found.append(AttachedSpring("CBUSH", float(stiffness), tuple(terms)))
-    return found
+            forms.append((float(stiffness), tuple(terms)))
+    return AttachedSpring("CBUSH", tuple(forms))
 
 
 def _bush_axes(card: Card, bulk: Bulk, start: Array, end: Array) -> Array:

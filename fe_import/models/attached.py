@@ -82,8 +82,9 @@ def attached_matrices(mesh: SolidMesh, where: AttachedNodes) -> tuple[sp.csc_arr
             present = dofs >= 0
             mass.add(dofs[present], block[np.ix_(present, present)])
         elif isinstance(item, AttachedSpring):
-            rows, coefficients = _form(item.terms, where)
-            stiffness.add(rows, item.stiffness * np.outer(coefficients, coefficients))
+            for value, terms in item.forms:
+                rows, coefficients = _form(terms, where)
+                stiffness.add(rows, value * np.outer(coefficients, coefficients))
         elif isinstance(item, AttachedBeam):
             dofs = where.dof_map[list(item.element.nodes)].ravel()
             present = np.ix_(dofs >= 0, dofs >= 0)  # a node of a solid does not turn where the beam's end is pinned
