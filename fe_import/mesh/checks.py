@@ -208,7 +208,7 @@ def _check_parts(mesh: SolidMesh, part: IntArray) -> None:
     for block, _, numbers in mesh.parts():
         vertex[block.elements] = part[numbers][:, None]
     vertex[len(mesh.nodes) :] = count + np.arange(further)
-    rows = [vertex[np.array(nodes_of(item))] for item in mesh.attachments]
+    rows = [vertex[np.array(nodes_of(item), dtype=np.int64)] for item in mesh.attachments]
     pairs = np.array([(own[0], other) for own in rows for other in own[1:]], dtype=np.int64).reshape(-1, 2)
     graph = sp.coo_array((np.ones(len(pairs)), pairs.T), shape=(count + further,) * 2)
     together = connected_components(graph, directed=False)[1]
