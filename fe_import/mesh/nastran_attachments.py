@@ -24,6 +24,7 @@ from fe_import.mesh.nastran_bulk import Bulk, Unused, digits
 from fe_import.model import Array
 from fe_import.nastran.cards import Card
 
+_MOST_FIELDS = {"CONM2": 14, "CBAR": 16, "CBEAM": 18, "CELAS1": 6, "CELAS2": 8, "CBUSH": 13, "RBAR": 8}
 _DISPLACEMENTS = {"1", "2", "3"}
 _ALL = (0, 1, 2, 3, 4, 5)
 
@@ -41,6 +42,8 @@ def attached(card: Card, bulk: Bulk) -> list[Attachment] | None:
     reader = READERS.get(card.name)
     if reader is None:
         return None
+    if any(card.fields[_MOST_FIELDS.get(card.name, len(card.fields)) :]):
+        raise Unused(f"a {card.name} with more fields than it has")
     found = reader(card, bulk)
     return found if isinstance(found, list) else [found]
 

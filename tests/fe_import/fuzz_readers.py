@@ -223,10 +223,14 @@ ASSEMBLED = """*PART, NAME=Bar
 20, 20, 21
 *NSET, NSET=End
 {end}
+*NSET, NSET=Root
+{root}
 *SURFACE, NAME=Up
 1, S2
+2, S2
 *SURFACE, NAME=Low
 1, S1
+2, S1
 *SOLID SECTION, ELSET=All, MATERIAL=Wood, ORIENTATION=Along
 *BEAM SECTION, ELSET=Beam, MATERIAL=Alu, SECTION=RECT, OFFSET1=0.1
 .01, .02
@@ -299,7 +303,8 @@ def _decks() -> Iterator[Reader]:
     end = (mesh.node_sets["x1"] + 1).tolist()
     nodes = "\n".join(f"{k}, " + ", ".join(map(repr, p)) for k, p in enumerate(mesh.nodes.tolist(), start=1))
     rows = (", ".join(map(str, [k, *(e + 1)])) for k, e in enumerate(mesh.only.elements, start=1))
-    text = ASSEMBLED.format(nodes=nodes, elements="\n".join(rows), end=", ".join(map(str, end)))
+    sides = {name: ", ".join(str(n + 1) for n in mesh.node_sets[own]) for name, own in (("root", "x0"), ("end", "x1"))}
+    text = ASSEMBLED.format(nodes=nodes, elements="\n".join(rows), **sides)
     options: dict[str, Any] = {"counts": False, "ends": False, "told": _lost}
     yield Reader("assembly", {"all.inp": text.encode()}, ("all.inp",), _mesh_of("all.inp"), mesh_facts, **options)
     cards = CARDS.format(end=",".join(str(10 * n - 3) for n in end))

@@ -83,6 +83,7 @@ LOSSES = {  # cards, what the message says, names to ignore
         "point masses (a CONM2 in a coordinate system that is not rectangular",
         ["CONM2"],
     ),
+    "long mass": (["CONM2,90,7,,1.5", ",.1,,.1,,,.1,1."], "a CONM2 with more fields than it has", ["CONM2"]),
     "rigid in part": (["RBE2,90,7,13,17,27"], "(an RBE2 that leaves displacements free, line 26)", ["RBE2"]),
     "two averaged": (["RBE3,90,,7,123,1.,123,17,27"], "fewer than three grid points", ["RBE3"]),
     "bar": (["RBAR,90,7,17,123,456"], "constraints between nodes (an RBAR whose independent", ["RBAR"]),
@@ -119,6 +120,7 @@ FAULTS = {
     "unknown grid point": (bulk(BAR, "CTETRA,90,2,7,17,27,8"), "needs a grid point that is not there"),
     "element twice": (bulk(BAR, "CTETRA,1,2,7,17,27,37"), "stands twice"),
     "grid twice": (bulk(BAR, "GRID,7"), "stands twice"),
+    "ten fields": (bulk(BAR, "GRID,901,,1.,2.,3.,,,,5.,6."), "more fields than a line holds"),
     "word": (bulk(BAR, "GRID,901,,a"), "finite real number"),
     "defaults": (bulk(BAR, "GRDSET,,,,,,,123"), "defaults for GRID"),
 }
