@@ -188,8 +188,13 @@ def _mesh(bulk: Bulk, cases: dict[int, str]) -> RawMesh:
 
 
 def _marks(card: Card, properties: set[int]) -> int:
-    """How many grid points a surface or line element has that only marks them; 0 for other cards."""
+    """How many grid points a surface or line element has that only marks them; 0 for other cards.
+
+    Those with pin flags or offsets are meant as beams: without a property they are refused.
+    """
     name = card.name.rstrip("_")
+    if name in LINES and any(card.fields[8:]):
+        return 0
     count = SURFACES.get(name) or LINES.get(name) or 0
     return count if count and card.integer(2, card.integer(1)) not in properties else 0
 
