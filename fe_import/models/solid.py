@@ -233,7 +233,15 @@ def _node(interface: Interface, mesh: SolidMesh, names: dict[str, int], place: s
     count = len(mesh.nodes) + len(mesh.further_nodes)
     alone = {name: int(own[0]) for name, own in mesh.node_sets.items() if len(own) == 1}
     known = {**alone, **{name: count + k for name, k in mesh.further_names.items()}, **names}
-    choose(interface.node, sorted(known), f"{place}.node")
+    if interface.node not in known:
+        raise FEImportError(
+            Cause.INTERFACE,
+            "no node of this name, neither of [solid.nodes] nor alone in a set of the mesh",
+            where=f"{place}.node",
+            value=interface.node,
+            limit=", ".join(sorted(known)) or "none is named",
+            remedy="give face = SET, or a node of a beam or of a rigid body by the set that holds it alone",
+        )
     for field in ("position", "weights"):
         if getattr(interface, field):
             message, remedy = f"an interface on a node has no {field}", "remove the field, or couple a face"

@@ -234,7 +234,7 @@ def test_a_beam_on_the_clamped_face(tmp_path):
 
 def test_an_interface_needs_a_node_that_turns(tmp_path):
     lines = [*beam_nodes(1), *beam_elements(1), *RECT, "*RIGID BODY, NSET=X1, REF NODE=9000", "*NSET, NSET=ONE", "1,"]
-    for node, words in (("ONE", "does not turn"), ("NONE", "unknown name"), ("TIP", None)):
+    for node, words in (("ONE", "does not turn"), ("NONE", "no node of this name"), ("TIP", None)):
         link = deck_link(tmp_path, *lines, interfaces=[{"name": "hand", "node": node}])
         if words is None:
             assert build_model(link).interface_nodes[0].coupling == "node"
