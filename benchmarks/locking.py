@@ -26,6 +26,7 @@ from fe_import.elements.solid import SolidMaterial, assemble_solid
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.elements.solid_stress import solid_stress
+from fe_import.health.mesh_error import frequency_errors
 
 Array = NDArray[np.float64]
 STEEL = SolidMaterial(2.1e11, 0.3, 7850.0)
@@ -61,7 +62,7 @@ def estimated(mesh: SolidMesh) -> float:
     squares, shapes = sla.eigsh(stiffness, 9, mass, sigma=-shift, OPinv=solve, which="LM")
     shapes = shapes[:, np.argsort(squares)][:, 6:]
     error, energy = solid_stress(mesh, [STEEL]).energy_of_error(shapes, np.arange(len(shapes)).reshape(-1, 3))
-    return float((1 / np.sqrt(1 - np.minimum(error / energy, 1 - 1e-6)) - 1).max())
+    return float(frequency_errors(error, energy).max())
 
 
 def main() -> None:

@@ -23,10 +23,8 @@ from fe_import.elements.attachments import (
     Attachment,
     nodes_of,
 )
-from fe_import.elements.solid_mesh import Filling
+from fe_import.elements.solid_mesh import FILLING, Filling
 from fe_import.model import Array
-
-_FILLING = "NONSTRUCTURAL MASS"
 
 
 @dataclass
@@ -43,10 +41,10 @@ def attachments(deck: Deck) -> Attached:
     """Interpret the statements of a deck; sets may stand behind them."""
     result = Attached()
     served: set[int] = set()
-    statements = [s for s in deck.statements if s.name in _READERS or s.name == _FILLING]
+    statements = [s for s in deck.statements if s.name in _READERS or s.name == FILLING]
     for statement in statements:
         try:
-            if statement.name == _FILLING:
+            if statement.name == FILLING:
                 result.fillings.append(filling(deck, statement))
                 continue
             for item in _READERS[statement.name](deck, statement, served):

@@ -64,6 +64,9 @@ class MeshSection:
     orientation: str = ""
 
 
+FILLING = "NONSTRUCTURAL MASS"  # keyword of a filling
+
+
 @dataclass(frozen=True)
 class Filling:
     """Nonstructural mass in the elements of a set: ``density`` per volume, or ``total``, shared as their own mass is

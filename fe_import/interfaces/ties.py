@@ -20,6 +20,8 @@ from fe_import.model import Array, IntArray
 
 MOST_FACE_NODES = 9
 _STEPS = 30  # of the projection; it converges in few on faces that are nearly flat
+_CONVERGED = 1e-14  # of the local coordinates
+_BULGE = 1.1  # a curved face may stand out beyond its nodes
 _PAIRS = 4_000_000  # distances held at a time
 
 
@@ -36,7 +38,7 @@ class Feet:
     gaps : (k,) array
         Distance from the face.
     sizes : (k,) array
-        Largest distance of the face's corners from their centre.
+        Largest distance of the face's nodes from its centre.
     """
 
     nodes: IntArray
@@ -64,9 +66,9 @@ def feet_on_faces(points: Array, positions: Array, faces: Sequence[IntArray]) ->
         np.zeros(count),
     )
     for group in faces:
-        width, corners = group.shape[1], 3 if group.shape[1] in (3, 6) else 4
-        placed = positions[group]
-        centres = placed[:, :corners].mean(axis=1)
+        width, placed = group.shape[1], positions[group]
+        middle = np.full((2, 1), 1 / 3 if width in (3, 6) else 0.5)
+        centres = np.einsum("w,fwc->fc", face_shapes(width, middle)[0][:, 0], placed)
         sizes = np.linalg.norm(placed - centres[:, None], axis=2).max(axis=1)
         for chosen, face in _near(points, centres, sizes):
             local, gaps = _feet(points[chosen], placed[face])
@@ -88,8 +90,8 @@ def _near(points: Array, centres: Array, sizes: Array) -> Iterator[tuple[IntArra
     for start in range(0, len(points), step):
         some = points[start : start + step]
         distance = np.linalg.norm(some[:, None] - centres[None], axis=2)
-        reach = (distance + sizes).min(axis=1)
-        chosen, face = np.nonzero(distance - sizes <= reach[:, None])
+        reach = distance.min(axis=1)  # no farther than this centre
+        chosen, face = np.nonzero(distance - _BULGE * sizes <= reach[:, None])
         yield chosen + start, face
 
 
@@ -104,7 +106,9 @@ def _feet(points: Array, placed: Array) -> tuple[Array, Array]:
         tangents = np.einsum("wdp,pwc->pdc", gradients, placed)
         metric = tangents @ tangents.swapaxes(1, 2)
         step = np.linalg.solve(metric, (tangents @ rest[:, :, None]))[:, :, 0].T
-        local = _inside(local + step, triangle)
+        before, local = local, _inside(local + step, triangle)
+        if np.abs(local - before).max(initial=0.0) < _CONVERGED:
+            break
     values, _ = face_shapes(width, local)
     return local, np.linalg.norm(points - np.einsum("wp,pwc->pc", values, placed), axis=1)
 

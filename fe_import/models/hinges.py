@@ -109,7 +109,8 @@ def _resisted(motions: tuple[IntArray, Array], coupled: Coupling, stiffness: sp.
     broken[rows] -= values
     block = stiffness[rows][:, rows]
     weight = stiffness.diagonal()[rows]
-    energy = values.T @ (block @ values) / np.einsum("rk,r,rk->", values, weight, values)
+    scale = float(np.einsum("rk,r,rk->", values, weight, values))
+    energy = values.T @ (block @ values) / (scale if scale > 0 else 1.0)
     share = broken.T @ broken / np.einsum("rk,rk->", values, values)
     return bool(np.linalg.eigvalsh(energy + share)[0] > _LOOSE)
 

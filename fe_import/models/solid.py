@@ -12,7 +12,7 @@ from fe_import.description.records import Interface, LinkDescription, Solid
 from fe_import.elements.attachments import AttachedBeam, AttachedSpring, needs_rotations
 from fe_import.elements.elasticity import turned_moduli
 from fe_import.elements.solid import SolidMaterial, assemble_solid, volume
-from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
+from fe_import.elements.solid_mesh import FILLING, SolidMesh, surface_triangles
 from fe_import.elements.solid_orders import raised, with_incompatible_modes
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
@@ -23,8 +23,6 @@ from fe_import.mesh.read import read_mesh
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.attached import attached_constraints, attached_matrices, attached_nodes
 from fe_import.models.hinges import check_hinges
-
-FILLING = "NONSTRUCTURAL MASS"
 
 
 def solid_model(link: LinkFile) -> FEModel:

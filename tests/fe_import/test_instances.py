@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from solid_meshes import box
 from test_ties import MATERIAL, frequencies, link
 
-from fe_import.elements.attachments import AttachedBeam, TiedNodes
+from fe_import.elements.attachments import AttachedBeam, AttachedMass, AttachedSpring, TiedNodes
 from fe_import.errors import FEImportError
 from fe_import.mesh.read import read_mesh
 
@@ -77,6 +77,19 @@ def test_sets_of_an_assembly(tmp_path):
     np.testing.assert_array_equal(mesh.node_sets["OfE"], first + np.unique(FINE.only.elements[:2]))
     faces = FINE.only.elements[:2][:, FINE.only.element.faces[FINE.only.element.cell.deck_faces[1]]]
     np.testing.assert_array_equal(mesh.node_sets["Up"], first + np.unique(faces))
+
+
+def test_elements_between_instances(tmp_path):
+    """Springs and masses of the assembly name nodes of instances."""
+    lines = ["*TIE, NAME=T", "Two.S-A-x0, One.S-A-x1", "*ELEMENT, TYPE=SPRINGA, ELSET=S", "1, One.1, Two.5"]
+    lines += ["*SPRING, ELSET=S", "", "300.", "*ELEMENT, TYPE=MASS, ELSET=M", "2, Two.5", "*MASS, ELSET=M", "0.4"]
+    (tmp_path / "two.inp").write_text("\n".join(assembled(*lines)) + "\n")
+    mesh = read_mesh(tmp_path / "two.inp")
+    first = len(COARSE.nodes)
+    (spring,) = (item for item in mesh.attachments if isinstance(item, AttachedSpring))
+    (mass,) = (item for item in mesh.attachments if isinstance(item, AttachedMass))
+    assert {node for _, terms in spring.forms for node, _, _ in terms} == {0, first + 4}
+    assert (mass.node, mass.mass) == (first + 4, 0.4)
 
 
 def test_a_moved_instance(tmp_path):
