@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from fe_import.interfaces.weights import face_shapes
 from fe_import.model import Array, IntArray
@@ -22,7 +23,7 @@ MOST_FACE_NODES = 9
 _STEPS = 30  # of the projection; it converges in few on faces that are nearly flat
 _CONVERGED = 1e-14  # of the local coordinates
 _BULGE = 1.1  # a curved face may stand out beyond its nodes
-_PAIRS = 4_000_000  # distances held at a time
+_POINTS = 2000  # looked at together
 
 
 @dataclass(frozen=True)
@@ -86,13 +87,16 @@ def feet_on_faces(points: Array, positions: Array, faces: Sequence[IntArray]) ->
 
 def _near(points: Array, centres: Array, sizes: Array) -> Iterator[tuple[IntArray, IntArray]]:
     """Pairs of points and of all faces that may be their nearest, some points at a time."""
-    step = max(1, _PAIRS // len(centres))
-    for start in range(0, len(points), step):
-        some = points[start : start + step]
-        distance = np.linalg.norm(some[:, None] - centres[None], axis=2)
-        reach = distance.min(axis=1)  # no farther than this centre
-        chosen, face = np.nonzero(distance - _BULGE * sizes <= reach[:, None])
-        yield chosen + start, face
+    tree, reach = cKDTree(centres), _BULGE * sizes
+    nearest = tree.query(points)[0]  # the foot is no farther than this centre
+    for start in range(0, len(points), _POINTS):
+        some = slice(start, start + _POINTS)
+        lists = tree.query_ball_point(points[some], nearest[some] + reach.max())
+        chosen = start + np.repeat(np.arange(len(lists)), [len(found) for found in lists])
+        face = np.concatenate([np.asarray(found, dtype=np.int64) for found in lists])
+        distance = np.linalg.norm(points[chosen] - centres[face], axis=1)
+        usable = distance - reach[face] <= nearest[chosen]
+        yield chosen[usable], face[usable]
 
 
 def _feet(points: Array, placed: Array) -> tuple[Array, Array]:
