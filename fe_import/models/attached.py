@@ -221,7 +221,8 @@ def _faces(item: TiedNodes, mesh: SolidMesh) -> list[IntArray]:
     faces = element_faces(mesh)
     corners = np.where(np.isin(faces.sizes, (3, 6)), 3, 4)
     own = np.array(sorted({node for face in wanted for node in face}), dtype=np.int64)
-    chosen = (np.isin(faces.nodes[:, :4], own) | (np.arange(4) >= corners[:, None])).all(axis=1)
+    ends = faces.nodes[:, :4]
+    chosen = np.asarray((np.isin(ends, own) | (np.arange(ends.shape[1]) >= corners[:, None])).all(axis=1))
     for k in np.flatnonzero(chosen):
         chosen[k] = tuple(sorted(faces.nodes[k, : corners[k]].tolist())) in wanted
     return [faces.nodes[chosen & (faces.sizes == k), :k] for k in np.unique(faces.sizes[chosen])]
