@@ -57,7 +57,7 @@ def check_hinges(mesh: SolidMesh, places: AttachedNodes, coupled: Coupling, stif
                 Cause.MESH,
                 f"{', '.join(names)}: they turn freely about {at if len(shared) else 'nothing'}",
                 where=mesh.source,
-                value=", ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in places.nodes[[*shared, *nodes][:2]]),
+                value=", ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in places.nodes[(shared if len(shared) else nodes)[:2]]),
                 limit="three nodes, not on one line",
                 remedy="join them to a face by a rigid body or a coupling, or let them share more nodes",
             )
