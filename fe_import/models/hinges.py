@@ -52,12 +52,13 @@ def check_hinges(mesh: SolidMesh, places: AttachedNodes, coupled: Coupling, stif
         shared = nodes[nodes < solid]
         if _on_a_line(places.nodes[shared]) and not _resisted(_rigid_motions(places, nodes), coupled, stiffness):
             names = sorted({item.keyword for item, at in turning if label[at[0]] == own})
+            shown = places.nodes[(shared if len(shared) else nodes)[:2]]
             at = f"the {len(shared)} nodes that they share with the solid, which pass on no moments"
             raise FEImportError(
                 Cause.MESH,
                 f"{', '.join(names)}: they turn freely about {at if len(shared) else 'nothing'}",
                 where=mesh.source,
-                value=", ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in places.nodes[(shared if len(shared) else nodes)[:2]]),
+                value=", ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in shown),
                 limit="three nodes, not on one line",
                 remedy="join them to a face by a rigid body or a coupling, or let them share more nodes",
             )
