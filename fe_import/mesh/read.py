@@ -167,7 +167,10 @@ def _solid_blocks(raw: RawMesh, where: str) -> list[int]:
             remedy="mesh with one of the supported types",
         )
     if not counts:
-        found = _listing((block.type, len(block.cells)) for block in raw.blocks) or "no elements at all"
+        others: Counter[str] = Counter()
+        for block in raw.blocks:
+            others[block.type] += len(block.cells)
+        found = _listing(others.items()) or "no elements at all"
         raise FEImportError(
             Cause.MESH,
             f"no solid elements, found {found}",

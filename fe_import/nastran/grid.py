@@ -82,17 +82,16 @@ def grid_points(cards: Iterable[Card]) -> GridPoints:
     Raises
     ------
     FEImportError
-        ``EXPORT``: a faulty field, a number that stands twice, GRDSET; ``BAD_REFERENCE``: a coordinate system that is
-        not there, or not a CORD2R, CORD2C or CORD2S.
+        ``EXPORT``: a faulty field, a number that stands twice; ``BAD_REFERENCE``: a coordinate system that is not
+        there, or not a CORD2R, CORD2C or CORD2S.
     """
     found = list(cards)
     frames = _Frames(found)
     result = GridPoints({}, {}, set(), [])
+    placed, moved = _defaults(found)
     for card in found:
         if card.name == "GRID":
-            _add_grid(card, frames, result)
-        elif card.name == "GRDSET":
-            raise card.fault("defaults for GRID are not followed", remedy="write CP and CD on each GRID")
+            _add_grid(card, frames, result, placed, moved)
         elif card.name == "SPOINT":
             result.scalar_points.update(_numbers(card))
         elif card.name == "PLOTEL":
@@ -100,14 +99,22 @@ def grid_points(cards: Iterable[Card]) -> GridPoints:
     return result
 
 
-def _add_grid(card: Card, frames: _Frames, points: GridPoints) -> None:
+def _defaults(cards: list[Card]) -> tuple[int, int]:
+    """Coordinate systems of grid points that name none: of GRDSET, else the basic one."""
+    found = [card for card in cards if card.name == "GRDSET"]
+    if len(found) > 1:
+        raise found[1].fault("this card stands twice")
+    return (found[0].integer(2, 0), found[0].integer(6, 0)) if found else (0, 0)
+
+
+def _add_grid(card: Card, frames: _Frames, points: GridPoints, default_placed: int, default_moved: int) -> None:
     number = card.integer(1)
     if number in points.positions:
         raise card.fault("this grid point stands twice", number)
-    placed = frames.get(card.integer(2, 0), card)
+    placed = frames.get(card.integer(2, default_placed), card)
     local = np.array([card.real(k, 0.0) for k in (3, 4, 5)])
     points.positions[number] = placed.position(local)
-    frame = card.integer(6, 0)
+    frame = card.integer(6, default_moved)
     if frame:
         points.axes[number] = frames.get(frame, card).axes_at(points.positions[number])
 
