@@ -35,16 +35,16 @@ from fe_import.reduce import reduce_link
 YOUNG, POISSON, DENSITY = 2.1e11, 0.3, 7850.0  # Pa, -, kg/m³
 SAME = 1e-6  # relative: ccx prints seven digits
 FORMULATION = {  # relative: where ccx integrates mass or stiffness otherwise, coarse meshes show it
-    **{"hex20": 1e-4, "tet10": 1e-3, "wedge15": 5e-3},
-    **{"tet4": 0.05, "wedge6": 0.1, "hex8": 0.1},
+    "hex20": 1e-4, "tet10": 1e-3, "wedge15": 5e-3,
+    "tet4": 0.05, "wedge6": 0.1, "hex8": 0.1,
 }
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
 _KEPT = re.compile(r"NODE|ELEMENT|NSET|ELSET|SURFACE|MASS|SPRING|EQUATION|RIGIDBODY|SOLIDSECTION|MPC|ROTARYINERTIA")
 _LONG = re.compile(r"[+-]?\d\.\d{14,}[Ee][+-]\d+")  # ccx reads twenty characters
 WHAT = {"program": "Ansys", **{name: f"ccx, {name}" for name in ("deck", "twin", "mesh")}}
 _DECK_TYPES = {
-    **{"tet4": "C3D4", "tet10": "C3D10", "wedge6": "C3D6", "wedge15": "C3D15"},
-    **{"hex8": "C3D8I", "hex20": "C3D20"},
+    "tet4": "C3D4", "tet10": "C3D10", "wedge6": "C3D6", "wedge15": "C3D15",
+    "hex8": "C3D8I", "hex20": "C3D20",
 }
 _ANSYS = 7366.49503969  # Hz, first elastic one of HexBeam in Ansys: README of pymapdl-reader
 _TITANIUM = (16900000.0, 0.31, 0.00041408)  # its material there: lbf/in², -, lbf s²/in⁴
@@ -204,7 +204,8 @@ def _set_of_all(lines: list[str]) -> list[str]:
     for line in lines:
         if line.startswith("*"):
             kept = not re.match(r"(?i)\*ELEMENT(?!.*TYPE\s*=\s*C3D)", line)
-            line = re.sub(r"(?i),\s*ELSET\s*=\s*[^,\s]+", "", line) + ", ELSET=ALL" if "*ELEMENT" in line.upper() else line
+            if "*ELEMENT" in line.upper():
+                line = re.sub(r"(?i),\s*ELSET\s*=\s*[^,\s]+", "", line) + ", ELSET=ALL"
             kept &= not line.upper().startswith(("*ELSET", "*NSET", "*SURFACE"))
         if kept:
             result.append(line)

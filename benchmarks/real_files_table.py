@@ -56,7 +56,7 @@ class Case(NamedTuple):
 
 _SUPPORTS = ("BOUNDARY",)
 _SPC = ("SPC1", "SPCADD")
-_CDB = "tests/test_data/"
+_CDB, _OP2 = "tests/test_data/", "pyNastran/op2/test/examples/"
 
 
 def _decks(names: str, refused: str = "", ignore: tuple[str, ...] = _SUPPORTS) -> list[Case]:
@@ -77,7 +77,7 @@ CASES = [
     Case("abaqusreader", "test/test_parse_mesh/beam.inp", "Abaqus deck"),
     Case("sfepy", "meshes/various_formats/abaqus_tet.inp", "Abaqus deck"),
     Case("pynastran", "models/solid_bending/solid_bending.bdf", "Nastran bulk (Patran)", ignore=_SPC),
-    Case("pynastran", "pyNastran/op2/test/examples/autodesk/aa8lzviq9.nas", "Nastran bulk (Autodesk)", ignore=("SPC1",)),
+    Case("pynastran", f"{_OP2}autodesk/aa8lzviq9.nas", "Nastran bulk (Autodesk)", ignore=("SPC1",)),
     Case("pynastran", "models/autodesk/nonlinear_beam.bdf", "Nastran bulk (Autodesk)", ignore=_SPC),
     Case("pynastran", "models/complex/tet10/Simple_Example.bdf", "Nastran bulk (Femap)", "", "", _SPC, length="in"),
     Case("pynastran", "models/nx/composite_solids/test.bdf", "Nastran bulk (NX)", ignore=("SPC",)),

@@ -18,7 +18,9 @@ from fe_import.mesh.ansys_types import MESHING, MESHING_SOLIDS, SOLIDS, command_
 from fe_import.mesh.labelled import LabelledMesh
 from fe_import.mesh.raw import LeftOut, RawMesh
 
-_FORMAT = re.compile(r"\(\s*(\d*)i(\d+)(?:,\s*(\d*)i(\d+))?(?:,\s*\d*[eg](\d+)\.\d+(?:e\d+)?)?(?:,\s*\d*a\d+)?\s*\)", re.I)
+_FORMAT = re.compile(  # such as (3i9,6e21.13e3), (1i7,2i9,6e21.13), (19i9), (2i9,19a9)
+    r"\(\s*(\d*)i(\d+)(?:,\s*(\d*)i(\d+))?(?:,\s*\d*[eg](\d+)\.\d+(?:e\d+)?)?(?:,\s*\d*a\d+)?\s*\)", re.IGNORECASE
+)
 _COMMAND = re.compile(r"\s*([A-Za-z/*_][\w/*:]*)")
 _HEADER = 11  # numbers before the nodes of an element: material, type, ... , count of nodes, -, number
 _MOST_NODES = 30
@@ -56,9 +58,12 @@ class _Reader:
 
     def mesh(self) -> RawMesh:
         blocks = {"NBLO": self._nodes, "EBLO": self._block, "CMBL": self._component}
+        command = ""
         while (line := self._file.line()) is not None:
             match = _COMMAND.match(line.partition("!")[0])
             if match is None:
+                if command[:4] in blocks and line.partition("!")[0].strip():
+                    raise self._fault("numbers behind the end of a block", line)
                 continue
             command = match[1].upper()
             fields = [f.strip() for f in line.partition("!")[0].split(",")]

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import re
 
-HEX, TET = {8: ("hex8", "wedge6", "pyramid5", "tet4"), 20: ("hex20", "wedge15", "pyramid13", "tet10")}, {4, 10}
+_TETRAHEDRA = (4, 10)  # nodes of types that are tetrahedra only
+_FOLDED: dict[tuple[bool, bool], tuple[str, str, tuple[int, ...], tuple[int, ...]]] = {
+    # edges fall together (L = K, P = O), all of the top (M = N = O = P): types, corners and edges that are left
+    (False, False): ("hex8", "hex20", tuple(range(8)), tuple(range(12))),
+    (True, False): ("wedge6", "wedge15", (0, 1, 2, 4, 5, 6), (0, 1, 3, 4, 5, 7, 8, 9, 10)),
+    (False, True): ("pyramid5", "pyramid13", (0, 1, 2, 3, 4), (0, 1, 2, 3, 8, 9, 10, 11)),
+    (True, True): ("tet4", "tet10", (0, 1, 2, 4), (0, 1, 3, 8, 9, 10)),
+}
 SOLIDS = {  # type -> most nodes; those of 8 and 20 nodes may be wedges, pyramids, tetrahedra with repeated nodes
     **dict.fromkeys((5, 45, 62, 64, 65, 69, 70, 96, 185), 8),
     **dict.fromkeys((90, 95, 122, 186, 226), 20),
@@ -69,7 +76,7 @@ def solid_nodes(nodes: list[int], most: int) -> tuple[str, list[int]] | None:
     tuple or None
         None for another number of nodes, and where some middle nodes are left out but not all.
     """
-    if most in TET:
+    if most in _TETRAHEDRA:
         nodes = nodes + [0] * (most - len(nodes))
         corners, middle = nodes[:4], nodes[4:most]
         return _of_order("tet4", "tet10", corners, middle) if len(nodes) == most else None
@@ -77,17 +84,10 @@ def solid_nodes(nodes: list[int], most: int) -> tuple[str, list[int]] | None:
     if len(nodes) != most:
         return None
     corners, middle = nodes[:8], nodes[8:]
-    folded, pointed = corners[2] == corners[3], len(set(corners[4:])) == 1
-    if pointed and folded:
-        kind, kept, edges = 3, (0, 1, 2, 4), (0, 1, 3, 8, 9, 10)
-    elif pointed:
-        kind, kept, edges = 2, (0, 1, 2, 3, 4), (0, 1, 2, 3, 8, 9, 10, 11)
-    elif folded and corners[6] == corners[7]:
-        kind, kept, edges = 1, (0, 1, 2, 4, 5, 6), (0, 1, 3, 4, 5, 7, 8, 9, 10)
-    else:
-        kind, kept, edges = 0, tuple(range(8)), tuple(range(12))
+    folded, pointed = corners[2] == corners[3] and corners[6] == corners[7], len({*corners[4:]}) == 1
+    linear, quadratic, kept, edges = _FOLDED[folded, pointed]
     chosen = [middle[k] for k in edges] if middle else []
-    return _of_order(HEX[8][kind], HEX[20][kind], [corners[k] for k in kept], chosen)
+    return _of_order(linear, quadratic, [corners[k] for k in kept], chosen)
 
 
 def _of_order(linear: str, quadratic: str, corners: list[int], middle: list[int]) -> tuple[str, list[int]] | None:
