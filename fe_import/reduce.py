@@ -14,7 +14,9 @@ from fe_import.description.link import LinkFile, load_link
 from fe_import.description.records import Material
 from fe_import.files.toml import choose
 from fe_import.files.versions import package_version
-from fe_import.health.plausibility import plausible_link, plausible_materials
+from fe_import.health.materials import check_materials
+from fe_import.health.matrix_scale import speed_of_sound
+from fe_import.health.plausibility import SOUND_IN_MATRICES, plausible_link, plausible_materials, refuse_slips
 from fe_import.health.report import check_basis, check_model, check_reduction, mode_residuals
 from fe_import.health.static_flexibility import check_static
 from fe_import.health.thermal_expansion import check_expansion
@@ -73,8 +75,10 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     choose(options.method, REDUCTIONS, f"{where}: reduction.method")
     units = unit_factors(link.description, where)
     materials = {**link.description.materials, **{name: Material(*m) for name, m in model.materials.items()}}
-    checks = plausible_materials(materials, *units, where) + check_model(model, where)
-    _unit_checks(model, np.zeros(0), where)  # a slipped unit is named before the work is done
+    unusual = link.description.units.unusual
+    checks = (*plausible_materials(materials, *units, where), *check_materials(materials, *units))
+    checks = refuse_slips(checks, unusual, where) + check_model(model, where)
+    refuse_slips(_unit_checks(model, np.zeros(0), where), unusual, where)  # named before the work is done
     basis = with_thermal_shape(model, REDUCTIONS[options.method](model, options, where))
     mass, stiffness = reduced_matrices(model, basis)
     interfaces, inboard = basis.vectors[model.interface_dofs], _inboard(model, options.inboard)
@@ -93,7 +97,7 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     thermal = thermal_expansion(model, shapes, wanted, where)
     checks += check_expansion(model, None if thermal is None else thermal.force, modes.omega)
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, where)
-    checks += _unit_checks(model, modes.omega, where)
+    checks += refuse_slips(_unit_checks(model, modes.omega, where), unusual, where)
     checks += _mesh_checks(model, link, shapes, modes.omega)
     residuals = mode_residuals(model, shapes, modes.omega)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
@@ -141,18 +145,24 @@ def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) ->
     if link.description.solid is None:
         return ()
     from fe_import.elements.solid_stress import SolidStress  # frames have no use for it
+    from fe_import.health.incompressible import check_incompressible
     from fe_import.health.mesh_error import check_mesh_error
+    from fe_import.health.mesh_shape import check_mesh_shape
 
     assert isinstance(model.stress, SolidStress)
     limit = link.description.solid.mesh_error
-    return check_mesh_error(model, model.stress, shapes, omega, limit, str(link.path))
+    shape = (*check_mesh_shape(model.stress.mesh), *check_incompressible(model.stress))
+    return (*shape, *check_mesh_error(model, model.stress, shapes, omega, limit, str(link.path)))
 
 
 def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck, ...]:
     rigid = model.rigid_body_modes()
     mass = mass_properties(rigid.T @ (model.mass @ rigid)).mass
     first = float(omega[6] / (2 * np.pi)) if len(omega) > 6 else None
-    return plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
+    checks = plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
+    if model.kind != "matrices" or (speed := speed_of_sound(model)) is None:
+        return checks
+    return (*checks, SOUND_IN_MATRICES.check(speed, f"{where}: units"))
 
 
 def _nodal(shapes: Array, rows: IntArray) -> Array:

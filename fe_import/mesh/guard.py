@@ -90,7 +90,7 @@ def check_declared(path: Path, name: str) -> None:
                 _check_count(f"NumberOf{what.decode()}", _number(count), 50 * size, name)  # zlib packs 1000 : 1
         elif path.suffix.lower() == ".msh":
             if text[:4] == b"$NOD":
-                message, remedy = "cannot be read as a mesh: MSH 1, of the year 2005", "open it with gmsh, save as MSH 4.1"
+                message, remedy = "cannot be read as a mesh: MSH 1 of 2005", "open it with gmsh, save as MSH 4.1"
                 raise FEImportError(Cause.NOT_READABLE, message, where=name, remedy=remedy)
             for section in (b"$Nodes", b"$Elements"):
                 for count in _msh_counts(text, section):

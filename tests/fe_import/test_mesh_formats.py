@@ -139,7 +139,7 @@ FAULTS = {
     "words.unv": (after(UNIVERSAL, "  2411", *rows([1, 1, 1, 11], 10, 8), "1. 2. x"), NOT_READ, "three coordinates"),
     "no nodes.unv": ("    -1\n  2412\n    -1\n", NOT_READ, "no nodes"),
     "stray.unv": ("hello\n" + UNIVERSAL, NOT_READ, "must begin with -1", "hello"),
-    "missing node.unv": (UNIVERSAL.replace(*(rows([n, 1, 1, 11], 10, 8)[0] for n in (17, 18))), NOT_READ, "needs node 17"),
+    "missing node.unv": (UNIVERSAL.replace(*(rows([n, 1, 1, 11], 10, 8)[0] for n in (17, 18))), NOT_READ, "node 17"),
     "cut.cdb": (ARCHIVE[: len(ARCHIVE) // 2], NOT_READ, "cut off"),
     "support.cdb": (ARCHIVE + "D,       7,UX  ,  0.0 , 0.0\n", LOST, "supports", "1 D"),
     "constraint.cdb": (ARCHIVE + "CE,R5.0,DEFN,  1,  2, 0.0\nCE,R5.0,NODE,  1,  7,UX  ,  1.0\n", LOST, "2 CE"),
