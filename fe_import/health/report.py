@@ -25,11 +25,12 @@ _ROUNDING = 1e-9  # symmetry, mass properties: sums of many terms of one sign in
 _RIGID = 1e-5  # rounding times the condition of a slender link's stiffness; a loose or grounded part gives 1
 _RIGID_PRINTED = 1e-4  # the same with the 14 digits of exported text, which leave 1.2e-5 on the L of 100 hexahedra
 _EIGEN = 1e-6
+RIGID = "rigid-body"  # begin of checks that loose parts and hinges fail
 _CAUSES = {
     "mass matrix": Cause.NOT_DEFINITE,
     "stiffness matrix": Cause.NOT_DEFINITE,
     "grounding": Cause.GROUNDED,
-    "rigid-body": Cause.NOT_DEFINITE,
+    RIGID: Cause.NOT_DEFINITE,
 }
 
 
@@ -113,7 +114,7 @@ def check_basis(
     """
     checks = [
         HealthCheck(
-            "rigid-body motion by stiffness against geometry",
+            f"{RIGID} motion by stiffness against geometry",
             rigid_motion_by_stiffness(model, basis, stiffness),
             _RIGID_PRINTED if model.kind == "matrices" else _RIGID,
         )
@@ -121,8 +122,8 @@ def check_basis(
     if len(omega) > 6:
         frequency, departure = rigid_motion_as_eigenmodes(mass, stiffness, basis.rigid, float(omega[6]))
         checks += [
-            HealthCheck("rigid-body eigenvalues, per first elastic one", frequency, _EIGEN),
-            HealthCheck("rigid-body eigenmodes against geometry", departure, _EIGEN),
+            HealthCheck(f"{RIGID} eigenvalues, per first elastic one", frequency, _EIGEN),
+            HealthCheck(f"{RIGID} eigenmodes against geometry", departure, _EIGEN),
         ]
     carried = basis.fixed_interface.effective_mass
     if len(carried):

@@ -1,0 +1,74 @@
+"""What moves without strain in a link that its reduction found to be unstable: loose parts, hinges inside."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from fe_import.model import Array, FEModel
+
+_MOST_DOFS = 3000  # of a dense eigenproblem
+_FREE = 1e-9  # of the largest scaled eigenvalue: no strain, up to rounding
+
+
+def mechanism(model: FEModel) -> str:
+    """How many motions without strain there are besides those of the whole link, and where; empty if not found.
+
+    Parameters
+    ----------
+    model : FEModel
+    """
+    loose = _loose_part(model)
+    if loose or model.mass.shape[0] > _MOST_DOFS:
+        return loose
+    _, stiffness = model.reduced_matrices()
+    dense = stiffness.toarray()
+    diagonal = np.diag(dense)
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, diagonal.max()))
+    values, vectors = la.eigh(dense * np.outer(scale, scale))
+    free = scale[:, None] * vectors[:, values <= _FREE * values[-1]]
+    rigid = la.orth(model.rigid_body_modes()[model.independent])
+    free = free - rigid @ (rigid.T @ free)
+    motions, sizes, _ = la.svd(free, full_matrices=False)
+    motions = motions[:, sizes > 1e-6 * sizes.max(initial=0.0)]
+    count = int((values <= _FREE * values[-1]).sum()) - 6
+    if count <= 0 or not motions.shape[1]:
+        return ""
+    what = "one motion" if count == 1 else f"{count} motions"
+    return f"{what} without strain inside the link, largest at {_place(model, motions[:, :count])}"
+
+
+def _loose_part(model: FEModel) -> str:
+    """Nodes that no stiffness joins to the others."""
+    rows = model.dof_map.max(axis=1) >= 0
+    _, stiffness = model.reduced_matrices()
+    parts, part = connected_components(stiffness, directed=False)
+    if parts == 1:
+        return ""
+    owner = np.full(model.mass.shape[0], -1)
+    for component in range(6):
+        known = model.dof_map[:, component] >= 0
+        owner[model.dof_map[known, component]] = np.flatnonzero(known)
+    owner = owner[model.independent]
+    groups = [np.unique(owner[part == k]) for k in range(parts)]
+    groups = sorted((g[g >= 0] for g in groups), key=len)
+    smallest = groups[0] if len(groups[0]) else groups[-1]
+    centre = model.nodes[smallest].mean(axis=0)
+    return (
+        f"{parts} parts that no stiffness joins, the smallest of {len(smallest)} of {int(rows.sum())} nodes around "
+        f"({centre[0]:.4g}, {centre[1]:.4g}, {centre[2]:.4g})"
+    )
+
+
+def _place(model: FEModel, motions: Array) -> str:
+    """Position of the node that moves most."""
+    full = np.zeros((model.mass.shape[0], motions.shape[1]))
+    full[model.independent] = motions
+    if model.coupling is not None:
+        full = np.asarray(sp.csr_array(model.coupling) @ motions)
+    rows = model.dof_map[:, :3]
+    sizes = np.where(rows[..., None] >= 0, full[rows], 0.0)
+    node = int(np.linalg.norm(sizes, axis=(1, 2)).argmax())
+    return "({:.4g}, {:.4g}, {:.4g})".format(*model.nodes[node])
