@@ -96,7 +96,9 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
     mass, stiffness = reduced_matrices(model, basis)
     interfaces, inboard = basis.vectors[model.interface_dofs], _inboard(model, options.inboard)
     modes = orthonormal_modes(mass, stiffness, basis, options, interfaces, where, inboard)
-    checks += check_basis(model, basis, mass, stiffness, modes.omega, where)
+    basis_checks = check_basis(model, basis, mass, stiffness, modes.omega, where)
+    rounding = basis_checks[0].value
+    checks += basis_checks
     shapes, modes = mode_shapes(model, basis, modes)
     counts = [text for text in ((basis.selection or {}).get("whole", ""), modes.told) if text]
     for text in counts:
@@ -109,7 +111,7 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
     checks += check_static(reference, shapes[model.interface_dofs], modes.omega, promised)
     thermal = thermal_expansion(model, shapes, wanted, where)
     checks += check_expansion(model, None if thermal is None else thermal.force, modes.omega)
-    checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, where)
+    checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, rounding, where)
     checks += refuse_slips(_unit_checks(model, modes.omega, where), unusual, where)
     checks += _mesh_checks(model, link, shapes, modes.omega)
     residuals = mode_residuals(model, shapes, modes.omega)

@@ -10,7 +10,12 @@ from scipy.sparse.csgraph import connected_components
 from fe_import.model import Array, FEModel
 
 _MOST_DOFS = 3000  # of a dense eigenproblem
-_FREE = 1e-9  # of the largest scaled eigenvalue: no strain, up to rounding
+_FREE = 1e-13  # of the largest scaled eigenvalue: no strain, up to rounding
+_GAP = 1e3  # from motions without strain to those with some
+_NOT_CLEAR = (
+    "or the link is too slender for its elements, or its parts differ too much in stiffness, for double precision: use "
+    "beams, or fewer and longer elements"
+)
 
 
 def mechanism(model: FEModel) -> str:
@@ -28,12 +33,14 @@ def mechanism(model: FEModel) -> str:
     diagonal = np.diag(dense)
     scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, diagonal.max()))
     values, vectors = la.eigh(dense * np.outer(scale, scale))
-    free = scale[:, None] * vectors[:, values <= _FREE * values[-1]]
+    count = int((values <= _FREE * values[-1]).sum()) - 6
+    if count > 0 and values[count + 6] < _GAP * max(values[count + 5], np.finfo(float).eps * values[-1]):
+        return _NOT_CLEAR
+    free = scale[:, None] * vectors[:, : count + 6]
     rigid = la.orth(model.rigid_body_modes()[model.independent])
     free = free - rigid @ (rigid.T @ free)
     motions, sizes, _ = la.svd(free, full_matrices=False)
     motions = motions[:, sizes > 1e-6 * sizes.max(initial=0.0)]
-    count = int((values <= _FREE * values[-1]).sum()) - 6
     if count <= 0 or not motions.shape[1]:
         return ""
     what = "one motion" if count == 1 else f"{count} motions"
