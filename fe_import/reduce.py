@@ -12,14 +12,14 @@ import numpy as np
 
 from fe_import.description.link import LinkFile, load_link
 from fe_import.description.records import Material
-from fe_import.errors import Cause, FEImportError
+from fe_import.errors import FEImportError
 from fe_import.files.toml import choose
 from fe_import.files.versions import package_version
 from fe_import.health.materials import check_materials
 from fe_import.health.matrix_scale import speed_of_sound
-from fe_import.health.mechanisms import mechanism
+from fe_import.health.mechanisms import NOT_CLEAR, mechanism
 from fe_import.health.plausibility import SOUND_IN_MATRICES, plausible_link, plausible_materials, refuse_slips
-from fe_import.health.report import RIGID, check_basis, check_model, check_reduction, mode_residuals
+from fe_import.health.report import RIGID, ROUNDING, check_basis, check_model, check_reduction, mode_residuals
 from fe_import.health.static_flexibility import check_static
 from fe_import.health.thermal_expansion import check_expansion
 from fe_import.modal.damping import damping_ratios
@@ -34,7 +34,7 @@ from fe_import.reduction.modes import mode_kinds, mode_shapes, orthonormal_modes
 from fe_import.reduction.thermal import with_thermal_shape
 from fe_import.second_order.compute import second_order
 from fe_import.solver import chosen_solver
-from fe_import.solver.dense import MECHANISM
+from fe_import.solver.dense import MECHANISM, singular_matrix
 from fe_import.solver.watch import say, telling
 
 
@@ -77,9 +77,11 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     try:
         return _reduced(model, link)
     except FEImportError as problem:
-        loose = MECHANISM in problem.message or problem.message.startswith(RIGID)
-        if problem.cause is Cause.NOT_DEFINITE and loose and (found := mechanism(model)):
-            problem.message += f" ({found})"
+        slender, loose = problem.message.startswith(ROUNDING), problem.message.startswith(RIGID)
+        if (slender or loose or MECHANISM in problem.message) and (found := mechanism(model)):
+            if slender and found != NOT_CLEAR:  # a mechanism has the frequency 0, so that rounding is all of it
+                raise singular_matrix(f"stiffness of the link, {found}") from None
+            problem.message += "" if slender else f" ({found})"
         raise
 
 

@@ -12,7 +12,7 @@ from fe_import.model import Array, FEModel
 _MOST_DOFS = 3000  # of a dense eigenproblem
 _FREE = 1e-13  # of the largest scaled eigenvalue: no strain, up to rounding
 _GAP = 1e3  # from motions without strain to those with some
-_NOT_CLEAR = (
+NOT_CLEAR = (
     "or the link is too slender for its elements, or its parts differ too much in stiffness, for double precision: use "
     "beams, or fewer and longer elements"
 )
@@ -35,7 +35,7 @@ def mechanism(model: FEModel) -> str:
     values, vectors = la.eigh(dense * np.outer(scale, scale))
     count = int((values <= _FREE * values[-1]).sum()) - 6
     if count > 0 and values[count + 6] < _GAP * max(values[count + 5], np.finfo(float).eps * values[-1]):
-        return _NOT_CLEAR
+        return NOT_CLEAR
     free = scale[:, None] * vectors[:, : count + 6]
     rigid = la.orth(model.rigid_body_modes()[model.independent])
     free = free - rigid @ (rigid.T @ free)
@@ -48,24 +48,28 @@ def mechanism(model: FEModel) -> str:
 
 
 def _loose_part(model: FEModel) -> str:
-    """Nodes that no stiffness joins to the others."""
-    rows = model.dof_map.max(axis=1) >= 0
-    _, stiffness = model.reduced_matrices()
-    parts, part = connected_components(stiffness, directed=False)
-    if parts == 1:
-        return ""
+    """Nodes that no stiffness joins to the others; modal coordinates count as nodes of their own."""
     owner = np.full(model.mass.shape[0], -1)
     for component in range(6):
-        known = model.dof_map[:, component] >= 0
-        owner[model.dof_map[known, component]] = np.flatnonzero(known)
+        known = np.flatnonzero(model.dof_map[:, component] >= 0)
+        owner[model.dof_map[known, component]] = known
     owner = owner[model.independent]
-    groups = [np.unique(owner[part == k]) for k in range(parts)]
-    groups = sorted((g[g >= 0] for g in groups), key=len)
-    smallest = groups[0] if len(groups[0]) else groups[-1]
-    centre = model.nodes[smallest].mean(axis=0)
+    modal = owner < 0
+    owner[modal] = len(model.nodes) + np.arange(modal.sum())
+    _, stiffness = model.reduced_matrices()
+    pattern = sp.coo_array(stiffness)
+    count = len(model.nodes) + int(modal.sum())
+    joined = sp.coo_array((np.ones(pattern.nnz), (owner[pattern.row], owner[pattern.col])), shape=(count, count))
+    _, part = connected_components(joined.tocsr(), directed=False)
+    nodes = np.unique(owner[~modal])
+    groups = [nodes[part[nodes] == k] for k in np.unique(part[nodes])]
+    if len(groups) < 2:
+        return ""
+    smallest = min(groups, key=len)
+    centre = ", ".join(f"{x:.4g}" for x in model.nodes[smallest].mean(axis=0))
     return (
-        f"{parts} parts that no stiffness joins, the smallest of {len(smallest)} of {int(rows.sum())} nodes around "
-        f"({centre[0]:.4g}, {centre[1]:.4g}, {centre[2]:.4g})"
+        f"{len(groups)} parts that no stiffness joins, the smallest of {len(smallest)} of {len(nodes)} nodes around "
+        f"({centre})"
     )
 
 

@@ -13,8 +13,8 @@ import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.health.rigid_motion import rigid_motion_as_eigenmodes, rigid_motion_by_stiffness
-from fe_import.health.rounding import MOST, rounding_share
 from fe_import.health.rotation_terms import rotation_departure
+from fe_import.health.rounding import MOST, rounding_share
 from fe_import.modal.inertia import InertiaInvariants, mass_properties
 from fe_import.modal.model import NO_LIMIT, HealthCheck
 from fe_import.model import Array, FEModel
@@ -29,9 +29,11 @@ _LOOSE = 0.3  # a part that moves alone departs by 1
 _MARGIN = 10  # of rounding: a motion found by solving departs by 0.3 to 2 times its share
 _EIGEN = 1e-6
 _TOO_SLENDER = (
-    "the link is too slender for its elements: no solver finds its bending in double precision; use beams, or fewer and "
+    "the link is too slender for its elements: no solver finds its bending in double precision; use beams, or fewer, "
     "longer elements"
 )
+_EIGEN_PRINTED = 1e-5  # with the ten digits of DMIG entries, which leave 3.5e-6 on an L of 40 beams
+ROUNDING = "rounding in the stiffness"
 RIGID = "rigid-body"  # begin of checks that loose parts and hinges fail
 _CAUSES = {
     "mass matrix": Cause.NOT_DEFINITE,
@@ -91,7 +93,7 @@ def _refuse(checks: Iterable[tuple[HealthCheck, str]], where: str) -> None:
             cause = next((c for start, c in _CAUSES.items() if check.name.startswith(start)), Cause.EIGENSOLVER)
             raise FEImportError(
                 cause,
-                f"{check.name} is not {'small' if check.name.startswith('rounding') else 'zero'}",
+                f"{check.name} is not {'small' if check.name.startswith(ROUNDING) else 'zero'}",
                 where=where,
                 value=check.value,
                 limit=check.limit,
@@ -122,18 +124,19 @@ def check_basis(
     least = _RIGID_PRINTED if model.kind == "matrices" else _RIGID
     rounding = rounding_share(model, float(omega[6]), where) if len(omega) > 6 else 0.0
     checks = [
-        HealthCheck("rounding in the stiffness, share of the first elastic ω²", rounding, MOST),
+        HealthCheck(f"{ROUNDING}, share of the first elastic ω²", rounding, MOST),
         HealthCheck(
             f"{RIGID} motion by stiffness against geometry",
             rigid_motion_by_stiffness(model, basis, stiffness),
             max(least, min(_MARGIN * rounding, _LOOSE)),
         ),
     ]
+    spent = _spent(model, rounding)
     if len(omega) > 6:
         frequency, departure = rigid_motion_as_eigenmodes(mass, stiffness, basis.rigid, float(omega[6]))
         checks += [
-            HealthCheck(f"{RIGID} eigenvalues, per first elastic one", frequency, max(_EIGEN, rounding)),
-            HealthCheck(f"{RIGID} eigenmodes against geometry", departure, max(_EIGEN, rounding)),
+            HealthCheck(f"{RIGID} eigenvalues, per first elastic one", frequency, spent),
+            HealthCheck(f"{RIGID} eigenmodes against geometry", departure, spent),
         ]
     carried = basis.fixed_interface.effective_mass
     if len(carried):
@@ -143,8 +146,13 @@ def check_basis(
         "look for loose parts, hinges, supports, matrices of another model, and for many small elements in a slender "
         "or very stiff part"
     )
-    _refuse(((check, _TOO_SLENDER if check.name.startswith("rounding") else remedy) for check in checks), where)
+    _refuse(((check, _TOO_SLENDER if check.name.startswith(ROUNDING) else remedy) for check in checks), where)
     return (*checks, *_missing_modes(model, omega), HealthCheck("condition of the basis", _condition(mass), NO_LIMIT))
+
+
+def _spent(model: FEModel, rounding: float) -> float:
+    """Limit of what rigid-body motions may cost, per first elastic ω²."""
+    return max(_EIGEN_PRINTED if model.kind == "matrices" else _EIGEN, rounding)
 
 
 def _missing_modes(model: FEModel, omega: Array) -> tuple[HealthCheck, ...]:
@@ -209,7 +217,7 @@ def check_reduction(
     rounding: float,
     where: str,
 ) -> tuple[HealthCheck, ...]:
-    """Checks of the reduced link against the full model; ``rounding``: share of ω² that it may make up in the stiffness.
+    """Checks of the reduced link against the full model; ``rounding``: the share of ω² that it may make up.
 
     Raises
     ------
@@ -225,7 +233,7 @@ def check_reduction(
     distance = full.centre_of_mass @ full.centre_of_mass  # both inertias were moved here from the mesh origin
     inertia_scale = np.abs(full.inertia).max() + full.mass * distance
     elastic = omega[6:] ** 2
-    identity = np.eye(len(omega))
+    identity, spent = np.eye(len(omega)), _spent(model, rounding)
     checks = [
         HealthCheck("modes: rigid-body motion of geometry reproduced", float(reproduced.max()), _ROUNDING),
         HealthCheck("mass against the full model", abs(reduced.mass / full.mass - 1), _ROUNDING),
@@ -245,7 +253,7 @@ def check_reduction(
         strain = np.abs(np.diag(stiffness)[:6]).max() / elastic[0]
         spread = np.abs(np.diag(stiffness)[6:] / elastic - 1).max()
         checks += [
-            HealthCheck("strain energy of rigid-body modes, per first elastic mode", float(strain), max(_EIGEN, rounding)),
+            HealthCheck(f"strain energy of {RIGID} modes, per first elastic mode", float(strain), spent),
             HealthCheck("Rayleigh quotients against squared frequencies", float(spread), max(_EIGEN, rounding)),
         ]
     if model.kind == "matrices":  # of a superelement only the kept nodes are known

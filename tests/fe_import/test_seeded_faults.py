@@ -281,7 +281,7 @@ FAULTS = {
     ),
     "matrices: missing coupling": matrices("parts that no stiffness joins, the smallest of", k=with_loose_part),
     "matrices: hinge inside": matrices(
-        "(one motion without strain inside the link, largest at (",
+        "one motion without strain inside the link, largest at (", "some part can move without strain",
         k=lambda: hinged_files()["k.mtx"],
         m=lambda: hinged_files()["m.mtx"],
         rows=lambda: rows_of(hinged_files()["k.dof"]),
