@@ -59,16 +59,11 @@ def export(
         link = of_modal_model(read_modal_file(source), str(source))
         method = "none"
     paths = write_link(link, output, form, lambda path: claim(path, path.suffix, inputs, force), method)
-    summary = {
-        "link": link.name,
-        "dofs": int(link.mass.shape[0]),
-        "nodes": len(link.labels),
-        "modal_coordinates": link.modal,
-        "interfaces": {name: int(link.labels[node]) for name, node in link.interfaces.items()},
-        "files": [str(path) for path in paths],
-    }
+    dofs, names = int(link.mass.shape[0]), [str(path) for path in paths]
+    interfaces = {name: int(link.labels[node]) for name, node in link.interfaces.items()}
     if json:
-        return print_json(summary)
-    print(f"{link.name}: {summary['dofs']} dofs, {summary['nodes']} nodes, {link.modal} modal coordinates")
-    print("interfaces: " + ", ".join(f"{name} is node {number}" for name, number in summary["interfaces"].items()))
-    print("written: " + ", ".join(summary["files"]))
+        counts = {"dofs": dofs, "nodes": len(link.labels), "modal_coordinates": link.modal}
+        return print_json({"link": link.name, **counts, "interfaces": interfaces, "files": names})
+    print(f"{link.name}: {dofs} dofs, {len(link.labels)} nodes, {link.modal} modal coordinates")
+    print("interfaces: " + ", ".join(f"{name} is node {number}" for name, number in interfaces.items()))
+    print("written: " + ", ".join(names))

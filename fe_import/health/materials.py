@@ -31,4 +31,4 @@ def check_materials(materials: dict[str, Material], length: float, mass: float, 
         if stiff and heavy and not stiff & heavy:
             mixed.append(f"{name} has Young's modulus of {min(stiff)} ({modulus:.3g} Pa) and density of {min(heavy)}")
     text = f" ({'; '.join(mixed)})" if mixed else ""
-    return (HealthCheck(f"units: materials with constants of two metals{text}", float(len(mixed)), 0.0),)
+    return (HealthCheck(f"material: constants of two metals{text}", float(len(mixed)), 0.0),)

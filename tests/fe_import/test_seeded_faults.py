@@ -37,8 +37,8 @@ class Fault(NamedTuple):
     reported: bool = False
 
 
-def frame(*words: str, **changes: Any) -> Fault:
-    return Fault(lambda folder: load_link(write_toml(folder / "l.toml", merged(FRAME, changes))), words)
+def frame(*words: str, reported: bool = False, **changes: Any) -> Fault:
+    return Fault(lambda folder: load_link(write_toml(folder / "l.toml", merged(FRAME, changes))), words, reported)
 
 
 def deck(mesh: SolidMesh) -> str:
@@ -174,10 +174,10 @@ FAULTS = {
     "frame: modulus in MPa": frame("Young's modulus", "MPa", materials={"m": {"youngs_modulus": 7e4}}),
     "frame: density in g/cm3": frame("density", "g/cm³", materials={"m": {"density": 2.7}}),
     "frame: aluminium with the density of steel": frame(
-        "m has Young's modulus of aluminium", "density of steel", materials={"m": {"density": 7850.0}}
+        "m has Young's modulus of aluminium", "density of steel", reported=True, materials={"m": {"density": 7850.0}}
     ),
     "frame: steel with the density of aluminium": frame(
-        "modulus of steel", "density of aluminium", materials={"m": {"youngs_modulus": 2.1e11}}
+        "modulus of steel", "density of aluminium", reported=True, materials={"m": {"youngs_modulus": 2.1e11}}
     ),
     "frame: floating part": frame(
         "no members join node",
@@ -197,7 +197,9 @@ FAULTS = {
     ),
     "solid: m read as mm": solid("density", "unit slipped", units={"length": "mm"}),
     "solid: modulus in MPa": solid("Young's modulus", "MPa", materials={"m": {"youngs_modulus": 7e4}}),
-    "solid: aluminium with the density of steel": solid("density of steel", materials={"m": {"density": 7850.0}}),
+    "solid: aluminium with the density of steel": solid(
+        "density of steel", reported=True, materials={"m": {"density": 7850.0}}
+    ),
     "solid: missing coupling": solid("2 parts", "no element face joins", text=lambda: parts(0.01)),
     "solid: duplicate nodes": solid("pairs of nodes coincide", text=lambda: parts(0.0)),
     "solid: hinge inside": solid("2 parts", "touch at nodes or edges only", text=hinged),
