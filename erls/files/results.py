@@ -32,7 +32,11 @@ _BEGINS = {
     ".mp4": b"",
     ".npz": b"PK",
     ".mat": b"MATLAB",
-    ".mtx": b"", ".txt": b"#", ".pch": b"$", ".inp": b"**",
+    ".sweep": b"SQLite format 3",
+    ".mtx": b"",
+    ".txt": b"#",
+    ".pch": b"$",
+    ".inp": b"**",
     ".op4": b"\x18",  # has no place for a mark
 }
 _TABLE = re.compile(
