@@ -28,10 +28,9 @@ def rounding_share(model: FEModel, first: float, where: str) -> float:
         First elastic circular frequency ω [rad/s].
     where : str
     """
-    mass, stiffness = model.reduced_matrices()
     try:
-        rigid = np.abs(rigid_modes(mass, model.rigid_body_modes()[model.independent], where)[0])
+        rigid = np.abs(rigid_modes(model.mass, model.rigid_body_modes(), where)[0])
     except FEImportError:
         return 0.0
-    energy = np.einsum("dk,dk->k", rigid, abs(stiffness) @ rigid)
+    energy = np.einsum("dk,dk->k", rigid, abs(model.stiffness) @ rigid)
     return float(np.finfo(float).eps * energy.max() / first**2)

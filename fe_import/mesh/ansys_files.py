@@ -25,6 +25,7 @@ _COMMAND = re.compile(r"\s*([A-Za-z/*_][\w/*:]*)")
 _HEADER = 11  # numbers before the nodes of an element: material, type, ... , count of nodes, -, number
 _MOST_NODES = 30
 _DIGITS = 15
+_MOST_MEMBERS = 20_000_000  # of a component; a file of a few lines must not fill the memory
 _PLAIN = "write it with CDWRITE,DB and blocks (not UNBLOCKED)"
 
 
@@ -106,8 +107,11 @@ class _Reader:
         match = _FORMAT.match(line.strip())
         if match is None:
             raise self._fault("the format of a block is not understood", line)
-        widths = [int(match[2])] * min(int(match[1] or 1), 100) + [int(match[4] or 0)] * min(int(match[3] or 1), 100)
-        return [w for w in widths if w], int(match[5] or 0)
+        widths = [int(match[2])] * min(int(match[1] or 1), 100)
+        widths += [int(match[4])] * min(int(match[3] or 1), 100) if match[4] else []
+        if not widths or min(widths) < 1:
+            raise self._fault("the format of a block has no whole numbers", line)
+        return widths, int(match[5] or 0)
 
     def _integers(self, line: str, width: int) -> list[int]:
         text = line.rstrip()
@@ -123,7 +127,7 @@ class _Reader:
     def _type_block(self) -> None:
         widths, _ = self._format()
         while (line := self._line()).strip() != "-1":
-            number, kind, *options = self._integers(line[: 3 * widths[0]], widths[0])
+            number, kind, *options = (*self._integers(line[: 3 * widths[0]], widths[0]), 0, 0)[:3]
             self._types[number] = kind
             self._first_option[number] = options[0] if options else 0
 
@@ -186,6 +190,8 @@ class _Reader:
         for number in found:
             if number < 0 and members and members[-1] <= -number <= members[-1] + 10_000_000:
                 members += range(members[-1] + 1, -number + 1)
+                if len(members) > _MOST_MEMBERS:
+                    raise self._fault("a component has more members than a mesh", str(len(members)))
             elif number > 0:
                 members.append(number)
             else:

@@ -78,6 +78,12 @@ def test_element_types_of_ansys(tmp_path: Path, name: str, element: int) -> None
     same(read_mesh(written(tmp_path, "box.cdb", archive(mesh, element))), mesh, 1e-13)
 
 
+def test_blocks_of_types(tmp_path: Path) -> None:
+    """ETBLOCK instead of ET."""
+    block = "ETBLOCK,        1,        1\n(2i9,19a9)\n        1      185        0\n       -1\n"
+    same(read_mesh(written(tmp_path, "box.cdb", ARCHIVE.replace("ET,        1,185\n", block))), BOX, 1e-13)
+
+
 def test_middle_nodes_of_ansys(tmp_path: Path) -> None:
     """All left out make an element linear; some left out are refused."""
     mesh = box("hex8", (2, 1, 1))
@@ -149,6 +155,10 @@ FAULTS = {
     "count.cdb": (ARCHIVE.replace(f",  {len(BOX.nodes)}\n", ",  99\n"), NOT_READ, "another count of nodes"),
     "elements.cdb": (ARCHIVE.replace("EBLOCK,19,SOLID, 2, 2", "EBLOCK,19,SOLID, 2, 3"), NOT_READ, "count of elements"),
     "unknown.cdb": (ARCHIVE + "FOOBAR, 3\n", LOST, "not known here", "1 FOOBAR"),
+    "no width.cdb": (ARCHIVE.replace("(19i9)", "(19i0)"), NOT_READ, "no whole numbers"),
+    "giant.cdb": (ARCHIVE.replace("CMBLOCK,HALF    ,ELEM,  1\n(8i10)\n         1", "CMBLOCK,HALF    ,ELEM,  6\n(8i10)\n"
+                                  + "".join(f"{n:10d}" for k in range(3) for n in (1, -9_000_000))),
+                  NOT_READ, "more members than a mesh"),
     "format.cdb": (ARCHIVE.replace("(3i9,6e21.13e3)", "(3x9)"), NOT_READ, "format of a block"),
     "no head.cdb": (ARCHIVE.replace("CMBLOCK,NODES   ,NODE,  4\n", ""), NOT_READ, "numbers behind the end of a block"),
     "empty.cdb": ("/PREP7\nFINISH\n", NOT_READ, "NBLOCK"),
