@@ -9,8 +9,7 @@ import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports import Export
-from fe_import.exports.dofs import COMPONENTS
-from fe_import.models.export_rigid import listed
+from fe_import.models.export_rigid import listed, row_name
 from fe_import.models.measures import asymmetry
 
 _ASYMMETRY = 1e-9
@@ -70,7 +69,7 @@ def _check_signs(export: Export, where: str) -> None:
         raise FEImportError(
             Cause.NOT_DEFINITE,
             f"the {name} matrix is negative on its diagonal in {len(negative)} of {len(diagonal)} rows, the first is "
-            f"{_row_name(export, row)}: a sign is wrong there",
+            f"{row_name(export.dof_map, export.labels, row)}: a sign is wrong there",
             where=where,
             value=float(diagonal[row]),
             limit="zero or more",
@@ -84,15 +83,6 @@ def _check_signs(export: Export, where: str) -> None:
             where=where,
             remedy="export K of K u = f and M of kinetic energy, not their negatives",
         )
-
-
-def _row_name(export: Export, row: int) -> str:
-    """Node and component of a row."""
-    found = np.argwhere(export.dof_map == row)
-    if not len(found):
-        return f"row {row + 1}, a modal coordinate"
-    node, component = found[0]
-    return f"row {row + 1}, {COMPONENTS[component]} of node {export.labels[node]}"
 
 
 def _check_exchanged(export: Export, where: str) -> None:
@@ -125,7 +115,7 @@ def _check_symmetry(matrix: sp.csc_array, name: str, where: str, export: Export)
     if off.count_nonzero() <= _FEW:
         place = sp.coo_array(off)
         row, column = (int(c[place.data.argmax()]) for c in place.coords)
-        places = f"{_row_name(export, row)} and {_row_name(export, column)}"
+        places = f"{row_name(export.dof_map, export.labels, row)} and {row_name(export.dof_map, export.labels, column)}"
         message = f"the {name} matrix is not symmetric at one place: {places}"
         values = f"{matrix[row, column]:.6g} and {matrix[column, row]:.6g}"
         remedy = "mend the entry, one of the two has a wrong value or sign"

@@ -117,7 +117,7 @@ def _reason(model: FEModel, rigid: Array, labels: IntArray) -> tuple[str, str]:
             return message, "name the deck as 'mesh', which has all digits"
         return message, "check the unit of length, the mesh, the order of the dofs and the frames of the nodes"
     if pair := _flipped_pair(model, force):
-        names = " and ".join(_row_name(model, labels, row) for row in pair)
+        names = " and ".join(row_name(model.dof_map, labels, row) for row in pair)
         return f"the stiffness entry between {names} has the wrong sign", "mend it, and its twin in the other triangle"
     size = force[rows, :3].max(axis=(1, 2))
     held = size > _NOTICED * size.max()
@@ -145,9 +145,14 @@ def _flipped_pair(model: FEModel, force: Array) -> tuple[int, int] | None:
     return (i, j) if np.abs(resisting[rows] - twice).max() <= _NOTICED * twice else None
 
 
-def _row_name(model: FEModel, labels: IntArray, row: int) -> str:
-    node, component = np.argwhere(model.dof_map == row)[0]
-    return f"{COMPONENTS[component]} of node {labels[node] if node < len(labels) else 'of an interface'}"
+def row_name(dof_map: IntArray, labels: IntArray, row: int) -> str:
+    """Row, component and node, by its number; modal coordinates have none."""
+    found = np.argwhere(dof_map == row)
+    if not len(found):
+        return f"row {row + 1}, a modal coordinate"
+    node, component = found[0]
+    number = labels[node] if node < len(labels) else "of an interface"
+    return f"row {row + 1}, {COMPONENTS[component]} of node {number}"
 
 
 def listed(labels: IntArray) -> str:
