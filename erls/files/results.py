@@ -33,6 +33,11 @@ _BEGINS = {
     ".npz": b"PK",
     ".mat": b"MATLAB",
     ".sweep": b"SQLite format 3",
+    ".mtx": b"",
+    ".txt": b"#",
+    ".pch": b"$",
+    ".inp": b"**",
+    ".op4": b"\x18",  # has no place for a mark
 }
 _TABLE = re.compile(
     rb'"?(t \[s\]|load \[1\]),.*(energy\.\w+ \[J\]|: energy \[J\])"?\r?\n'  # of a run, or of several

@@ -53,13 +53,15 @@ _LOSSES = {
         MATRIX, MATRIX INPUT, MATRIX ASSEMBLE, SUBSTRUCTURE PROPERTY, REBAR, REBAR LAYER, NODAL THICKNESS"""
     ),
     "shells": _names("SHELL SECTION, SHELL GENERAL SECTION, MEMBRANE SECTION, SURFACE SECTION"),
-    "beams": _names("BEAM SECTION, BEAM GENERAL SECTION, FRAME SECTION, FLUID SECTION"),
+    "beams": _names("BEAM SECTION, BEAM GENERAL SECTION, FRAME SECTION"),
+    "a fluid": _names("FLUID SECTION, FLUID SECTIONS, BOUNDARYF, EQUATIONF, TRANSFORMF, NETWORK SELECTION FOR GAS"),
     "changes of the model": _names("MODEL CHANGE, RELEASE, SUBMODEL, REFINE MESH, CHANGE SOLID SECTION"),
 }
 _LOSS_OF = {name: text for text, names in _LOSSES.items() for name in names}
 _ELEMENTS = {
     "point masses": re.compile(r"MASS|ROTARYI"),
     "springs, dampers or connectors": re.compile(r"SPRING|DASHPOT|GAP|CONN|JOINT|ITS|DCOUP"),
+    "a fluid": re.compile(r"D\Z|D[A-Z]\w*|F3D\d+|FC3D\d+"),
 }
 
 

@@ -98,7 +98,7 @@ def _nodes(reader: DeckReader, options: dict[str, str], deck: Deck) -> None:
         raise ValueError("nodes in spherical coordinates")
     labels: list[int] = []
     while (fields := reader.data()) is not None:
-        if len(fields) not in (2, 3, 4, 7):  # 7: with the direction of a normal; zeros at the end may be left out
+        if not 2 <= len(fields) <= 7:  # with the direction of a normal; zeros at the end may be left out
             raise reader.fault("expected a node and three coordinates", shortened(", ".join(fields)))
         label = reader.integer(fields[0])
         if not 0 < label <= _LARGEST_LABEL:

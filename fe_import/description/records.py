@@ -33,11 +33,15 @@ class Units(_Record, frozen=True):
         ``kg``, ``g``, ``t``, ``lb``, or with pounds of force ``slug`` (feet) or ``lbf*s2/in`` (inches).
     time : str
         ``s`` or ``ms``.
+    unusual : bool
+        The link is as large, heavy, soft or light as its figures say: those that look like a slipped unit are reported,
+        not refused.
     """
 
     length: str = "m"
     mass: str = "kg"
     time: str = "s"
+    unusual: bool = False
 
 
 class Material(_Record, frozen=True):

@@ -23,6 +23,7 @@ from fe_import.files.text import TextFile
 from fe_import.mesh.nastran_attachments import READERS, attached
 from fe_import.mesh.nastran_bulk import Bulk, Unused
 from fe_import.mesh.nastran_materials import solid_materials
+from fe_import.mesh.orders import HEIGHT_FIRST
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 from fe_import.model import IntArray
 from fe_import.nastran.cards import Card, read_cards
@@ -35,10 +36,6 @@ _SOLIDS = {  # card -> types by number of nodes
     "CPYRA": ("pyramid5", "pyramid13"),
     "CPENTA": ("wedge6", "wedge15"),
     "CHEXA": ("hex8", "hex20"),
-}
-_ORDER = {  # where Nastran's order of nodes is another one: edges along the height come before those of the top
-    "wedge15": [*range(9), 12, 13, 14, 9, 10, 11],
-    "hex20": [*range(12), 16, 17, 18, 19, 12, 13, 14, 15],
 }
 _SHAPES = {2: ("line", 1), 3: ("triangle", 2), 4: ("quad", 2), 6: ("triangle6", 2), 8: ("quad8", 2)}
 _PROPERTIES = re.compile(r"(PSHELL|PCOMP|PSHEAR|PBAR|PBEAM|PROD|PTUBE|PBEND)")
@@ -159,7 +156,7 @@ def _mesh(bulk: Bulk, cases: dict[int, str]) -> RawMesh:
         else:
             why = f" ({reasons[card.name]})" if card.name in reasons else ""
             left_out.append((card.name, card.where, loss(card.name) + why))
-            if card.name == "GRID":
+            if card.name in ("GRID", "GRDSET"):
                 left_out.pop()
                 left_out += _of_grid(card)
             continue
@@ -224,16 +221,16 @@ def _solid(card: Card, linear: str, quadratic: str) -> tuple[str, list[int]]:
         given.pop()
     for kind in (linear, quadratic):
         if len(given) == MESH_ELEMENTS[kind].size and all(given):
-            return kind, [given[k] for k in _ORDER.get(kind, range(len(given)))]
+            return kind, [given[k] for k in HEIGHT_FIRST.get(kind, range(len(given)))]
     sizes = " or ".join(str(MESH_ELEMENTS[kind].size) for kind in (linear, quadratic))
     raise card.fault("another number of grid points than these elements have", sum(map(bool, given)), sizes)
 
 
 def _of_grid(card: Card) -> Iterable[tuple[str, str, str]]:
     if card.field(7) and card.field(7) != "0":
-        yield "PS of GRID", card.where, "supports (a link is free, and joints hold it)"
+        yield f"PS of {card.name}", card.where, "supports (a link is free, and joints hold it)"
     if card.field(8) and card.field(8) != "0":
-        yield "SEID of GRID", card.where, "superelements"
+        yield f"SEID of {card.name}", card.where, "superelements"
 
 
 def _counted(found: list[tuple[str, str, str]]) -> list[LeftOut]:

@@ -1,14 +1,14 @@
-"""Mesh files: everything that meshio reads -> a checked mesh of solid elements with its named sets.
+"""Mesh files: our own readers and everything that meshio reads -> a checked mesh of solid elements with its named sets.
 
-meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX are read by
-`fe_import.mesh.abaqus_files`, bulk data of Nastran by `fe_import.mesh.nastran_files`.
+meshio stays behind `fe_import.mesh.meshio_files`; what it does not read, or not whole, has readers of its own.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,14 @@ from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
 from fe_import.model import IntArray
 
-_NASTRAN = (".bdf", ".fem", ".nas")
+_READERS = {  # by suffix: module and function, imported when asked for
+    ".inp": ("fe_import.mesh.abaqus_files", "read_abaqus"),
+    **dict.fromkeys((".bdf", ".fem", ".nas"), ("fe_import.mesh.nastran_files", "read_nastran")),
+    ".cdb": ("fe_import.mesh.ansys_files", "read_ansys"),
+    **dict.fromkeys((".e", ".ex2", ".exo"), ("fe_import.mesh.exodus_files", "read_exodus")),
+    ".unv": ("fe_import.mesh.universal_files", "read_universal"),
+}
+_OTHERS = ("fe_import.mesh.meshio_files", "read_with_meshio")
 _BY_MESHIO_NAME = {element.meshio_name: name for name, element in MESH_ELEMENTS.items()}
 
 
@@ -91,17 +98,9 @@ def _read(path: Path) -> RawMesh:
             Cause.NOT_READABLE, "cannot be read as a mesh: not a file", where=str(path), remedy="check the path"
         )
     with unpacked(path) as plain:
-        if plain.suffix.lower() == ".inp":
-            from fe_import.mesh.abaqus_files import read_abaqus
-
-            return read_abaqus(plain, str(path))
-        if plain.suffix.lower() in _NASTRAN:
-            from fe_import.mesh.nastran_files import read_nastran
-
-            return read_nastran(plain, str(path))
-        from fe_import.mesh.meshio_files import read_with_meshio  # meshio is heavy
-
-        return read_with_meshio(plain, str(path))
+        module, function = _READERS.get(plain.suffix.lower(), _OTHERS)
+        read: Callable[[Path, str], RawMesh] = getattr(import_module(module), function)
+        return read(plain, str(path))
 
 
 def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]:
@@ -167,7 +166,10 @@ def _solid_blocks(raw: RawMesh, where: str) -> list[int]:
             remedy="mesh with one of the supported types",
         )
     if not counts:
-        found = _listing((block.type, len(block.cells)) for block in raw.blocks) or "no elements at all"
+        others: Counter[str] = Counter()
+        for block in raw.blocks:
+            others[block.type] += len(block.cells)
+        found = _listing(others.items()) or "no elements at all"
         raise FEImportError(
             Cause.MESH,
             f"no solid elements, found {found}",

@@ -95,7 +95,10 @@ def read_cards(
             continue
         if name:
             if not head[0].isalpha():
-                raise _damaged(place(number), "neither a card nor the continuation of one", raw)
+                message = "neither a card nor the continuation of one"
+                if head.startswith("="):
+                    message = "cards repeated with = and * are not followed"
+                raise _damaged(place(number), message, raw)
             yield Card(name, tuple(fields), place(start))
         name = ""
         keyword = head.rstrip("* ").upper()

@@ -85,7 +85,7 @@ def grid_points(cards: Iterable[Card]) -> GridPoints:
     Raises
     ------
     FEImportError
-        ``EXPORT``: a faulty field, a number that stands twice, GRDSET; ``BAD_REFERENCE``: a coordinate system that is
+        ``EXPORT``: a faulty field, a number that stands twice; ``BAD_REFERENCE``: a coordinate system that is
         not there.
     """
     found = list(cards)
@@ -94,8 +94,6 @@ def grid_points(cards: Iterable[Card]) -> GridPoints:
     for card in found:
         if card.name == "GRID":
             _add_grid(card, frames, result)
-        elif card.name == "GRDSET":
-            raise card.fault("defaults for GRID are not followed", remedy="write CP and CD on each GRID")
         elif card.name == "SPOINT":
             result.scalar_points.update(_numbers(card))
         elif card.name == "PLOTEL":
@@ -103,12 +101,20 @@ def grid_points(cards: Iterable[Card]) -> GridPoints:
     return result
 
 
+def _defaults(cards: list[Card]) -> tuple[int, int]:
+    """Coordinate systems of grid points that name none: of GRDSET, else the basic one."""
+    found = [card for card in cards if card.name == "GRDSET"]
+    if len(found) > 1:
+        raise found[1].fault("this card stands twice")
+    return (found[0].integer(2, 0), found[0].integer(6, 0)) if found else (0, 0)
+
+
 def _add_grid(card: Card, frames: Frames, points: GridPoints) -> None:
     number = card.integer(1)
     if number in points.positions:
         raise card.fault("this grid point stands twice", number)
     points.positions[number] = frames.of_grid(card)
-    frame = card.integer(6, 0)
+    frame = card.integer(6, frames.moved)
     if frame:
         points.axes[number] = frames.get(frame, card).axes_at(points.positions[number])
 
@@ -130,6 +136,7 @@ class Frames:
         self._cards: dict[int, tuple[Card, int]] = {}  # with the field of its number: a CORD1 may define two
         self._grids = {card.integer(1): card for card in cards if card.name == "GRID"}
         self._open: set[int] = set()
+        self._placed, self.moved = _defaults(cards)
         for card in cards:
             for at in (1, 5) if card.name in _BY_GRIDS and card.field(5) else (1,):
                 if card.name.startswith("CORD"):
@@ -140,7 +147,7 @@ class Frames:
 
     def of_grid(self, card: Card) -> Array:
         """(3,) position that a GRID states."""
-        return self.get(card.integer(2, 0), card).position(np.array([card.real(k, 0.0) for k in (3, 4, 5)]))
+        return self.get(card.integer(2, self._placed), card).position(np.array([card.real(k, 0.0) for k in (3, 4, 5)]))
 
     def get(self, number: int, user: Card) -> Frame:
         """The coordinate system that a card refers to."""

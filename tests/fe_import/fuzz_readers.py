@@ -18,6 +18,7 @@ from fuzzing import Facts, Reader
 from fuzzing_facts import content, taken
 from fuzzing_hdf5 import edited
 from link_files import toml
+from mesh_writers import archive, exodus, universal
 from modal_models import synthetic_model
 from solid_meshes import box, bulk
 from superelements import Reduced, condensed, deck, frame_model, matrix_input, punch, substructure
@@ -197,6 +198,10 @@ def _meshes() -> Iterator[Reader]:
             path = Path(folder) / f"box{suffix}"
             meshio.write(path, hexes, form, binary=binary)
             sound[suffix] = path.read_bytes()
+    sound[".unv"], sound[".cdb"] = universal(mesh).encode(), archive(mesh).encode()
+    with tempfile.TemporaryDirectory() as folder:
+        exodus(Path(folder) / "box.e", mesh)
+        sound[".e"] = (Path(folder) / "box.e").read_bytes()
     sound[".inp.gz"] = gzip.compress(sound[".inp"], mtime=0)
     options: dict[str, Any] = {
         ".inp": {"counts": False, "ends": False},
@@ -204,6 +209,9 @@ def _meshes() -> Iterator[Reader]:
         ".vtu": {"counts": False},
         ".vtk": {"binary": True},
         "-binary.msh": {"binary": True},
+        ".unv": {"counts": False, "ends": False},
+        ".cdb": {"counts": False, "ends": False},
+        ".e": {"binary": True},
         ".inp.gz": {"binary": True, "exact": True},
     }
     for suffix, data in sound.items():

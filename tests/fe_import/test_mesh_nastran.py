@@ -74,6 +74,9 @@ def test_coordinate_systems(tmp_path, frame, given):
             line = ",".join([*words[:2], "4", *(repr(float(v)) for v in local)])
         lines.append(line)
     np.testing.assert_allclose(read(tmp_path, "\n".join(lines)).nodes, BAR.nodes, atol=1e-14)
+    unnamed = [line.replace(",4,", ",,", 1) if line.startswith("GRID,") else line for line in lines]
+    default = "\n".join(unnamed).replace("ENDDATA", "GRDSET,,4\nENDDATA")
+    np.testing.assert_allclose(read(tmp_path, default).nodes, BAR.nodes, atol=1e-14)
 
 
 LOSSES = {  # cards, what the message says, names to ignore
@@ -92,6 +95,7 @@ LOSSES = {  # cards, what the message says, names to ignore
     "supports": (["SPC1,1,123,7"], "supports (a link is free", ["SPC1"]),
     "beams": (["CBAR,90,3,7,17,0.,0.,1.", "PBAR,3,1,.1,.1,.1,.1"], "beams or bars (a beam without length", ["CBAR"]),
     "shells": (["CTRIA3,90,3,7,17,27", "PSHELL,3,1,.1"], "shells: 1 CTRIA3", ["CTRIA3"]),
+    "supports of all points": (["GRDSET,,,,,,,123"], "1 PS of GRDSET", ["PS of GRDSET"]),
     "supports of a point": (["GRID,901,,0.,0.,0.,,123"], "1 PS of GRID", ["PS of GRID"]),
     "matrices": (["DMIG,K2GG,0,6,2,0"], "given as matrices: 1 DMIG", ["DMIG"]),
     "unknown": (["ODDONE,1,2"], "not known here: 1 ODDONE", ["ODDONE"]),
@@ -122,7 +126,8 @@ FAULTS = {
     "grid twice": (bulk(BAR, "GRID,7"), "stands twice"),
     "ten fields": (bulk(BAR, "GRID,901,,1.,2.,3.,,,,5.,6."), "more fields than a line holds"),
     "word": (bulk(BAR, "GRID,901,,a"), "finite real number"),
-    "defaults": (bulk(BAR, "GRDSET,,,,,,,123"), "defaults for GRID"),
+    "defaults twice": (bulk(BAR, "GRDSET,,4", "GRDSET,,4"), "this card stands twice"),
+    "repeated": (bulk(BAR, "GRID,901,,0.,0.,0.", "=,*(1),=,*(.1)"), "repeated with = and * are not followed"),
 }
 
 

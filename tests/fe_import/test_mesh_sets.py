@@ -180,7 +180,7 @@ DECKS = {
     "a rotation without axis": (["*INSTANCE, NAME=A, PART=P", "1., 2.", "1.,2.,3.,1.,2.,3.,9."], "different points"),
     "backwards": (["*NSET, NSET=X, GENERATE", "1, 9, -1"], "step of -1"),
     "giant set": (["*NSET, NSET=X, GENERATE", "1, 999999999999, 1"], "members"),
-    "six fields of a node": (["*NODE", "999, 0.5, 0.5, 0.5, 7, 8"], "a node and three coordinates"),
+    "eight fields of a node": (["*NODE", "999, 0.5, 0.5, 0.5, 7, 8, 9, 10"], "a node and three coordinates"),
     "parameters of digits": (["*ELEMENT, TYPE=C3D,8", "9, 7, 17"], "no such parameter; got '8'"),
     "data in the keyword line": (["*NSET, NSET=X, 7, 17"], "no such parameter; got '7'"),
     "misspelled": (["*NSET, NSET=X, GENERTE", "7, 27, 10"], "no such parameter"),
