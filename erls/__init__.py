@@ -12,6 +12,7 @@ The command line in three lines::
 from typing import Any
 
 __all__ = [
+    "invert",
     "linearize",
     "load_run",
     "load_scene",
@@ -27,6 +28,7 @@ __all__ = [
 _HOME = {
     "load_scene": ("erls.scene.read", "load_scene"),
     "linearize": ("erls.linear.linearize", "linearize"),
+    "invert": ("erls.inverse.invert", "invert"),
     "simulate": ("erls.simulation.simulate", "simulate"),
     "simulate_many": ("erls.simulation.batch", "simulate_many"),
     "load_run": ("erls.run.file", "load_run"),

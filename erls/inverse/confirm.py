@@ -32,6 +32,7 @@ class Confirmation:
 
     Attributes
     ----------
+    problem : Problem
     run : ChainRun
     t : (k,) array
         Its steps [s].
@@ -41,6 +42,7 @@ class Confirmation:
         Of all points from where they are demanded, the farthest [m]; of conditions on joints alone zero.
     """
 
+    problem: Problem
     run: ChainRun
     t: Array
     missed: Array
@@ -50,6 +52,11 @@ class Confirmation:
     def error(self) -> float:
         """Largest distance [m]."""
         return float(self.distance.max(initial=0.0))
+
+    @property
+    def largest(self) -> list[float]:
+        """(p,) what each condition misses at most, in its unit."""
+        return [float(x) for x in np.abs(self.missed).max(axis=0)]
 
 
 def confirmed(
@@ -79,7 +86,7 @@ def confirmed(
     """
     scene = driven_scene(inversion.problem, inversion.t, efforts, start, formulation)
     run = simulate(scene, tell=tell, progress=progress, verdict=False)
-    return Confirmation(run, *missed(inversion.problem, run))
+    return Confirmation(inversion.problem, run, *missed(inversion.problem, run))
 
 
 def driven_scene(
@@ -114,15 +121,11 @@ def missed(problem: Problem, run: ChainRun) -> tuple[Array, Array, Array]:
     conditions, t = problem.conditions, run.times
     series = run.series(t)
     places = [run.position(point.name, t) for point in conditions.points]
-    still = [np.zeros_like(place) for place in places]
-    points = PointMotion(*(np.stack(x, 1) if x else np.zeros((len(t), 0, 3)) for x in (places, still, still)), _none(t, places))
-    joints = Joints(series.angles, np.zeros_like(series.angles), np.zeros_like(series.angles), np.zeros((series.angles.shape[1], 0)))
-    held = conditions.held(conditions.demand(t), points, joints)
+    place = np.stack(places, 1) if places else np.zeros((len(t), 0, 3))
+    points = PointMotion(place, np.zeros_like(place), np.zeros_like(place), np.zeros((*place.shape, 0)))
+    still = np.zeros_like(series.angles)
+    held = conditions.held(conditions.demand(t), points, Joints(series.angles, still, still, np.zeros((still.shape[1], 0))))
     distances = held.gap * held.metres
     ends = [getattr(each.measure, "end", -1) for each in conditions.every]
     each = [np.linalg.norm(distances[:, [e == k for e in ends]], axis=1) for k in range(len(places))]
     return t, held.gap, np.max(each, axis=0) if each else np.zeros(len(t))
-
-
-def _none(t: Array, places: list[Array]) -> Array:
-    return np.zeros((len(t), len(places), 3, 0))

@@ -31,6 +31,7 @@ from fe_import.files.toml import choose
 
 METHODS = ("auto", "collocation", "shooting", "forward")
 _TOLERANCE = 1e-11  # m: change that ends iterations
+_ROUGH = 1e-4  # m: the same of those that give others a start
 _PASSES = 3  # of fast ways, at most
 _SAME = 1e-4  # of the largest effort: change that ends them
 _FAST = 20.0  # times the slowest frequency of a demanded motion: internal motions that follow
@@ -105,6 +106,14 @@ class Inversion:
         servoed = self.problem.flexible
         found = servoed.joints(self.t, self.states.y, self.states.v).angles.T
         return {j.name: x for j, x in zip(servoed.tree.mechanism.joints, found, strict=True) if not j.fixed}
+
+    @cached_property
+    def deflection(self) -> Array:
+        """(k,) largest displacement by an elastic coordinate against the joints that the links sit on [m]."""
+        servoed = self.problem.flexible
+        joints = len(servoed.tree.free_joints)
+        moved = np.abs(self.states.y[:, joints:] * servoed.metres[joints:])
+        return np.asarray(moved.max(axis=1, initial=0.0))
 
     def pre_actuation(self, threshold: float = 0.01) -> float:
         """How long before what is demanded begins to move drives do, by a share of their largest effort beyond that at
@@ -285,9 +294,7 @@ class _Work:
         self._take(self._whole(), slow)
         x = np.hstack([states.y[:, own], states.v[:, own]])
         try:
-            more = self._solver(method)(
-                self.solved, self.problem.t, x, self._ends, self.scales, _TOLERANCE, progress
-            )[0]
+            more = self._solved(method, x, progress)
         except SimulationError as problem:
             if problem.cause != Cause.NEWTON_FAILED:
                 raise
@@ -297,11 +304,11 @@ class _Work:
 
     def _followed(self, method: str, progress: Callable[[int, float], None]) -> _Found:
         """Iterate, then let fast ways have their accelerations, as long as that changes less each time."""
-        internal, t = self.solved, self.problem.t
-        x = np.zeros((len(t), internal.size))
+        internal = self.solved
+        x = np.zeros((len(self.problem.t), internal.size))
         iterations, before, left = 0, np.zeros(0), math.inf
         for number in range(_PASSES):
-            found, _ = self._solver(method)(internal, t, x, self._ends, self.scales, _TOLERANCE, progress)
+            found = self._solved(method, x, progress)
             x, iterations = found.x, iterations + found.iterations
             efforts = internal.states.efforts
             if number:
@@ -311,9 +318,12 @@ class _Work:
                 break
         return _Found(iterations, left)
 
-    @staticmethod
-    def _solver(method: str) -> Callable[..., tuple[Solved, Ends]]:
-        return shoot if method == "shooting" else collocate
+    def _solved(self, method: str, x: Array, progress: Callable[[int, float], None]) -> Solved:
+        """From a guess; of shooting, whose stretches are lost from far away, after a rough collocation."""
+        if method != "shooting":
+            return collocate(self.solved, self.problem.t, x, self._ends, self.scales, _TOLERANCE, progress)[0]
+        rough = collocate(self.solved, self.problem.t, x, self._ends, self.scales, _ROUGH, progress)[0]
+        return shoot(self.solved, self.problem.t, rough.x, self._ends, self.scales, _TOLERANCE, progress)[0]
 
     def inversion(
         self, method: str, states: States, found: _Found, begun: float, warnings: tuple[str, ...]

@@ -22,7 +22,7 @@ _ITERATIONS = 25
 _TOLERANCE = 1e-12  # of the scales: change that ends the iterations of a step
 _SLOW = 0.1  # ratio of changes beyond which tangents are made anew
 _SHOTS = 25
-_GROWTH = 1e3  # over a stretch: what is lost of as many digits
+_GROWTH = 30.0  # over a stretch: beyond it, errors of nodes carry stretches out of what is nearly linear
 _AWAY = 1.0  # of a link's size: displacement at which nothing is left to integrate
 
 
@@ -49,7 +49,9 @@ def _begun(part: Internal, x: Array) -> tuple[Array, Array]:
     return part.slopes(x), part.tangents()
 
 
-def _stepped(part: Internal, h: float, before: Array, slopes: Array, tangents: Array, scales: Array) -> _Stepped:
+def _stepped(
+    part: Internal, h: float, before: Array, slopes: Array, tangents: Array, guess: Array, scales: Array
+) -> _Stepped:
     """One step of all stretches to the knots of ``part``.
 
     Raises
@@ -57,7 +59,7 @@ def _stepped(part: Internal, h: float, before: Array, slopes: Array, tangents: A
     SimulationError
         NEWTON_FAILED; OUT_OF_REACH, SINGULAR_SERVO.
     """
-    unit, x = np.eye(before.shape[1]), before + h * slopes
+    unit, x = np.eye(before.shape[1]), guess
     far, fresh = math.inf, False
     for _ in range(_ITERATIONS):
         part.look(x)
@@ -114,7 +116,8 @@ def march(internal: Internal, scales: Array) -> tuple[States, int, str]:
     for k in range(1, len(t)):
         following = internal.part(np.array([k]), part)
         try:
-            x, slopes, _ = _stepped(following, float(t[k] - t[k - 1]), x, slopes, tangents, scales)
+            h = float(t[k] - t[k - 1])
+            x, slopes, _ = _stepped(following, h, x, slopes, tangents, x + h * slopes, scales)
         except (SimulationError, np.linalg.LinAlgError) as problem:
             reason = str(getattr(problem, "message", problem))
             break
@@ -168,11 +171,11 @@ def shoot(
     starts = np.arange(0, last, _stretch(made[0], h, last))
     nodes = x[[*starts, last]]
     for iteration in range(1, _SHOTS + 1):
-        flight = _flown(internal, h, nodes, starts, scales)
+        flight = _flown(internal, h, nodes, x, starts, scales)
         step = _closing(flight, nodes, conditions, scales)
         worst = float(np.abs(step / scales).max(initial=0.0))
         told(iteration, worst)
-        nodes = nodes + step
+        nodes, x = nodes + step, flight.x
         if worst <= tolerance:
             internal.look(flight.x)
             return Solved(flight.x, iteration, worst), conditions
@@ -195,7 +198,7 @@ def _stretch(tangent: Array, h: float, most: int) -> int:
     return int(min(max(math.log(_GROWTH) / math.log(max(growth, 1 + 1e-12)), 1.0), most))
 
 
-def _flown(internal: Internal, h: float, nodes: Array, starts: IntArray, scales: Array) -> _Flight:
+def _flown(internal: Internal, h: float, nodes: Array, guess: Array, starts: IntArray, scales: Array) -> _Flight:
     last, d = len(internal.demand.t) - 1, nodes.shape[1]
     path, ends = np.empty((last + 1, d)), np.empty((len(starts), d))
     by = np.tile(np.eye(d), (len(starts), 1, 1))
@@ -208,8 +211,8 @@ def _flown(internal: Internal, h: float, nodes: Array, starts: IntArray, scales:
         rows = (starts + k)[: len(rows)]
         rows = rows[rows <= np.r_[starts[1:], last][: len(rows)]]
         count = len(rows)
-        part = internal.part(rows, part)
-        found = _stepped(part, h, x[:count], slopes[:count], tangents[:count], scales)
+        part = internal.part(rows)
+        found = _stepped(part, h, x[:count], slopes[:count], tangents[:count], guess[rows], scales)
         x, slopes, tangents = found.x, found.slopes, part.tangents()
         by[:count] = found.by @ by[:count]
         ends[:count] = path[rows] = x
