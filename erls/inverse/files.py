@@ -47,15 +47,15 @@ def write_columns(path: Path, inversion: Inversion) -> None:
 
 
 def summary(inversion: Inversion, elastic: Confirmation | None, rigid: Confirmation | None) -> dict[str, Any]:
-    """The JSON of ``erls invert``; errors are None where no run was made."""
-    nature = inversion.nature
+    """The JSON of ``erls invert``; errors are None where no run was made, or no point is demanded."""
+    nature, points = inversion.nature, bool(inversion.problem.conditions.points)
     return {
         "scene": inversion.problem.scene.name,
         "method": inversion.method,
         "minimum_phase": nature.minimum_phase,
         "conditions": [{"name": each.name, "unit": each.unit} for each in inversion.problem.conditions.every],
-        "forward_error": None if elastic is None else elastic.error,
-        "rigid_forward_error": None if rigid is None else rigid.error,
+        "forward_error": elastic.error if elastic is not None and points else None,
+        "rigid_forward_error": rigid.error if rigid is not None and points else None,
         "forward_misses": None if elastic is None else elastic.largest,
         "rigid_forward_misses": None if rigid is None else rigid.largest,
         "forward_formulation": None if elastic is None else elastic.run.scene.record.simulation.formulation,

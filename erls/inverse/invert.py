@@ -33,8 +33,9 @@ METHODS = ("auto", "collocation", "shooting", "forward")
 _TOLERANCE = 1e-11  # m: change that ends iterations
 _ROUGH = 1e-4  # m: the same of those that give others a start
 _PASSES = 3  # of fast ways, at most
-_SAME = 1e-4  # of the largest effort: change that ends them
+_SAME = 1e-3  # of the largest effort: change that ends them
 _FAST = 20.0  # times the slowest frequency of a demanded motion: internal motions that follow
+_EXCITED = 6.0  # times the same: undamped internal motions that what is demanded makes
 _STEEP = 0.1  # of the largest, the smallest metres that count
 
 
@@ -216,7 +217,7 @@ def _rigid(problem: Problem) -> States:
 
 def _cut(problem: Problem, nature: Nature) -> tuple[str, ...]:
     """What the user should know about the ends of the interval."""
-    found = list(problem.warnings)
+    found = [*problem.warnings, *nature.warnings]
     demand = problem.conditions.demand(problem.t[[0, -1]])
     for at, name in enumerate(("start", "end")):
         if np.abs(demand.rate[at]).max() or np.abs(demand.acceleration[at]).max():
@@ -255,7 +256,7 @@ class _Work:
         own = tangents(servoed.system, Knots(self.demand.t[:1], *(x for x in start.states[:3])), servoed.steps)
         motions = Linearization(own.mass[0], own.damping[0], own.stiffness[0], np.eye(servoed.tree.size))
         self._units = units
-        self.nature = nature_of(zeros, motions, self._limit(), float(problem.t[-1]))
+        self.nature = nature_of(zeros, motions, self._limit(), _EXCITED * self._slowest(), float(problem.t[-1]))
         self._take(basis_of(first[m:, :m], units, self.nature.limit))
 
     def _limit(self) -> float:
@@ -263,8 +264,13 @@ class _Work:
         given = self.problem.scene.record.inverse.bandwidth
         if given is not None:
             return 2 * math.pi * given
-        spans = np.diff([t for t in self.problem.conditions.breakpoints if t < self.problem.t[-1]])
-        return _FAST * 2 * math.pi / float(spans.min(initial=self.problem.t[-1]))
+        return _FAST * self._slowest()
+
+    def _slowest(self) -> float:
+        """Frequency of the shortest demanded motion [rad/s]."""
+        end = float(self.problem.t[-1])
+        spans = np.diff([t for t in self.problem.conditions.breakpoints if t < end])
+        return 2 * math.pi / float(spans.min(initial=end))
 
     def _whole(self) -> Basis:
         """All ways are slow."""
@@ -280,14 +286,12 @@ class _Work:
             self.solved.begin(before.states)
 
     def _ends(self, first: Array, last: Array) -> Ends:
-        if self.nature.minimum_phase:
-            return Ends(np.diag(1 / self.scales), np.zeros((0, len(first))), np.zeros((2, len(first))))
         return ends_of(first, last, self.scales)
 
     def solve(self, method: str, progress: Callable[[int, float], None]) -> _Found:
-        """With fast ways that follow; then, unless a bandwidth says that they do, as they move."""
+        """With fast ways that follow; then, where that leaves something and no bandwidth says so, as they move."""
         found = self._followed(method, progress)
-        if self.problem.scene.record.inverse.bandwidth is not None or not self.basis.fast.shape[1]:
+        if found.left <= _SAME or self.problem.scene.record.inverse.bandwidth is not None:
             return found
         slow, states = self.solved, self.solved.states
         own = self.problem.flexible.internal
@@ -311,11 +315,14 @@ class _Work:
             found = self._solved(method, x, progress)
             x, iterations = found.x, iterations + found.iterations
             efforts = internal.states.efforts
-            if number:
+            if not self.basis.fast.shape[1]:
+                left = 0.0
+            elif number:
                 left = float(np.abs(efforts - before).max()) / max(float(np.abs(efforts).max()), 1e-300)
             before = efforts
-            if left <= _SAME or number == _PASSES - 1 or not internal.refine():
+            if left <= _SAME or number == _PASSES - 1:
                 break
+            internal.refine()
         return _Found(iterations, left)
 
     def _solved(self, method: str, x: Array, progress: Callable[[int, float], None]) -> Solved:

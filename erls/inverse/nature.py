@@ -26,15 +26,18 @@ class Nature(NamedTuple):
     limit : float
         Motions faster than this follow [rad/s].
     growing : (g,) complex array
-        Slow ones that grow.
+        Those that grow, slow ones first.
     ringing : (s,) complex array
         Slow ones that neither grow nor decay, although drives make them and conditions see them.
+    excited : float
+        Motions up to this belong to what is demanded [rad/s].
     """
 
     zeros: Array
     limit: float
     growing: Array
     ringing: Array
+    excited: float
 
     @property
     def minimum_phase(self) -> bool:
@@ -46,7 +49,18 @@ class Nature(NamedTuple):
         """For reports."""
         if self.minimum_phase:
             return "minimum phase: internal motions decay or rest, and are integrated forward"
-        return f"non-minimum phase: internal motions grow ({shown(self.growing[0])} 1/s), and the bounded one is taken"
+        slowest = shown(self.growing[0])
+        if abs(self.growing[0]) >= self.limit:
+            return f"non-minimum phase: what grows is fast ({slowest} 1/s), and follows what is demanded"
+        return f"non-minimum phase: internal motions grow ({slowest} 1/s), and the bounded one is taken"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know."""
+        if not len(self.ringing):
+            return ()
+        hz = ", ".join(dict.fromkeys(f"{abs(root) / (2 * math.pi):.3g}" for root in self.ringing.tolist()))
+        return (f"internal motions of {hz} Hz neither grow nor decay: they start at rest, and what is excited rings on",)
 
     def refuse(self, forward: bool, force: bool) -> None:
         """Refuse what has no bounded solution, and integration forward of what grows.
@@ -56,7 +70,7 @@ class Nature(NamedTuple):
         SimulationError
             UNDAMPED_INVERSE, UNSTABLE_INVERSE: name the zero.
         """
-        if len(self.ringing):
+        if len(self.ringing) and abs(self.ringing[0]) < self.excited:
             raise SimulationError(
                 Cause.UNDAMPED_INVERSE,
                 "internal motions neither grow nor decay, so that none of them is the bounded one",
@@ -74,7 +88,9 @@ class Nature(NamedTuple):
             )
 
 
-def nature_of(zeros: Array, motions: Linearization, limit: float, duration: float) -> Nature:
+def nature_of(
+    zeros: Array, motions: Linearization, limit: float, excited: float, duration: float
+) -> Nature:
     """From all roots of the internal dynamics.
 
     Parameters
@@ -82,8 +98,8 @@ def nature_of(zeros: Array, motions: Linearization, limit: float, duration: floa
     zeros : (2 m,) complex array
     motions : Linearization
         Small motions of the mechanism with its unknown drives at rest, whose roots are its poles.
-    limit : float
-        [rad/s]
+    limit, excited : float
+        See `Nature` [rad/s].
     duration : float
         Of the run [s].
     """
@@ -92,7 +108,8 @@ def nature_of(zeros: Array, motions: Linearization, limit: float, duration: floa
     poles = roots(motions) if motions.size else np.zeros(0, dtype=complex)
     apart = np.abs(ordered[:, None] - poles).min(axis=1, initial=math.inf) > _ON_POLE * np.abs(ordered)
     still = np.abs(ordered) * duration < _STILL
-    return Nature(ordered, limit, ordered[slow & grows(ordered)], ordered[slow & rests(ordered) & (apart | still)])
+    ringing = ordered[slow & rests(ordered) & (apart | still)]
+    return Nature(ordered, limit, ordered[grows(ordered)], ringing, excited)
 
 
 def shown(root: complex) -> str:
