@@ -24,6 +24,7 @@ from erls.mechanism.place import Place
 from erls.scene.chain import Scene
 from erls.scene.check_servo import AXES
 from erls.scene.servo import About, Servo
+from fe_import.model import IntArray
 
 
 class Joints(NamedTuple):
@@ -75,8 +76,8 @@ class Along:
     def at(self, points: PointMotion, joints: Joints) -> Measured:
         """See `Measure`."""
         place, velocity, acceleration, rows = (x[:, self.end] for x in points)
-        parts = (x @ self.direction for x in (place, velocity, acceleration))
-        return Measured(*parts, self.direction @ rows, np.ones(len(place)))
+        value, rate, bias = (x @ self.direction for x in (place, velocity, acceleration))
+        return Measured(value, rate, bias, self.direction @ rows, np.ones(len(place)))
 
 
 @dataclass(frozen=True)
@@ -112,10 +113,10 @@ class Together:
 
     def at(self, points: PointMotion, joints: Joints) -> Measured:
         """See `Measure`."""
-        parts = (x @ self.factors for x in (joints.angles, joints.rates, joints.accelerations))
+        value, rate, bias = (x @ self.factors for x in (joints.angles, joints.rates, joints.accelerations))
         count = len(joints.angles)
         rows = np.broadcast_to(self.factors @ joints.rows, (count, joints.rows.shape[1]))
-        return Measured(*parts, rows, np.zeros(count))
+        return Measured(value, rate, bias, rows, np.zeros(count))
 
 
 class Condition(NamedTuple):
@@ -155,7 +156,7 @@ class Demand(NamedTuple):
     rate: Array
     acceleration: Array
 
-    def part(self, rows: slice | Array) -> Demand:
+    def part(self, rows: slice | IntArray) -> Demand:
         """Of some times."""
         return Demand(*(x[rows] for x in self))
 
@@ -235,7 +236,7 @@ def _of_one(servo: Servo, place: Place, mechanism: Mechanism, points: list[Point
     else:
         whole = servo.path.build(place.at("path"))
         curves = [whole[axis] for axis in axes]
-    return [Condition(name, "m", *each) for name, *each in zip(names, measures, curves, strict=True)]
+    return [Condition(name, "m", *each) for name, each in zip(names, zip(measures, curves, strict=True), strict=True)]
 
 
 def _motion(servo: Servo, place: Place) -> Curve:

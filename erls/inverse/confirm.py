@@ -17,9 +17,10 @@ from erls.mechanism.drives import TorqueDrive
 from erls.mechanism.profiles import LoadTable
 from erls.run.chain.run import ChainRun
 from erls.scene.build import Message
+from erls.scene.build_joints import joint_coordinates
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
-from erls.scene.joints import JointInitial
+from erls.scene.joints import Coordinate, Joint, JointInitial
 from erls.simulation.simulate import Progress, simulate
 
 FINER = 4
@@ -96,24 +97,35 @@ def driven_scene(
     rest where the inversion starts.
     """
     record = problem.scene.record
-    joints = []
-    for joint in record.joints:
-        changes: dict[str, object] = {}
-        if joint.name in efforts:
-            table = LoadTable(times=tuple(t.tolist()), values=tuple(efforts[joint.name].tolist()), interpolation="cubic")
-            changes["drive"] = TorqueDrive((table,))
-        if joint.name in start:
-            changes["initial"] = JointInitial(position=start[joint.name])
-        joints.append(msgspec.structs.replace(joint, **changes))
+    joints = [_driven(joint, t, efforts, start) for joint in record.joints]
     own = record.simulation
-    settings = msgspec.structs.replace(
-        own, step=problem.step / FINER, integrator=FIXED_STEP, formulation=formulation or own.formulation, output_step=None
-    )
-    loaded = bool(problem.mechanism.gravity.any()) or bool(record.loads)
-    initial = msgspec.structs.replace(record.initial, deformation="static" if loaded else record.initial.deformation)
+    steps = {"step": problem.step / FINER, "integrator": FIXED_STEP, "output_step": None}
+    settings = msgspec.structs.replace(own, formulation=formulation or own.formulation, **steps)
+    initial = record.initial
+    if problem.mechanism.gravity.any() or record.loads:  # links rest where these bend them
+        initial = msgspec.structs.replace(initial, deformation="static")
     return Scene(
         problem.scene.path, msgspec.structs.replace(record, joints=joints, simulation=settings, initial=initial)
     )
+
+
+def _driven(joint: Joint, t: Array, efforts: Mapping[str, Array], start: Mapping[str, float]) -> Joint:
+    """A joint with efforts over time and initial coordinates, along each of its coordinates."""
+    parts = dict(joint.coordinates)
+    for name, freedom in joint_coordinates(joint).items():
+        own = parts.get(freedom.name, Coordinate()) if freedom.name else joint
+        changes: dict[str, object] = {}
+        if name in efforts:
+            times, values = (tuple(x.tolist()) for x in (t, efforts[name]))
+            changes["drive"] = TorqueDrive(profiles=(LoadTable(times=times, values=values, interpolation="cubic"),))
+        if name in start:
+            changes["initial"] = JointInitial(position=start[name])
+        changed = msgspec.structs.replace(own, **changes)
+        if isinstance(changed, Joint):
+            joint = changed
+        else:
+            parts[freedom.name] = changed
+    return msgspec.structs.replace(joint, coordinates=parts)
 
 
 def missed(problem: Problem, run: ChainRun) -> tuple[Array, Array, Array]:
@@ -123,8 +135,8 @@ def missed(problem: Problem, run: ChainRun) -> tuple[Array, Array, Array]:
     places = [run.position(point.name, t) for point in conditions.points]
     place = np.stack(places, 1) if places else np.zeros((len(t), 0, 3))
     points = PointMotion(place, np.zeros_like(place), np.zeros_like(place), np.zeros((*place.shape, 0)))
-    still = np.zeros_like(series.angles)
-    held = conditions.held(conditions.demand(t), points, Joints(series.angles, still, still, np.zeros((still.shape[1], 0))))
+    still, none = np.zeros_like(series.angles), np.zeros((series.angles.shape[1], 0))
+    held = conditions.held(conditions.demand(t), points, Joints(series.angles, still, still, none))
     distances = held.gap * held.metres
     ends = [getattr(each.measure, "end", -1) for each in conditions.every]
     each = [np.linalg.norm(distances[:, [e == k for e in ends]], axis=1) for k in range(len(places))]

@@ -61,7 +61,7 @@ def basis_of(tangent: Array, scales: Array, limit: float) -> Basis:
 
 
 class _Local(NamedTuple):
-    """Derivatives of what is missing: (k, n + p, n + p) by what belongs to a knot alone, and (k, n + p, 2 e) by (ζ, ζ̇)."""
+    """Derivatives of what is missing: (k, n + p, n + p) by what belongs to a knot alone, (k, n + p, 2 e) by (ζ, ζ̇)."""
 
     own: Array
     states: Array
@@ -98,7 +98,7 @@ class Internal:
     @property
     def size(self) -> int:
         """Number of states (ζ, ζ̇)."""
-        return 2 * self.basis.slow.shape[1]
+        return 2 * int(self.basis.slow.shape[1])
 
     def begin(self, states: States) -> None:
         """Go on from states that are known."""
@@ -169,7 +169,7 @@ class Internal:
         t, fast = self.demand.t, self.basis.fast
         if not fast.shape[1] or len(t) < 3:
             return False
-        self._rate = np.gradient(self._eta, t, axis=0, edge_order=2)
+        self._rate = np.asarray(np.gradient(self._eta, t, axis=0, edge_order=2))
         before, self._acceleration = self._acceleration, second_difference(t, self._eta)
         self._accelerations = self._accelerations.copy()
         self._accelerations[:, self.servoed.internal] += (self._acceleration - before) @ fast.T

@@ -59,7 +59,8 @@ def _stepped(
     SimulationError
         NEWTON_FAILED; OUT_OF_REACH, SINGULAR_SERVO.
     """
-    unit, x = np.eye(before.shape[1]), guess
+    unit = np.eye(before.shape[1])
+    x: Array = guess
     far, fresh = math.inf, False
     for _ in range(_ITERATIONS):
         part.look(x)
@@ -68,16 +69,16 @@ def _stepped(
             fresh = True
         own, now = part.tangents(), part.slopes(x)
         open_ = x - before - h / 2 * (slopes + now)
-        step = -np.linalg.solve(unit - h / 2 * own, open_[..., None])[..., 0]
+        step = np.asarray(-np.linalg.solve(unit - h / 2 * own, open_[..., None])[..., 0], dtype=float)
         last, far = far, max(float(np.abs(step / scales).max(initial=0.0)), part.move(step))
-        x = x + step
+        x = np.asarray(x + step)
         if not np.isfinite(far):
             break
         if far <= _TOLERANCE * max(1.0, float(np.abs(x / scales).max(initial=0.0))):
             part.look(x)
             part.learn(np.arange(len(x)))
             own = part.tangents()
-            by = np.linalg.solve(unit - h / 2 * own, unit + h / 2 * tangents)
+            by = np.asarray(np.linalg.solve(unit - h / 2 * own, unit + h / 2 * tangents), dtype=float)
             return _Stepped(x, part.slopes(x), by)
         fresh = far <= _SLOW * last
     raise SimulationError(
@@ -178,7 +179,7 @@ def shoot(
         nodes, x = nodes + step, flight.x
         if worst <= tolerance:
             internal.look(flight.x)
-            return Solved(flight.x, iteration, worst), conditions
+            return Solved(flight.x, iteration), conditions
         if not np.isfinite(worst):
             break
     raise SimulationError(

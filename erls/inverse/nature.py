@@ -60,7 +60,8 @@ class Nature(NamedTuple):
         if not len(self.ringing):
             return ()
         hz = ", ".join(dict.fromkeys(f"{abs(root) / (2 * math.pi):.3g}" for root in self.ringing.tolist()))
-        return (f"internal motions of {hz} Hz neither grow nor decay: they start at rest, and what is excited rings on",)
+        text = f"internal motions of {hz} Hz neither grow nor decay"
+        return (f"{text}: they start at rest, and what is excited rings on",)
 
     def refuse(self, forward: bool, force: bool) -> None:
         """Refuse what has no bounded solution, and integration forward of what grows.

@@ -90,12 +90,12 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
         if not joint.drive.prescribed and k not in drives.tolist()
     }
     rigid = with_rigid(_with_drives(free, held), {link.name for link in mechanism.links})
-    systems = (Servoed(_tree(scene, each, conditions), conditions, drives) for each in (free, rigid))
+    flexible, stiff = (Servoed(_tree(scene, each, conditions), conditions, drives) for each in (free, rigid))
     settings = scene.record.simulation
     count = max(2, round(settings.duration / (settings.step or STEP)))
     t = np.linspace(0.0, settings.duration, count + 1)
     names = tuple(mechanism.joints[k].name for k in drives.tolist())
-    return Problem(scene, mechanism, conditions, names, *systems, t, built.warnings)
+    return Problem(scene, mechanism, conditions, names, flexible, stiff, t, built.warnings)
 
 
 def unknown_drives(scene: Scene, mechanism: Mechanism) -> IntArray:

@@ -245,7 +245,8 @@ class Servoed:
         last = last_by_place @ places + last_by_rate @ later, last_by_rate @ rates, rows
         pushed = np.zeros((len(rows), self.tree.size + p, p))
         pushed[:, s, np.arange(p)] = -1.0
-        return Derivatives(*(np.concatenate(pair, axis=1) for pair in zip(forces, last, strict=True)), pushed)
+        by = [np.concatenate(pair, axis=1) for pair in zip(forces, last, strict=True)]
+        return Derivatives(by[0], by[1], by[2], pushed)
 
     def _kinematics(self, demand: Demand, states: States) -> tuple[Array, Array, Array]:
         """(k, p, n) derivatives of ḣ by q, and of ḧ by q and by q̇."""

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy.linalg as la
+from numpy.typing import NDArray
 
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
@@ -60,29 +61,25 @@ class Ends(NamedTuple):
     ----------
     start, end : (q, d), (d - q, d) arrays
         L₀, L_N.
-    roots : (2, d) complex array
-        Eigenvalues of ∂f/∂x at the start and at the end [1/s].
     """
 
     start: Array
     end: Array
-    roots: Array
 
 
 class Solved(NamedTuple):
-    """States (k, d) at the knots, iterations, and their last change over `size`."""
+    """States (k, d) at the knots, and iterations."""
 
     x: Array
     iterations: int
-    change: float
 
 
-def grows(roots: Array) -> Array:
+def grows(roots: Array) -> NDArray[np.bool_]:
     """(d,) bool: which roots lie to the right of the imaginary axis."""
     return np.asarray(roots.real > _margin(roots))
 
 
-def rests(roots: Array) -> Array:
+def rests(roots: Array) -> NDArray[np.bool_]:
     """(d,) bool: which roots lie on the imaginary axis."""
     return np.asarray(np.abs(roots.real) <= _margin(roots))
 
@@ -105,33 +102,31 @@ def ends_of(first: Array, last: Array, scales: Array) -> Ends:
     SimulationError
         UNSTABLE_INVERSE: not as much grows at the end as at the start.
     """
-    decaying, roots, number = _left_rows(first, scales, False)
-    growing, later, found = _left_rows(last, scales, True)
-    if number + found != len(first):
+    decaying, growing = _left_rows(first, scales, False), _left_rows(last, scales, True)
+    if len(decaying) + len(growing) != len(first):
         raise SimulationError(
             Cause.UNSTABLE_INVERSE,
             "internal motions change on the way between growing and decaying",
             where="from the start to the end",
-            value=f"{found} that grow at the end",
-            limit=f"{len(first) - number} at the start",
+            value=f"{len(growing)} that grow at the end",
+            limit=f"{len(first) - len(decaying)} at the start",
             remedy="split the motion where they change, or demand other points",
         )
-    return Ends(decaying, growing, np.stack([roots, later]))
+    return Ends(decaying, growing)
 
 
-def _left_rows(tangent: Array, scales: Array, growing: bool) -> tuple[Array, Array, int]:
-    """Rows that span the left invariant subspace of what grows, or of the rest; all roots; and how many rows."""
+def _left_rows(tangent: Array, scales: Array, growing: bool) -> Array:
+    """(q, d) rows that span the left invariant subspace of what grows, or of the rest."""
+    if not len(tangent):
+        return np.zeros((0, 0))
     scaled = tangent * scales / scales[:, None]
-    roots = np.linalg.eigvals(scaled).astype(complex)
-    margin = _AXIS, _FINE * float(np.abs(roots).max(initial=0.0))
+    fine = _FINE * float(np.abs(np.linalg.eigvals(scaled)).max())
 
     def wanted(real: float, imaginary: float) -> bool:
-        return (real > margin[0] * abs(complex(real, imaginary)) + margin[1]) == growing
+        return (real > _AXIS * abs(complex(real, imaginary)) + fine) == growing
 
-    if not len(roots):
-        return np.zeros((0, 0)), roots, 0
     _, vectors, number = la.schur(scaled.T, output="real", sort=wanted)
-    return vectors[:, :number].T / scales, roots[np.argsort(np.abs(roots), kind="stable")], int(number)
+    return np.asarray(vectors[:, :number].T / scales)
 
 
 def collocate(
@@ -181,7 +176,7 @@ def collocate(
         x = x + step
         if worst <= max(tolerance, _ROUNDING * float(np.abs(x / scales).max(initial=0.0))):
             field.look(x)
-            return Solved(x, iteration, worst), conditions
+            return Solved(x, iteration), conditions
         if not np.isfinite(worst):
             break
         if worst > _SLOW * before:
@@ -227,8 +222,8 @@ def _newton_step(
 
 class Sweep:
     """Linear conditions A₀ ξ₀ = b₀, G_k ξ_k + H_k ξ_k+1 = r_k, A_N ξ_N = b_N, solved by orthogonal elimination: what is
-    known of ξ_k, and the step, become d rows that give ξ_k from ξ_k+1, and what is known of ξ_k+1. That factors the whole
-    matrix into orthogonal and triangular ones, stable whatever grows or decays; rows must not be scaled on the way.
+    known of ξ_k, and the step, become d rows that give ξ_k from ξ_k+1, and what is known of ξ_k+1. That factors the
+    whole matrix into orthogonal and triangular ones, stable whatever grows or decays; rows must not be scaled between.
 
     Parameters
     ----------
@@ -246,7 +241,7 @@ class Sweep:
         whole = np.zeros((q + d, 2 * d + 1))
         whole[:q, :d], whole[:q, -1] = self._known, self._right
         whole[q:, :d], whole[q:, d : 2 * d], whole[q:, -1] = before, after, right
-        found = np.linalg.qr(whole, mode="r")
+        found: Array = np.asarray(np.linalg.qr(whole, mode="r"))
         self._kept.append(found[:d])
         self._known, self._right = found[d : d + q, d : 2 * d], found[d : d + q, -1]
 

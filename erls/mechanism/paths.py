@@ -1,8 +1,8 @@
 """Paths of a point in the world over time, run through from rest to rest.
 
 Each shape is one record, which a scene selects by ``shape = "..."``, and its ``build``, which checks the numbers and
-returns x, y and z as a `Curve` each. To add a shape: one record with ``build``, one name in `Path`, one row in the table
-of ``tests/erls/test_servo_records.py``. Before its start a path rests at its first place, after its end at its last one.
+returns x, y and z as a `Curve` each. To add a shape: one record with ``build``, one name in `Path`, one row in the
+table of ``tests/erls/test_servo.py``. Before its start a path rests at its first place, after its end at its last one.
 """
 
 from __future__ import annotations

@@ -32,7 +32,8 @@ def drive_lines(inversion: Inversion, table_file: Path) -> list[str]:
     """``drive`` of each joint, as a scene beside the table takes it."""
     shape = f'shape = "table", file = "{table_file.name}", column = {{}}, interpolation = "cubic"'
     return [
-        f'{name}: drive = {{ type = "torque", profiles = [{{ {shape.format(k + 1)} }}] }}'
+        f'{name}: initial = {{ position = {inversion.start[name]:.9g} }}, '
+        f'drive = {{ type = "torque", profiles = [{{ {shape.format(k + 1)} }}] }}'
         for k, name in enumerate(inversion.efforts)
     ]
 
@@ -43,8 +44,9 @@ def _words(inversion: Inversion, elastic: Confirmation | None, rigid: Confirmati
     about = f"{problem.scene.name}: {', '.join(problem.drives)} so that {names} is as demanded"
     above = [shown(zero) for zero in nature.zeros.tolist() if zero.imag >= 0][:_ZEROS]
     zeros = f"zeros [1/s], slow ones first: {', '.join(above) or 'none'}"
-    work = f"{inversion.method}, {len(inversion.t) - 1} steps, {inversion.iterations} iterations, {inversion.wall_s:.2f} s"
-    lines = [about, f"{nature.words}\n{zeros}", f"{work}; drives begin {inversion.pre_actuation():.3g} s ahead (1 %)"]
+    steps = f"{inversion.method}, {len(inversion.t) - 1} steps, {inversion.iterations} iterations"
+    ahead = f"drives begin {inversion.pre_actuation():.3g} s ahead (1 %)"
+    lines = [about, f"{nature.words}\n{zeros}", f"{steps}, {inversion.wall_s:.2f} s; {ahead}"]
     if inversion.left > 0 and np.isfinite(inversion.left):
         lines.append(f"fast internal motions follow; the last pass changed efforts by {100 * inversion.left:.2g} %")
     return lines + [f"forward run {kind}: {_missed(run)}" for kind, run in _runs(elastic, rigid)]

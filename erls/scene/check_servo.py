@@ -66,6 +66,6 @@ def _check_one(servo: Servo, points: Sequence[str], joints: Sequence[str], place
         if servo.path is not None:
             raise bad(f"{place}.path", "a path has no angle about a line", None, "give its motion, or coordinates")
         directed(f"{place}.about.axis", servo.about.axis)
-        axis, zero = np.array(servo.about.axis), np.array(servo.about.zero)
-        if np.linalg.norm(np.cross(axis, zero)) <= _ALONG * np.linalg.norm(axis) * np.linalg.norm(zero):
+        line, zero = (np.array(x, dtype=float) for x in (servo.about.axis, servo.about.zero))
+        if np.linalg.norm(np.cross(line, zero)) <= _ALONG * np.linalg.norm(line) * np.linalg.norm(zero):
             raise bad(f"{place}.about.zero", "lies along the axis", servo.about.zero, "give a direction across it")
