@@ -29,7 +29,7 @@ from fe_import.model import IntArray
 
 _ITERATIONS = 40
 _SLOW = 0.2  # ratio of changes beyond which tangents are made anew
-_ROUNDING = 1e-13  # of the states: changes that mean nothing
+_ROUNDING = 100.0  # times the tolerance: changes that fall no more are rounding of stiff forces
 _AXIS, _FINE = 1e-6, 1e-9  # of a root, and of the largest: real parts that are none
 COARSE = 101
 """Knots at which tangents are made at first."""
@@ -174,7 +174,7 @@ def collocate(
         worst = max(float(change.max(initial=0.0)), field.move(step))
         told(iteration, worst)
         x = x + step
-        if worst <= max(tolerance, _ROUNDING * float(np.abs(x / scales).max(initial=0.0))):
+        if worst <= tolerance or before / 2 < worst <= _ROUNDING * tolerance:
             field.look(x)
             return Solved(x, iteration), conditions
         if not np.isfinite(worst):

@@ -21,8 +21,8 @@ def nine(t: Array, angle: float, start: float, duration: float) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class LinearArm:
-    """M q̈ + K q = b u, y = c q: a hub that turns by θ = q₀, and the nodes of a beam in its axes, q₁ ...: deflections and
-    slopes of four Euler-Bernoulli elements; rotations of the hub small, no axial motion, no damping.
+    """M q̈ + K q = b u, y = c q: a hub that turns by θ = q₀, and the nodes of a beam in its axes, q₁ ...: deflections
+    and slopes of four Euler-Bernoulli elements; rotations of the hub small, no axial motion, no damping.
     """
 
     mass: Array
@@ -36,10 +36,11 @@ class LinearArm:
         youngs_modulus, density, width, height, length, count = 70e9, 2700.0, 0.04, 0.004, 1.0, 4
         bending, line = youngs_modulus * width * height**3 / 12, density * width * height
         e, n = length / count, 2 * (count + 1)
-        heavy = line * e / 420 * np.array([[156, 22 * e, 54, -13 * e], [22 * e, 4 * e**2, 13 * e, -3 * e**2],
-                                           [54, 13 * e, 156, -22 * e], [-13 * e, -3 * e**2, -22 * e, 4 * e**2]])  # fmt: skip
-        stiff = bending / e**3 * np.array([[12, 6 * e, -12, 6 * e], [6 * e, 4 * e**2, -6 * e, 2 * e**2],
-                                           [-12, -6 * e, 12, -6 * e], [6 * e, 2 * e**2, -6 * e, 4 * e**2]])  # fmt: skip
+        units = np.outer(*([1.0, e, 1.0, e],) * 2)
+        heavy = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
+        heavy = line * e / 420 * units * heavy
+        stiff = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+        stiff = bending / e**3 * units * stiff
         mass, stiffness = np.zeros((2, n, n))
         for k in range(count):
             at = slice(2 * k, 2 * k + 4)
@@ -62,8 +63,7 @@ class LinearArm:
         """ẅ = A w + B y + C ÿ of the deflections w where y is held: (m, m), (m,), (m,)."""
         back = np.eye(len(self.mass))
         back[0, 1:] = -self.output[1:]  # q of (y, w)
-        left = np.hstack([self.output[1:, None] * -1.0, np.eye(len(back) - 1)])  # across the drive, whose row is (1, -c)
-        left[:, 0] = self.output[1:]
+        left = np.hstack([self.output[1:, None], np.eye(len(back) - 1)])  # across the drive, which is (1, -c) there
         mass, stiffness = (left @ back.T @ part @ back for part in (self.mass, self.stiffness))
         inverse = np.linalg.inv(mass[:, 1:])
         return -inverse @ stiffness[:, 1:], -inverse @ stiffness[:, 0], -inverse @ mass[:, 0]
