@@ -10,7 +10,7 @@ import numpy as np
 
 from erls.inverse.conditions import Joints
 from erls.inverse.frames import PointMotion
-from erls.inverse.invert import Inversion
+from erls.inverse.inversion import Inversion
 from erls.inverse.problem import Problem
 from erls.maths.so3 import Array
 from erls.mechanism.drives import TorqueDrive

@@ -10,7 +10,7 @@ import numpy as np
 from erls.files.csv_table import write_table
 from erls.files.output import replacing
 from erls.inverse.confirm import Confirmation
-from erls.inverse.invert import Inversion
+from erls.inverse.inversion import Inversion
 from erls.maths.so3 import Array
 
 

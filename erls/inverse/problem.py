@@ -24,6 +24,9 @@ from fe_import.model import IntArray
 STEP = 1e-3
 """Of scenes that give none [s]."""
 
+_MOST = 50_000_000
+"""Numbers of one matrix at all knots, 400 MB; there are some ten."""
+
 _SYSTEMS = {
     "nodal": ("formulation", "use erls or ffr; erls invert --confirm nodal runs the drives on nodal elements"),
     "pieces": ("formulation", "leave links in one piece (substructures = 1)"),
@@ -93,6 +96,15 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     flexible, stiff = (Servoed(_tree(scene, each, conditions), conditions, drives) for each in (free, rigid))
     settings = scene.record.simulation
     count = max(2, round(settings.duration / (settings.step or STEP)))
+    if count * flexible.tree.size**2 > _MOST:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            f"too many steps for {flexible.tree.size} coordinates",
+            where=f"{scene.path}: simulation.step",
+            value=count,
+            limit=_MOST // flexible.tree.size**2,
+            remedy="give a larger step, a shorter duration, or links with fewer modes (elastic_modes)",
+        )
     t = np.linspace(0.0, settings.duration, count + 1)
     names = tuple(mechanism.joints[k].name for k in drives.tolist())
     return Problem(scene, mechanism, conditions, names, flexible, stiff, t, built.warnings)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from erls.inverse.confirm import Confirmation
-from erls.inverse.invert import Inversion
+from erls.inverse.inversion import Inversion
 from erls.inverse.nature import shown
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table

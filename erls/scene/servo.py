@@ -61,8 +61,8 @@ class Inverse(Record, frozen=True):
     drives : list of str
         Joints whose efforts are found, whatever drives them otherwise; all that a drive is given for unless named.
     bandwidth : float, optional
-        Internal motions faster than this follow [Hz]; 20 times the slowest frequency of the shortest demanded motion
-        unless given.
+        Internal motions faster than this follow [Hz]; 20 times the frequency of what is demanded, that of a sine with
+        its range and its largest acceleration, unless given.
     """
 
     drives: tuple[str, ...] = ()

@@ -95,3 +95,28 @@ def test_a_motion_cut_off_is_told(arm: Path, capsys: pytest.CaptureFixture[str])
     _, err = told(capsys, arm, *short, *QUICK)
     assert "only 0.1 s before the motion" in err
     assert "moves at the end of the run" in err
+    assert "jumps" not in err
+    _, err = told(capsys, arm, "--set", "servo.0.motion.degree=3", "--confirm", "none", *QUICK)
+    assert "jumps at t = 0.7 s" in err
+
+
+def test_corrections_that_do_not_help_are_told(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit code 4, with the best that there was: what is cut off before the motion, nothing brings back."""
+    little = ["--set", "servo.0.motion.start=0.05", "--set", "simulation.tolerance=1e-9", *QUICK]
+    out, err = told(capsys, arm, "--correct", "--json", *little, code=4)
+    assert json.loads(out)["forward_misses"][0] > 1e-9
+    assert "do not bring the forward run to simulation.tolerance" in err
+    told(capsys, arm, "--correct", "--confirm", "none", code=2)
+
+
+def test_what_has_no_mass_is_named(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A passive link without any: exit code 3."""
+    empty = "{ mass = 0.0, points = { root = [0.0, 0.0, 0.0], tip = [1.0, 0.0, 0.0] } }"
+    _, err = told(capsys, arm, "--set", f"links.1.rigid={empty}", *QUICK, code=3)
+    assert "no mass" in err
+
+
+def test_more_knots_than_memory_are_refused(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With how many there may be."""
+    _, err = told(capsys, arm, "--set", "simulation.step=1e-7", code=2)
+    assert "simulation.step: too many steps for 2 coordinates" in err
