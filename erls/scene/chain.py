@@ -203,7 +203,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     inverse: Inverse = Inverse()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene(SceneFile):
     """A checked chain and its file."""
 
