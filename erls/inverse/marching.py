@@ -23,7 +23,7 @@ _TOLERANCE = 1e-12  # of the scales: change that ends the iterations of a step
 _SLOW = 0.1  # ratio of changes beyond which tangents are made anew
 _SHOTS = 25
 _GROWTH = 30.0  # over a stretch: beyond it, errors of nodes carry stretches out of what is nearly linear
-_AWAY = 1.0  # of a link's size: displacement at which nothing is left to integrate
+_AWAY = 10.0  # of a link: displacement at which nothing is left to integrate
 
 
 class _Stepped(NamedTuple):

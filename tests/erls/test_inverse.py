@@ -144,7 +144,8 @@ def test_shooting_agrees_with_collocation(passive: Inversion) -> None:
 
 def test_minimum_phase_is_integrated_forward() -> None:
     """The hub's own angle: the passive link swings and decays. Steps one by one give what all at once do."""
-    loaded = scene(PASSIVE, "servo.0.joints={ hub = 1.0 }", "simulation.step=0.02")
+    short = ("servo.0.motion.start=0.1", "simulation.duration=1.2", "servo.0.motion.duration=0.6")
+    loaded = scene(PASSIVE, "servo.0.joints={ hub = 1.0 }", "simulation.step=0.02", *short)
     found = invert(loaded)
     assert (found.method, found.nature.minimum_phase, found.warnings) == ("forward", True, ())
     assert abs(found.nature.zeros) == pytest.approx(np.sqrt(150.0), rel=1e-6)  # k over m l² / 3
@@ -160,8 +161,9 @@ def test_naive_integration_is_refused_or_shown_to_diverge() -> None:
     with pytest.raises(SimulationError, match=r"26\.04") as caught:
         invert(scene(PASSIVE), method="forward")
     assert (caught.value.cause, caught.value.exit_code) == (Cause.UNSTABLE_INVERSE, 2)
-    found = invert(scene(PASSIVE, "simulation.step=0.01"), method="forward", force=True)
-    assert found.t[-1] - 0.7 == pytest.approx(0.27, abs=0.03)
+    soon = "servo.0.motion.start=0.2"
+    found = invert(scene(PASSIVE, "simulation.step=0.01", soon), method="forward", force=True)
+    assert found.t[-1] - 0.2 == pytest.approx(0.27, abs=0.03)
     assert f"diverges at t = {found.t[-1]:.4g} s" in found.warnings[0]
 
 
