@@ -73,7 +73,7 @@ def invert(
     >>> found = erls.invert("data/inverse/passive_arm.toml")
     >>> found.nature.minimum_phase
     False
-    >>> bool(0.1 < found.pre_actuation() < 0.3)
+    >>> bool(0.0 < found.pre_actuation() < 0.1)
     True
     """
     choose(method, METHODS, "method", SceneError)
