@@ -18,7 +18,7 @@ from erls.inverse.marching import march
 from erls.inverse.nature import Nature
 from erls.inverse.problem import Problem, followed, problem_of
 from erls.inverse.servoed import States
-from erls.inverse.work import Found, Work
+from erls.inverse.work import SAME, Found, Work
 from erls.maths.jit import announcing
 from erls.maths.so3 import Array
 from erls.scene.build import Message
@@ -97,7 +97,14 @@ def invert(
             return made("forward", states, Found(steps, 0.0), warnings)
         chosen = "shooting" if method == "shooting" else "forward" if plain else "collocation"
         found = work.solve(chosen, progress)
-        return made(chosen, work.solved.states, found, _cut(problem, nature))
+        return made(chosen, work.solved.states, found, (*_cut(problem, nature), *_followed(found)))
+
+
+def _followed(found: Found) -> tuple[str, ...]:
+    """Where fast motions are not what they would be."""
+    if found.left <= SAME:
+        return ()
+    return (f"fast internal motions follow; the last pass changed efforts by {100 * found.left:.2g} % of their peak",)
 
 
 def _jumps(condition: Condition, times: Array) -> Iterator[str]:

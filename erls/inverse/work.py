@@ -24,10 +24,11 @@ from erls.sensitivity.tangents import Knots, tangents
 _TOLERANCE = 1e-11  # m: change that ends iterations
 _ROUGH = 1e-4  # m: the same of those that give others a start
 _PASSES = 3  # of fast ways, at most
-_SAME = 1e-3  # of the largest effort: change that ends them
 _FAST = 20.0  # times the slowest frequency of a demanded motion: internal motions that follow
 _EXCITED = 6.0  # times the same: undamped internal motions that what is demanded makes
 _STEEP = 0.1  # of the largest, the smallest metres that count
+SAME = 1e-3
+"""Of the largest effort: change that ends passes of fast ways."""
 
 
 class Found(NamedTuple):
@@ -105,7 +106,7 @@ class Work:
     def solve(self, method: str, progress: Callable[[int, float], None]) -> Found:
         """With fast ways that follow; then, where that leaves something and no bandwidth says so, as they move."""
         found = self._followed(method, progress)
-        if found.left <= _SAME or self.problem.scene.record.inverse.bandwidth is not None:
+        if found.left <= SAME or self.problem.scene.record.inverse.bandwidth is not None:
             return found
         slow = self.basis, self.scales, self.solved
         try:
@@ -147,7 +148,7 @@ class Work:
             elif number:
                 left = float(np.abs(efforts - before).max()) / max(float(np.abs(efforts).max()), 1e-300)
             before = efforts
-            if left <= _SAME or number == _PASSES - 1:
+            if left <= SAME or number == _PASSES - 1:
                 break
             internal.refine()
         return Found(iterations, left)
