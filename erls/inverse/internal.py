@@ -103,7 +103,8 @@ class Internal:
     def begin(self, states: States) -> None:
         """Go on from states that are known."""
         self._near, self._accelerations, self._efforts = states.y, states.a, states.efforts
-        self._eta = states.y[:, self.servoed.internal] @ self.basis.to_fast.T
+        fast, own = self.basis.to_fast.T, self.servoed.internal
+        self._eta, self._rate, self._acceleration = (x[:, own] @ fast for x in states[:3])
 
     def look(self, x: Array) -> None:
         """Take in states (k, 2 e)."""

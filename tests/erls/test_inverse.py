@@ -257,9 +257,13 @@ def test_robot_under_weight_follows_two_coordinates() -> None:
     assert confirmed(found, found.rigid_efforts, found.rigid_start).error > 100 * missed.error
 
 
-def test_corrections_take_off_what_a_forward_run_misses() -> None:
-    """The error of a coarse step here, as that of another model elsewhere: a tenth is left; unless told so, none."""
-    found = invert(scene(ARM, "simulation.step=0.008", *FEW))
+@pytest.mark.parametrize("bandwidth", ["20.0", "1000.0"])
+def test_corrections_take_off_what_a_forward_run_misses(bandwidth: str) -> None:
+    """The error of a coarse step here, as that of another model elsewhere, whether fast motions follow or move: a tenth
+    is left; of a goal that is met nothing is taken off.
+    """
+    found = invert(scene(ARM, "simulation.step=0.008", f"inverse.bandwidth={bandwidth}", *FEW))
+    assert bool(found.left) == (bandwidth == "20.0")
     first = confirmed(found, found.efforts, found.start)
     assert corrected(found, first, 1.0).corrections == 0
     missed: list[float] = []
