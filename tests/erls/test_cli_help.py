@@ -26,6 +26,7 @@ OPTIONS = {
     "effects": ["--set", "--json"],
     "linearize": ["--output", "-o", "--at", "--equilibrium", "--inputs", "--outputs", "--campbell", "--locus", "--mode",
                   "--set", "--force", "--json"],
+    "invert": ["--output", "-o", "--method", "--confirm", "--correct", "--set", "--force", "--json"],
     "info": ["--json"],
     "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--overlay", "--force", "--json"],
 }
