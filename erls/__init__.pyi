@@ -1,3 +1,4 @@
+from .identify.identify import identify as identify
 from .linear.linearize import linearize as linearize
 from .run.chain.run import ChainRun as ChainRun
 from .run.file import load_run as load_run

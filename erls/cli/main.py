@@ -19,6 +19,7 @@ from erls.cli.address_space import address_space, require_address_space
 from erls.cli.compare import compare
 from erls.cli.effects import effects
 from erls.cli.files import info, view
+from erls.cli.identify import identify
 from erls.cli.importing import import_
 from erls.cli.linearize import linearize
 from erls.cli.reduce import reduce
@@ -44,7 +45,7 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-for command in (reduce, simulate, info, view, compare, effects, linearize, new, schema):
+for command in (reduce, simulate, info, view, compare, effects, linearize, identify, new, schema):
     app.command(command)
 app.command(import_, name="import")
 for group in (study, examples):
