@@ -15,10 +15,14 @@ from __future__ import annotations
 import math
 
 from erls.equations.compiled_system import Array, IntArray
+from erls.equations.nodal.beam_ends import NONE, inward, outward, section_at, unit_twist
+from erls.equations.nodal.beam_linear import linear_derivatives, linear_energies, linear_inertia
 from erls.equations.nodal.contract import (
     BLOCKS,
     ENERGIES,
     FORCES,
+    HELICOIDAL,
+    LINEAR,
     REMEMBER,
     Model,
     Work,
@@ -66,43 +70,18 @@ from erls.maths.vectors import (
 _POINTS = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))  # of Gauss's rule on a length of one
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 _HALF = (0.5, 0.0, 0.0)
-_NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-
-@part
-def _section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rotation]:
-    """Frame of the section at an end in the world."""
-    node = model.beam_nodes[e, side]
-    turn = nine(poses, node, 3)
-    place = plus(vector(poses, node, 0), times(turn, vector(model.beam_frames, e, 12 * side)))
-    return place, product(turn, nine(model.beam_frames, e, 12 * side + 3))
 
 
 @part
 def _bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tuple[Vector, Vector]:
     """d of element e, which goes on past a turn of π, near that in ``before``; also written into ``out``."""
-    place, turn = _section(model, poses, e, 0)
-    end, end_turn = _section(model, poses, e, 1)
+    place, turn = section_at(model, poses, e, 0)
+    end, end_turn = section_at(model, poses, e, 1)
     psi = logarithm_near(back_product(turn, end_turn), vector(before, e, 3))
     u = value(-0.5, inverse_coefficient(dot(psi, psi))[0], psi, turned(turn, minus(end, place)))
     out[e, 0], out[e, 1], out[e, 2] = u
     out[e, 3], out[e, 4], out[e, 5] = psi
     return u, psi
-
-
-@part
-def _inward(model: Model, e: int, side: int, force: Twist) -> Twist:
-    """Wrench on a section as one on its node."""
-    frames = model.beam_frames
-    return transposed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), force[0], force[1])
-
-
-@part
-def _outward(model: Model, e: int, side: int, table: Array) -> Twist:
-    """Twist of a section from those of the nodes."""
-    at, frames = 6 * model.beam_nodes[e, side], model.beam_frames
-    v, w = (table[at], table[at + 1], table[at + 2]), (table[at + 3], table[at + 4], table[at + 5])
-    return transformed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), v, w)
 
 
 @part
@@ -114,17 +93,17 @@ def _section_force(model: Model, e: int, u: Vector, psi: Vector) -> Twist:
 @part
 def _inertia(model: Model, work: Work, e: int, u: Vector, psi: Vector, b: Three) -> tuple[Twist, Twist]:
     """Inertia less weight as a wrench on the first section, and one along d."""
-    c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
-    a0, a1 = _outward(model, e, 0, work.rate), _outward(model, e, 1, work.rate)
+    c0, c1 = outward(model, e, 0, work.twist), outward(model, e, 1, work.twist)
+    a0, a1 = outward(model, e, 0, work.rate), outward(model, e, 1, work.rate)
     apart, pull = pair_minus(c1, c0), pair_minus(a1, a0)
     eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
     gain = pair_plus(bracket(u, psi, a0[0], a0[1]), series(_HALF, b, u, psi, pull[0], pull[1]))
     gain = pair_plus(gain, change(_HALF, b, u, psi, eta[0], eta[1], apart[0], apart[1]))
     gain = pair_plus(gain, bracket(eta[0], eta[1], c0[0], c0[1]))
-    _, turn = _section(model, work.poses, e, 0)
+    _, turn = section_at(model, work.poses, e, 0)
     down = turned(turn, vector(model.gravity, 0, 0))
     angle = dot(psi, psi)
-    direct = along = _NONE
+    direct = along = NONE
     for k in range(3):
         x, weight = _POINTS[k], _WEIGHTS[k]
         xu, xpsi = scaled(x, u), scaled(x, psi)
@@ -158,14 +137,17 @@ def beam_forces(reals: Array, integers: IntArray, scratch: Array, last: Array) -
         u, psi = _bend(model, work.poses, before, work.bent, e)
         b = inverse_coefficient(dot(psi, psi))
         push = _section_force(model, e, u, psi)
-        direct = _NONE
-        if model.beam_moving[e]:
+        direct = further = NONE
+        if model.beam_moving[e] == HELICOIDAL:
             direct, along = _inertia(model, work, e, u, psi, b)
             push = pair_plus(push, along)
+        elif model.beam_moving[e] == LINEAR:
+            direct, further = linear_inertia(model, work, e)
         outer = series_transposed(_HALF, b, u, psi, push[0], push[1])
         inner = pair_plus(direct, pair_minus(cobracket(u, psi, push[0], push[1]), outer))
+        outer = pair_plus(outer, further)
         for side in range(2):
-            force = _inward(model, e, side, inner if side == 0 else outer)
+            force = inward(model, e, side, inner if side == 0 else outer)
             at = 6 * model.beam_nodes[e, side]
             add(out, at, force[0])
             add(out, at + 3, force[1])
@@ -202,24 +184,13 @@ def _add_power(out: Array, table: Array, j: int, scale: float, force: Twist) -> 
 
 
 @part
-def _unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
-    """Twists of both sections when coordinate j of the nodes moves alone."""
-    side = j // 6
-    frames = model.beam_frames
-    moved = transformed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), unit(j % 6), unit(j % 6 - 3))
-    if side == 0:
-        return moved, _NONE
-    return _NONE, moved
-
-
-@part
 def _inertia_derivatives(model: Model, work: Work, e: int, block: Array, u: Vector, psi: Vector) -> None:
     rows, shape = work.rows, work.shape
-    c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
+    c0, c1 = outward(model, e, 0, work.twist), outward(model, e, 1, work.twist)
     apart = pair_minus(c1, c0)
     b = inverse_coefficient(dot(psi, psi))
     eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
-    _, turn = _section(model, work.poses, e, 0)
+    _, turn = section_at(model, work.poses, e, 0)
     down = turned(turn, vector(model.gravity, 0, 0))
     for k in range(3):
         x, weight = _POINTS[k], _WEIGHTS[k]
@@ -236,7 +207,7 @@ def _inertia_derivatives(model: Model, work: Work, e: int, block: Array, u: Vect
             q = _column(rows, j)
             q = pair_scaled(x, series(f, g, xu, xpsi, q[0], q[1]))
             if j < 6:
-                first = _unit_twist(model, e, j)[0]
+                first = unit_twist(model, e, j)[0]
                 q = pair_plus(q, transformed(p, r, first[0], first[1]))
             _set_column(shape, j, q)
         for j in range(12):
@@ -258,7 +229,7 @@ def _derivatives(model: Model, work: Work, e: int, block: Array, material: int) 
     b = inverse_coefficient(dot(psi, psi))
     push = _section_force(model, e, u, psi)
     for j in range(12):
-        c0, c1 = _unit_twist(model, e, j)
+        c0, c1 = unit_twist(model, e, j)
         apart = pair_minus(c1, c0)
         eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
         _set_column(rows, j, eta)
@@ -272,12 +243,14 @@ def _derivatives(model: Model, work: Work, e: int, block: Array, material: int) 
         outer = change_transposed(_HALF, b, u, psi, eta[0], eta[1], push[0], push[1])
         inner = pair_minus(cobracket(eta[0], eta[1], push[0], push[1]), outer)
         for side in range(2):
-            n, m = _inward(model, e, side, inner if side == 0 else outer)
+            n, m = inward(model, e, side, inner if side == 0 else outer)
             for i in range(3):
                 stiffness[6 * side + i, j] += n[i]
                 stiffness[6 * side + 3 + i, j] += m[i]
-    if model.beam_moving[e]:
+    if model.beam_moving[e] == HELICOIDAL:
         _inertia_derivatives(model, work, e, block, u, psi)
+    elif model.beam_moving[e] == LINEAR:
+        linear_derivatives(model, work, e, block)
 
 
 @kernel(BLOCKS, counted=False)
@@ -297,12 +270,15 @@ def _energy(model: Model, work: Work, e: int) -> tuple[float, float, float]:
     push = _section_force(model, e, u, psi)
     strain = minus(u, vector(built, e, 0)), minus(psi, vector(built, e, 3))
     elastic = 0.5 * (dot(push[0], strain[0]) + dot(push[1], strain[1]))
+    if model.beam_moving[e] == LINEAR:
+        kinetic, gravity = linear_energies(model, work, e)
+        return kinetic, elastic, gravity
     kinetic = height = 0.0 * elastic
     b = inverse_coefficient(dot(psi, psi))
-    c0, c1 = _outward(model, e, 0, work.twist), _outward(model, e, 1, work.twist)
+    c0, c1 = outward(model, e, 0, work.twist), outward(model, e, 1, work.twist)
     apart = pair_minus(c1, c0)
     eta = pair_plus(bracket(u, psi, c0[0], c0[1]), series(_HALF, b, u, psi, apart[0], apart[1]))
-    place, turn = _section(model, work.poses, e, 0)
+    place, turn = section_at(model, work.poses, e, 0)
     for k in range(3):
         x = _POINTS[k]
         xu, xpsi = scaled(x, u), scaled(x, psi)
