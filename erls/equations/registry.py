@@ -41,11 +41,11 @@ def _nodal(mechanism: Mechanism, settings: Simulation) -> Formulation:
     from erls.equations.nodal.parts import BeamRules
 
     rules = BeamRules(settings.residual_bending_flexibility, settings.inertia_interpolation == "linear")
-    start = _closed_start(mechanism) if mechanism.loops else None
+    start = closed_start_of(mechanism) if mechanism.loops else None
     return Nodal(mechanism, settings.elements_per_member, start, rules=rules)
 
 
-def _closed_start(mechanism: Mechanism) -> ClosedStart:
+def closed_start_of(mechanism: Mechanism) -> ClosedStart:
     """Of the same mechanism with rigid links."""
     from erls.equations.erls.formulation import Erls
 

@@ -1,0 +1,160 @@
+"""A convex problem about a design: components of constraints linear in powers of the variables, measures kept.
+
+With ω = (x / x₀)^p, flexibilities of sections are linear in ω, and lengths of vectors that are linear are convex: near a
+design the problem
+
+    min f(x(ω)) + ρ f₀ s   so that   measure(c₀ + J δω) ≤ limit (1 + s),  s ≥ 0
+
+hardly differs from the true one, but for what loads change. The slack s keeps it solvable; where it does not vanish, no
+design within reach holds the constraints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from erls.maths.so3 import Array
+from erls.optimize.evaluation import Evaluation, Rules, aggregate
+from fe_import.model import IntArray
+
+_SLACK = 50.0  # ρ
+_NEAR, _MOST_ROWS, _ROUNDS = 0.7, 120, 6  # share of the limit from which on rows count; of one constraint at a time
+_MET = 1e-8
+
+
+class Powers:
+    """ω of designs about one; of variables with power 1 their share of the bounds' distance, so that zero is allowed."""
+
+    def __init__(self, rules: Rules, x: Array) -> None:
+        self._x, self._plain = x, rules.powers == 1
+        self._p = np.where(self._plain, 1.0, rules.powers)
+        self._span = rules.upper - rules.lower
+
+    def to(self, x: Array) -> Array:
+        """(v,) ω, 1 at the design."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            powered = (x / self._x) ** self._p
+        return np.where(self._plain, 1 + (x - self._x) / self._span, powered)
+
+    def back(self, omega: Array) -> Array:
+        """(v,) x."""
+        powered = self._x * np.maximum(omega, 1e-12) ** (1 / self._p)
+        return np.where(self._plain, self._x + self._span * (omega - 1), powered)
+
+    def rate(self, omega: Array) -> Array:
+        """(v,) dx/dω."""
+        powered = self._x / self._p * np.maximum(omega, 1e-12) ** (1 / self._p - 1)
+        return np.where(self._plain, self._span, powered)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A solution of the convex problem: the design, what was predicted there, and the slack that remains."""
+
+    x: Array
+    slack: float
+    objective: float
+
+
+class Approximation:
+    """About a differentiated design."""
+
+    def __init__(self, rules: Rules, base: Evaluation) -> None:
+        self.rules, self.base, self.powers = rules, base, Powers(rules, base.x)
+        rate = self.powers.rate(np.ones(len(base.x)))
+        self._jacobians = [jacobian * rate for jacobian in base.jacobians]
+        self._ones = np.ones(len(base.x))
+
+    def components(self, omega: Array) -> list[Array]:
+        """(n, q) of every constraint."""
+        return [c + j @ (omega - 1) for c, j in zip(self.base.components, self._jacobians, strict=True)]
+
+    def objective(self, omega: Array) -> tuple[float, Array]:
+        """Value and slope by ω."""
+        quadratic = self.base.quadratic
+        assert quadratic is not None
+        change = self.powers.back(omega) - self.base.x
+        timed, slopes = self.rules.objective.timed(self.components(omega), self.rules.measures)
+        slope = quadratic.slope(change) * self.powers.rate(omega)
+        for own, jacobian in zip(slopes, self._jacobians, strict=True):
+            slope = slope + np.einsum("nq,nqv->v", own, jacobian)
+        return quadratic.value(change) + timed, slope
+
+    def rows(self, omega: Array, k: int, rows: IntArray) -> tuple[Array, Array]:
+        """Shares (n,) of the limit of some rows of constraint k, with slopes (n, v); one value where aggregated."""
+        limit = self.rules.limits[k]
+        assert limit is not None
+        jacobian = self._jacobians[k][rows]
+        components = self.base.components[k][rows] + jacobian @ (omega - 1)
+        measure = self.rules.measures[k]
+        shares = measure.value(components) / limit
+        slopes = np.einsum("nq,nqv->nv", measure.slope(components), jacobian) / limit
+        if not self.rules.aggregated[k]:
+            return shares, slopes
+        value, weights = aggregate(shares)
+        return np.array([value]), (weights @ slopes)[None]
+
+    def solved(self, lower: Array, upper: Array) -> Step:
+        """Within bounds (v,) of the design."""
+        ends = np.sort([self.powers.to(lower), self.powers.to(upper)], axis=0)
+        chosen = [self._chosen(self._ones, k) for k in range(len(self.rules.limits))]
+        omega, slack = self._ones, 0.0
+        for _ in range(_ROUNDS):
+            omega, slack = self._minimum(ends, chosen, self._ones)
+            further = [np.union1d(rows, self._chosen(omega, k)) for k, rows in enumerate(chosen)]
+            passed = [self._passed(omega, k, slack) for k in range(len(chosen))]
+            if all(len(np.setdiff1d(p, rows)) == 0 for p, rows in zip(passed, chosen, strict=True)):
+                break
+            chosen = further
+        x = np.clip(self.powers.back(omega), lower, upper)
+        return Step(x, slack, self.objective(omega)[0])
+
+    def _shares(self, omega: Array, k: int) -> Array:
+        return self.rules.shares(self.components(omega))[k]
+
+    def _chosen(self, omega: Array, k: int) -> IntArray:
+        """Rows near their limits."""
+        shares = self._shares(omega, k)
+        if self.rules.aggregated[k] or self.rules.every[k] or not len(shares):
+            return np.arange(len(shares))
+        near = np.flatnonzero(shares >= _NEAR * max(1.0, float(shares.max())))
+        near = np.union1d(near, [int(shares.argmax())])
+        return np.sort(near[np.argsort(-shares[near])[:_MOST_ROWS]])
+
+    def _passed(self, omega: Array, k: int, slack: float) -> IntArray:
+        return np.flatnonzero(self._shares(omega, k) > 1 + slack + 1e-6)
+
+    def _minimum(self, ends: Array, chosen: list[IntArray], start: Array) -> tuple[Array, float]:
+        scale = max(abs(self.base.objective), 1e-300)
+        used = [k for k, limit in enumerate(self.rules.limits) if limit is not None]
+
+        def cost(z: Array) -> tuple[float, Array]:
+            value, slope = self.objective(z[:-1])
+            return value / scale + _SLACK * z[-1], np.append(slope / scale, _SLACK)
+
+        def found(z: Array) -> tuple[Array, Array]:
+            both = [self.rows(z[:-1], k, chosen[k]) for k in used]
+            return np.concatenate([s for s, _ in both]), np.concatenate([j for _, j in both])
+
+        rows = {
+            "type": "ineq",
+            "fun": lambda z: 1 + z[-1] - found(z)[0],
+            "jac": lambda z: np.column_stack([-found(z)[1], np.ones(len(found(z)[0]))]),
+        }
+        worst = max(0.0, float((found(np.append(start, 0.0))[0] - 1).max())) if used else 0.0
+        result = minimize(
+            cost,
+            np.append(start, worst),
+            jac=True,
+            method="SLSQP",
+            bounds=[*zip(*ends, strict=True), (0.0, max(10.0, 2 * worst))],
+            constraints=[rows] if used else [],
+            options={"maxiter": 300, "ftol": 1e-12},
+        )
+        omega = np.clip(result.x[:-1], ends[0], ends[1])
+        shares = found(np.append(omega, 0.0))[0] if used else np.zeros(0)
+        slack = max(0.0, float((shares - 1).max(initial=0.0)))
+        return omega, slack if slack > _MET else 0.0

@@ -1,0 +1,138 @@
+"""Stiffness and outlines of the beams of a mechanism, from the descriptions of its links alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from erls.equations.nodal.parts import link_parts
+from erls.errors import Cause, SceneError
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.optimize.frozen import Frozen, rules_of
+from erls.scene.build import link_description
+from erls.scene.chain import Scene
+from fe_import.description.records import LinkDescription
+from fe_import.elements.sections import Circular, RectangularTube, Rectangular, Section, Tubular
+from fe_import.models.frame_parts import frame_parts
+from fe_import.models.model import unit_factors
+
+
+def sections_of(mechanism: Mechanism, scene: Scene) -> Array:
+    """(e, 6, 6) force and moment per twist of each element: stiffness of its section over its length.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Of the same lengths.
+    scene : Scene
+        Whose link descriptions are taken.
+    """
+    settings, found = scene.record.simulation, []
+    rules, elements = rules_of(settings), _elements(scene)
+    for number, description in _described(mechanism, scene):
+        link = replace(mechanism.links[number], description=description)
+        found += [(beam.section.stiffness, _length(beam.frames)) for beam in link_parts(link, elements, 1, rules).beams]
+    return np.array([stiffness / length for stiffness, length in found]).reshape(-1, 6, 6)
+
+
+def _length(frames: Array) -> float:
+    return float(np.linalg.norm(frames[1, :3, 3] - frames[0, :3, 3]))
+
+
+def _elements(scene: Scene) -> int | None:
+    settings = scene.record.simulation
+    return settings.elements_per_member if settings.formulation == "nodal" else None
+
+
+def _described(mechanism: Mechanism, scene: Scene) -> list[tuple[int, LinkDescription]]:
+    """Numbers in the mechanism of links that are made of beams and deform, with their descriptions."""
+    found = []
+    for number, link in zip(mechanism.bodies, scene.record.links, strict=True):
+        if mechanism.links[number].elastic_modes and link.model:
+            found.append((number, link_description(scene, link).description))
+    return found
+
+
+class Outlines(NamedTuple):
+    """Of each element.
+
+    Attributes
+    ----------
+    factors : (e, 3) array
+        1/A, and half the height and half the width over the second moments: stress by axial force and by bendings about
+        y and z.
+    rounds : (e,) array
+        Whether its section is round.
+    links : (e,) array
+        Number of its link.
+    """
+
+    factors: Array
+    rounds: Array
+    links: Array
+
+
+def outlines_of(mechanism: Mechanism, scene: Scene) -> Outlines:
+    """Of all elements.
+
+    Raises
+    ------
+    SceneError
+        A section of which only constants are known.
+    """
+    factors, rounds, links = [], [], []
+    for number, description in _described(mechanism, scene):
+        frame = description.frame
+        assert frame is not None
+        mesh = frame_parts(description, frame, description.name, _elements(scene)).mesh
+        metre = unit_factors(description, description.name)[0]
+        for member, elements in zip(frame.members, mesh.members, strict=True):
+            section = description.sections[member.section]
+            where = f"link {mechanism.links[number].name!r}: sections.{member.section}"
+            height, width = (metre * size for size in _half_sizes(section, where))
+            for e in elements:
+                own = mesh.elements[e].section
+                factors.append((1 / own.area, height / own.inertia_y, width / own.inertia_z))
+                rounds.append(isinstance(section, (Circular, Tubular)))
+                links.append(number)
+    return Outlines(np.array(factors).reshape(-1, 3), np.array(rounds, dtype=bool), np.array(links, dtype=np.int64))
+
+
+def _half_sizes(section: Section, where: str) -> tuple[float, float]:
+    """Along local z and y [m]."""
+    if isinstance(section, Circular):
+        return section.diameter / 2, section.diameter / 2
+    if isinstance(section, Tubular):
+        return section.outer_diameter / 2, section.outer_diameter / 2
+    if isinstance(section, (Rectangular, RectangularTube)):
+        return section.height / 2, section.width / 2
+    raise SceneError(
+        Cause.BAD_FIELD,
+        "how large this section is, and with it its stress, is not known",
+        where=where,
+        remedy="give a shape with dimensions, or limit stress of other links",
+    )
+
+
+def assembled(frozen: Frozen, elements: Array) -> Array:
+    """(6 N, 6 N) of matrices of elements (e, 6, 6) on their twists."""
+    result = np.zeros((6 * len(frozen.links),) * 2)
+    blocks = np.einsum("eji,ejk,ekl->eil", frozen.strains, elements, frozen.strains)
+    for place, block in zip(frozen.places, blocks, strict=True):
+        result[np.ix_(place, place)] += block
+    return result
+
+
+def clamped_flexibility(frozen: Frozen, elements: Array) -> Array:
+    """(6 N, 6 N) displacements by forces on links that are held at their inboard nodes; 0 there."""
+    result = np.zeros((6 * len(frozen.links),) * 2)
+    free = frozen.flexible
+    if len(free):
+        stiffness = assembled(frozen, elements)[np.ix_(free, free)]
+        result[np.ix_(free, free)] = np.linalg.inv(stiffness)
+    return result
+
+
