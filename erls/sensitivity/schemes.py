@@ -20,7 +20,8 @@ from erls.integrate.alpha_rules import Formulas, Rules
 from erls.integrate.lobatto import NODES, tableau
 from erls.maths.so3 import Array
 
-_SAME_STEP = 1e-6  # relative change of a step that leaves α where it is, as in `erls.integrate.alpha_steps`
+SAME_STEP = 1e-6
+"""Relative change of a step that leaves α where it is, as in `erls.integrate.alpha_steps`."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Scheme:
     def rescaled(self, h: float, before: float | None) -> Array:
         """(4, 4) what a change of the step does to (y, v, a, α)."""
         result = np.eye(4)
-        if before is not None and abs(h - before) > _SAME_STEP * h and self.algorithmic.any():
+        if before is not None and abs(h - before) > SAME_STEP * h and self.algorithmic.any():
             ratio = h / before
             result[3, 2:] = 1 - ratio, ratio
         return result

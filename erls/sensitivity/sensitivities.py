@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from erls.equations.registry import system_of
+from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -17,18 +18,17 @@ from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
 from erls.scene.read import AnyScene, chain_alone, load_chain
-from erls.sensitivity.forward import differentiated
+from erls.sensitivity import forward
 from erls.sensitivity.outputs import Output, derivative_of, value_of
 from erls.sensitivity.parameters import parameters_of
 from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
-from erls.sensitivity.variants import differences
+from erls.sensitivity.variants import Difference, differences
 from erls.simulation.simulate import simulate
 
 _ROOM = 50_000_000
 """Numbers of derivatives of a motion that are held at a time, 400 MB: more parameters go one group after the other."""
 
 _UNKNOWN = {
-    "nodal": "the nodal formulation",
     "pieces": "links in substructures",
     "quasi-static": "modes that follow statically",
     "absolute": "absolute coordinates",
@@ -113,33 +113,54 @@ def sensitivities(
         refuse(loaded, build_mechanism(loaded, tell).mechanism)
         keys = parameters_of(loaded, parameters)
         run = simulate(loaded, tell=tell, verdict=False)
-    scheme = scheme_of(run)
+    refuse_run(run)
     values = {name: value_of(output, run, name) for name, output in outputs.items()}
     derivatives: dict[str, dict[str, Array]] = {name: {} for name in outputs}
     some = max(1, _ROOM // max(1, 3 * run.solution.y.size))
     for first in range(0, len(keys), some):
         found = differences(run, keys[first : first + some])
-        motion = differentiated(run, found, scheme)
+        motion, metres = motion_of(run, found)
         for k, one in enumerate(found):
             for name, output in outputs.items():
                 key = one.parameter.key
-                derivatives[name][key] = derivative_of(output, name, run, one, motion[..., k])
+                derivatives[name][key] = derivative_of(output, name, run, one, motion[..., k], metres)
     return Sensitivities(run, {one.key: one.value for one in keys}, values, derivatives)
 
 
+def motion_of(run: ChainRun, differences: Sequence[Difference]) -> tuple[Array, Array]:
+    """(k, 3, n, p) derivatives of what a run keeps of its knots, with rates and accelerations, and (n,) metres per unit
+    of it.
+
+    Raises
+    ------
+    SceneError, SimulationError
+        This cannot be differentiated; names what.
+    """
+    formulation: Any = run.formulation
+    if system_of(formulation.mechanism, run.scene.record.simulation) == "nodal":
+        from erls.sensitivity import nodal_forward  # here: most runs need none of it
+
+        return nodal_forward.differentiated(run, differences), nodal_forward.metres_of(formulation)
+    return forward.differentiated(run, differences, scheme_of(run)), metre_scales(formulation)
+
+
 def scheme_of(run: ChainRun) -> Scheme:
-    """What made a run, as maps of small changes.
+    """What made a run of a chain with coordinates of its own, as maps of small changes."""
+    settings = run.scene.record.simulation
+    return generalized_alpha(settings.spectral_radius) if settings.integrator == FIXED_STEP else lobatto()
+
+
+def refuse_run(run: ChainRun) -> None:
+    """Refuse what cannot be differentiated yet.
 
     Raises
     ------
     SceneError
-        BAD_FIELD: this cannot be differentiated yet; names what.
+        BAD_FIELD: names what.
     """
-    settings = run.scene.record.simulation
     refuse(run.scene, run.formulation.mechanism)
     if run.failure is not None:
         raise _refusal("a run that did not come to its end", str(run.scene.path), "shorten it, or mend why it failed")
-    return generalized_alpha(settings.spectral_radius) if settings.integrator == FIXED_STEP else lobatto()
 
 
 def refuse(scene: Scene, mechanism: Mechanism) -> None:
@@ -153,14 +174,14 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
     settings, where = scene.record.simulation, f"{scene.path}: simulation"
     if settings.output_step is not None:
         raise _refusal("a run that keeps only some of its steps", f"{where}.output_step", "keep all steps")
+    kind = system_of(mechanism, settings)
     if settings.integrator not in (FIXED_STEP, "lobatto", "auto"):
         raise _refusal(f"steps of {settings.integrator}", f"{where}.integrator", "use auto, lobatto or a step")
-    kind = system_of(mechanism, settings)
     if kind in _UNKNOWN:
         raise _refusal(_UNKNOWN[kind], where, "use erls or ffr with independent coordinates and links in one piece")
-    if settings.gauge == "minimum-norm":
+    if settings.gauge == "minimum-norm" and kind != "nodal":
         raise _refusal("the minimum-norm gauge", f"{where}.gauge", "use the joint-angle gauge")
-    if mechanism.rotation_vectors:
+    if mechanism.rotation_vectors and kind != "nodal":
         raise _refusal("coordinates that are rotation vectors", f"{scene.path}: joints", "use universal joints")
     if kind == "loops" and settings.integrator == FIXED_STEP:
         remedy = "use integrator auto or lobatto, whose equations hold the forces of loops"

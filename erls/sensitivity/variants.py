@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
+from erls.equations.nodal.equations import Nodal
 from erls.equations.registry import formulate
 from erls.equations.series import residual_series
 from erls.errors import Cause, SceneError
@@ -29,8 +30,10 @@ from erls.simulation.chains import models_of
 from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
 
-_LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
-_ROUNDING = 1e-13  # of forces
+LINEAR = 1e-10
+"""Of a derivative: what the third order of steps makes of it; a square root makes 1e-7."""
+ROUNDING = 1e-13
+"""Of forces."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +96,9 @@ class Difference:
             return self
         inner = Difference(self.parameter, tuple(replace(v, weight=0.75 * v.weight) for v in self.variants[1:3]))
         forces = [np.abs(variant.forces(sample)).max(initial=0.0) for variant in self.variants]
-        rounding = _ROUNDING * max(forces) * inner.variants[1].weight
+        rounding = ROUNDING * max(forces) * inner.variants[1].weight
         whole, less = (one.of(lambda variant: variant.forces(sample)) for one in (self, inner))
-        return inner if np.abs(whole - less).max() <= _LINEAR * np.abs(whole).max() + rounding else self
+        return inner if np.abs(whole - less).max() <= LINEAR * np.abs(whole).max() + rounding else self
 
     def of(self, what: Callable[[Variant], Array]) -> Array:
         """The derivative of what an array depends on."""
@@ -134,7 +137,8 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float
     base: Any = run.formulation
     mechanisms = [_mechanism(run, parameter, parameter.value + at * step) for at, _ in stencil]
     turns: list[Array | None] = [None] * len(stencil)
-    if parameter.within and parameter.link is not None:
+    nodal = isinstance(base, Nodal)
+    if parameter.within and parameter.link is not None and not nodal:
         number = base.mechanism.bodies[parameter.link]
         models = [mechanism.links[number].model for mechanism in mechanisms]
         found = held(models, base.mechanism.links[number].model, f"parameter {parameter.key}")
@@ -142,9 +146,11 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float
     result = []
     for (_, weight), mechanism, turn in zip(stencil, mechanisms, turns, strict=True):
         formulation: Any = formulate(mechanism, run.scene.record.simulation)
-        if mechanism.loops:
+        if nodal:
+            _refuse_others(formulation, base, parameter)
+        elif mechanism.loops:
             formulation.kept = base.kept  # of rows that follow from one another, any others would do as well
-        if formulation.breakpoints != base.breakpoints:
+        if _times(formulation) != _times(base):
             raise SceneError(
                 Cause.BAD_FIELD,
                 "times at which forces jump depend on this parameter: derivatives through them are not known yet",
@@ -154,6 +160,25 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float
             )
         result.append(Variant(weight / step, formulation, turn))
     return result
+
+
+def _times(formulation: Any) -> tuple[float, ...]:
+    """At which forces jump."""
+    of: Any = formulation.system if isinstance(formulation, Nodal) else formulation
+    found: tuple[float, ...] = of.breakpoints
+    return found
+
+
+def _refuse_others(formulation: Nodal, base: Nodal, parameter: Parameter) -> None:
+    """Refuse nodes, elements or conditions of another number or order."""
+    if formulation.chain.left_out != base.chain.left_out:
+        message = "which conditions of a loop follow from the others depends on this parameter"
+    elif not np.array_equal(formulation.system.flat.integers, base.system.flat.integers):
+        message = "elements and joints change with this parameter by jumps"
+    else:
+        return
+    where, remedy = f"parameter {parameter.key}", "name another field, or give it a value off such a place"
+    raise SceneError(Cause.BAD_FIELD, message, where=where, value=parameter.value, remedy=remedy)
 
 
 def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
@@ -167,6 +192,8 @@ def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
         scene = scene_with(scene, parameter, value)
     if k is not None:
         models[k] = link_model(scene, k, lambda text: None, described)
+        if described is not None and descriptions[k] is not None:  # made of beams, as nodes take them
+            descriptions[k] = described.description
     return build_mechanism(scene, lambda text: None, models, descriptions, pieces).mechanism
 
 

@@ -1,4 +1,4 @@
-"""Sections at the ends of beam elements: their frames, and what carries twists and wrenches between them and the nodes."""
+"""Sections at the ends of beam elements: their frames, what carries twists and wrenches between them and nodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @part
-def section_at(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rotation]:
+def section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rotation]:
     """Frame of the section at an end in the world."""
     node = model.beam_nodes[e, side]
     turn = nine(poses, node, 3)

@@ -15,11 +15,25 @@ heavy against turning than those of `beam_forces`; both converge to the same. Fo
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array
-from erls.equations.nodal.beam_ends import inward, outward, section_at, unit_twist
+from erls.equations.nodal.beam_ends import inward, outward, section, unit_twist
 from erls.equations.nodal.contract import Model, Work
+from erls.maths.coefficients import stumpff
 from erls.maths.jit import part
-from erls.maths.vectors import Rotation, Twist, Vector, back_product, cross, dot, minus, of_matrix, plus, scaled
-from erls.maths.vectors import times, turned, vector
+from erls.maths.rotations import exponential
+from erls.maths.vectors import (
+    Rotation,
+    Twist,
+    Vector,
+    cross,
+    dot,
+    minus,
+    of_matrix,
+    plus,
+    scaled,
+    times,
+    turned,
+    vector,
+)
 
 _SAME, _OTHER = 1.0 / 3.0, 1.0 / 6.0
 _ZERO = (0.0, 0.0, 0.0)
@@ -38,15 +52,22 @@ def _turning(model: Model, e: int, own: Vector, other: Vector) -> Vector:
 
 
 @part
-def linear_inertia(model: Model, work: Work, e: int) -> tuple[Twist, Twist]:
-    """Inertia less weight as wrenches on the first and on the second section, in their own axes."""
-    mass, down = model.beam_inertia[e, 0, 0], scaled(0.5, vector(model.gravity, 0, 0))
+def _between(psi: Vector) -> Rotation:
+    """Turn of the second section in the first."""
+    c = stumpff(dot(psi, psi))
+    return exponential(psi, c[0], c[1])
+
+
+@part
+def linear_inertia(model: Model, work: Work, e: int, psi: Vector) -> tuple[Twist, Twist]:
+    """Inertia less weight as wrenches on the first and on the second section, turned by ψ, in their own axes."""
+    mass, r = model.beam_inertia[e, 0, 0], _between(psi)
+    down = turned(section(model, work.poses, e, 0)[1], scaled(0.5, vector(model.gravity, 0, 0)))
     (v0, w0), (v1, w1) = outward(model, e, 0, work.twist), outward(model, e, 1, work.twist)
     (a0, b0), (a1, b1) = outward(model, e, 0, work.rate), outward(model, e, 1, work.rate)
-    r0, r1 = section_at(model, work.poses, e, 0)[1], section_at(model, work.poses, e, 1)[1]
-    x0, x1 = times(r0, plus(a0, cross(w0, v0))), times(r1, plus(a1, cross(w1, v1)))
-    f0 = turned(r0, scaled(mass, minus(_mean(x0, x1), down)))
-    f1 = turned(r1, scaled(mass, minus(_mean(x1, x0), down)))
+    x0, x1 = plus(a0, cross(w0, v0)), plus(a1, cross(w1, v1))
+    f0 = scaled(mass, minus(_mean(x0, times(r, x1)), down))
+    f1 = scaled(mass, minus(_mean(x1, turned(r, x0)), turned(r, down)))
     m0 = plus(_turning(model, e, b0, b1), cross(w0, _turning(model, e, w0, w1)))
     m1 = plus(_turning(model, e, b1, b0), cross(w1, _turning(model, e, w1, w0)))
     return (f0, m0), (f1, m1)
@@ -63,30 +84,27 @@ def _add_column(model: Model, e: int, out: Array, j: int, first: Twist, second: 
 
 
 @part
-def _across(turn: Rotation, mass: float, own: Vector, other: Vector) -> Vector:
-    """m Σ_j n_ij of vectors of both ends, each in the axes of its own, in those of the first; ``turn`` leads there."""
-    return scaled(mass, _mean(own, times(turn, other)))
-
-
-@part
-def linear_derivatives(model: Model, work: Work, e: int, block: Array) -> None:
-    """Add mass, gyroscopic damping and the stiffness of weight."""
-    mass, half = model.beam_inertia[e, 0, 0], scaled(0.5, vector(model.gravity, 0, 0))
+def linear_derivatives(model: Model, work: Work, e: int, block: Array, psi: Vector, exact: int) -> None:
+    """Add those by accelerations and velocities, and what turns of sections do to the weight; if ``exact``, at fixed
+    bending.
+    """
+    mass, r = model.beam_inertia[e, 0, 0], _between(psi)
+    half = scaled(0.5 * mass, vector(model.gravity, 0, 0))
     (v0, w0), (v1, w1) = outward(model, e, 0, work.twist), outward(model, e, 1, work.twist)
-    r0, r1 = section_at(model, work.poses, e, 0)[1], section_at(model, work.poses, e, 1)[1]
-    ahead, back = back_product(r0, r1), back_product(r1, r0)
+    pull0 = turned(section(model, work.poses, e, 0)[1], half)
+    pull1 = turned(r, pull0)
     spin0, spin1 = _turning(model, e, w0, w1), _turning(model, e, w1, w0)
-    pull0, pull1 = scaled(mass, turned(r0, half)), scaled(mass, turned(r1, half))
     for j in range(12):
         (c0, d0), (c1, d1) = unit_twist(model, e, j)
         m0, m1 = _turning(model, e, d0, d1), _turning(model, e, d1, d0)
-        first, second = (_across(ahead, mass, c0, c1), m0), (_across(back, mass, c1, c0), m1)
+        first, second = (scaled(mass, _mean(c0, times(r, c1))), m0), (scaled(mass, _mean(c1, turned(r, c0))), m1)
         _add_column(model, e, block[0], j, first, second)
         k0, k1 = plus(cross(d0, v0), cross(w0, c0)), plus(cross(d1, v1), cross(w1, c1))
         g0, g1 = plus(cross(d0, spin0), cross(w0, m0)), plus(cross(d1, spin1), cross(w1, m1))
-        first, second = (_across(ahead, mass, k0, k1), g0), (_across(back, mass, k1, k0), g1)
+        first, second = (scaled(mass, _mean(k0, times(r, k1))), g0), (scaled(mass, _mean(k1, turned(r, k0))), g1)
         _add_column(model, e, block[1], j, first, second)
-        _add_column(model, e, block[2], j, (cross(d0, pull0), _ZERO), (cross(d1, pull1), _ZERO))
+        tipped = turned(r, d0) if exact else d1
+        _add_column(model, e, block[2], j, (cross(d0, pull0), _ZERO), (cross(tipped, pull1), _ZERO))
 
 
 @part
@@ -94,7 +112,7 @@ def linear_energies(model: Model, work: Work, e: int) -> tuple[float, float]:
     """Kinetic energy, and that of gravity."""
     mass = model.beam_inertia[e, 0, 0]
     (v0, w0), (v1, w1) = outward(model, e, 0, work.twist), outward(model, e, 1, work.twist)
-    (p0, r0), (p1, r1) = section_at(model, work.poses, e, 0), section_at(model, work.poses, e, 1)
+    (p0, r0), (p1, r1) = section(model, work.poses, e, 0), section(model, work.poses, e, 1)
     x0, x1 = times(r0, v0), times(r1, v1)
     kinetic = mass * (dot(x0, _mean(x0, x1)) + dot(x1, _mean(x1, x0)))
     kinetic += dot(w0, _turning(model, e, w0, w1)) + dot(w1, _turning(model, e, w1, w0))
