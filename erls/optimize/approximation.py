@@ -1,12 +1,12 @@
 """A convex problem about a design: components of constraints linear in powers of the variables, measures kept.
 
-With ω = (x / x₀)^p, flexibilities of sections are linear in ω, and lengths of vectors that are linear are convex: near a
+With ω = (x / x₀)^p, flexibilities of sections are linear in ω, and masses, which load them, in μ = (x / x₀)^q: near a
 design the problem
 
-    min f(x(ω)) + ρ f₀ s   so that   measure(c₀ + J δω) ≤ limit (1 + s),  s ≥ 0
+    min f(x(ω)) + ρ f₀ s   so that   measure(c₀ + J_s δω + J_m δμ) ≤ limit (1 + s),  s ≥ 0
 
-hardly differs from the true one, but for what loads change. The slack s keeps it solvable; where it does not vanish, no
-design within reach holds the constraints.
+hardly differs from the true one (p = -4, q = 2 for diameters). The slack s keeps it solvable; where it does not vanish,
+no design within reach holds the constraints.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ class Powers:
         self._x, self._plain = x, rules.powers == 1
         self._p = np.where(self._plain, 1.0, rules.powers)
         self._span = rules.upper - rules.lower
+        self._q = np.where(self._p == -4, 2.0, 1.0)
 
     def to(self, x: Array) -> Array:
         """(v,) ω, 1 at the design."""
@@ -49,6 +50,12 @@ class Powers:
         powered = self._x / self._p * np.maximum(omega, 1e-12) ** (1 / self._p - 1)
         return np.where(self._plain, self._span, powered)
 
+    def masses(self, omega: Array) -> tuple[Array, Array]:
+        """(v,) changes of masses in shares of the variables, and their rates by ω: both as of the variables near 1."""
+        omega, ratio = np.maximum(omega, 1e-12), self._q / self._p
+        change, rate = (omega**ratio - 1) / self._q * self._x, omega ** (ratio - 1) / self._p * self._x
+        return np.where(self._plain, self._span * (omega - 1), change), np.where(self._plain, self._span, rate)
+
 
 @dataclass(frozen=True)
 class Step:
@@ -64,13 +71,20 @@ class Approximation:
 
     def __init__(self, rules: Rules, base: Evaluation) -> None:
         self.rules, self.base, self.powers = rules, base, Powers(rules, base.x)
-        rate = self.powers.rate(np.ones(len(base.x)))
-        self._jacobians = [jacobian * rate for jacobian in base.jacobians]
         self._ones = np.ones(len(base.x))
+        rate = self.powers.rate(self._ones)
+        self._flexible = [jacobian * rate for jacobian in base.flexible]
+        self._loaded = [whole - own for whole, own in zip(base.jacobians, base.flexible, strict=True)]
+
+    def _linear(self, omega: Array, k: int, rows: IntArray | slice) -> tuple[Array, Array]:
+        """(n, q) components of constraint k and their slopes (n, q, v) by ω."""
+        mass, rate = self.powers.masses(omega)
+        flexible, loaded = self._flexible[k][rows], self._loaded[k][rows]
+        return self.base.components[k][rows] + flexible @ (omega - 1) + loaded @ mass, flexible + loaded * rate
 
     def components(self, omega: Array) -> list[Array]:
         """(n, q) of every constraint."""
-        return [c + j @ (omega - 1) for c, j in zip(self.base.components, self._jacobians, strict=True)]
+        return [self._linear(omega, k, slice(None))[0] for k in range(len(self._flexible))]
 
     def objective(self, omega: Array) -> tuple[float, Array]:
         """Value and slope by ω."""
@@ -79,16 +93,16 @@ class Approximation:
         change = self.powers.back(omega) - self.base.x
         timed, slopes = self.rules.objective.timed(self.components(omega), self.rules.measures)
         slope = quadratic.slope(change) * self.powers.rate(omega)
-        for own, jacobian in zip(slopes, self._jacobians, strict=True):
-            slope = slope + np.einsum("nq,nqv->v", own, jacobian)
+        for k, own in enumerate(slopes):
+            if own.any():
+                slope = slope + np.einsum("nq,nqv->v", own, self._linear(omega, k, slice(None))[1])
         return quadratic.value(change) + timed, slope
 
     def rows(self, omega: Array, k: int, rows: IntArray) -> tuple[Array, Array]:
         """Shares (n,) of the limit of some rows of constraint k, with slopes (n, v); one value where aggregated."""
         limit = self.rules.limits[k]
         assert limit is not None
-        jacobian = self._jacobians[k][rows]
-        components = self.base.components[k][rows] + jacobian @ (omega - 1)
+        components, jacobian = self._linear(omega, k, rows)
         measure = self.rules.measures[k]
         shares = measure.value(components) / limit
         slopes = np.einsum("nq,nqv->nv", measure.slope(components), jacobian) / limit

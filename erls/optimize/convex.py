@@ -78,7 +78,7 @@ def sequential_convex(
     scale, count, move, change = max(abs(current.objective), 1e-300), 1, settings.move_limit, np.inf
 
     def merit(found: Evaluation) -> float:
-        return found.objective / scale + _PENALTY * max(0.0, found.violation - settings.violation_tolerance)
+        return found.objective / scale + _PENALTY * max(0.0, found.violation)
 
     while True:
         current = evaluator.differentiate(current) if current.quadratic is None else current

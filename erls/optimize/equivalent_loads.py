@@ -13,20 +13,38 @@ the run nothing is approximated.
 
 from __future__ import annotations
 
-
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
+from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.optimize.beams import assembled, clamped_flexibility, sections_of
-from erls.optimize.design import scene_at
-from erls.optimize.dynamics import Dynamics
+from erls.optimize.design import Design, Designs, scene_at
 from erls.optimize.evaluation import Evaluation, Rules
 from erls.optimize.frozen import Frozen
-from erls.optimize.limits import Motion
+from erls.optimize.limits import Limit, Motion
+from erls.optimize.problem import Problem
+from erls.scene.build import link_description
+from erls.scene.chain import Scene
 
 _STEP = 1e-4  # of variables: sections are polynomials of low order in them
+
+
+class Source(Protocol):
+    """What frozen loads take from who runs designs."""
+
+    problem: Problem
+    rules: Rules
+    designs: Designs
+    start: Design
+
+    def limits(self, design: Design) -> list[Limit]:
+        """Constraints at a design."""
+
+    def limits_at(self, x: Array) -> list[Limit]:
+        """The same where no node moves."""
 
 
 class FrozenLoads:
@@ -34,7 +52,7 @@ class FrozenLoads:
 
     Parameters
     ----------
-    dynamics : Dynamics
+    source : Source
     x : (v,) array
         Design of the run.
     motion : Motion
@@ -48,18 +66,17 @@ class FrozenLoads:
         Static analyses of all times so far.
     """
 
-    def __init__(self, dynamics: Dynamics, x: Array, motion: Motion, whole: bool) -> None:
-        self.rules: Rules = dynamics.rules
-        self._dynamics, self._whole, self.evaluations = dynamics, whole, 0
+    def __init__(self, source: Source, x: Array, motion: Motion, whole: bool) -> None:
+        self.rules: Rules = source.rules
+        self._source, self._whole, self.evaluations = source, whole, 0
         self._frozen: Frozen = motion.frozen
-        self._motion, self._x = motion, x
-        self._mechanism = dynamics.designs.at(x).mechanism
+        self._motion = motion
         stiffness = assembled(self._frozen, self._sections(x))
         self._loads = motion.shape.reshape(len(motion.frozen.times), -1) @ stiffness
         self._base = self._response(x)
 
     def _sections(self, x: Array) -> Array:
-        return sections_of(self._mechanism, scene_at(self._dynamics.problem, x))
+        return sections_of(self._source.start.mechanism, scene_at(self._source.problem, x))
 
     @cached_property
     def _turned(self) -> Array:
@@ -99,30 +116,59 @@ class FrozenLoads:
         self.evaluations += 1
         r, w, _ = self._response(x)
         change = r - self._base[0], w - self._base[1]
-        limits = self._dynamics.limits(x)
-        components = [
-            limit.exact(self._motion) + limit.increments(self._frozen, *change) for limit in limits
-        ]
-        return self.rules.evaluation(x, components)
+        return self.rules.evaluation(x, [self._components(limit, *change) for limit in self._source.limits_at(x)])
+
+    def _components(self, limit: Limit, r: Array, w: Array) -> Array:
+        """Those of the run, which loads that are held hold as well, and what r and w add to them."""
+        return limit.exact(self._motion) + limit.increments(self._frozen, r, w)
 
     def differentiate(self, found: Evaluation) -> Evaluation:
         """With derivatives: dC = -C dK C."""
         x = found.x
-        _, w, flexibility = self._response(x)
-        limits, base = self._dynamics.limits(x), w - self._base[1]
-        r_now = self._response(x)[0] - self._base[0]
+        r, w, flexibility = self._response(x)
+        limits, change = self._source.limits_at(x), (r - self._base[0], w - self._base[1])
         columns: list[list[Array]] = [[] for _ in limits]
-        for v in range(len(x)):
-            step = _STEP * max(abs(float(x[v])), 1e-2 * float(self.rules.upper[v] - self.rules.lower[v]))
-            sides = [x + sign * step * np.eye(len(x))[v] for sign in (1.0, -1.0)]
-            rate = (self._sections(sides[0]) - self._sections(sides[1])) / (2 * step)
+        for above, below, step in self.rules.beside(x, _STEP):
+            rate = (self._sections(above) - self._sections(below)) / (2 * step)
             alone = -(w @ assembled(self._frozen, rate)) @ flexibility
-            r, further = self._joined(flexibility, alone, None)
-            beside = [self._dynamics.limits(side) for side in sides]
+            moved = self._joined(flexibility, alone, None)
+            beside = [self._source.limits_at(side) if limits_vary(limits) else limits for side in (above, below)]
             for k, limit in enumerate(limits):
-                own = [
-                    other[k].exact(self._motion) + other[k].increments(self._frozen, r_now, base) for other in beside
-                ]
-                moved = limit.increments(self._frozen, r, alone + further)
-                columns[k].append(moved + (own[0] - own[1]) / (2 * step))
+                column = limit.increments(self._frozen, moved[0], alone + moved[1])
+                if limit.of_sections:
+                    own = [self._components(other[k], *change) for other in beside]
+                    column = column + (own[0] - own[1]) / (2 * step)
+                columns[k].append(column)
         return self.rules.differentiated(found, [np.stack(column, axis=-1) for column in columns])
+
+
+def limits_vary(limits: list[Limit]) -> bool:
+    """Whether some depend on sections by themselves."""
+    return any(limit.of_sections for limit in limits)
+
+
+def flexible(scene: Scene) -> bool:
+    """Whether all links that deform are made of beams."""
+    links = [link for link in scene.record.links if link.rigid is None and link.flexible]
+    return all(link.model and link_description(scene, link).description.frame is not None for link in links)
+
+
+def refuse(source: Source, method: str) -> None:
+    """Refuse what loads that are held cannot treat.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: variables that move nodes, constraints on forces, links that are not made of beams.
+    """
+    path, remedy = source.problem.path, 'use methods = ["integrated"], or take it out'
+    if source.designs.moving:
+        message = f"{method} holds the motion and its loads: a number that changes lengths or drives is no variable for it"
+        raise SceneError(Cause.BAD_FIELD, message, where=f"{path}: variables.{source.designs.moving[0]}", remedy=remedy)
+    if not flexible(source.start.scene):
+        message = f"{method} knows the stiffness of links that are made of beams alone"
+        raise SceneError(Cause.BAD_FIELD, message, where=f"{path}: scene", remedy='use methods = ["integrated"]')
+    for limit in source.limits(source.start):
+        if not limit.of_shape:
+            message = f"{method} holds all loads: it cannot limit them"
+            raise SceneError(Cause.BAD_FIELD, message, where=f"{path}: constraints.{limit.name}", remedy=remedy)

@@ -1,13 +1,13 @@
 """What optimizers see: designs with objective, constraint components and their derivatives.
 
-`Evaluator` is what they call; a run of the motion or a static response stands behind it. Components of constraints
-depend nearly linearly on powers of the variables, their `Measure` is convex: whoever approximates linearizes the
-components in these powers and keeps the measure.
+`Evaluator` is what they call; a run of the motion or a static response stands behind it. What stiffness makes of
+components of constraints depends nearly linearly on powers of the variables, what loads make of them on others, and
+their `Measure` is convex: whoever approximates linearizes the components in these powers and keeps the measure.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -32,6 +32,8 @@ class Evaluation:
         Largest share by which a constraint passes its limit; negative where all hold.
     jacobians : tuple of (n, q, v) arrays
         Of components by the variables; empty until asked for.
+    flexible : tuple of (n, q, v) arrays
+        The parts of them that stiffness makes at held loads; all unless known apart.
     quadratic : Quadratic or None
         Of the part of masses, with the jacobians.
     """
@@ -41,6 +43,7 @@ class Evaluation:
     components: tuple[Array, ...]
     violation: float
     jacobians: tuple[Array, ...] = ()
+    flexible: tuple[Array, ...] = ()
     quadratic: Quadratic | None = None
 
 
@@ -84,6 +87,13 @@ class Rules:
     every: tuple[bool, ...]
     objective: Objective
 
+    def beside(self, x: Array, share: float) -> Iterator[tuple[Array, Array, float]]:
+        """Designs on both sides of one, variable by variable, and how far away."""
+        for k in range(len(x)):
+            step = share * max(abs(float(x[k])), 1e-2 * float(self.upper[k] - self.lower[k]))
+            way = step * np.eye(len(x))[k]
+            yield x + way, x - way, step
+
     def shares(self, components: Sequence[Array]) -> list[Array]:
         """(n,) values of each constraint over its limit; empty for those without one."""
         found = zip(self.measures, components, self.limits, strict=True)
@@ -99,9 +109,13 @@ class Rules:
         objective = self.objective.weighed(x) + timed
         return Evaluation(x, objective, tuple(components), self.violation(components))
 
-    def differentiated(self, found: Evaluation, jacobians: Sequence[Array]) -> Evaluation:
+    def differentiated(
+        self, found: Evaluation, jacobians: Sequence[Array], flexible: Sequence[Array] | None = None
+    ) -> Evaluation:
         """With derivatives."""
-        return replace(found, jacobians=tuple(jacobians), quadratic=self.objective.quadratic(found.x))
+        own = tuple(jacobians if flexible is None else flexible)
+        quadratic = self.objective.quadratic(found.x)
+        return replace(found, jacobians=tuple(jacobians), flexible=own, quadratic=quadratic)
 
 
 _KS = 200.0  # of the Kreisselmeier-Steinhauser function of shares: ln(n)/200 above their largest

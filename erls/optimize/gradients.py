@@ -4,7 +4,7 @@ otherwise differences of runs whose steps are fixed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,16 +16,17 @@ from erls.run.chain.run import ChainRun
 from erls.scene.integrators import FIXED_STEP
 from erls.sensitivity.sensitivities import sensitivities
 
-Asked = Callable[[ChainRun], Sequence[Array]]
-"""Arrays that a run gives."""
+Asked = Callable[[ChainRun], Array]
+"""(n,) what a run gives."""
 
-_STEP = 2e-4  # of a variable: truncation takes 4e-8 of a derivative, iterations that end at 1e-13 m as much
+_ALL = "constraints"
+_STEP = 2e-5  # of a variable: vibrations that fall out of step make large third derivatives
 
 
 def derivatives(
     problem: Problem, designs: Designs, design: Design, run: ChainRun, asked: Asked
-) -> tuple[list[Array], str]:
-    """Of arrays by all variables, (..., v) each, and how they were found.
+) -> tuple[Array, str]:
+    """(n, v) by all variables, and how they were found.
 
     Raises
     ------
@@ -34,10 +35,9 @@ def derivatives(
     SimulationError
         A run beside the design failed.
     """
-    count = len(asked(run))
     keys = [p.key for p in problem.parameters]
     try:
-        found = sensitivities(run, {str(k): lambda r, k=k: asked(r)[k] for k in range(count)}, keys)
+        found = sensitivities(run, {_ALL: asked}, keys).derivatives[_ALL]
     except SceneError as refusal:
         if refusal.cause != Cause.BAD_FIELD or "not known yet" not in refusal.message:
             raise
@@ -51,11 +51,10 @@ def derivatives(
                 remedy=f"{refusal.remedy}; or give simulation.step",
             ) from None
         return _differences(designs, design, asked), "differences"
-    by_key = [np.stack([found.derivatives[str(k)][key] for key in keys], axis=-1) for k in range(count)]
-    return [array @ problem.factors for array in by_key], "sensitivities"
+    return np.stack([found[key] for key in keys], axis=-1) @ problem.factors, "sensitivities"
 
 
-def _differences(designs: Designs, design: Design, asked: Asked) -> list[Array]:
+def _differences(designs: Designs, design: Design, asked: Asked) -> Array:
     problem, columns = designs.problem, []
     span = problem.upper - problem.lower
     for k in range(len(design.x)):
@@ -65,5 +64,5 @@ def _differences(designs: Designs, design: Design, asked: Asked) -> list[Array]:
             x = design.x.copy()
             x[k] += sign * step
             sides.append(asked(run_of(designs.at(x))))
-        columns.append([(above - below) / (2 * step) for above, below in zip(*sides, strict=True)])
-    return [np.stack([column[k] for column in columns], axis=-1) for k in range(len(columns[0]))]
+        columns.append((sides[0] - sides[1]) / (2 * step))
+    return np.stack(columns, axis=-1)

@@ -3,7 +3,7 @@
 Rules for a new constraint: one record in `erls.optimize.records`, one class here, one line in `limit_of`. ``exact``
 tells components (n, q) of a motion, ``increments`` what small displacements of its nodes add to them, of many directions
 at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, ``of_run`` asks the run, and
-equivalent static loads cannot treat it.
+equivalent static loads cannot treat it; with ``of_sections`` components depend on sections at the same motion, too.
 """
 
 from __future__ import annotations
@@ -61,6 +61,7 @@ class Limit(Protocol):
     measure: Measure
     at: IntArray
     of_shape: bool
+    of_sections: bool
 
     def exact(self, motion: Motion) -> Array:
         """(n, q) components in a motion."""
@@ -83,7 +84,7 @@ class Deflection:
     """Of named points."""
 
     measure = Length()
-    of_shape = True
+    of_shape, of_sections = True, False
 
     def __init__(self, record: DeflectionLimit, at: IntArray, mechanism: Mechanism, nodal: Nodal) -> None:
         self.name, self.limit, self.at = record.name, record.limit, at
@@ -140,7 +141,7 @@ def _part(term: Term, mechanism: Mechanism, nodal: Nodal) -> _Part:
 class Stress:
     """Largest normal stress at both ends of elements, one row for each time and end."""
 
-    of_shape = True
+    of_shape, of_sections = True, True
 
     def __init__(
         self, record: StressLimit, at: IntArray, mechanism: Mechanism, scene: Scene, links: list[int]
@@ -177,7 +178,7 @@ class Effort:
     """Of a joint's drive."""
 
     measure = Length()
-    of_shape = False
+    of_shape, of_sections = False, False
 
     def __init__(self, record: EffortLimit, at: IntArray) -> None:
         self.name, self.limit, self.at, self._joint = record.name, record.limit, at, record.joint

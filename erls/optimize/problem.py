@@ -90,7 +90,7 @@ class Problem:
     def overrides(self, x: Array) -> list[str]:
         """KEY=VALUE of the scene at a design (v,)."""
         values = (self.factors @ x).tolist()
-        return [f"{p.key}={value!r}" for p, value in zip(self.parameters, values, strict=True)]
+        return [f"{p.key}={float(value)!r}" for p, value in zip(self.parameters, values, strict=True)]
 
     def times(self, constraint: AnyConstraint) -> Array:
         """(k,) samples of a constraint [s]."""
