@@ -1,4 +1,4 @@
-"""The command ``erls``: reduce, simulate, linearize, compare, study, info, view.
+"""The command ``erls``: reduce, simulate, linearize, optimize, compare, study, info, view.
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 2 bad input, 3 numerical failure, 4 did not
 converge where convergence was asked for, 130 interrupted. Heavy packages are imported inside the commands, so that
@@ -20,6 +20,7 @@ from erls.cli.compare import compare
 from erls.cli.effects import effects
 from erls.cli.files import info, view
 from erls.cli.linearize import linearize
+from erls.cli.optimize import optimize
 from erls.cli.reduce import reduce
 from erls.cli.simulate import simulate
 from erls.cli.streams import StdoutLost, prepare_streams
@@ -42,7 +43,7 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-for command in (reduce, simulate, info, view, compare, effects, linearize):
+for command in (reduce, simulate, info, view, compare, effects, linearize, optimize):
     app.command(command)
 app.command(study)
 

@@ -44,6 +44,8 @@ class Dynamics:
     problem : Problem
     memory : Memory
     tell : callable
+    times : (k,) array, optional
+        Samples of all constraints, in place of their own.
 
     Attributes
     ----------
@@ -57,12 +59,14 @@ class Dynamics:
         At which constraints look.
     """
 
-    def __init__(self, problem: Problem, memory: Memory, tell: Message = lambda text: None) -> None:
+    def __init__(
+        self, problem: Problem, memory: Memory, tell: Message = lambda text: None, times: Array | None = None
+    ) -> None:
         self.problem, self._memory, self._tell = problem, memory, tell
         self.designs = Designs(problem, tell)
         self.analyses, self.run_s, self.gradient_s, self.gradient = 0, 0.0, 0.0, ""
         record = problem.record
-        samples = [problem.times(c) for c in record.constraints]
+        samples = [problem.times(c) if times is None else times for c in record.constraints]
         self.times = np.unique(np.concatenate([*samples, [0.0]]))
         self.at = [np.searchsorted(self.times, own) for own in samples]
         self._places: list[Place] = []

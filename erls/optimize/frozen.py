@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -68,8 +69,8 @@ class Frozen:
         Inboard nodes.
     carried : (6 N, 6 L) array
         Z.
-    rows : (k, m, 6 N) array
-        B; coordinates of joints that move freely are held.
+    joints : NodalSystem
+        The joints alone; coordinates that nothing prescribes or ties are held.
     ends : (e, 2) array
         Nodes of elements.
     strains : (e, 6, 12) array
@@ -83,10 +84,17 @@ class Frozen:
     links: IntArray
     roots: IntArray
     carried: Array
-    rows: Array
+    joints: NodalSystem
     ends: IntArray
     strains: Array
     lengths: Array
+
+    @cached_property
+    def rows(self) -> Array:
+        """(k, m, 6 N) B."""
+        poses = self.frames[:, self.links] @ self.local
+        each = zip(self.times.tolist(), poses, strict=True)
+        return np.array([dense(self.joints.constraint_matrix(t, self.joints.at(own))) for t, own in each])
 
     @property
     def places(self) -> IntArray:
@@ -124,10 +132,7 @@ def frozen(mechanism: Mechanism, nodal: Nodal, times: Array) -> Frozen:
     carried = np.zeros((6 * len(links), 6 * len(roots)))
     for n, k in enumerate(links.tolist()):
         carried[6 * n : 6 * n + 6, 6 * k : 6 * k + 6] = motions.adjoint_inverse(local[n])
-    tied = _held(nodal, rigid)
-    poses = frames[:, links] @ local
-    rows = [dense(tied.constraint_matrix(t, tied.at(poses[k]))) for k, t in enumerate(times.tolist())]
-    return Frozen(times, frames, local, links, roots, carried, np.array(rows), *_strains(nodal))
+    return Frozen(times, frames, local, links, roots, carried, _held(nodal, rigid), *_strains(nodal))
 
 
 def _strains(nodal: Nodal) -> tuple[IntArray, Array, Array]:

@@ -1,7 +1,7 @@
 """The motion of rigid links: where a mechanism would be if nothing bent, at prescribed and wanted motions.
 
-Joints that follow closing joints are found by Newton's method from one time to the next, so that they stay on the
-branch on which they start.
+Joints that follow closing joints are found by Newton's method, first from one time to the next in short strides, so that
+they stay on the branch on which they start, and from there on at all times together.
 """
 
 from __future__ import annotations
@@ -9,17 +9,39 @@ from __future__ import annotations
 import numpy as np
 
 from erls.errors import Cause, SceneError, SimulationError
+from erls.maths.rotation_maps import exp
 from erls.maths.so3 import Array
-from erls.mechanism.chain import Mechanism, poses
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.drives import Drive
 from erls.mechanism.loops import Loop, LoopEnd
 
-_ITERATIONS, _STEP = 30, 1e-6
+_ITERATIONS, _STEP, _REACHED = 30, 1e-6, 1e-11
 _CLOSED = 1e-6  # of the size of the mechanism: what lengths that do not fit may leave open
-_STRIDE, _MOST = 0.1, 1000  # rad or m: prescribed coordinates go no farther between two solutions; their number
+_STRIDE, _MOST = 0.1, 10_000  # rad or m: prescribed coordinates go no farther in a stride; strides in all
+_RANK = 1e-9
+
+
+def link_frames(mechanism: Mechanism, theta: Array) -> Array:
+    """(k, links, 4, 4) in the world at joint coordinates (k, joints)."""
+    moved = [joint.freedom.poses(theta[:, n]) for n, joint in enumerate(mechanism.joints)]
+    for n in mechanism.rotation_vectors:
+        moved[n] = np.tile(np.eye(4), (len(theta), 1, 1))
+        moved[n][:, :3, :3] = exp(theta[:, n : n + 3])
+    result: list[Array] = []
+    for joint, own in zip(mechanism.joints, moved, strict=True):
+        step = joint.before @ own @ joint.after
+        result.append(step if joint.parent < 0 else result[joint.parent] @ step)
+    return np.stack(result, axis=1)
 
 
 class RigidMotion:
     """Of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    times : (k,) array
+        Rising [s].
 
     Attributes
     ----------
@@ -27,6 +49,8 @@ class RigidMotion:
     coordinates : (k, joints) array
     frames : (k, links, 4, 4) array
         Of the links in the world.
+    following : list of int
+        Joints that no motion is given for: closing joints lead them.
 
     Raises
     ------
@@ -37,15 +61,19 @@ class RigidMotion:
     """
 
     def __init__(self, mechanism: Mechanism, times: Array) -> None:
-        self.times = times
-        self._mechanism = mechanism
-        joints, loops = mechanism.joints, mechanism.loops
-        self._driven = [k for k, joint in enumerate(joints) if joint.drive.motion is not None]
-        self.following = [k for k in range(len(joints)) if k not in self._driven]
-        if self.following and not loops:
+        self.times, self._mechanism = times, mechanism
+        self._driven = [k for k, joint in enumerate(mechanism.joints) if joint.drive.motion is not None]
+        self.following = [k for k in range(len(mechanism.joints)) if k not in self._driven]
+        if self.following and not mechanism.loops:
             raise self._free()
-        self.coordinates = np.array([self._at(t) for t in self._walk(times)])[self._wanted]
-        self.frames = np.array([poses(mechanism, row) for row in self.coordinates])
+        theta = self._given(times)
+        if self.following:
+            walk = self._walk(times)
+            path = self._followed(walk)
+            for k in self.following:
+                theta[:, k] = np.interp(times, walk, path[:, k])
+            theta = self._closed(times, theta)
+        self.coordinates, self.frames = theta, link_frames(mechanism, theta)
 
     def _free(self) -> SceneError:
         return SceneError(
@@ -55,83 +83,95 @@ class RigidMotion:
             remedy="let its drive have a motion; joints that follow closed loops need none",
         )
 
-    def _walk(self, times: Array) -> Array:
-        """Times to solve at, in rising order, those that are asked for among them."""
-        if not self.following:
-            self._wanted = np.arange(len(times))
-            return times
-        every = np.unique(np.append(times, 0.0))
-        moved = np.abs(np.diff([self._inputs(t) for t in every], axis=0)).max(axis=1, initial=0.0)
-        parts = np.maximum(1, np.minimum(np.ceil(moved / _STRIDE), _MOST)).astype(int)
-        pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(every, every[1:], parts, strict=False)]
-        every = np.unique(np.concatenate([*pieces, every]))
-        self._wanted = np.searchsorted(every, times)
-        self._last = np.array([joint.position for joint in self._mechanism.joints])
-        return every
-
-    def _inputs(self, t: float) -> list[float]:
-        """Prescribed coordinates."""
-        own = [self._mechanism.joints[k].drive.reference(t) for k in self._driven]
-        own += [loop.freedom.drive.reference(t) for loop in self._mechanism.loops if loop.freedom and loop.prescribed]
-        return [0.0 if value is None else value[0] for value in own]
-
-    def _at(self, t: float) -> Array:
-        theta = np.array([joint.position for joint in self._mechanism.joints])
+    def _given(self, times: Array) -> Array:
+        """(k, joints) with what is given; others as they start."""
+        theta = np.tile([joint.position for joint in self._mechanism.joints], (len(times), 1)).astype(float)
         for k in self._driven:
-            found = self._mechanism.joints[k].drive.reference(t)
-            assert found is not None
-            theta[k] = found[0]
-        if not self.following:
-            return theta
-        theta[self.following] = self._last[self.following]
+            theta[:, k] = _motion(self._mechanism.joints[k].drive, times)
+        return theta
+
+    def _walk(self, times: Array) -> Array:
+        """Times of short strides."""
+        walk = np.unique(np.append(times, 0.0))
+        inputs = [_motion(self._mechanism.joints[k].drive, walk) for k in self._driven]
+        inputs += [_motion(x.freedom.drive, walk) for x in self._mechanism.loops if x.freedom and x.prescribed]
+        moved = np.abs(np.diff(inputs, axis=1)).max(axis=0, initial=0.0)
+        parts = np.clip(np.ceil(moved / _STRIDE), 1, _MOST // len(walk) + 1).astype(int)
+        pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(walk, walk[1:], parts, strict=False)]
+        fine = np.append(np.concatenate(pieces), walk[-1]) if pieces else walk
+        far = np.concatenate([[0.0], np.cumsum(np.repeat(moved / parts, parts))])
+        kept = np.unique(np.append(np.unique(np.floor(far / _STRIDE), return_index=True)[1], len(fine) - 1))
+        return np.asarray(fine[kept])
+
+    def _followed(self, walk: Array) -> Array:
+        """(k, joints) one time after the other."""
+        path = self._given(walk)
+        for n in range(len(walk)):
+            path[n, self.following] = path[max(n - 1, 0), self.following]
+            path[n] = self._closed(walk[n : n + 1], path[n : n + 1])[0]
+        return path
+
+    def _closed(self, times: Array, theta: Array) -> Array:
+        """Followers at all times, by Newton's method from where they are."""
+        theta = theta.copy()
         for _ in range(_ITERATIONS):
-            gap = self._gap(t, theta)
-            slope = np.stack([self._slope(t, theta, k) for k in self.following], axis=1)
-            step, _, rank, _ = np.linalg.lstsq(slope, gap, rcond=1e-9)
-            if rank < len(self.following) and t == self.times[0]:
+            gap = self._gap(times, theta)
+            slope = np.stack([self._slope(times, theta, k) for k in self.following], axis=2)
+            if np.linalg.matrix_rank(slope[0], tol=_RANK * max(1.0, float(np.abs(slope).max()))) < len(self.following):
                 raise self._free()
-            theta[self.following] -= step
-            if np.abs(step).max(initial=0.0) <= 1e-11:
+            step = np.einsum("kij,kj->ki", np.linalg.pinv(slope, rcond=_RANK), gap)
+            theta[:, self.following] -= step
+            if not np.abs(step).max() > _REACHED:
                 break
-        if not np.abs(self._gap(t, theta)).max() <= _CLOSED * self._mechanism.reach:
+        left = np.abs(self._gap(times, theta)).max(axis=1)
+        if not left.max() <= _CLOSED * self._mechanism.reach:
             raise SimulationError(
                 Cause.LOOP_OPEN,
                 "rigid links do not reach",
-                where=f"t = {t:.6g} s, loop {self._mechanism.loops[0].name!r}",
+                where=f"t = {times[int(np.nan_to_num(left, nan=np.inf).argmax())]:.6g} s",
+                value=float(left.max()),
+                limit=_CLOSED * self._mechanism.reach,
                 remedy="look at lengths and motions",
             )
-        self._last = theta.copy()
         return theta
 
-    def _slope(self, t: float, theta: Array, k: int) -> Array:
+    def _slope(self, times: Array, theta: Array, k: int) -> Array:
         above, below = theta.copy(), theta.copy()
-        above[k] += _STEP
-        below[k] -= _STEP
-        return (self._gap(t, above) - self._gap(t, below)) / (2 * _STEP)
+        above[:, k] += _STEP
+        below[:, k] -= _STEP
+        return np.asarray((self._gap(times, above) - self._gap(times, below)) / (2 * _STEP))
 
-    def _gap(self, t: float, theta: Array) -> Array:
-        """(m,) violations of closing joints, turns times the size of the mechanism [m]."""
-        frames = poses(self._mechanism, theta)
-        return np.concatenate([self._violation(loop, frames, t) for loop in self._mechanism.loops])
+    def _gap(self, times: Array, theta: Array) -> Array:
+        """(k, m) violations of closing joints, turns times the size of the mechanism [m]."""
+        frames = link_frames(self._mechanism, theta)
+        return np.concatenate([self._violation(loop, frames, times) for loop in self._mechanism.loops], axis=1)
 
-    def _violation(self, loop: Loop, frames: list[Array], t: float) -> Array:
+    def _violation(self, loop: Loop, frames: Array, times: Array) -> Array:
         inner, outer = self._end(loop.inner, frames), self._end(loop.outer, frames)
         conditions = loop.type.conditions
         if loop.freedom is not None and loop.prescribed:
-            reference = loop.freedom.drive.reference(t)
-            ahead = (0.0 if reference is None else reference[0]) - loop.freedom.zero
-            inner = inner @ loop.freedom.freedom.pose(ahead)
+            ahead = _motion(loop.freedom.drive, times) - loop.freedom.zero
+            inner = inner @ loop.freedom.freedom.poses(ahead)
             conditions = loop.type.driven_conditions
         relative = np.linalg.inv(inner) @ outer
-        turn = np.arctan2(relative[1, 0] - relative[0, 1], relative[0, 0] + relative[1, 1])
-        found = [c.line @ relative[:3, 3] + (c.entries * relative[:3, :3]).sum() - c.pitch * turn for c in conditions]
-        turns = np.array([not c.line.any() for c in conditions])
-        return np.array(found) * np.where(turns, self._mechanism.reach, 1.0)
+        turn = np.arctan2(relative[:, 1, 0] - relative[:, 0, 1], relative[:, 0, 0] + relative[:, 1, 1])
+        rows = [
+            (relative[:, :3, 3] @ c.line + (c.entries * relative[:, :3, :3]).sum(axis=(1, 2)) - c.pitch * turn)
+            * (1.0 if c.line.any() else self._mechanism.reach)
+            for c in conditions
+        ]
+        return np.stack(rows, axis=1)
 
-    def _end(self, end: LoopEnd, frames: list[Array]) -> Array:
+    def _end(self, end: LoopEnd, frames: Array) -> Array:
+        """(k, 4, 4) a joint frame in the world."""
         if end.link is None:
-            return end.frame
-        result = frames[end.link] @ end.frame
-        place = self._mechanism.links[end.link].model.nodes[end.node] + end.frame[:3, 3]
-        result[:3, 3] = frames[end.link][:3, :3] @ place + frames[end.link][:3, 3]
-        return result
+            return np.tile(end.frame, (len(frames), 1, 1))
+        local = end.frame.copy()
+        local[:3, 3] += self._mechanism.links[end.link].model.nodes[end.node]
+        return np.asarray(frames[:, end.link] @ local)
+
+
+def _motion(drive: Drive, times: Array) -> Array:
+    """(k,) prescribed or wanted coordinates."""
+    found = [drive.reference(t) for t in times.tolist()]
+    return np.array([0.0 if one is None else one[0] for one in found])
