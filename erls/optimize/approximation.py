@@ -12,9 +12,10 @@ no design within reach holds the constraints.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import minimize, nnls
 
 from erls.maths.so3 import Array
 from erls.optimize.evaluation import Evaluation, Rules, aggregate
@@ -23,6 +24,9 @@ from fe_import.model import IntArray
 _SLACK = 50.0  # ρ
 _NEAR, _MOST_ROWS, _ROUNDS = 0.7, 120, 6  # share of the limit from which on rows count; of one constraint at a time
 _MET = 1e-8
+_ACTIVE = 2e-3  # of the limit: rows that may hold a design
+_BOUND = 1e-6  # of the distance of the bounds
+_LEAST = 1e-9  # of the objective's slope: multipliers that are rounding
 
 
 class Powers:
@@ -57,13 +61,33 @@ class Powers:
         return np.where(self._plain, self._span * (omega - 1), change), np.where(self._plain, self._span, rate)
 
 
+class Held(NamedTuple):
+    """What holds a design: constraint and row, or variable and -1 at its lower, -2 at its upper bound; value over limit;
+    multiplier, per share of the limit or unit of the variable.
+    """
+
+    number: int
+    row: int
+    share: float
+    multiplier: float
+
+
 @dataclass(frozen=True)
 class Step:
-    """A solution of the convex problem: the design, what was predicted there, and the slack that remains."""
+    """A solution of the convex problem.
+
+    Attributes
+    ----------
+    x : (v,) array
+    slack : float
+        That remains.
+    pressure : float
+        Sum of the multipliers of constraints: by how much the objective falls per share by which limits are relaxed.
+    """
 
     x: Array
     slack: float
-    objective: float
+    pressure: float
 
 
 class Approximation:
@@ -124,7 +148,39 @@ class Approximation:
                 break
             chosen = further
         x = np.clip(self.powers.back(omega), lower, upper)
-        return Step(x, slack, self.objective(omega)[0])
+        return Step(x, slack, sum(held.multiplier for held in self.held(omega)[0] if held.row >= 0))
+
+    def held(self, omega: Array) -> tuple[list[Held], float]:
+        """What holds a design, with multipliers, and what these leave of the objective's slope, over that."""
+        _, slope = self.objective(omega)
+        rate, columns, known = self.powers.rate(omega), [], []
+        for k, limit in enumerate(self.rules.limits):
+            if limit is None:
+                continue
+            shares = self._shares(omega, k)
+            rows = np.arange(len(shares)) if self.rules.aggregated[k] else np.flatnonzero(shares >= 1 - _ACTIVE)
+            if not len(rows):
+                continue
+            values, slopes = self.rows(omega, k, rows)
+            for n, (share, column) in enumerate(zip(values.tolist(), slopes, strict=True)):
+                if share >= 1 - _ACTIVE:
+                    columns.append(column)
+                    row = int(shares.argmax()) if self.rules.aggregated[k] else int(rows[n])
+                    known.append(Held(k, row, share, 0.0))
+        span, x = self.rules.upper - self.rules.lower, self.powers.back(omega)
+        for v in range(len(x)):
+            for sign, row, bound in ((-1.0, -1, self.rules.lower[v]), (1.0, -2, self.rules.upper[v])):
+                if abs(x[v] - bound) <= _BOUND * span[v]:
+                    columns.append(sign * rate * np.eye(len(x))[v])
+                    known.append(Held(v, row, 1.0, 0.0))
+        size = float(np.linalg.norm(slope)) or 1.0
+        if not columns:
+            return [], float(np.linalg.norm(slope)) / size
+        scales = np.array([float(np.linalg.norm(c)) or 1.0 for c in columns])
+        multipliers, left = nnls(np.stack(columns, axis=1) / scales, -slope)
+        found = [one._replace(multiplier=float(m / s)) for one, m, s in zip(known, multipliers, scales, strict=True)]
+        kept = [one for one, m in zip(found, multipliers, strict=True) if m > _LEAST * size]
+        return kept, float(left) / size
 
     def _shares(self, omega: Array, k: int) -> Array:
         return self.rules.shares(self.components(omega))[k]

@@ -63,7 +63,7 @@ def _looked(
     problem: Problem, x: Array, changes: Sequence[str], name: str, tell: Callable[[str], None]
 ) -> Confirmed:
     scene = scene_at(problem, x, changes)
-    run = simulate(scene, tell=tell, verdict=False)
+    run = simulate(scene, verdict=False)
     times = run.times[:: 1 + len(run.times) // _MOST_STEPS]
     every = [msgspec.structs.replace(c, samples=2) for c in problem.record.constraints]
     record = msgspec.structs.replace(problem.record, constraints=every)
