@@ -28,7 +28,7 @@ __all__ = [
 _HOME = {
     "load_scene": ("erls.scene.read", "load_scene"),
     "linearize": ("erls.linear.linearize", "linearize"),
-    "optimize": ("erls.optimize.optimize", "optimize"),
+    "optimize": ("erls.optimization.optimize", "optimize"),
     "simulate": ("erls.simulation.simulate", "simulate"),
     "simulate_many": ("erls.simulation.batch", "simulate_many"),
     "load_run": ("erls.run.file", "load_run"),

@@ -11,7 +11,7 @@ from erls.cli.reports import Set, bad, check_output, dumped, read_by, tell_writt
 from erls.cli.terminal import Force, Json, Output, print_json, tell
 
 if TYPE_CHECKING:
-    from erls.optimize.result import Analysis
+    from erls.optimization.result import Analysis
 
 
 def optimize(
@@ -28,7 +28,8 @@ def optimize(
 ) -> int:
     """Find the best design of a mechanism: links as light as its motion allows.
 
-    Ends with exit code 4 where a method does not converge: the report says why, and holds the best design that it found.
+    Ends with exit code 4 where a method does not converge: the report says why, and holds the best design that it
+    found.
 
     Parameters
     ----------
@@ -50,9 +51,9 @@ def optimize(
         Print one JSON object.
     """
     from erls.files.results import claim
-    from erls.optimize.optimize import optimize as optimum
-    from erls.optimize.problem import load_problem
-    from erls.optimize.result import INTERRUPTED, summary
+    from erls.optimization.optimize import optimize as optimum
+    from erls.optimization.problem import load_problem
+    from erls.optimization.result import INTERRUPTED, summary
     from erls.report.optimum_page import optimum_page, optimum_text
     from erls.studies.apply import check_copy, write_copy
 

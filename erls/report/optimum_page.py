@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from erls.optimize.result import REASONS, Analysis, Confirmed, Optimization, Outcome
+from erls.optimization.result import REASONS, Analysis, Confirmed, Optimization, Outcome
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
 from erls.report.tables import table
@@ -32,7 +32,8 @@ def optimum_text(found: Optimization) -> str:
 def optimum_page(found: Optimization) -> str:
     """One self-contained HTML page."""
     parts = [paragraph(_about(found))]
-    parts += [paragraph(f"{o.method}: {_reason(o)}", "good" if o.status == "converged" else "bad") for o in found.outcomes]
+    for o in found.outcomes:
+        parts.append(paragraph(f"{o.method}: {_reason(o)}", "good" if o.status == "converged" else "bad"))
     parts += [heading("Designs"), html_table(_header(found), _rows(found))]
     parts += [heading("Simulated again, all steps"), html_table(_confirmed_header(found), _confirmed_rows(found))]
     parts += [figure(plot) for plot in _motions(found)]
@@ -47,18 +48,22 @@ def optimum_page(found: Optimization) -> str:
 
 def _about(found: Optimization) -> str:
     names = [o.method for o in found.outcomes]
-    return f"{found.problem.name}: {len(found.problem.names)} variables, scene {found.problem.scene.name}, {', '.join(names)}"
+    sizes = f"{len(found.problem.names)} variables, scene {found.problem.scene.name}"
+    return f"{found.problem.name}: {sizes}, {', '.join(names)}"
 
 
 def _reason(o: Outcome) -> str:
     text = REASONS[o.status]
     if o.status != "converged" and o.violation > 0:
         text += f"; {o.worst or 'a constraint'} passes its limit by {100 * o.violation:.3g} %"
+    for name in o.idle:
+        text += f"; {name} holds nothing: it comes to {100 * o.peaks[name]:.3g} % of its limit"
     return text
 
 
 def _header(found: Optimization) -> tuple[str, ...]:
-    return "", "objective", *found.problem.names, "violation", "analyses", "inner", "seconds", "KKT", "status"
+    counts = "analyses", "inner", "seconds", "KKT", "status"
+    return "", "objective", *found.problem.names, "violation, all steps", *counts
 
 
 def _rows(found: Optimization) -> Rows:
@@ -136,7 +141,7 @@ def _change(a: Analysis) -> str:
 
 
 def _histories(o: Outcome) -> list[Plot]:
-    count = np.arange(1, len(o.history) + 1)
+    count = np.arange(1.0, len(o.history) + 1)
     objective = Curve(o.method, count, np.array([a.objective for a in o.history]), marked=True)
     passed = Curve(o.method, count, np.array([a.violation for a in o.history]), marked=True)
     return [

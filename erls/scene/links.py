@@ -66,8 +66,7 @@ class Link(Record, frozen=True):
         With ``model``: fields that replace those of its table ``[reduction]``.
     changes : dict
         With ``model``: values that replace those of its other tables, in tables of the same names:
-        ``changes = { sections.tube.outer_diameter = 0.04 }``. ``--set links.NAME.model.sections.tube.outer_diameter=0.04``
-        writes them here.
+        ``changes = { sections.tube.outer_diameter = 0.04 }``; ``--set links.NAME.model.sections...`` writes them here.
     inboard : str
         Interface of the link's own joint; the first unless given.
     outboard : str

@@ -14,7 +14,7 @@ _DESCRIBED = re.compile(r"(links\.[^.]+)\.model\.(?=.)")
 
 
 def in_scene(key: str) -> str:
-    """Where a scene holds what a key says: behind ``links.NAME.model`` keys go on in the description of that link, whose
+    """Where a scene holds what a key says: behind ``links.NAME.model`` keys go on in that link description, whose
     ``changes`` the scene holds.
     """
     return _DESCRIBED.sub(r"\1.changes.", key, count=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.errors import SceneError
-from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES, DRIVEN_TYPES
+from erls.mechanism.joint_types import DRIVEN_TYPES, HOLDING_TYPES, JOINT_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
 from erls.scene.check_sensors import check_sensors

@@ -11,11 +11,11 @@ from erls.equations.nodal.parts import link_parts
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.optimize.frozen import Frozen, rules_of
+from erls.optimization.frozen import Frozen, rules_of
 from erls.scene.build import link_description
 from erls.scene.chain import Scene
 from fe_import.description.records import LinkDescription
-from fe_import.elements.sections import Circular, RectangularTube, Rectangular, Section, Tubular
+from fe_import.elements.sections import Circular, Rectangular, RectangularTube, Section, Tubular
 from fe_import.models.frame_parts import frame_parts
 from fe_import.models.model import unit_factors
 
@@ -123,6 +123,14 @@ def assembled(frozen: Frozen, elements: Array) -> Array:
     blocks = np.einsum("eji,ejk,ekl->eil", frozen.strains, elements, frozen.strains)
     for place, block in zip(frozen.places, blocks, strict=True):
         result[np.ix_(place, place)] += block
+    return result
+
+
+def scattered(frozen: Frozen, forces: Array) -> Array:
+    """(k, 6 N) of forces on the ends of elements (k, e, 12)."""
+    result = np.zeros((len(forces), 6 * len(frozen.links)))
+    for place, force in zip(frozen.places, np.moveaxis(forces, 1, 0), strict=True):
+        result[:, place] += force
     return result
 
 

@@ -34,7 +34,7 @@ class Length:
 
     def slope(self, components: Array) -> Array:
         """(n, q)"""
-        return components / np.maximum(np.linalg.norm(components, axis=1, keepdims=True), _TINY)
+        return np.asarray(components / np.maximum(np.linalg.norm(components, axis=1, keepdims=True), _TINY))
 
 
 class RoundSection:

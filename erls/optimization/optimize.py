@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from erls.maths.so3 import Array
-from erls.optimize.confirm import confirmed, simulated
-from erls.optimize.dynamics import Dynamics
-from erls.optimize.memory import Memory
-from erls.optimize.methods import outcome
-from erls.optimize.problem import Problem, load_problem
-from erls.optimize.result import INTERRUPTED, Analysis, Optimization, Outcome
+from erls.optimization.confirm import confirmed, simulated
+from erls.optimization.dynamics import Dynamics
+from erls.optimization.memory import Memory
+from erls.optimization.methods import outcome
+from erls.optimization.problem import Problem, load_problem
+from erls.optimization.result import INTERRUPTED, Analysis, Optimization, Outcome
 
 
 def optimize(

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from erls.maths.so3 import Array
-from erls.optimize.optimality import Active
-from erls.optimize.problem import Problem
+from erls.optimization.optimality import Active
+from erls.optimization.problem import Problem
 
 CONVERGED, INFEASIBLE, STALLED, BUDGET, INTERRUPTED = "converged", "infeasible", "stalled", "budget", "interrupted"
 REASONS = {
@@ -20,6 +20,8 @@ REASONS = {
     INTERRUPTED: "interrupted",
 }
 """Statuses, and what they say."""
+
+_NEAR = 0.99  # of a limit: below, a constraint holds nothing
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,8 @@ class Outcome:
         Objective, violation, analyses and status of further starts.
     worst : str
         The constraint that is passed farthest.
+    peaks : dict of str to float
+        Largest value of every constraint over its limit, at the samples of the last analysis.
     """
 
     method: str
@@ -121,6 +125,12 @@ class Outcome:
     confirmed: tuple[Confirmed, ...] = ()
     further: tuple[tuple[float, float, int, str], ...] = ()
     worst: str = ""
+    peaks: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def idle(self) -> list[str]:
+        """Constraints that are nowhere near their limit."""
+        return [name for name, share in self.peaks.items() if share < _NEAR]
 
     @property
     def analyses(self) -> int:
@@ -190,6 +200,7 @@ def _outcome(problem: Problem, o: Outcome) -> dict[str, Any]:
         "mass": o.mass,
         "variables": _named(problem, o.x),
         "violation": o.violation,
+        "violation_at_samples": max(o.peaks.values(), default=0.0) - 1,
         "analyses": o.analyses,
         "outer_iterations": o.analyses,
         "inner_iterations": o.inner_iterations,
@@ -200,6 +211,7 @@ def _outcome(problem: Problem, o: Outcome) -> dict[str, Any]:
         "status": o.status,
         "reason": REASONS[o.status],
         "kkt_residual": o.residual,
+        "idle_constraints": o.idle,
         "active": [
             {"name": a.name, "row": a.row, "share": a.share, "multiplier": a.multiplier} for a in o.active
         ],

@@ -1,7 +1,7 @@
 """The motion of rigid links: where a mechanism would be if nothing bent, at prescribed and wanted motions.
 
-Joints that follow closing joints are found by Newton's method, first from one time to the next in short strides, so that
-they stay on the branch on which they start, and from there on at all times together.
+Joints that follow closing joints are found by Newton's method, first from one time to the next in short strides, so
+that they stay on the branch on which they start, and from there on at all times together.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.optimize.records import (
+from erls.optimization.records import (
     AnyConstraint,
     DeflectionLimit,
     EffortLimit,
@@ -133,6 +133,10 @@ def load_problem(path: Path | str, changes: Sequence[str] = ()) -> Problem:
         _check_constraint(constraint, scene, f"{file}: constraints[{k}]")
     for k, goal in enumerate(record.objective):
         _check_goal(goal, record, scene, f"{file}: objective[{k}]")
+    for k, constraint in enumerate(record.constraints):
+        if constraint.limit is None and constraint.name not in [goal.of for goal in record.objective]:
+            message, remedy = "it holds nothing, and no objective asks for it", "give a 'limit', or take it out"
+            raise bad(f"{file}: constraints[{k}].limit", message, None, remedy)
     _check_settings(record, file)
     powers = np.array([float(_power(variable)) for variable in record.variables])
     return Problem(path, record, scene, start, parameters, factors, powers)
@@ -274,7 +278,8 @@ def _check_goal(goal: Goal, record: ProblemRecord, scene: Scene, place: str) -> 
             raise bad(f"{place}.of", "mass is that of links", goal.of, "remove it")
         return
     kinds = {"deflection": DeflectionLimit, "effort": EffortLimit, "stress": StressLimit}
-    choose(goal.of, [c.name for c in record.constraints if isinstance(c, kinds[goal.quantity])], f"{place}.of", SceneError)
+    known = [c.name for c in record.constraints if isinstance(c, kinds[goal.quantity])]
+    choose(goal.of, known, f"{place}.of", SceneError)
 
 
 def _check_settings(record: ProblemRecord, file: str) -> None:

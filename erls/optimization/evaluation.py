@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from erls.maths.so3 import Array
-from erls.optimize.measures import Measure
-from erls.optimize.objective import Objective, Quadratic
+from erls.optimization.measures import Measure
+from erls.optimization.objective import Objective, Quadratic
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 from erls.errors import Cause, SceneError
 from erls.files.output import replacing
 from erls.maths.so3 import Array
-from erls.optimize.problem import Problem
+from erls.optimization.problem import Problem
 from erls.scene.build import link_description
 
 _FORMAT = "erls optimization 1"
@@ -73,7 +73,7 @@ class Memory:
         try:
             if path.stat().st_size > _MOST:
                 raise ValueError("too large")
-            with np.load(path, allow_pickle=False) as file:
+            with path.open("rb") as data, np.load(data, allow_pickle=False) as file:
                 for name in file.files:
                     found[name] = np.asarray(file[name])
             with contextlib.suppress(ValueError):
@@ -81,7 +81,7 @@ class Memory:
         except FileNotFoundError:
             remedy = "give the file of an optimization that was stopped, or leave --resume out"
             raise SceneError(Cause.FILE_NOT_FOUND, "no such file", where=where, remedy=remedy) from None
-        except Exception as problem:  # noqa: BLE001 (zip, NumPy and the system have their own for damaged files)
+        except Exception as problem:
             message, remedy = f"no record of an optimization: {problem}", "leave --resume out"
             raise SceneError(Cause.NOT_READABLE, message, where=where, remedy=remedy) from None
         if not isinstance(about, list) or len(about) != 2 or about[0] != _FORMAT:

@@ -1,14 +1,16 @@
 """Constraints of a problem on motions: their components in a run, and what small displacements change of them.
 
-Rules for a new constraint: one record in `erls.optimize.records`, one class here, one line in `limit_of`. ``exact``
-tells components (n, q) of a motion, ``increments`` what small displacements of its nodes add to them, of many directions
-at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, ``of_run`` asks the run, and
-equivalent static loads cannot treat it; with ``of_sections`` components depend on sections at the same motion, too.
+Rules for a new constraint: one record in `erls.optimization.records`, one class here, one line in `limit_of`. ``exact``
+tells components (n, q) of a motion, ``increments`` what small displacements of its nodes add to them, of many
+directions at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, ``of_run`` asks
+the run, and equivalent static loads cannot treat it; with ``of_sections`` components depend on sections at the same
+motion, too.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -18,11 +20,11 @@ from erls.errors import SceneError
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.optimize.beams import outlines_of, sections_of
-from erls.optimize.frozen import Frozen
-from erls.optimize.measures import EdgedSection, Length, Measure, RoundSection
-from erls.optimize.problem import Problem, stressed, terms_of
-from erls.optimize.records import AnyConstraint, DeflectionLimit, EffortLimit, StressLimit, Term
+from erls.optimization.beams import outlines_of, sections_of
+from erls.optimization.frozen import Frozen
+from erls.optimization.measures import EdgedSection, Length, Measure, RoundSection
+from erls.optimization.problem import Problem, stressed, terms_of
+from erls.optimization.records import AnyConstraint, DeflectionLimit, EffortLimit, StressLimit, Term
 from erls.run.chain.run import ChainRun
 from erls.scene.chain import Scene
 from fe_import.files.toml import choose
@@ -46,11 +48,10 @@ class Motion:
     poses: Array
     run: ChainRun | None = None
 
-    @property
-    def shape(self) -> Array:
-        """(k, N, 6) w: displacements of nodes from where they are undeformed on their links, in their own axes."""
-        roots = self.poses[:, self.frozen.roots[self.frozen.links]]
-        return motions.log(motions.inverse(self.frozen.local) @ motions.inverse(roots) @ self.poses)
+    @cached_property
+    def twists(self) -> Array:
+        """(k, e, 6) of elements."""
+        return self.frozen.twists(self.poses)
 
 
 class Limit(Protocol):
@@ -83,7 +84,7 @@ class _Part:
 class Deflection:
     """Of named points."""
 
-    measure = Length()
+    measure: Measure = Length()
     of_shape, of_sections = True, False
 
     def __init__(self, record: DeflectionLimit, at: IntArray, mechanism: Mechanism, nodal: Nodal) -> None:
@@ -153,19 +154,19 @@ class Stress:
         self._factors = outlines.factors[wanted]
         self._stiffness = sections_of(mechanism, scene)[wanted]
         rounds = outlines.rounds[wanted]
-        self.measure: Measure = RoundSection() if rounds.all() else EdgedSection()  # the second is never below the first
+        self.measure: Measure = RoundSection() if rounds.all() else EdgedSection()  # which is never below it
 
     def exact(self, motion: Motion) -> Array:
         """(k e 2, 3)"""
-        return self._stresses(motion.frozen, motion.shape[self.at].reshape(len(self.at), -1))
+        return self._stresses(motion.frozen, motion.twists[self.at][:, self._elements])
 
     def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
         """(k e 2, 3)"""
-        return self._stresses(frozen, w[self.at])
-
-    def _stresses(self, frozen: Frozen, w: Array) -> Array:
         places, strains = frozen.places[self._elements], frozen.strains[self._elements]
-        force = np.einsum("eij,ejl,kel->kei", self._stiffness, strains, w[:, places])
+        return self._stresses(frozen, np.einsum("ejl,kel->kej", strains, w[self.at][:, places]))
+
+    def _stresses(self, frozen: Frozen, twists: Array) -> Array:
+        force = np.einsum("eij,kej->kei", self._stiffness, twists)
         half = frozen.lengths[self._elements] / 2
         ends = []
         for side in (-1.0, 1.0):  # m' = -x × n
@@ -177,7 +178,7 @@ class Stress:
 class Effort:
     """Of a joint's drive."""
 
-    measure = Length()
+    measure: Measure = Length()
     of_shape, of_sections = False, False
 
     def __init__(self, record: EffortLimit, at: IntArray) -> None:

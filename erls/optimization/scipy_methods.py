@@ -8,10 +8,10 @@ import numpy as np
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
 from erls.maths.so3 import Array
-from erls.optimize.approximation import Approximation, Powers
-from erls.optimize.convex import Found, relative_change
-from erls.optimize.evaluation import Evaluation, Evaluator, aggregate
-from erls.optimize.records import Settings
+from erls.optimization.approximation import Approximation, Powers
+from erls.optimization.convex import Found, relative_change
+from erls.optimization.evaluation import Evaluation, Evaluator, aggregate
+from erls.optimization.records import Settings
 
 
 class _Enough(Exception):
@@ -21,7 +21,10 @@ class _Enough(Exception):
 class _Scaled:
     """Objective and constraint values by ω about the start; every design is evaluated once."""
 
-    def __init__(self, evaluator: Evaluator, x: Array, most: int, told: Callable[[Evaluation, float], None]) -> None:
+    def __init__(
+        self, evaluator: Evaluator, x: Array, tolerance: float, most: int, told: Callable[[Evaluation, float], None]
+    ) -> None:
+        self._tolerance = tolerance
         self._evaluator, self.rules, self._most, self._told = evaluator, evaluator.rules, most, told
         self.powers, self.last = Powers(evaluator.rules, x), x
         self.known: dict[bytes, Evaluation] = {}
@@ -40,11 +43,13 @@ class _Scaled:
         found = self.known[key]
         if slopes and found.quadratic is None:
             found = self.known[key] = self._evaluator.differentiate(found)
-        if self.best is None or found.x is not self.best.x:
-            worse = self.best is not None and (max(found.violation, 0), found.objective) > (
-                max(self.best.violation, 0), self.best.objective)  # fmt: skip
-            self.best = self.best if worse else found
+        if self.best is None or self._rank(found) <= self._rank(self.best):
+            self.best = found
         return found
+
+    def _rank(self, found: Evaluation) -> tuple[float, float]:
+        """Of several designs the one with the least is best."""
+        return max(found.violation - self._tolerance, 0.0), found.objective
 
     def objective(self, omega: Array) -> tuple[float, Array]:
         """Value and slope."""
@@ -77,7 +82,7 @@ class _Scaled:
 
 
 def scipy_method(name: str) -> Callable[..., Found]:
-    """``slsqp`` or ``trust-constr`` as an optimizer like `erls.optimize.convex.sequential_convex`."""
+    """``slsqp`` or ``trust-constr`` as an optimizer like `erls.optimization.convex.sequential_convex`."""
 
     def minimized(
         evaluator: Evaluator,
@@ -86,7 +91,7 @@ def scipy_method(name: str) -> Callable[..., Found]:
         most: int,
         told: Callable[[Evaluation, float], None] = lambda found, change: None,
     ) -> Found:
-        scaled = _Scaled(evaluator, x, most, told)
+        scaled = _Scaled(evaluator, x, settings.violation_tolerance, most, told)
         rules, ones = evaluator.rules, np.ones(len(x))
         scale = max(abs(scaled.at(ones, False).objective), 1e-300)
         ends = np.sort([scaled.powers.to(rules.lower), scaled.powers.to(rules.upper)], axis=0)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.optimize.approximation import Approximation
-from erls.optimize.evaluation import Evaluation, Rules
+from erls.optimization.approximation import Approximation
+from erls.optimization.evaluation import Evaluation, Rules
 
 
 @dataclass(frozen=True)

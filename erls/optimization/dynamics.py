@@ -1,9 +1,8 @@
-"""Designs judged by their motion: an `erls.optimize.evaluation.Evaluator` whose evaluations are runs."""
+"""Designs judged by their motion: an `erls.optimization.evaluation.Evaluator` whose evaluations are runs."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +10,15 @@ import numpy as np
 from erls.equations.nodal.equations import Nodal
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.optimize.design import Design, Designs, Message, run_of, scene_at
-from erls.optimize.equivalent_loads import FrozenLoads, flexible
-from erls.optimize.evaluation import Evaluation, Rules
-from erls.optimize.frozen import Frozen, frozen, nodal_of, node_poses
-from erls.optimize.gradients import derivatives
-from erls.optimize.limits import Limit, Motion, limit_of
-from erls.optimize.memory import Memory
-from erls.optimize.objective import Objective
-from erls.optimize.problem import Problem
+from erls.optimization.design import Design, Designs, Message, run_of, scene_at
+from erls.optimization.equivalent_loads import FrozenLoads, flexible
+from erls.optimization.evaluation import Evaluation, Rules
+from erls.optimization.frozen import Frozen, frozen, nodal_of, node_poses
+from erls.optimization.gradients import derivatives
+from erls.optimization.limits import Limit, Motion, limit_of
+from erls.optimization.memory import Memory
+from erls.optimization.objective import Objective
+from erls.optimization.problem import Problem
 from erls.run.chain.run import ChainRun
 from erls.scene.chain import Scene
 

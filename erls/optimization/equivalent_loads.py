@@ -4,11 +4,10 @@ At a frozen configuration, small displacements u = Z r + w of a mechanism under 
 
     w = C (f - Bᵀ λ),   Zᵀ (f - Bᵀ λ) = 0,   B (Z r + w) = 0
 
-with the flexibility C of links that are clamped at their inboard nodes and the multipliers λ of the joints. The loads of a
-run with shapes w₀ are f = K w₀ (E. Tromme, O. Brüls, J. Emonds-Alt, M. Bruyneel, G. Virlez, P. Duysinx, Struct.
-Multidiscip. Optim. 48 (2013) 1167–1185, on Lie groups; B.-S. Kang, G.-J. Park, J. S. Arora, AIAA J. 43 (2005) 846–852,
-for single links, λ = 0). What a design changes of w and r is added to the run's own components, so that at the design of
-the run nothing is approximated.
+with the flexibility C of links that are clamped at their inboard nodes and the multipliers λ of the joints. The loads
+of a run are f = Pᵀ σ, σ the forces in its elements (B.-S. Kang, G.-J. Park, J. S. Arora, AIAA J. 43 (2005) 846–852, for
+single links, λ = 0; E. Tromme, O. Brüls and co-workers, Liège, for whole mechanisms on Lie groups). What a design
+changes of w and r is added to the run's own components, so that at the design of the run nothing is approximated.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.optimize.beams import assembled, clamped_flexibility, sections_of
-from erls.optimize.design import Design, Designs, scene_at
-from erls.optimize.evaluation import Evaluation, Rules
-from erls.optimize.frozen import Frozen
-from erls.optimize.limits import Limit, Motion
-from erls.optimize.problem import Problem
+from erls.optimization.beams import assembled, clamped_flexibility, scattered, sections_of
+from erls.optimization.design import Design, Designs, scene_at
+from erls.optimization.evaluation import Evaluation, Rules
+from erls.optimization.frozen import Frozen
+from erls.optimization.limits import Limit, Motion
+from erls.optimization.problem import Problem
 from erls.scene.build import link_description
 from erls.scene.chain import Scene
 
@@ -48,7 +47,7 @@ class Source(Protocol):
 
 
 class FrozenLoads:
-    """Static response under the loads of a run; an `erls.optimize.evaluation.Evaluator`.
+    """Static response under the loads of a run; an `erls.optimization.evaluation.Evaluator`.
 
     Parameters
     ----------
@@ -71,8 +70,8 @@ class FrozenLoads:
         self._source, self._whole, self.evaluations = source, whole, 0
         self._frozen: Frozen = motion.frozen
         self._motion = motion
-        stiffness = assembled(self._frozen, self._sections(x))
-        self._loads = motion.shape.reshape(len(motion.frozen.times), -1) @ stiffness
+        force = np.einsum("eij,kej->kei", self._sections(x), motion.twists)
+        self._loads = scattered(self._frozen, np.einsum("eji,kej->kei", self._frozen.strains, force))
         self._base = self._response(x)
 
     def _sections(self, x: Array) -> Array:
@@ -163,8 +162,9 @@ def refuse(source: Source, method: str) -> None:
     """
     path, remedy = source.problem.path, 'use methods = ["integrated"], or take it out'
     if source.designs.moving:
-        message = f"{method} holds the motion and its loads: a number that changes lengths or drives is no variable for it"
-        raise SceneError(Cause.BAD_FIELD, message, where=f"{path}: variables.{source.designs.moving[0]}", remedy=remedy)
+        message = f"{method} holds the motion and its loads: what changes lengths or drives is no variable for it"
+        where = f"{path}: variables.{source.designs.moving[0]}"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, remedy=remedy)
     if not flexible(source.start.scene):
         message = f"{method} knows the stiffness of links that are made of beams alone"
         raise SceneError(Cause.BAD_FIELD, message, where=f"{path}: scene", remedy='use methods = ["integrated"]')

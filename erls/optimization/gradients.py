@@ -1,5 +1,5 @@
-"""Derivatives of what a run gives by the variables of a problem: those of `erls.sensitivities` where they are known, and
-otherwise differences of runs whose steps are fixed.
+"""Derivatives of what a run gives by the variables of a problem: those of `erls.sensitivities` where they are known,
+and otherwise differences of runs whose steps are fixed.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.optimize.design import Design, Designs, run_of
-from erls.optimize.problem import Problem
+from erls.optimization.design import Design, Designs, run_of
+from erls.optimization.problem import Problem
 from erls.run.chain.run import ChainRun
 from erls.scene.integrators import FIXED_STEP
 from erls.sensitivity.sensitivities import sensitivities

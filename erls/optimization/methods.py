@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from erls.maths.so3 import Array
-from erls.optimize import equivalent_loads
-from erls.optimize.convex import Found, relative_change, sequential_convex
-from erls.optimize.dynamics import Dynamics
-from erls.optimize.equivalent_loads import FrozenLoads
-from erls.optimize.evaluation import Evaluation
-from erls.optimize.optimality import Optimality, optimality
-from erls.optimize.result import BUDGET, CONVERGED, INFEASIBLE, INTERRUPTED, STALLED, Analysis, Outcome
-from erls.optimize.scipy_methods import scipy_method
+from erls.optimization import equivalent_loads
+from erls.optimization.convex import Found, relative_change, sequential_convex
+from erls.optimization.dynamics import Dynamics
+from erls.optimization.equivalent_loads import FrozenLoads
+from erls.optimization.evaluation import Evaluation
+from erls.optimization.optimality import Optimality, optimality
+from erls.optimization.result import BUDGET, CONVERGED, INFEASIBLE, INTERRUPTED, STALLED, Analysis, Outcome
+from erls.optimization.scipy_methods import scipy_method
 
 Optimizer = Callable[..., Found]
 OPTIMIZERS: dict[str, Optimizer] = {
@@ -154,4 +154,5 @@ def _outcome(method: str, dynamics: Dynamics, start: Array, way: Way, wall_s: fl
         dynamics.run_s,
         dynamics.gradient_s,
         worst=rules.names[worst] if worst >= 0 else "",
+        peaks={name: float(own.max()) for name, own in zip(rules.names, shares, strict=False) if len(own)},
     )

@@ -8,12 +8,12 @@ import msgspec
 
 from erls.errors import SimulationError
 from erls.maths.so3 import Array
-from erls.optimize.design import scene_at
-from erls.optimize.dynamics import Dynamics
-from erls.optimize.equivalent_loads import flexible
-from erls.optimize.memory import Memory
-from erls.optimize.problem import Problem
-from erls.optimize.result import Confirmed
+from erls.optimization.design import scene_at
+from erls.optimization.dynamics import Dynamics
+from erls.optimization.equivalent_loads import flexible
+from erls.optimization.memory import Memory
+from erls.optimization.problem import Problem
+from erls.optimization.result import Confirmed
 from erls.simulation.simulate import simulate
 from fe_import.errors import ReportedError
 

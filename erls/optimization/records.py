@@ -164,8 +164,8 @@ class Settings(Record, frozen=True):
     Attributes
     ----------
     methods : list of str
-        ``integrated``: derivatives of the motion; ``esl-system``, ``esl-component``: equivalent static loads of the whole
-        mechanism, or of each link alone.
+        ``integrated``: derivatives of the motion; ``esl-system``, ``esl-component``: equivalent static loads of the
+        whole mechanism, or of each link alone.
     optimizer : str
         ``scp`` (sequential convex programming), or SciPy's ``slsqp`` or ``trust-constr``.
     design_tolerance : float

@@ -1,9 +1,10 @@
 """Sequential convex programming: approximate about a design, solve, look at what comes out, go on or come back.
 
-A step that makes the merit worse is taken back, and the next goes less far; after others the next may go farther, but for
-variables that go to and fro, whose steps get shorter. Near the limits the merit is f + λ · violation, what the objective would be on them, λ being the multipliers of the convex
-problem; beyond a band about them violations are penalized, so that no step is lost to the curvature of constraints. (C. Fleury, Int. J. Numer. Methods Eng. 28 (1989) 409–428; K. Svanberg,
-ibid. 24 (1987) 359–373, approximate in reciprocal variables; here the powers say in which.)
+A step that makes the merit worse is taken back, and the next goes less far; after others the next may go farther, but
+for variables that go to and fro, whose steps get shorter. Near the limits the merit is f + λ · violation, what the
+objective would be on them, λ being the multipliers of the convex problem; beyond a band about them violations are
+penalized, so that no step is lost to the curvature of constraints. (C. Fleury, Int. J. Numer. Methods Eng. 28 (1989)
+409–428; K. Svanberg, ibid. 24 (1987) 359–373, approximate in reciprocal variables; here the powers say in which.)
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.maths.so3 import Array
-from erls.optimize.approximation import Approximation
-from erls.optimize.evaluation import Evaluation, Evaluator
-from erls.optimize.records import Settings
+from erls.optimization.approximation import Approximation
+from erls.optimization.evaluation import Evaluation, Evaluator
+from erls.optimization.records import Settings
 
 _PENALTY = 10.0  # of a violation beyond the band, in objectives of the start
 _BAND = 10.0  # of the tolerance of violations

@@ -29,7 +29,7 @@ from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.sensors.base import Node
-from erls.optimize.rigid import RigidMotion
+from erls.optimization.rigid import RigidMotion
 from erls.run.chain.instants import Instants
 from erls.run.chain.run import ChainRun
 from erls.scene.settings import Simulation
@@ -76,6 +76,10 @@ class Frozen:
     strains : (e, 6, 12) array
         Twist of an element, from one end to the other, per displacement of its nodes.
     lengths : (e,) array
+    sections : (e, 2, 4, 4) array
+        At the ends of elements, in their nodes.
+    straight : (e, 6) array
+        Twists of elements without force.
     """
 
     times: Array
@@ -88,6 +92,8 @@ class Frozen:
     ends: IntArray
     strains: Array
     lengths: Array
+    sections: Array
+    straight: Array
 
     @cached_property
     def rows(self) -> Array:
@@ -95,6 +101,11 @@ class Frozen:
         poses = self.frames[:, self.links] @ self.local
         each = zip(self.times.tolist(), poses, strict=True)
         return np.array([dense(self.joints.constraint_matrix(t, self.joints.at(own))) for t, own in each])
+
+    def twists(self, poses: Array) -> Array:
+        """(k, e, 6) of elements beyond those without force, at poses (k, N, 4, 4), however far links have turned."""
+        ends = poses[:, self.ends] @ self.sections
+        return np.asarray(motions.log(motions.inverse(ends[:, :, 0]) @ ends[:, :, 1]) - self.straight)
 
     @property
     def places(self) -> IntArray:
@@ -135,19 +146,21 @@ def frozen(mechanism: Mechanism, nodal: Nodal, times: Array) -> Frozen:
     return Frozen(times, frames, local, links, roots, carried, _held(nodal, rigid), *_strains(nodal))
 
 
-def _strains(nodal: Nodal) -> tuple[IntArray, Array, Array]:
-    """Nodes, strains per displacement and lengths of all elements: P of `erls.equations.nodal.beam_forces`, where
-    T⁻¹(±d) = 1 ± ad(d)/2 since elements are straight.
+def _strains(nodal: Nodal) -> tuple[IntArray, Array, Array, Array, Array]:
+    """Nodes, strains per displacement, lengths, sections and twists without force of all elements.
+
+    P is that of `erls.equations.nodal.beam_forces`, where T⁻¹(±d) = 1 ± ad(d)/2 since elements are straight.
     """
     beams = nodal.chain.beams
     if beams is None:
-        return np.zeros((0, 2), dtype=np.int64), np.zeros((0, 6, 12)), np.zeros(0)
+        none = np.zeros((0, 6, 12)), np.zeros(0), np.zeros((0, 2, 4, 4)), np.zeros((0, 6))
+        return np.zeros((0, 2), dtype=np.int64), *none
     d = np.zeros((len(beams.nodes), 6))
     d[:, 0] = beams.length
     half = motions.bracket(d) / 2
     inner, outer = (motions.adjoint_inverse(beams.frames[:, side]) for side in range(2))
     first, second = -(np.eye(6) - half) @ inner, (np.eye(6) + half) @ outer
-    return beams.nodes, np.concatenate([first, second], axis=2), beams.length
+    return beams.nodes, np.concatenate([first, second], axis=2), beams.length, beams.frames, beams.built
 
 
 def _held(nodal: Nodal, rigid: RigidMotion) -> NodalSystem:

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize, nnls
 
 from erls.maths.so3 import Array
-from erls.optimize.evaluation import Evaluation, Rules, aggregate
+from erls.optimization.evaluation import Evaluation, Rules, aggregate
 from fe_import.model import IntArray
 
 _SLACK = 50.0  # ρ
@@ -30,7 +30,9 @@ _LEAST = 1e-9  # of the objective's slope: multipliers that are rounding
 
 
 class Powers:
-    """ω of designs about one; of variables with power 1 their share of the bounds' distance, so that zero is allowed."""
+    """ω of designs about one; of variables with power 1 their share of the bounds' distance, so that zero is
+    allowed.
+    """
 
     def __init__(self, rules: Rules, x: Array) -> None:
         self._x, self._plain = x, rules.powers == 1
@@ -62,8 +64,8 @@ class Powers:
 
 
 class Held(NamedTuple):
-    """What holds a design: constraint and row, or variable and -1 at its lower, -2 at its upper bound; value over limit;
-    multiplier, per share of the limit or unit of the variable.
+    """What holds a design: constraint and row, or variable and -1 at its lower, -2 at its upper bound; value over
+    limit; multiplier, per share of the limit or unit of the variable.
     """
 
     number: int

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.maths.so3 import Array
-from erls.optimize.design import scene_at
-from erls.optimize.measures import Measure
-from erls.optimize.problem import Problem
+from erls.optimization.design import scene_at
+from erls.optimization.measures import Measure
+from erls.optimization.problem import Problem
 from erls.scene.build import link_description, link_model
 from erls.scene.chain import Scene
 from fe_import.models.frame_parts import frame_parts

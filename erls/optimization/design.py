@@ -10,7 +10,7 @@ from erls.integrate.choice import compile_kernels, compiled_steps, compiling_ste
 from erls.maths.jit import announcing
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.optimize.problem import Problem
+from erls.optimization.problem import Problem
 from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism, link_description, link_model
 from erls.scene.chain import Scene
