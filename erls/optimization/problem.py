@@ -6,14 +6,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import msgspec
 import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.optimization.records import (
+    FRAMES,
+    METHODS,
+    OPTIMIZERS,
+    OVER_TIME,
+    QUANTITIES,
+    TIMES,
     AnyConstraint,
     DeflectionLimit,
     EffortLimit,
@@ -33,11 +36,7 @@ from erls.sensitivity.parameters import Parameter, parameters_of
 from fe_import.errors import ReportedError
 from fe_import.files.toml import choose, convert, read_toml
 
-METHODS = ("integrated", "esl-system", "esl-component")
-OPTIMIZERS = ("scp", "slsqp", "trust-constr")
-TIMES = ("all", "active", "aggregate")
 _POWERS = {"diameter": -4, "width": -3, "height": -3}
-_SCENE_KEYS = ("simulation", "points", "events", "sensors", "name")
 
 
 @dataclass(frozen=True)
@@ -234,7 +233,7 @@ def _check_constraint(constraint: AnyConstraint, scene: Scene, place: str) -> No
         for k, term in enumerate(terms_of(constraint)):
             where = f"{place}.terms[{k}]" if constraint.terms else place
             choose(term.point, [point.name for point in record.points], f"{where}.point", SceneError)
-            choose(term.frame, ("world", "link"), f"{where}.frame", SceneError)
+            choose(term.frame, FRAMES, f"{where}.frame", SceneError)
             wanted = term.components
             if not wanted or set(wanted) - set("xyz") or len(set(wanted)) != len(wanted):
                 raise bad(f"{where}.components", "not components", wanted, "give some of x, y and z")
@@ -267,8 +266,8 @@ def stressed(constraint: StressLimit, scene: Scene) -> list[int]:
 
 
 def _check_goal(goal: Goal, record: ProblemRecord, scene: Scene, place: str) -> None:
-    choose(goal.quantity, ("mass", "deflection", "effort", "stress"), f"{place}.quantity", SceneError)
-    choose(goal.over_time, ("peak", "rms"), f"{place}.over_time", SceneError)
+    choose(goal.quantity, QUANTITIES, f"{place}.quantity", SceneError)
+    choose(goal.over_time, OVER_TIME, f"{place}.over_time", SceneError)
     if not math.isfinite(goal.weight) or goal.weight <= 0:
         raise bad(f"{place}.weight", "not a positive factor", goal.weight, "give one")
     for k, name in enumerate(goal.links):
@@ -302,9 +301,3 @@ def _check_settings(record: ProblemRecord, file: str) -> None:
         choose(method, METHODS, f"{file}: published.{method}", SceneError)
         for name in known.variables:
             choose(name, [v.name for v in record.variables], f"{file}: published.{method}.variables", SceneError)
-
-
-def described(record: ProblemRecord) -> dict[str, Any]:
-    """The record as builtins, for reports and for telling problems apart."""
-    found: dict[str, Any] = msgspec.to_builtins(record)
-    return found

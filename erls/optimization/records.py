@@ -5,6 +5,14 @@ from __future__ import annotations
 from erls.scene.records import Record
 
 
+METHODS = ("integrated", "esl-system", "esl-component")
+OPTIMIZERS = ("scp", "slsqp", "trust-constr")
+QUANTITIES, OVER_TIME = ("mass", "deflection", "effort", "stress"), ("peak", "rms")
+TIMES = ("all", "active", "aggregate")
+FRAMES = ("world", "link")
+"""Names that fields take."""
+
+
 class Variable(Record, frozen=True):
     """A number of the design.
 
@@ -132,6 +140,7 @@ class EffortLimit(Constraint, frozen=True, kw_only=True, tag="effort"):
     Attributes
     ----------
     joint : str
+        Its name.
     """
 
     joint: str
@@ -146,10 +155,11 @@ class Published(Record, frozen=True):
     Attributes
     ----------
     objective : float
+        In the unit of the objective.
     variables : dict of str to float
         By the names of the variables, in their units.
-    analyses : int, optional
-    inner_iterations : int, optional
+    analyses, inner_iterations : int, optional
+        Of the motion, and under loads that are held.
     """
 
     objective: float

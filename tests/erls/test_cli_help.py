@@ -25,6 +25,7 @@ OPTIONS = {
     "effects": ["--set", "--json"],
     "linearize": ["--output", "-o", "--at", "--equilibrium", "--inputs", "--outputs", "--campbell", "--locus", "--mode",
                   "--set", "--force", "--json"],
+    "optimize": ["--output", "-o", "--scene", "--state", "--resume", "--set", "--force", "--json"],
     "info": ["--json"],
     "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--overlay", "--force", "--json"],
 }

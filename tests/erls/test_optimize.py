@@ -24,7 +24,7 @@ from erls.optimization.result import Analysis, summary
 
 DATA = Path(__file__).parents[2] / "data" / "optimization"
 CANTILEVER, ROBOT = DATA / "cantilever.toml", DATA / "app2.toml"
-SHORT, BRIEF = ('set=["simulation.duration=%s"]' % t for t in ("0.06", "0.002"))
+SHORT, BRIEF = (f'set=["simulation.duration={t}"]' for t in ("0.06", "0.002"))
 
 
 def exact_cantilever() -> tuple[float, float, float]:
