@@ -11,6 +11,7 @@ from erls.maths.so3 import Array
 from erls.optimization.design import scene_at
 from erls.optimization.measures import Measure
 from erls.optimization.problem import Problem
+from erls.optimization.records import Goal
 from erls.scene.build import link_description, link_model
 from erls.scene.chain import Scene
 from fe_import.models.frame_parts import frame_parts
@@ -75,7 +76,7 @@ class Objective:
     """Of a problem."""
 
     def __init__(self, problem: Problem) -> None:
-        self.goals, self._masses = problem.record.objective, Masses(problem)
+        self.goals, self._masses = problem.record.objective or [Goal()], Masses(problem)
         self._names = [c.name for c in problem.record.constraints]
         links = [link.name for link in problem.scene.record.links]
         self._weights = np.zeros(len(links))

@@ -144,8 +144,6 @@ def load_problem(path: Path | str, changes: Sequence[str] = ()) -> Problem:
 def _check_tables(record: ProblemRecord, file: str) -> None:
     if not record.variables:
         raise bad(f"{file}: variables", "nothing may change", None, "add [[variables]]")
-    if not record.objective:
-        raise bad(f"{file}: objective", "nothing is wanted", None, "add [[objective]], or leave it out for the mass")
     for table in ("variables", "constraints"):
         check_names((f"{file}: {table}[{k}].name", one.name) for k, one in enumerate(getattr(record, table)))
 

@@ -229,7 +229,7 @@ class ProblemRecord(Record, frozen=True):
     variables: list[Variable]
     name: str = ""
     set: list[str] = []
-    objective: tuple[Goal, ...] = (Goal(),)
+    objective: list[Goal] = []
     constraints: list[AnyConstraint] = []
     settings: Settings = Settings()
     published: dict[str, Published] = {}

@@ -263,7 +263,6 @@ FAULTS = [
     (["variables.0.power=9"], Cause.BAD_FIELD, "not a power", "variables[0].power"),
     (["variables.0.colour=1"], Cause.UNKNOWN_FIELD, "unknown field", "variables[0].colour"),
     (["variables=[]"], Cause.BAD_FIELD, "nothing may change", "variables"),
-    (["objective=[]"], Cause.BAD_FIELD, "nothing is wanted", "objective"),
     (["objective=[{quantity=\"price\"}]"], Cause.BAD_REFERENCE, "unknown name", "objective[0].quantity"),
     (["objective=[{quantity=\"effort\", of=\"sag\"}]"], Cause.BAD_REFERENCE, "unknown name", "objective[0].of"),
     (["objective=[{weight=-1.0}]"], Cause.BAD_FIELD, "not a positive factor", "objective[0].weight"),
