@@ -11,48 +11,53 @@ from erls.equations.nodal.parts import link_parts
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import Link
 from erls.optimization.frozen import Frozen, rules_of
-from erls.scene.build import link_description
-from erls.scene.chain import Scene
+from erls.optimization.link_numbers import LinkNumbers
+from erls.scene.settings import Simulation
 from fe_import.description.records import LinkDescription
 from fe_import.elements.sections import Circular, Rectangular, RectangularTube, Section, Tubular
 from fe_import.models.frame_parts import frame_parts
 from fe_import.models.model import unit_factors
 
 
-def sections_of(mechanism: Mechanism, scene: Scene) -> Array:
-    """(e, 6, 6) force and moment per twist of each element: stiffness of its section over its length.
+def sections_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, x: Array) -> Array:
+    """(e, 6, 6) force and moment per twist of each element at a design (v,): stiffness of its section over its length.
 
     Parameters
     ----------
     mechanism : Mechanism
         Of the same lengths.
-    scene : Scene
-        Whose link descriptions are taken.
+    settings : Simulation
+        Of the scene, which say how beams become elements.
+    links : LinkNumbers
+    x : (v,) array
     """
-    settings, found = scene.record.simulation, []
-    rules, elements = rules_of(settings), _elements(scene)
-    for number, description in _described(mechanism, scene):
-        link = replace(mechanism.links[number], description=description)
-        found += [(beam.section.stiffness, _length(beam.frames)) for beam in link_parts(link, elements, 1, rules).beams]
-    return np.array([stiffness / length for stiffness, length in found]).reshape(-1, 6, 6)
+    found = [
+        links.kept("sections", k, x, lambda n=number, d=description: _stiffness(mechanism.links[n], d, settings))
+        for k, number, description in _described(mechanism, links, x)
+    ]
+    return np.concatenate([np.zeros((0, 6, 6)), *found])
 
 
-def _length(frames: Array) -> float:
-    return float(np.linalg.norm(frames[1, :3, 3] - frames[0, :3, 3]))
+def _stiffness(link: Link, description: LinkDescription, settings: Simulation) -> Array:
+    """Of the elements of a link."""
+    made = link_parts(replace(link, description=description), _elements(settings), 1, rules_of(settings))
+    lengths = [float(np.linalg.norm(beam.frames[1, :3, 3] - beam.frames[0, :3, 3])) for beam in made.beams]
+    return np.array([beam.section.stiffness / length for beam, length in zip(made.beams, lengths, strict=True)])
 
 
-def _elements(scene: Scene) -> int | None:
-    settings = scene.record.simulation
+def _elements(settings: Simulation) -> int | None:
     return settings.elements_per_member if settings.formulation == "nodal" else None
 
 
-def _described(mechanism: Mechanism, scene: Scene) -> list[tuple[int, LinkDescription]]:
-    """Numbers in the mechanism of links that are made of beams and deform, with their descriptions."""
+def _described(mechanism: Mechanism, links: LinkNumbers, x: Array) -> list[tuple[int, int, LinkDescription]]:
+    """Links that are made of beams and deform: numbers in the scene and in the mechanism, descriptions."""
     found = []
-    for number, link in zip(mechanism.bodies, scene.record.links, strict=True):
-        if mechanism.links[number].elastic_modes and link.model:
-            found.append((number, link_description(scene, link).description))
+    for k, number in enumerate(mechanism.bodies):
+        description = links.at(k, x) if mechanism.links[number].elastic_modes else None
+        if description is not None and description.frame is not None:
+            found.append((k, number, description))
     return found
 
 
@@ -75,7 +80,7 @@ class Outlines(NamedTuple):
     links: Array
 
 
-def outlines_of(mechanism: Mechanism, scene: Scene) -> Outlines:
+def outlines_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, x: Array) -> Outlines:
     """Of all elements.
 
     Raises
@@ -83,22 +88,28 @@ def outlines_of(mechanism: Mechanism, scene: Scene) -> Outlines:
     SceneError
         A section of which only constants are known.
     """
-    factors, rounds, links = [], [], []
-    for number, description in _described(mechanism, scene):
-        frame = description.frame
-        assert frame is not None
-        mesh = frame_parts(description, frame, description.name, _elements(scene)).mesh
-        metre = unit_factors(description, description.name)[0]
-        for member, elements in zip(frame.members, mesh.members, strict=True):
-            section = description.sections[member.section]
-            where = f"link {mechanism.links[number].name!r}: sections.{member.section}"
-            height, width = (metre * size for size in _half_sizes(section, where))
-            for e in elements:
-                own = mesh.elements[e].section
-                factors.append((1 / own.area, height / own.inertia_y, width / own.inertia_z))
-                rounds.append(isinstance(section, (Circular, Tubular)))
-                links.append(number)
-    return Outlines(np.array(factors).reshape(-1, 3), np.array(rounds, dtype=bool), np.array(links, dtype=np.int64))
+    found = [
+        links.kept("outlines", k, x, lambda n=number, d=description: _outlines(n, d, settings))
+        for k, number, description in _described(mechanism, links, x)
+    ]
+    return Outlines(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _outlines(number: int, description: LinkDescription, settings: Simulation) -> Outlines:
+    """Of the elements of a link."""
+    frame, factors, rounds = description.frame, [], []
+    assert frame is not None
+    mesh = frame_parts(description, frame, description.name, _elements(settings)).mesh
+    metre = unit_factors(description, description.name)[0]
+    for member, elements in zip(frame.members, mesh.members, strict=True):
+        section = description.sections[member.section]
+        where = f"link {description.name!r}: sections.{member.section}"
+        height, width = (metre * size for size in _half_sizes(section, where))
+        for e in elements:
+            own = mesh.elements[e].section
+            factors.append((1 / own.area, height / own.inertia_y, width / own.inertia_z))
+            rounds.append(isinstance(section, (Circular, Tubular)))
+    return Outlines(np.array(factors), np.array(rounds, dtype=bool), np.full(len(rounds), number))
 
 
 def _half_sizes(section: Section, where: str) -> tuple[float, float]:

@@ -16,11 +16,11 @@ from erls.optimization.evaluation import Evaluation, Rules
 from erls.optimization.frozen import Frozen, frozen, nodal_of, node_poses
 from erls.optimization.gradients import derivatives
 from erls.optimization.limits import Limit, Motion, limit_of
+from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.memory import Memory
 from erls.optimization.objective import Objective
 from erls.optimization.problem import Problem
 from erls.run.chain.run import ChainRun
-from erls.scene.chain import Scene
 
 _STEP = 1e-4  # of variables: what they change of a measure by themselves
 _PLACES = 16  # mechanisms of other lengths that are kept: those beside a design
@@ -62,7 +62,7 @@ class Dynamics:
         self, problem: Problem, memory: Memory, tell: Message = lambda text: None, times: Array | None = None
     ) -> None:
         self.problem, self._memory, self._tell = problem, memory, tell
-        self.designs = Designs(problem, tell)
+        self.designs, self.numbers = Designs(problem, tell), LinkNumbers(problem)
         self.analyses, self.run_s, self.gradient_s, self.gradient = 0, 0.0, 0.0, ""
         record = problem.record
         samples = [problem.times(c) if times is None else times for c in record.constraints]
@@ -80,7 +80,7 @@ class Dynamics:
             tuple(limit.measure for limit in self.limits(self.start)),
             tuple(c.times == "aggregate" for c in record.constraints),
             tuple(c.times == "all" for c in record.constraints),
-            Objective(problem),
+            Objective(problem, self.numbers),
         )
 
     def fresh(self) -> None:
@@ -99,16 +99,16 @@ class Dynamics:
 
     def limits(self, design: Design) -> list[Limit]:
         """Constraints at a design."""
-        return self._limits(design.mechanism, design.scene)
+        return self._limits(design.mechanism, design.x)
 
     def limits_at(self, x: Array) -> list[Limit]:
         """The same where variables move no node."""
-        return self._limits(self.start.mechanism, scene_at(self.problem, x))
+        return self._limits(self.start.mechanism, x)
 
-    def _limits(self, mechanism: Mechanism, scene: Scene) -> list[Limit]:
+    def _limits(self, mechanism: Mechanism, x: Array) -> list[Limit]:
         nodal = self.place(mechanism).nodal
         given = zip(self.problem.record.constraints, self.at, strict=True)
-        return [limit_of(c, at, self.problem, mechanism, scene, nodal) for c, at in given]
+        return [limit_of(c, at, self.problem, mechanism, nodal, self.numbers, x) for c, at in given]
 
     def motion_of(self, run: ChainRun) -> Motion:
         """A run at all times."""

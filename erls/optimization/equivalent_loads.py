@@ -20,10 +20,11 @@ import numpy as np
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.optimization.beams import assembled, clamped_flexibility, scattered, sections_of
-from erls.optimization.design import Design, Designs, scene_at
+from erls.optimization.design import Design, Designs
 from erls.optimization.evaluation import Evaluation, Rules
 from erls.optimization.frozen import Frozen
 from erls.optimization.limits import Limit, Motion
+from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.problem import Problem
 from erls.scene.build import link_description
 from erls.scene.chain import Scene
@@ -37,6 +38,7 @@ class Source(Protocol):
     problem: Problem
     rules: Rules
     designs: Designs
+    numbers: LinkNumbers
     start: Design
 
     def limits(self, design: Design) -> list[Limit]:
@@ -75,7 +77,8 @@ class FrozenLoads:
         self._base = self._response(x)
 
     def _sections(self, x: Array) -> Array:
-        return sections_of(self._source.start.mechanism, scene_at(self._source.problem, x))
+        settings = self._source.problem.scene.record.simulation
+        return sections_of(self._source.start.mechanism, settings, self._source.numbers, x)
 
     @cached_property
     def _turned(self) -> Array:

@@ -22,11 +22,11 @@ from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.optimization.beams import outlines_of, sections_of
 from erls.optimization.frozen import Frozen
+from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.measures import EdgedSection, Length, Measure, RoundSection
 from erls.optimization.problem import Problem, stressed, terms_of
 from erls.optimization.records import AnyConstraint, DeflectionLimit, EffortLimit, StressLimit, Term
 from erls.run.chain.run import ChainRun
-from erls.scene.chain import Scene
 from fe_import.files.toml import choose
 from fe_import.model import IntArray
 
@@ -145,14 +145,15 @@ class Stress:
     of_shape, of_sections = True, True
 
     def __init__(
-        self, record: StressLimit, at: IntArray, mechanism: Mechanism, scene: Scene, links: list[int]
+        self, record: StressLimit, at: IntArray, mechanism: Mechanism, problem: Problem, numbers: LinkNumbers, x: Array
     ) -> None:
         self.name, self.limit, self.at = record.name, record.limit, at
-        outlines = outlines_of(mechanism, scene)
+        settings, links = problem.scene.record.simulation, stressed(record, problem.scene)
+        outlines = outlines_of(mechanism, settings, numbers, x)
         wanted = np.isin(outlines.links, [mechanism.bodies[k] for k in links])
         self._elements = np.flatnonzero(wanted)
         self._factors = outlines.factors[wanted]
-        self._stiffness = sections_of(mechanism, scene)[wanted]
+        self._stiffness = sections_of(mechanism, settings, numbers, x)[wanted]
         rounds = outlines.rounds[wanted]
         self.measure: Measure = RoundSection() if rounds.all() else EdgedSection()  # which is never below it
 
@@ -195,11 +196,17 @@ class Effort:
 
 
 def limit_of(
-    record: AnyConstraint, at: IntArray, problem: Problem, mechanism: Mechanism, scene: Scene, nodal: Nodal
+    record: AnyConstraint,
+    at: IntArray,
+    problem: Problem,
+    mechanism: Mechanism,
+    nodal: Nodal,
+    numbers: LinkNumbers,
+    x: Array,
 ) -> Limit:
-    """A constraint of a design, whose samples are those times of all that are looked at."""
+    """A constraint of a design (v,), whose samples are those times of all that are looked at."""
     if isinstance(record, DeflectionLimit):
         return Deflection(record, at, mechanism, nodal)
     if isinstance(record, StressLimit):
-        return Stress(record, at, mechanism, scene, stressed(record, problem.scene))
+        return Stress(record, at, mechanism, problem, numbers, x)
     return Effort(record, at)

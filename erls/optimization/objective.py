@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from erls.maths.so3 import Array
 from erls.optimization.design import scene_at
+from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.measures import Measure
 from erls.optimization.problem import Problem
 from erls.optimization.records import Goal
 from erls.scene.build import link_description, link_model
 from erls.scene.chain import Scene
+from fe_import.description.records import LinkDescription
 from fe_import.models.frame_parts import frame_parts
 
 _STEP = 1e-3  # of the variables: masses are polynomials of low order in dimensions
@@ -38,45 +40,42 @@ class Quadratic:
 
 
 class Masses:
-    """Masses of links over the design; links that no variable changes are weighed once."""
+    """Masses of links over the design, each weighed once for every set of its values."""
 
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
-        self._changed = {p.link for p in problem.parameters if p.link is not None}
-        self._known: dict[int, float] = {}
+    def __init__(self, problem: Problem, numbers: LinkNumbers) -> None:
+        self._problem, self._numbers = problem, numbers
+        self._rigid = any(p.key.startswith("links.") and not p.within for p in problem.parameters)
 
     def at(self, x: Array) -> Array:
         """(links,) without payloads [kg]."""
-        scene = scene_at(self._problem, x)
-        return np.array([self._link(scene, k) for k in range(len(scene.record.links))])
+        scene = scene_at(self._problem, x) if self._rigid else self._problem.scene
+        return np.array([self._link(scene, k, x) for k in range(len(scene.record.links))])
 
-    def _link(self, scene: Scene, k: int) -> float:
-        if k in self._changed:
-            return _mass(scene, k)
-        if k not in self._known:
-            self._known[k] = _mass(scene, k)
-        return self._known[k]
+    def _link(self, scene: Scene, k: int, x: Array) -> float:
+        link = scene.record.links[k]
+        if link.rigid is not None:
+            return link.rigid.mass
+        description = self._numbers.at(k, x)
+        return self._numbers.kept("mass", k, x, lambda: _mass(scene, k, description))
 
 
-def _mass(scene: Scene, k: int) -> float:
+def _mass(scene: Scene, k: int, description: LinkDescription | None) -> float:
     """Of a link, of its beams and point masses where it is made of them, else of its reduction."""
-    link = scene.record.links[k]
-    if link.rigid is not None:
-        return link.rigid.mass
-    if link.model:
-        description = link_description(scene, link).description
-        if description.frame is not None:
-            parts = frame_parts(description, description.frame, link.name)
-            lines = sum(e.density * e.section.area * e.length for e in parts.mesh.elements)
-            return float(lines + sum(m.mass for m in parts.masses))
-    return float(link_model(scene, k, lambda text: None, link_description(scene, link)).mass_properties.mass)
+    if description is not None and description.frame is not None:
+        parts = frame_parts(description, description.frame, scene.record.links[k].name)
+        lines = sum(e.density * e.section.area * e.length for e in parts.mesh.elements)
+        return float(lines + sum(m.mass for m in parts.masses))
+    file = None
+    if description is not None:
+        file = replace(link_description(scene, scene.record.links[k]), description=description)
+    return float(link_model(scene, k, lambda text: None, file).mass_properties.mass)
 
 
 class Objective:
     """Of a problem."""
 
-    def __init__(self, problem: Problem) -> None:
-        self.goals, self._masses = problem.record.objective or [Goal()], Masses(problem)
+    def __init__(self, problem: Problem, numbers: LinkNumbers) -> None:
+        self.goals, self._masses = problem.record.objective or [Goal()], Masses(problem, numbers)
         self._names = [c.name for c in problem.record.constraints]
         links = [link.name for link in problem.scene.record.links]
         self._weights = np.zeros(len(links))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from erls.scene.records import Record
 
-
 METHODS = ("integrated", "esl-system", "esl-component")
 OPTIMIZERS = ("scp", "slsqp", "trust-constr")
 QUANTITIES, OVER_TIME = ("mass", "deflection", "effort", "stress"), ("peak", "rms")
