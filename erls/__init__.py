@@ -7,10 +7,14 @@ The command line in three lines::
     scene = erls.load_scene("data/l_shape/steel_tall.toml")
     run = erls.simulate(scene)
     run.position("tip", [0.5, 1.0])  # dense output, at any time
+
+The public names stand in ``__init__.pyi``; each is imported when it is first used, so that importing the package is
+cheap.
 """
 
 from typing import Any
 
+<<<<<<< HEAD
 __all__ = [
     "linearize",
     "load_run",
@@ -38,13 +42,16 @@ _HOME = {
     "stepper": ("erls.simulation.stepper", "Stepper"),
     "stress": ("erls.run.recovery", "stress"),
 }
+=======
+import lazy_loader
+
+_named, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+>>>>>>> c1d66975d3d2d1134bb8ac1b1ddc9891cd6e0b9e
 
 
 def __getattr__(name: str) -> Any:
-    """Load the public names when first used: importing the package stays cheap."""
-    import importlib
+    if name == "__version__":
+        from fe_import.files.versions import package_version
 
-    if name in _HOME:
-        module, attribute = _HOME[name]
-        return getattr(importlib.import_module(module), attribute)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return package_version("erls")
+    return _named(name)
