@@ -1,8 +1,9 @@
 """What forces and conditions of nodal systems change with parameters, at the knots of a run.
 
-Constants of a system lie in one array; a parameter moves it along a line, as far as derivatives go. Where forces are
-linear along it (dimensions of sections, densities, moduli), one evaluation at its far end and that of the run itself
-tell the derivative to rounding; where they are quadratic, two evaluations do. Some knots tell whether they are.
+Constants of a system lie in one array; a parameter moves it along a line, as far as derivatives go. Forces are linear
+in stiffness and inertia of sections, in bodies and in loads, whatever dimensions do to these: one evaluation at the far
+end of the line and that of the run itself tell the derivative to rounding. Else forces at other values of the parameter
+do.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ import numpy as np
 
 from erls.equations.nodal.assembly import NodalSystem
 from erls.maths.so3 import Array
-from erls.sensitivity.variants import LINEAR, ROUNDING, Difference
+from erls.sensitivity.variants import Difference
 
 _TIMELESS = ("links", "gravity", "base", "payloads", "contacts", "points")
 """Tables on which what depends on time alone does not depend, unless a drive is fed forward."""
+_LINEAR, _WEIGHT = {"beam_stiffness", "beam_inertia", "bodies", "loads"}, "gravity"
+"""Constants in all of which together forces are linear, and one in which they are alone: it multiplies inertia."""
 
 
 @dataclass(frozen=True)
@@ -74,41 +77,30 @@ class Slope:
         return np.asarray(total)
 
 
-def slopes_of(known: Residuals, differences: Sequence[Difference], sample: Knots) -> list[Slope]:
-    """By each parameter, with as few evaluations as some knots allow."""
-    own = known.at(known.reals, sample)
-    return [_slope(known, difference, sample, own) for difference in differences]
-
-
-def _slope(known: Residuals, difference: Difference, sample: Knots, own: Array) -> Slope:
+def slope_of(known: Residuals, difference: Difference) -> Slope:
+    """By a parameter, with as few evaluations as what it changes allows."""
     variants, size = difference.variants, difference.parameter.size
-    systems = [variant.formulation.system for variant in variants]
-    timeless = _timeless(difference)
-    whole = Slope(
-        tuple(
-            (variant.weight, system.flat.reals, None if timeless else system)
-            for variant, system in zip(variants, systems, strict=True)
-        )
-    )
-    if not timeless:
-        return whole
-    constants = [np.where(np.isfinite(system.flat.reals), system.flat.reals, 0.0) for system in systems]
-    along = size * sum(variant.weight * part for variant, part in zip(variants, constants, strict=True))
-    if not along.any():
+    systems: list[NodalSystem] = [variant.formulation.system for variant in variants]
+    timeless, changed = _timeless(difference), _changed(systems)
+    if timeless and not changed:
         return Slope(())
-    ahead, back = known.reals + along, known.reals - along
-    with np.errstate(all="ignore"):  # a line leads anywhere
-        expected = whole.at(known, sample, own)
-        rounding = ROUNDING * np.abs(own).max(initial=0.0) / size
-        for few in (Slope(((1 / size, ahead, None),), -1 / size), _central(ahead, back, size)):
-            apart = np.abs(few.at(known, sample, own) - expected).max(initial=0.0)
-            if apart <= LINEAR * np.abs(expected).max(initial=0.0) + rounding:
-                return few
-    return whole
+    if timeless and (changed <= _LINEAR or changed == {_WEIGHT}):
+        constants = [np.where(np.isfinite(system.flat.reals), system.flat.reals, 0.0) for system in systems]
+        along = size * sum(variant.weight * part for variant, part in zip(variants, constants, strict=True))
+        return Slope(((1 / size, known.reals + along, None),), -1 / size)
+    given = [None if timeless else system for system in systems]
+    whole = zip(variants, systems, given, strict=True)
+    return Slope(tuple((variant.weight, system.flat.reals, samples) for variant, system, samples in whole))
 
 
-def _central(ahead: Array, back: Array, size: float) -> Slope:
-    return Slope(((0.5 / size, ahead, None), (-0.5 / size, back, None)))
+def _changed(systems: Sequence[NodalSystem]) -> set[str]:
+    """Names of constants that differ."""
+    first, *others = (system.model._asdict() for system in systems)
+    return {
+        name
+        for name, values in first.items()
+        if not all(np.array_equal(values, other[name], equal_nan=True) for other in others)
+    }
 
 
 def _timeless(difference: Difference) -> bool:

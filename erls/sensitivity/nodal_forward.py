@@ -20,15 +20,14 @@ from erls.integrate.nodal_chain import slopes_in_time
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
-from erls.sensitivity.nodal_forces import Knots, Residuals, slopes_of
-from erls.sensitivity.nodal_start import LegStart, share_of, start_changes
+from erls.sensitivity.nodal_forces import Knots, Residuals, slope_of
+from erls.sensitivity.nodal_start import LegStart, shares_of, start_changes
 from erls.sensitivity.outputs import ALONG
 from erls.sensitivity.schemes import SAME_STEP
 from erls.sensitivity.variants import Difference
 
 _ROOM = 4_000_000
 """Numbers of slopes of forces that are held at a time."""
-_SAMPLE = 12  # knots at which forces show how they depend on a parameter
 
 
 class _Walk(NamedTuple):
@@ -76,15 +75,6 @@ class _Motion:
         known = replace(near, bent=bent.reshape(near.bent.shape), turned=turned, wound=wound.reshape(near.wound.shape))
         return replace(known, poses=self.poses[row]), self.v[row]
 
-    def sample(self) -> Knots:
-        """Some of every leg."""
-        each = max(3, _SAMPLE // len(self.walks))
-        parts = [
-            self.knots(walk, np.unique(np.linspace(walk.first, walk.end - 1, each).astype(int))) for walk in self.walks
-        ]
-        arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in ("t", "samples", "q", "v", "a")]
-        return Knots(*arrays)
-
 
 def _walks(run: ChainRun) -> Iterator[_Walk]:
     """Legs that were walked over."""
@@ -114,18 +104,19 @@ def differentiated(run: ChainRun, differences: Sequence[Difference]) -> Array:
         The linearized equations of a step are singular; tells when.
     """
     motion = _Motion(run)
-    changes = _changes(run, differences, motion)
+    changes = changes_of(run, differences, motion)
     n = motion.system.size
     found = [_kept(motion, difference, changes[:, p], n) for p, difference in enumerate(differences)]
     return np.stack(found, axis=3)
 
 
-def _changes(run: ChainRun, differences: Sequence[Difference], motion: _Motion) -> Array:
-    """(k, p, 3 n + m) of places, twists, their rates and multipliers at all knots."""
+def changes_of(run: ChainRun, differences: Sequence[Difference], motion: _Motion | None = None) -> Array:
+    """(k, p, 3 n + m) of places, in the axes of the nodes, of twists, their rates and multipliers at all knots."""
     from erls.equations.nodal.tangents import addresses, room  # here: they are compiled
     from erls.sensitivity.nodal_kernels import ACCELERATION, ALGORITHMIC, PLACE, RATE, walk
 
     base: Any = run.formulation
+    motion = motion or _Motion(run)
     system = motion.system
     n, m, count = system.size, system.constraints, len(differences)
     result = np.empty((len(motion.t), count, 3 * n + m))
@@ -134,9 +125,9 @@ def _changes(run: ChainRun, differences: Sequence[Difference], motion: _Motion) 
     use = Formulas.of(Rules(run.scene.record.simulation.spectral_radius, 0.0), 1.0)
     rule = np.array([use.beta, use.gamma, use.share, use.pull, use.keep])
     known, scratch = Residuals(system), system.flat.scratch.copy()
-    slopes = slopes_of(known, differences, motion.sample()) if motion.walks else []
+    slopes = [slope_of(known, difference) for difference in differences]
     model = system.model
-    exact = addresses(len(model.beam_nodes), len(model.actuator_nodes) + len(model.contact_nodes))
+    exact = addresses(len(model.beam_nodes), len(model.actuator_nodes))
     memory = np.zeros(system.flat.factors), *room(system.count)
     chunk = max(1, _ROOM // (count * (n + m) + 1))
     for part in motion.walks:
@@ -197,7 +188,7 @@ def _kept(motion: _Motion, difference: Difference, change: Array, n: int) -> Arr
         stored(reals, flat.integers, scratch, motion.q, along * place, *moved, out)
         return out
 
-    step = share_of(system, place)
+    step = shares_of(system, place, (motion.v, rate), (motion.a[:, :n], gain))
     frames = np.asarray(sum((weight / step)[:, None, None] * at(flat.reals, far * step) for far, weight in ALONG))
     models = [variant.formulation.system for variant in difference.variants]
     if not all(np.array_equal(own.model.actuator_frames, models[0].model.actuator_frames) for own in models):

@@ -147,7 +147,7 @@ class _Resting:
     def __init__(self, held: NodalSystem, q: Nodes) -> None:
         self._held, self._q, rest = held, q, np.zeros(held.size)
         rows, force = held.constraint_matrix(0.0, q), held.residual(0.0, q, rest, rest)
-        self._multipliers = -np.linalg.lstsq(dense(rows).T, force, rcond=None)[0]
+        self._multipliers: Array = -np.linalg.lstsq(dense(rows).T, force, rcond=None)[0].astype(float)
         stiffness, _ = held.exact_stiffness_and_damping(0.0, q, rest, rest, self._multipliers)
         self._saddle = _saddle(stiffness, rows, metre_scales(held))
 
@@ -184,16 +184,21 @@ def total(
     found = difference.of(lambda variant: what(variant.formulation, q, v))
     if not place.any() and not rate.any():
         return found
-    step = share_of(base.system, place[None])[0] if place.any() else (1 + np.abs(v).max()) / np.abs(rate).max()
+    (step,) = shares_of(base.system, place[None], (v[None], rate[None]))
     for at, weight in ALONG:
         there = base.system.compose(q, at * step * place)
         found = found + weight / step * what(base, there, v + at * step * rate)
     return np.asarray(found)
 
 
-def share_of(system: NodalSystem, places: Array) -> Array:
-    """(k,) steps of differences along changes (k, n) of places: a share of the size of the system, or of a radian."""
+def shares_of(system: NodalSystem, places: Array, *others: tuple[Array, Array]) -> Array:
+    """(k,) steps of differences along changes (k, n) of places: a share of the size of the system, or of a radian; and
+    along those of other values (k, n), which need not be small, of about their size.
+    """
     extent = float(np.ptp(system.start.poses[:, :3, 3], axis=0).max()) or float(metre_scales(system).max())
-    scales = np.tile(np.repeat([1 / extent, 1.0], 3), system.count)
-    far = np.abs(places * scales).max(axis=1, initial=0.0)
-    return np.asarray(np.where(far > 0, MOVED / np.where(far > 0, far, 1.0), 1.0))
+    scales = np.tile(np.repeat([1 / extent, 1.0], 3), system.count) / MOVED
+    fastest = np.abs(places * scales).max(axis=1, initial=0.0)
+    for values, changes in others:
+        sizes = 1 + np.abs(values).max(axis=1, initial=0.0)
+        fastest = np.maximum(fastest, np.abs(changes).max(axis=1, initial=0.0) / sizes)
+    return np.asarray(1 / np.where(fastest > 0, fastest, 1.0))

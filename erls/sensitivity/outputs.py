@@ -24,6 +24,8 @@ from erls.sensitivity.variants import Difference
 Output = Callable[[ChainRun], Any]
 """A number or an array that a run gives, smooth in its motion."""
 
+EVALUATIONS = 4
+"""Of an output by a parameter, along the derivative of a motion."""
 ALONG = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 """Steps and weights of differences, of fourth order."""
 MOVED = 1e-3
@@ -50,8 +52,15 @@ def value_of(output: Output, run: ChainRun, name: str) -> Array:
     return found
 
 
+def own_derivative(output: Output, name: str, run: ChainRun, difference: Difference, value: Array) -> Array:
+    """What a parameter changes of an output whose ``value`` is known, the motion held; in the shape of the output."""
+    if all(np.array_equal(value_of(output, one.run(run), name), value) for one in difference.few):
+        return np.zeros_like(value)
+    return difference.of(lambda variant: value_of(output, variant.run(run), name))
+
+
 def derivative_of(
-    output: Output, name: str, run: ChainRun, difference: Difference, motion: Array, metres: Array
+    output: Output, name: str, run: ChainRun, difference: Difference, motion: Array, metres: Array, value: Array
 ) -> Array:
     """Of an output by a parameter, in the shape of the output.
 
@@ -67,8 +76,10 @@ def derivative_of(
         Derivatives of coordinates, rates and accelerations at the knots of the run.
     metres : (n,) array
         Per unit of each coordinate.
+    value : array
+        Of the output.
     """
-    own = difference.of(lambda variant: value_of(output, variant.run(run), name))
+    own = own_derivative(output, name, run, difference, value)
     formulation: Any = run.formulation
     largest = float(np.abs(metres * motion[:, 0]).max(initial=0.0))
     if not motion.any():

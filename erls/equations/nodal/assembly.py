@@ -188,7 +188,7 @@ class NodalSystem:
 
         model = self.model
         self._evaluated(t, q, v, a, multipliers)
-        known = addresses(len(model.beam_nodes), len(model.actuator_nodes) + len(model.contact_nodes))
+        known = addresses(len(model.beam_nodes), len(model.actuator_nodes))
         exact_blocks(known, *self._memory, *room(self.count))
         blocks = self._work.blocks
         return self._stiffness.matrix([blocks[:, 2]]), self._mass.matrix([blocks[: len(self.kinds.pairs), 1]])

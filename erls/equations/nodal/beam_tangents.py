@@ -8,20 +8,22 @@ direction of the weight in the first section. By d they are differentiated throu
 
 from __future__ import annotations
 
+from typing import Any
+
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.beam_derivatives import elastic_derivatives, inertia_derivatives, set_rows
 from erls.equations.nodal.beam_ends import inward
 from erls.equations.nodal.beam_forces import between
 from erls.equations.nodal.contract import TANGENTS, Model, Work, read_layout, read_model, read_work
 from erls.maths.jit import kernel, part
-from erls.maths.vectors import Twist, Vector, vector
+from erls.maths.vectors import Twist, vector
 
 STEP = 1e-30
 """Complex steps: the square of one is nothing beside any number."""
 
 
 @part
-def _ahead(x: Vector, k: int) -> tuple[complex, complex, complex]:
+def _ahead(x: Any, k: int) -> Any:
     """A complex step along axis k, none of the three for any other number."""
     none, step = 0.0j, 1j * STEP
     return x[0] + (step if k == 0 else none), x[1] + (step if k == 1 else none), x[2] + (step if k == 2 else none)

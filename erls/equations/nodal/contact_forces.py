@@ -1,8 +1,8 @@
 """Points against planes, by the law of `erls.maths.contact_law`.
 
 The rate of the gap is J ν with J = [-n at the place of the point, n at the point], each as a wrench of its node, and
-velocities along the plane likewise. How these rows turn with motion is left out of the derivatives that iterations
-take, and that friction grows with depth.
+velocities along the plane likewise. How these rows turn with motion is left out of the derivatives, and that friction
+grows with depth.
 """
 
 from __future__ import annotations
@@ -89,37 +89,24 @@ def _slip(model: Model, k: int, along: float, across: float, force: float) -> tu
 
 
 @part
-def _known(model: Model, poses: Array, twist: Array, k: int) -> tuple[float, float, float, float, float]:
+def _known(model: Model, work: Work, k: int) -> tuple[float, float, float, float, float]:
     """Gap and its rate, normal force, and velocities along the two axes of the plane, of contact k."""
-    _, local, gap, turn = _placed(model, poses, k)
+    _, local, gap, turn = _placed(model, work.poses, k)
     law = model.contacts[k, _LAW:]
-    rate = _rate(model, twist, k, _row(model, poses, k, local, turn, vector(model.contacts, k, 6)))
-    along = _rate(model, twist, k, _row(model, poses, k, local, turn, vector(model.contacts, k, 9)))
-    across = _rate(model, twist, k, _row(model, poses, k, local, turn, vector(model.contacts, k, 12)))
+    rate = _rate(model, work.twist, k, _row(model, work.poses, k, local, turn, vector(model.contacts, k, 6)))
+    along = _rate(model, work.twist, k, _row(model, work.poses, k, local, turn, vector(model.contacts, k, 9)))
+    across = _rate(model, work.twist, k, _row(model, work.poses, k, local, turn, vector(model.contacts, k, 12)))
     return gap, rate, contact_force(law, -gap, -rate), along, across
 
 
 @part
-def _strengths(model: Model, poses: Array, twist: Array, k: int) -> Vector:
+def _strengths(model: Model, work: Work, k: int) -> Vector:
     """Force on the point along the three axes of the plane."""
-    _, _, force, along, across = _known(model, poses, twist, k)
+    _, _, force, along, across = _known(model, work, k)
     slip = 0.0 * force
     if model.contacts[k, _FRICTION] != 0.0 and force.real > 0.0:
         slip = _slip(model, k, along, across, force)[0]
     return force, -slip * along, -slip * across
-
-
-@part
-def press(model: Model, poses: Array, twist: Array, k: int, out: Array) -> None:
-    """Subtract what contact k does from the forces on its nodes."""
-    _, local, gap, turn = _placed(model, poses, k)
-    if gap.real >= 0.0:
-        return
-    strengths = _strengths(model, poses, twist, k)
-    for axis in range(3):
-        inner, outer = _row(model, poses, k, local, turn, vector(model.contacts, k, 6 + 3 * axis))
-        push(out, model.contact_nodes[k, 0], -strengths[axis], inner)
-        push(out, model.contact_nodes[k, 1], -strengths[axis], outer)
 
 
 @kernel(FORCES, counted=False)
@@ -128,7 +115,14 @@ def contact_forces(reals: Array, integers: IntArray, scratch: Array, last: Array
     known = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     for k in range(len(model.contact_nodes)):
-        press(model, work.poses, work.twist, k, work.force)
+        _, local, gap, turn = _placed(model, work.poses, k)
+        if gap.real >= 0.0:
+            continue
+        strengths = _strengths(model, work, k)
+        for axis in range(3):
+            inner, outer = _row(model, work.poses, k, local, turn, vector(model.contacts, k, 6 + 3 * axis))
+            push(work.force, model.contact_nodes[k, 0], -strengths[axis], inner)
+            push(work.force, model.contact_nodes[k, 1], -strengths[axis], outer)
 
 
 @part
@@ -150,7 +144,7 @@ def _derivatives(model: Model, work: Work, k: int, block: Array) -> None:
     _, local, gap, turn = _placed(model, work.poses, k)
     if gap.real >= 0.0:
         return
-    _, rate, force, along, across = _known(model, work.poses, work.twist, k)
+    _, rate, force, along, across = _known(model, work, k)
     stiffness, damping = contact_gains(model.contacts[k, _LAW:], -gap, -rate)
     normal, first = vector(model.contacts, k, 6), vector(model.contacts, k, 9)
     second = vector(model.contacts, k, 12)
@@ -197,8 +191,8 @@ def in_contacts(reals: Array, integers: IntArray, scratch: Array, out: Array) ->
     set_twists(model, work)
     for k in range(len(model.contact_nodes)):
         place, _, gap, turn = _placed(model, work.poses, k)
-        _, rate, force, along, across = _known(model, work.poses, work.twist, k)
-        strengths, law = _strengths(model, work.poses, work.twist, k), model.contacts[k, _LAW:]
+        _, rate, force, along, across = _known(model, work, k)
+        strengths, law = _strengths(model, work, k), model.contacts[k, _LAW:]
         out[k, 0], out[k, 1], out[k, 2] = gap, rate, force
         put(out[k], 3, scaled(0.0, place))
         for axis in range(3):

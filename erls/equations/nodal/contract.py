@@ -193,8 +193,8 @@ class Layout(NamedTuple):
     forces, remember, knot, blocks, weighted : int
         Addresses of the functions of `erls.equations.nodal.sums`, `outputs` and `blocks`.
     beam_forces, bend_beams, beam_derivatives, beam_energies : int
-        Those of `beam_forces` and `beam_derivatives`; of this and of the next three kinds -1, and nothing of them is compiled, where there are
-        none.
+        Those of `beam_forces` and `beam_derivatives`; of this and of the next three kinds -1, and nothing of them is
+        compiled, where there are none.
     actuator_forces, turn_actuators, actuator_derivatives, actuator_energies, store_actuators : int
         Those of `actuator_forces`.
     contact_forces, contact_derivatives, contact_energies : int
@@ -292,4 +292,4 @@ call_contact_forces = caller(FORCES, "erls.equations.nodal.contact_forces:contac
 call_contact_derivatives = caller(BLOCKS, "erls.equations.nodal.contact_forces:contact_derivatives")
 call_contact_energies = caller(ENERGIES, "erls.equations.nodal.contact_forces:contact_energies")
 call_beam_tangents = caller(TANGENTS, "erls.equations.nodal.beam_tangents:beam_tangents")
-call_pair_tangents = caller(TANGENTS, "erls.equations.nodal.pair_tangents:pair_tangents")
+call_actuator_tangents = caller(TANGENTS, "erls.equations.nodal.actuator_tangents:actuator_tangents")

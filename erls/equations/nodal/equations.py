@@ -29,6 +29,7 @@ from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
 from erls.equations.nodal.seat import Seat
+from erls.equations.nodal.spinning import SpinningNeighbours, spinning_neighbours
 from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
 from erls.equations.stability import LARGEST, Stability, stability_of
@@ -146,6 +147,10 @@ class Nodal:
         """States beside one, with accelerations and multipliers that go with it."""
         q, velocity = self.configuration(y, v)
         return nodal_neighbours(self.system, t, q, velocity, _stored, self._names)
+
+    def spinning(self, joint: str, speed: float) -> SpinningNeighbours:
+        """States beside a steady motion about or along a joint [rad/s or m/s]: see `spinning_neighbours`."""
+        return spinning_neighbours(self.mechanism, self.chain, joint, speed, _stored, self._names)
 
     @property
     def _names(self) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """Exact tangents of nodal equations: all blocks of `erls.equations.nodal.blocks`, and what iterations leave out.
 
-Compiled for whoever asks for derivatives; runs do without. Springs between bodies have the blocks of iterations, which
-leave out what a change of place does to their dampers.
+Compiled for whoever asks for derivatives; runs do without. Contacts and springs between bodies have the blocks of
+iterations, which leave out how their rows turn, and what a change of place does to dampers.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from erls.equations.nodal.contract import (
     TANGENTS,
     call_beam_tangents,
     call_blocks,
-    call_pair_tangents,
+    call_actuator_tangents,
     read_layout,
 )
 from erls.maths.calls import address_for
@@ -27,7 +27,7 @@ class Exact(NamedTuple):
     """Addresses of what adds to the blocks of iterations, -1 for what a system does not have."""
 
     beams: int
-    pairs: int
+    actuators: int
 
 
 EXACT: Any = None
@@ -48,15 +48,15 @@ def exact_blocks(
     call_blocks(known.blocks, reals, integers, scratch, BEAMS_APART)
     if exact.beams >= 0:
         call_beam_tangents(exact.beams, reals, integers, scratch, poses, motion)
-    if exact.pairs >= 0:
-        call_pair_tangents(exact.pairs, reals, integers, scratch, poses, motion)
+    if exact.actuators >= 0:
+        call_actuator_tangents(exact.actuators, reals, integers, scratch, poses, motion)
 
 
-def addresses(beams: int, pairs: int) -> Exact:
-    """Of a system with so many beams, and actuators and contacts; compiled now."""
-    return Exact(address_for(call_beam_tangents, beams > 0), address_for(call_pair_tangents, pairs > 0))
+def addresses(beams: int, actuators: int) -> Exact:
+    """Of a system with so many beams and actuators; compiled now."""
+    return Exact(address_for(call_beam_tangents, beams > 0), address_for(call_actuator_tangents, actuators > 0))
 
 
 def room(nodes: int) -> tuple[Array, Array]:
     """Memory of complex numbers."""
-    return np.zeros((nodes, 12), dtype=complex), np.zeros((3, 6 * nodes), dtype=complex)  # type: ignore[return-value]
+    return np.zeros((nodes, 12), dtype=complex), np.zeros((3, 6 * nodes), dtype=complex)

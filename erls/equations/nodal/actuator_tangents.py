@@ -1,4 +1,4 @@
-"""Exact derivatives of what acts in joints and contacts: complex steps of their own source, coordinate by coordinate.
+"""Exact derivatives of what acts in joints: complex steps of its own source, coordinate by coordinate.
 
 Iterations do without what turns of the lines of action do, off the ways that joints leave, and without what speeds
 change of the acceleration of a rotor; derivatives by the place of a joint go such ways.
@@ -9,7 +9,6 @@ from __future__ import annotations
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.actuator_forces import actuate
 from erls.equations.nodal.beam_tangents import STEP
-from erls.equations.nodal.contact_forces import press
 from erls.equations.nodal.contract import TANGENTS, Model, Work, read_layout, read_model, read_work
 from erls.maths.jit import kernel, part
 from erls.maths.vectors import cross, unit, vector
@@ -45,10 +44,8 @@ def _still(work: Work, node: int, poses: Array, motion: Array) -> None:
 
 
 @part
-def _columns(
-    model: Model, work: Work, sample: Array, e: int, contact: int, k: int, poses: Array, motion: Array
-) -> None:
-    """Damping and stiffness of an actuator, or of a contact, into the block of element e."""
+def _columns(model: Model, work: Work, sample: Array, e: int, k: int, poses: Array, motion: Array) -> None:
+    """Damping and stiffness of actuator k into the block of element e."""
     block, pair = work.blocks[e], model.pairs[e]
     for side in range(2):
         if pair[side] >= 0:
@@ -59,11 +56,8 @@ def _columns(
                 continue
             for j in range(6):
                 _ahead(work, pair[side], j, kind, poses, motion, 1j * STEP)
-                if contact:
-                    press(model, poses, motion[_TWIST], k, motion[_FORCE])
-                else:
-                    near = work.turned[k]
-                    actuate(model, poses, motion[_TWIST], motion[_RATE], sample, k, near, motion[_FORCE])
+                near = work.turned[k]
+                actuate(model, poses, motion[_TWIST], motion[_RATE], sample, k, near, motion[_FORCE])
                 for other in range(2):
                     if pair[other] >= 0:
                         for i in range(6):
@@ -73,9 +67,9 @@ def _columns(
 
 
 @kernel(TANGENTS, counted=False)
-def pair_tangents(reals: Array, integers: IntArray, scratch: Array, poses: Array, motion: Array) -> None:
-    """Damping and stiffness of all actuators and contacts into `Work.blocks`, where their mass is known; ``poses``
-    (k, 12) and ``motion`` (3, n) are memory.
+def actuator_tangents(reals: Array, integers: IntArray, scratch: Array, poses: Array, motion: Array) -> None:
+    """Damping and stiffness of all actuators into `Work.blocks`, where their mass is known; ``poses`` (k, 12) and
+    ``motion`` (3, n) are memory.
     """
     known = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
@@ -83,7 +77,4 @@ def pair_tangents(reals: Array, integers: IntArray, scratch: Array, poses: Array
     first = len(model.beam_nodes) + len(model.body_nodes) + len(model.load_nodes)
     for k in range(len(model.actuator_nodes)):
         if model.actuator_active[k]:
-            _columns(model, work, sample, first + k, 0, k, poses, motion)
-    first += len(model.actuator_nodes)
-    for k in range(len(model.contact_nodes)):
-        _columns(model, work, sample, first + k, 1, k, poses, motion)
+            _columns(model, work, sample, first + k, k, poses, motion)
