@@ -1,4 +1,4 @@
-"""Published robots and what comes out here, side by side: objective, diameters, analyses, processor time; further starts.
+"""Published robots and what comes out here, side by side: objective, diameters, analyses, processor time, more starts.
 
     python benchmarks/optimization.py [--starts N] [--optimizers] [PROBLEM ...]
 
@@ -67,7 +67,8 @@ def main() -> None:
         rows += designs(name, [f"settings.starts={asked.starts}"])
         for optimizer in ("slsqp", "trust-constr") if asked.optimizers else ():
             rows += designs(name, [f'settings.optimizer="{optimizer}"'], f", {optimizer}")
-    print(table(("problem", "method", "objective", "variables / 1000", "analyses", "inner", "wall [s]", "spread"), rows))
+    head = "problem", "method", "objective", "variables / 1000", "analyses", "inner", "wall [s]", "spread"
+    print(table(head, rows))
     rows = [row for name in asked.problems if name in PUBLISHED[:4] for row in published(name)]
     if rows:
         print("\nPublished designs, simulated here\n")

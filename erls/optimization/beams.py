@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ def sections_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, 
     x : (v,) array
     """
     found = [
-        links.kept("sections", k, x, lambda n=number, d=description: _stiffness(mechanism.links[n], d, settings))
+        links.kept("sections", k, x, partial(_stiffness, mechanism.links[number], description, settings))
         for k, number, description in _described(mechanism, links, x)
     ]
     return np.concatenate([np.zeros((0, 6, 6)), *found])
@@ -89,7 +90,7 @@ def outlines_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, 
         A section of which only constants are known.
     """
     found = [
-        links.kept("outlines", k, x, lambda n=number, d=description: _outlines(n, d, settings))
+        links.kept("outlines", k, x, partial(_outlines, number, description, settings))
         for k, number, description in _described(mechanism, links, x)
     ]
     return Outlines(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
