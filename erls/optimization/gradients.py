@@ -37,7 +37,7 @@ def derivatives(
     """
     keys = [p.key for p in problem.parameters]
     try:
-        found = sensitivities(run, {_ALL: asked}, keys).derivatives[_ALL]
+        found = sensitivities(run, {_ALL: asked}, keys, "forward").derivatives[_ALL]
     except SceneError as refusal:
         if refusal.cause != Cause.BAD_FIELD or "not known yet" not in refusal.message:
             raise
