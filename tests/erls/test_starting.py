@@ -61,7 +61,8 @@ def test_examples_are_listed_and_copied(
     monkeypatch.chdir(tmp_path)
     assert main(["examples", "list", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["examples"]
-    own = {str(p.relative_to(DATA).with_suffix("")) for p in DATA.rglob("*.toml") if _kind(_read(p)) not in ("link", "problem")}
+    scenes = [p for p in DATA.rglob("*.toml") if _kind(_read(p)) not in ("link", "problem")]
+    own = {str(p.relative_to(DATA).with_suffix("")) for p in scenes}
     assert set(found) == own
     assert all(len(text) > 10 for text in found.values()), found
     assert main(["examples", "copy", "robot/two_link"]) == 0
