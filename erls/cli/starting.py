@@ -85,7 +85,12 @@ def copy(name: str, folder: Path | None = None, /, *, json: Json = False) -> Non
 
 
 def schema(
-    kind: Literal["scene", "link", "bodies", "problem"], /, *, output: Output = None, force: Force = False, json: Json = False
+    kind: Literal["scene", "link", "bodies", "problem"],
+    /,
+    *,
+    output: Output = None,
+    force: Force = False,
+    json: Json = False,
 ) -> None:
     """JSON schema of scenes, links, scenes of bodies or problems, for editors that complete and check TOML.
 
