@@ -34,22 +34,21 @@ def spent(work: Callable[[], Any]) -> tuple[float, Any]:
 
 def main(path: Path) -> None:
     """Print the table."""
-    print("elements of a link  steps  chosen by  parameters  run [s]  variants, motion, outputs [runs]  in all, run included")
+    print("elements of a link  steps  chosen by  parameters  run [s]  variants, motion, outputs [runs]  in all")
     for elements in (4, 20):
         for chosen in ("simulation.step=1e-3", "simulation.tolerance=1e-4"):
             overrides = [*FREE, f"simulation.elements_per_member={elements}", chosen, "simulation.duration=0.5"]
             scene: Any = erls.load_scene(path, overrides)
             run_s, run = spent(lambda scene=scene: erls.simulate(scene, verdict=False))
-            times = np.linspace(0.0, 0.5, 50)
             for count in (1, 4):
                 given = parameters_of(run.scene, KEYS[:count])
                 variants_s, found = spent(lambda given=given, run=run: _made(differences(run, given)))
                 motion_s, motion = spent(lambda found=found, run=run: differentiated(run, found))
-                metres, value = np.ones(run.solution.y.shape[1]), run.position("end2", times)
+                rest = np.ones(run.solution.y.shape[1]), _ends(run)
 
-                def outputs(run: Any = run, found: Any = found, motion: Any = motion, rest: Any = (metres, value)) -> None:
+                def outputs(run: Any = run, found: Any = found, motion: Any = motion, rest: Any = rest) -> None:
                     for k, one in enumerate(found):
-                        derivative_of(lambda run: run.position("end2", times), "end", run, one, motion[..., k], *rest)
+                        derivative_of(_ends, "end", run, one, motion[..., k], *rest)
 
                 outputs_s, _ = spent(outputs)
                 parts = [x / run_s for x in (variants_s, motion_s, outputs_s)]
@@ -58,6 +57,10 @@ def main(path: Path) -> None:
                     + " ".join(f"{x:9.2f}" for x in parts)
                     + f" {1 + sum(parts):13.2f}"
                 )
+
+
+def _ends(run: Any) -> Any:
+    return run.position("end2", np.linspace(0.0, 0.5, 50))
 
 
 def _made(found: Any) -> Any:

@@ -77,19 +77,30 @@ def _steps_back(stretch: Stretch, seeds: Seeds, state: Array, multipliers: Array
     flat = state.reshape(4, -1)
     for step in range(len(stretch.h) - 1, -1, -1):
         h, rows, rescaled = float(stretch.h[step]), stretch.rows(step), stretch.rescaled(step)
-        asked = np.zeros((3, *nodes))
-        for i in range(count):
-            seed = seeds.get(rows.start + i)
-            if seed is not None:
-                asked[:, i] = seed
-        by_y, by_v, by_a = asked.reshape(3, count, -1)
-        right = by_a + added[step].T @ flat + (h * h * scheme.places.T) @ by_y + (h * scheme.rates.T) @ by_v
+        right = added[step].T @ flat
+        asked = _asked(seeds, rows, nodes)
+        if asked is not None:
+            by_y, by_v, by_a = asked
+            right = right + by_a + (h * h * scheme.places.T) @ by_y + (h * scheme.rates.T) @ by_v
         t = float(stretch.knots.t[rows.start])
         found = -solve(stretch.blocks[step], right.reshape(count * n, columns), True, t).reshape(nodes)
         multipliers[rows] = found
-        by_y = by_y + (stiffness[rows].swapaxes(1, 2) @ found).reshape(count, -1)
-        by_v = by_v + (damping[rows].swapaxes(1, 2) @ found).reshape(count, -1)
-        flat = kept[step].T @ flat + to_y[step].T @ by_y + to_v[step].T @ by_v
+        before_y = (stiffness[rows].swapaxes(1, 2) @ found).reshape(count, -1)
+        before_v = (damping[rows].swapaxes(1, 2) @ found).reshape(count, -1)
+        if asked is not None:
+            before_y, before_v = before_y + asked[0], before_v + asked[1]
+        flat = kept[step].T @ flat + to_y[step].T @ before_y + to_v[step].T @ before_v
         if rescaled is not None:
             flat = rescaled.T @ flat
     return flat.reshape(shape)
+
+
+def _asked(seeds: Seeds, rows: slice, nodes: tuple[int, int, int]) -> Array | None:
+    """(3, s, n c) what outputs ask of the nodes of a step; None where they ask nothing."""
+    some = [i for i in range(nodes[0]) if rows.start + i in seeds]
+    if not some:
+        return None
+    found = np.zeros((3, *nodes))
+    for i in some:
+        found[:, i] = seeds[rows.start + i]
+    return found.reshape(3, nodes[0], -1)

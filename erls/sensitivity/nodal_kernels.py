@@ -30,7 +30,7 @@ from erls.equations.nodal.contract import (
 )
 from erls.equations.nodal.matrix import factored, solve
 from erls.equations.nodal.motion import compose
-from erls.equations.nodal.step import residual
+from erls.equations.nodal.step import keep, residual
 from erls.equations.nodal.tangents import EXACT, Exact, exact_blocks
 from erls.maths.coefficients import stumpff, tangent_coefficients
 from erls.maths.jit import ENABLED, kernel, part
@@ -97,14 +97,7 @@ def configurations(
         for node in range(len(work.poses)):
             for i in range(12):
                 there.poses[node, i] = work.poses[node, i]
-        for e in range(len(work.bent)):
-            for i in range(6):
-                there.bent[e, i] = work.bent[e, i]
-        for k in range(len(work.turned)):
-            there.turned[k] = work.turned[k]
-        for k in range(len(work.wound)):
-            for i in range(3):
-                there.wound[k, i] = work.wound[k, i]
+        keep(work, there)
         for i in range(len(last)):
             out[row, i] = last[i]
 

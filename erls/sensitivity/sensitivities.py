@@ -212,7 +212,7 @@ def _adjoint(
     for one, row in zip(found, through, strict=True):
         for (asking, _), own in zip(askings, columns, strict=True):
             held = own_derivative(asking.output, asking.name, run, one, asking.value)
-            derivatives[asking.name][one.parameter.key] = held + row[own].reshape(asking.value.shape)
+            derivatives[asking.name][one.parameter.key] = np.asarray(held + row[own].reshape(asking.value.shape))
     return derivatives
 
 

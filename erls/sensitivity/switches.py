@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,7 +118,7 @@ class Modes:
         ends = [0, *(np.flatnonzero(np.diff(t) == 0) + 1).tolist(), len(t)]
         whole = legs(self.system, (float(t[0]), float(t[-1])))
         found = []
-        for first, end in zip(ends[:-1], ends[1:], strict=True):
+        for first, end in pairwise(ends):
             leg = next((leg for leg in whole if leg.start <= t[first] < leg.end), whole[-1] if whole else None)
             if leg is None:
                 continue
@@ -177,10 +178,12 @@ class Modes:
             )
         result = state.copy()
         for k, difference in enumerate(differences):
-            change = difference.of(lambda variant: np.array(left(variant.formulation, t, y, v)))
-            share = passage.share(state[..., k])
+            change = difference.of(
+                lambda one: np.array(left(one.formulation, t, one.placed(y), one.placed(v)))
+            )
+            share, (place, rate) = passage.share(state[..., k]), state[..., k]
             if share:
-                moved = [left(self.sticking, t, y + x * state[0, :, k], v + x * state[1, :, k]) for x in (share, -share)]
+                moved = [left(self.sticking, t, y + x * place, v + x * rate) for x in (share, -share)]
                 change = change + (moved[0] - moved[1]) / (2 * share)
             result[1, :, k] -= (before - later) * (float(change) / falling)
         result[1, self.sticking.dry.places[after.modes == 0.0]] = 0.0

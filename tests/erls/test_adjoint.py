@@ -111,6 +111,7 @@ def test_outputs(case: str) -> None:
         largest = max(sizes[key] * np.abs(x).max() for key, x in expected.items())
         for key, x in expected.items():
             found = adjoint.derivatives[name][key]
+            assert isinstance(found, np.ndarray)
             assert found.shape == x.shape
             limit = (1e-7 if name == "moment" else 1e-8) * largest + NOTHING * np.abs(adjoint.values[name]).max()
             assert np.abs(found - x).max() <= limit / sizes[key], (name, key)

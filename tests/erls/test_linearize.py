@@ -15,8 +15,8 @@ from body_scenes_data import PENDULUM, STRIP, body_scene
 import erls
 from erls.errors import Cause, SceneError, SimulationError
 from erls.linear.diagrams import campbell
-from erls.linear.zeros import transmission_zeros
 from erls.linear.response import frequency_response
+from erls.linear.zeros import transmission_zeros
 
 G = 9.81
 LENGTHS, MASSES = (0.6, 0.4), (2.0, 1.5)

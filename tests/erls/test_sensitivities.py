@@ -32,7 +32,7 @@ FOUR_BAR = DATA / "four_bar"
 POLYNOMIAL = 'motion={shape="polynomial", from_deg=0.0, to_deg=60.0, duration=0.03, degree=7}'
 DRIVEN = [
     "simulation.duration=0.01",
-    'payloads=[{point="end2", mass=0.2, inertia=[1e-4, 1e-4, 2e-4], offset=[0.0, 0.01, 0.0]}]',
+    'payloads=[{point="end2", mass=0.2, inertia=[1.2e-4, 1.2e-4, 2e-4], offset=[0.0, 0.01, 0.0]}]',
     'loads=[{point="end1", force=[0.0, 1.0, 2.0], factor=[{shape="step", start=0.004, value=1.0}]}]',
     f'joints.0.drive={{type="pd", {POLYNOMIAL}, proportional_gain=200.0, derivative_gain=10.0}}',
     "joints.0.initial={position_deg=-2.0, rate=0.5}",

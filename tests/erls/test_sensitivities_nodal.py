@@ -12,6 +12,7 @@ from typing import Any
 import complex_nodal_runs
 import numpy as np
 import pytest
+from test_sensitivities import DRIVEN, OF_MECHANISM
 
 import erls
 from erls.integrate.choice import integrator, options_of
@@ -25,46 +26,6 @@ ROBOT, L, FOUR_BAR = DATA / "robot" / "two_link.toml", DATA / "l_shape" / "steel
 NODAL = 'simulation.formulation="nodal"'
 COARSE = [NODAL, "simulation.elements_per_member=2"]
 
-POLYNOMIAL = 'motion={shape="polynomial", from_deg=0.0, to_deg=60.0, duration=0.03, degree=7}'
-DRIVEN = [
-    *COARSE,
-    "simulation.duration=0.01",
-    'payloads=[{point="end2", mass=0.2, inertia=[1.2e-4, 1.2e-4, 2e-4], offset=[0.0, 0.01, 0.0]}]',
-    'loads=[{point="end1", force=[0.0, 1.0, 2.0], factor=[{shape="step", start=0.004, value=1.0}]}]',
-    f'joints.0.drive={{type="pd", {POLYNOMIAL}, proportional_gain=200.0, derivative_gain=10.0}}',
-    "joints.0.initial={position_deg=-2.0, rate=0.5}",
-    "joints.0.stiffness=3.0",
-    "joints.0.rest_deg=5.0",
-    "joints.0.damping=0.2",
-    "joints.0.friction={force=0.3, transition_rate=0.3}",
-    "joints.0.motor={rotor_inertia=1e-4, gear_ratio=30.0}",
-    "joints.1.motor={mass=0.3}",
-    f"joints.1.drive.{POLYNOMIAL}",
-]
-OF_MECHANISM = [
-    "gravity.2",
-    "base.position.0",
-    "joints.0.dh.a",
-    "joints.0.dh.alpha_deg",
-    "joints.0.drive.proportional_gain",
-    "joints.0.drive.derivative_gain",
-    "joints.0.drive.motion.to_deg",
-    "joints.0.stiffness",
-    "joints.0.rest_deg",
-    "joints.0.damping",
-    "joints.0.friction.force",
-    "joints.0.friction.transition_rate",
-    "joints.0.motor.rotor_inertia",
-    "joints.0.motor.gear_ratio",
-    "joints.0.initial.position_deg",
-    "joints.0.initial.rate",
-    "joints.1.drive.motion.to_deg",
-    "joints.1.motor.mass",
-    "payloads.0.mass",
-    "payloads.0.offset.1",
-    "payloads.0.inertia.2",
-    "loads.0.force.2",
-]
 EXACT = 1e-8  # what is promised
 NOTHING = 1e-11  # of the motion per size of a parameter: one on which it does not depend
 
@@ -77,7 +38,7 @@ def _run(path: Path, overrides: list[str]) -> ChainRun:
 @pytest.mark.parametrize(("method", "keys"), [("step=2e-3", OF_MECHANISM), ("tolerance=1e-4", OF_MECHANISM[2::7])])
 def test_parameters_of_mechanisms(method: str, keys: list[str]) -> None:
     """Two-link robot, one joint controlled, one prescribed, a load that jumps: a complex step through the scheme."""
-    run = _run(ROBOT, [*DRIVEN, f"simulation.{method}"])
+    run = _run(ROBOT, [*COARSE, *DRIVEN, f"simulation.{method}"])
     given = parameters_of(run.scene, keys)
     found = changes_of(run, differences(run, given))
     n = run.formulation.system.size  # type: ignore[attr-defined]
@@ -143,6 +104,18 @@ LOOP = [
             },
         ),
         (
+            ROBOT,
+            [
+                *COARSE,
+                "simulation.duration=0.02",
+                "simulation.step=1e-3",
+                'joints.0.type="spherical"',
+                'joints.0.drive={type="free"}',
+            ],
+            {"links.upper_arm.model.sections.bar.width": 0.01, "joints.0.dh.a": 0.02},
+            {"end": lambda run: run.position("end2", [0.01, 0.02])},
+        ),
+        (
             FOUR_BAR / "flexible.toml",
             LOOP,
             {"links.coupler.model.sections.bar.width": 0.003, "joints.1.dh.a": 0.02, "gravity.2": 9.81},
@@ -152,7 +125,7 @@ LOOP = [
             },
         ),
     ],
-    ids=["chain", "loop"],
+    ids=["chain", "spherical", "loop"],
 )
 def test_differences_of_tightened_runs(
     path: Path, overrides: list[str], keys: dict[str, float], outputs: dict[str, Callable[[ChainRun], Any]]

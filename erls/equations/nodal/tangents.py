@@ -14,9 +14,9 @@ from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.contract import (
     BEAMS_APART,
     TANGENTS,
+    call_actuator_tangents,
     call_beam_tangents,
     call_blocks,
-    call_actuator_tangents,
     read_layout,
 )
 from erls.maths.calls import address_for
