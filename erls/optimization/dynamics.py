@@ -48,8 +48,6 @@ class Dynamics:
 
     Attributes
     ----------
-    analyses : int
-        Designs that were run, those from memory included; runs for derivatives apart.
     run_s, gradient_s : float
         Time that runs and derivatives took [s].
     gradient : str
@@ -63,7 +61,7 @@ class Dynamics:
     ) -> None:
         self.problem, self._memory, self._tell = problem, memory, tell
         self.designs, self.numbers = Designs(problem, tell), LinkNumbers(problem)
-        self.analyses, self.run_s, self.gradient_s, self.gradient = 0, 0.0, 0.0, ""
+        self.run_s, self.gradient_s, self.gradient = 0.0, 0.0, ""
         record = problem.record
         samples = [problem.times(c) if times is None else times for c in record.constraints]
         self.times = np.unique(np.concatenate([*samples, [0.0]]))
@@ -85,7 +83,7 @@ class Dynamics:
 
     def fresh(self) -> None:
         """Count from nothing."""
-        self.analyses, self.run_s, self.gradient_s = 0, 0.0, 0.0
+        self.run_s, self.gradient_s = 0.0, 0.0
 
     def place(self, mechanism: Mechanism) -> Place:
         """Of a mechanism; of all designs the same unless variables move nodes."""
@@ -122,7 +120,6 @@ class Dynamics:
 
     def analysed(self, x: Array) -> tuple[Evaluation, Motion]:
         """A design by its run, and that."""
-        self.analyses += 1
         count = len(self.problem.record.constraints)
         poses = self._memory.get(x, "poses")
         kept = [c for k in range(count) if (c := self._memory.get(x, f"components{k}")) is not None]

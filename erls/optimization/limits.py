@@ -2,7 +2,7 @@
 
 Rules for a new constraint: one record in `erls.optimization.records`, one class here, one line in `limit_of`. ``exact``
 tells components (n, q) of a motion, ``increments`` what small displacements of its nodes add to them, of many
-directions at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, ``of_run`` asks
+directions at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, it asks
 the run, and equivalent static loads cannot treat it; with ``of_sections`` components depend on sections at the same
 motion, too.
 """
