@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_import.elements.attachments import AttachedMass, Attachment, nodes_of, renumbered
+from fe_import.elements.attachments import Attachment, nodes_of, renumbered
 from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.elements.solid_mesh import ElementBlock, SolidMesh
 from fe_import.errors import Cause, FEImportError
@@ -72,9 +72,10 @@ def read_mesh(path: Path, ignore: Sequence[str] = ()) -> SolidMesh:
     dense[used] = np.arange(len(used))
     element_sets, node_sets, lost = _sets(raw, solids, dense)
     blocks = _joined(raw, solids, dense)
-    further, attachments = _attachments(raw, left_out, dense, str(path))
+    further, attachments = _attachments(raw, left_out, dense)
+    names = _further_names(raw, further)
     mesh = SolidMesh(
-        points[used], blocks, element_sets, node_sets, str(path), lost, left_out, points[further], attachments,
+        points[used], blocks, element_sets, node_sets, str(path), lost, left_out, points[further], names, attachments,
         raw.materials,
     )  # fmt: skip
     if raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
@@ -125,23 +126,21 @@ def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]
 
 
 def _attachments(
-    raw: RawMesh, left_out: dict[str, int], dense: IntArray, where: str
+    raw: RawMesh, left_out: dict[str, int], dense: IntArray
 ) -> tuple[IntArray, tuple[Attachment, ...]]:
     """Points of no element that attachments need, and these: elements' nodes, then from -1 backwards the others."""
     chosen = [item for item in raw.attachments if item.keyword not in left_out]
     further = sorted({node for item in chosen for node in nodes_of(item) if dense[node] < 0})
     number = {node: k - len(further) for k, node in enumerate(further)}
-    joined = {node for item in chosen if not isinstance(item, AttachedMass) for node in nodes_of(item)}
-    for item in chosen:
-        if isinstance(item, AttachedMass) and item.node in number and item.node not in joined:
-            raise FEImportError(
-                Cause.DISCONNECTED,
-                f"{item.keyword} on a node that nothing joins to the solid, at {raw.points[item.node].tolist()}",
-                where=where,
-                remedy=f'join it (*RIGID BODY, RBE2 ...), or ignore = ["{item.keyword}"] in [solid]',
-            )
     items = tuple(renumbered(i, lambda node: number[node] if node in number else int(dense[node])) for i in chosen)
     return np.array(further, dtype=np.int64), items
+
+
+def _further_names(raw: RawMesh, further: IntArray) -> dict[str, int]:
+    """Sets of one point that is none of an element."""
+    place = {int(node): k - len(further) for k, node in enumerate(further)}
+    found = {name: np.unique(np.asarray(points)) for name, points in raw.point_sets.items() if np.size(points)}
+    return {name: place[int(own[0])] for name, own in found.items() if len(own) == 1 and int(own[0]) in place}
 
 
 def _joined(raw: RawMesh, solids: list[int], dense: IntArray) -> tuple[ElementBlock, ...]:
