@@ -76,13 +76,16 @@ def test_example_scene_and_link_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "data").rglob("*.toml")), ids=lambda p: p.name)
 def test_shipped_files_have_a_header_and_are_valid(path: Path) -> None:
-    """Each link and scene says what it shows, and loads."""
+    """Each link, scene and problem says what it shows, and loads."""
     from erls import load_scene
+    from erls.optimization.problem import load_problem
     from fe_import import load_link
 
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# ")
     if "[simulation]" in text:
         load_scene(path)
+    elif "[[variables]]" in text:
+        load_problem(path)
     else:
         load_link(path)
