@@ -48,9 +48,9 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-for command in (reduce, export, simulate, info, view, compare, effects, linearize, optimize, invert, identify):
-    app.command(command)
-for command in (new, schema):
+_RUN = (reduce, export, simulate, info, view, compare, effects, linearize, optimize, invert, identify)
+_BEGIN = (new, schema)
+for command in (*_RUN, *_BEGIN):
     app.command(command)
 app.command(import_, name="import")
 for group in (study, examples):
