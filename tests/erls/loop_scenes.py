@@ -109,7 +109,7 @@ def run(folder: Path, data: dict[str, Any], name: str = "erls", **simulation: An
     settings = {**data["simulation"], **FORMULATIONS.get(name, {"formulation": name}), **simulation}
     if simulation.get("integrator", "generalized_alpha") != "generalized_alpha" and "step" not in simulation:
         settings["step"] = 0.1
-    return simulate(scenes.write_toml(folder / "loop.toml", {**data, "simulation": settings}))
+    return simulate(scenes.write_toml(folder / "loop.toml", {**data, "simulation": settings}), verdict=False)
 
 
 def chain(folder: Path, data: dict[str, Any], name: str = "erls") -> ClosedChain:

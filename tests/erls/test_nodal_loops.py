@@ -210,7 +210,7 @@ def test_flexible_four_bar_from_static_equilibrium() -> None:
     changes = ["simulation.duration=0.03", "simulation.step=5e-4", *undamped]
 
     def run(name: str, *more: str) -> ChainRun:
-        return simulate(load_scene(pages, [*changes, f"simulation.formulation={name}", *more]))
+        return simulate(load_scene(pages, [*changes, f"simulation.formulation={name}", *more]), verdict=False)
 
     straight = run("nodal", "initial.deformation=zero", "simulation.duration=5e-4").position("coupler_middle", 0.0)
     nodal, erls = run("nodal"), run("erls")
@@ -234,7 +234,7 @@ def test_flexible_tree(tmp_path: Path) -> None:
     runs = []
     for name in ("nodal", "erls"):
         path = two_arms(tmp_path, simulation={"duration": 0.03, "step": 5e-4, "formulation": name, "effects": ["all"]})
-        runs.append(simulate(load_scene(path)))
+        runs.append(simulate(load_scene(path), verdict=False))
     t = np.linspace(0.0, 0.03, 16)
     for point in ("left", "right"):
         moved = np.abs(runs[0].position(point, t) - runs[0].position(point, 0.0)).max()

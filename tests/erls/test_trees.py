@@ -126,7 +126,7 @@ def test_formulations_agree_on_shipped_trees(path: str, point: str, limit: float
     found = {}
     for formulation in ("erls", "ffr", "nodal"):
         scene = erls.load_scene(scenes.ROOT / "data" / path, [*changes, f"simulation.formulation={formulation}"])
-        run = erls.simulate(scene)
+        run = erls.simulate(scene, verdict=False)
         assert run.failure is None
         found[formulation] = run.position(point, t)
     for other in ("ffr", "nodal"):

@@ -32,6 +32,6 @@ BUDGETS = [
 @pytest.mark.parametrize(("scene", "overrides", "most"), BUDGETS)
 def test_work(scene: str, overrides: list[str], most: tuple[int, int, int]) -> None:
     """Right-hand sides, iterations and factorizations."""
-    work = erls.simulate(erls.load_scene(scenes.ROOT / "data" / scene, overrides)).solution.work
+    work = erls.simulate(erls.load_scene(scenes.ROOT / "data" / scene, overrides), verdict=False).solution.work
     found = (work.rhs_calls, work.newton_iterations, work.factorizations)
     assert all(0 < have <= allowed for have, allowed in zip(found, most, strict=True)), found
