@@ -66,5 +66,5 @@ class LinkView:
         turns = sections[..., :3, :3] @ np.swapaxes(self._axes, 1, 2)
         back = np.swapaxes(turn, -2, -1)[..., None, :, :]
         turned = self._reach * rotations.log(back @ turns[..., model.rotation_nodes, :, :])
-        shape = np.concatenate([moved, turned], axis=-2)
-        return LinkState(frame, nodes, turns, shape.reshape(*shape.shape[:-2], -1) @ self._nearest.T)
+        shape = np.concatenate([moved, turned], axis=-2).reshape(*frame.shape[:-2], self._nearest.shape[1])
+        return LinkState(frame, nodes, turns, shape @ self._nearest.T)
