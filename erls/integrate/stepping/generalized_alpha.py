@@ -266,7 +266,7 @@ def advance(
     has no columns. Iterations have converged when the remaining error, rate/(1 − rate) |Δ|, is estimated within
     tolerance, with the rate of earlier steps at first (E. Hairer & G. Wanner, Solving ODEs II, sec. IV.8), which counts
     for less the older it gets; or when the residual is small against its terms. Where rounding is what the tolerance
-    allows, one more iteration brings the error to the last digit: what is left has a sign, and adds up over small steps.
+    allows, one more iteration brings the error to the last digit: what is left has a sign, and adds up over many steps.
     """
     use, progress = read_settings(own, places, places[0]), read_course(own, places, places[1])
     memory, rates, counts = read_memory(own, places, places[2]), progress.rates, progress.counts
