@@ -23,7 +23,9 @@ import numpy as np
 
 from erls.equations.consistency import consistent_acceleration, consistent_start, refuse_redundant
 from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
+from erls.equations.dead_points import dead_point
 from erls.equations.system import metre_scales
+from erls.errors import Cause, SimulationError
 from erls.integrate.alpha_rules import Rules, Words
 from erls.integrate.alpha_steps import Steps, adaptive_steps, equal_steps, rough_steps
 from erls.integrate.alpha_to_tolerance import to_tolerance
@@ -102,7 +104,10 @@ def _run(
                 steps.begin(place, rate, np.concatenate([start.a, start.multipliers]))
             if leg.end > leg.start:
                 before = recorder.steps
-                advance(steps, leg)
+                try:
+                    advance(steps, leg)
+                except SimulationError as problem:
+                    raise _why(problem, system, recorder.time or leg.start, steps) from None
                 if options.project_velocity:
                     recorder.work.factorizations += recorder.steps - before
             place, rate = steps.end()
@@ -110,6 +115,13 @@ def _run(
     found = run_to_end(system, times, recorder, go, lambda: recorder.add(times[0], given))
     assert isinstance(found, ConstrainedSolution)
     return found
+
+
+def _why(problem: SimulationError, system: ConstrainedSystem, t: float, steps: Steps) -> SimulationError:
+    """What ended the steps: a dead point, where that is why they fail."""
+    if problem.cause not in (Cause.NEWTON_FAILED, Cause.STEP_TOO_SMALL):
+        return problem
+    return dead_point(system, t, steps.end()[0]) or problem
 
 
 def steps_of(system: ConstrainedSystem, options: ConstrainedOptions, recorder: Recorder, kept: int) -> Steps:

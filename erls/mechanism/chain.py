@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from erls.maths import motion_maps as motions
 from erls.maths.rotation_maps import exp, tangent, tangent_derivative
-from erls.maths.se3 import pose, twist_cross, twist_transform
+from erls.maths.se3 import twist_cross, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.contacts import PointContact
 from erls.mechanism.effects import ALL
@@ -165,15 +166,23 @@ class Kinematics:
 
 
 def joint_poses(mechanism: Mechanism, theta: Array) -> list[Array]:
-    """(4, 4) each: what the joints move; the first of the three motions of a rotation vector turns for all."""
-    result = [joint.freedom.pose(coordinate) for joint, coordinate in zip(mechanism.joints, theta, strict=True)]
+    """(..., 4, 4) each: what the joints move; the first of the three motions of a rotation vector turns for all.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    theta : (..., n) array
+    """
+    theta = np.asarray(theta)
+    result = [joint.freedom.poses(theta[..., k]) for k, joint in enumerate(mechanism.joints)]
     for k in mechanism.rotation_vectors:
-        result[k] = pose(exp(np.asarray(theta[k : k + 3])))
+        turns = exp(theta[..., k : k + 3])
+        result[k] = motions.poses(turns, np.zeros(turns.shape[:-1]))
     return result
 
 
 def poses(mechanism: Mechanism, theta: Array) -> list[Array]:
-    """World poses of the link frames, (4, 4) each."""
+    """World poses of the link frames, (..., 4, 4) each, at coordinates (..., n)."""
     result: list[Array] = []
     for joint, moved in zip(mechanism.joints, joint_poses(mechanism, theta), strict=True):
         step = joint.before @ moved @ joint.after

@@ -83,9 +83,9 @@ class Freedom:
         return result
 
     def poses(self, coordinates: Array) -> Array:
-        """(k, 4, 4) poses at (k,) coordinates."""
+        """(..., 4, 4) poses at (...) coordinates."""
         factors = np.stack([np.ones_like(coordinates), np.cos(coordinates), np.sin(coordinates), coordinates])
-        return np.asarray(np.einsum("pk,pij->kij", factors, self.parts()))
+        return np.asarray(np.einsum("p...,pij->...ij", factors, self.parts()))
 
     def pose(self, coordinate: float) -> Array:
         """(4, 4) pose at a coordinate."""

@@ -58,6 +58,12 @@ class ChainFigure(Figure):
         mechanism = self.run.formulation.mechanism
         return [ChainPose(state.time, mechanism, state) for state in self.run.states(list(times))]
 
+    def paths(self, times: Array, magnification: float) -> list[Array]:
+        """All times at once."""
+        mechanism, states = self.run.formulation.mechanism, self.run.series(times)
+        places = [node_positions(mechanism, states, p.link, [p.node], magnification) for p in mechanism.points]
+        return [place[:, 0] for place in places]
+
 
 @dataclass(frozen=True)
 class ChainPose(Pose):

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from erls.maths.so3 import Array
 from erls.run.record import Run
 
@@ -112,3 +114,8 @@ class Figure(ABC):
     @abstractmethod
     def poses(self, times: Sequence[float] | Array) -> Sequence[Pose]:
         """The mechanism at each time."""
+
+    def paths(self, times: Array, magnification: float) -> list[Array]:
+        """(k, 3) places of each named point at times (k,)."""
+        points = [pose.points(magnification) for pose in self.poses(times)]
+        return [np.array(path) for path in zip(*points, strict=True)]

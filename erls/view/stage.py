@@ -51,10 +51,9 @@ class Motion:
         None where the mechanism has no finite size.
         """
         times = figure.run.spread(_PATH_SAMPLES)
-        poses = figure.poses(times)
-        paths = [np.array(path) for path in zip(*(p.points(magnification) for p in poses), strict=True)]
-        every = max(len(poses) // _BOX_SAMPLES, 1)
-        seen = poses[::every] if shown is None else shown
+        paths = figure.paths(times, magnification)
+        every = max(len(times) // _BOX_SAMPLES, 1)
+        seen = figure.poses(times[::every]) if shown is None else shown
         unit = 0.01 * figure.size
         extent, largest = list(figure.fixed()), 0.0
         for p in seen:

@@ -22,21 +22,23 @@ def simulated(path: Path, *changes: str, verdict: bool = False) -> ChainRun:
     return run
 
 
-def falling(folder: Path, restitution: float, position: float, rate: float, gravity: float, **more: Any) -> Path:
+def ball(restitution: float, position: float, rate: float, gravity: float, **more: Any) -> dict[str, Any]:
     """A body that moves along z above the ground."""
     start = {"position": position, "rate": rate}
     law = {"stiffness": STIFFNESS, "restitution": restitution}
-    return scenes.write_toml(
-        folder / "ball.toml",
-        {
-            "gravity": [0.0, 0.0, -gravity],
-            "simulation": {"duration": 1.0},
-            "joints": [{"name": "fall", "type": "prismatic", "dh": {"convention": "standard"}, "initial": start}],
-            "links": [{"name": "ball", "rigid": BALL}],
-            "points": [{"name": "centre", "link": "ball", "node": "centre"}],
-            "contacts": [{"name": "floor", "point": "centre", "plane": {"normal": [0.0, 0.0, 2.0]}, **law, **more}],
-        },
-    )
+    return {
+        "gravity": [0.0, 0.0, -gravity],
+        "simulation": {"duration": 1.0},
+        "joints": [{"name": "fall", "type": "prismatic", "dh": {"convention": "standard"}, "initial": start}],
+        "links": [{"name": "ball", "rigid": BALL}],
+        "points": [{"name": "centre", "link": "ball", "node": "centre"}],
+        "contacts": [{"name": "floor", "point": "centre", "plane": {"normal": [0.0, 0.0, 2.0]}, **law, **more}],
+    }
+
+
+def falling(folder: Path, restitution: float, position: float, rate: float, gravity: float, **more: Any) -> Path:
+    """A file of it."""
+    return scenes.write_toml(folder / "ball.toml", ball(restitution, position, rate, gravity, **more))
 
 
 def two_bodies(folder: Path, **more: Any) -> Path:
@@ -58,26 +60,27 @@ def two_bodies(folder: Path, **more: Any) -> Path:
     )
 
 
-def pendulum(folder: Path, **more: Any) -> Path:
+def arm(**more: Any) -> dict[str, Any]:
     """A rigid arm of 1 m that turns about z at 1 rad/s; ``joint`` has more fields of its joint."""
-    arm = {"mass": 1.0, "centre_of_mass": [0.5, 0.0, 0.0], "inertia": [0.01, 0.1, 0.1]}
+    body = {"mass": 1.0, "centre_of_mass": [0.5, 0.0, 0.0], "inertia": [0.01, 0.1, 0.1]}
     joint = {"name": "hinge", "dh": {"convention": "standard"}, "initial": {"rate": 1.0}}
-    return scenes.write_toml(
-        folder / "pendulum.toml",
-        {
-            "gravity": [0.0, 0.0, 0.0],
-            "simulation": {"duration": 0.6},
-            "links": [{"name": "arm", "rigid": {**arm, "points": {"root": [0, 0, 0], "tip": [1.0, 0.0, 0.0]}}}],
-            "points": [{"name": "tip", "link": "arm", "node": "tip"}],
-            "joints": [{**joint, **more.pop("joint", {})}],
-            **more,
-        },
-    )
+    return {
+        "gravity": [0.0, 0.0, 0.0],
+        "simulation": {"duration": 0.6},
+        "links": [{"name": "arm", "rigid": {**body, "points": {"root": [0, 0, 0], "tip": [1.0, 0.0, 0.0]}}}],
+        "points": [{"name": "tip", "link": "arm", "node": "tip"}],
+        "joints": [{**joint, **more.pop("joint", {})}],
+        **more,
+    }
 
 
-def flexible(folder: Path, **changes: Any) -> Path:
-    """A flexible arm that falls about a hinge, its tip onto a plane."""
-    scenes.arm_link(folder)
+def pendulum(folder: Path, **more: Any) -> Path:
+    """A file of it."""
+    return scenes.write_toml(folder / "pendulum.toml", arm(**more))
+
+
+def falling_arm(**changes: Any) -> dict[str, Any]:
+    """A flexible arm that falls about a hinge, its tip onto a plane; its link is `scenes.ARM_LINK`."""
     contact = {"name": "floor", "point": "tip", "plane": {"normal": [0.0, 0.0, 1.0], "position": [0.0, 0.0, 0.05]}}
     data = {
         "simulation": {"duration": 0.12},
@@ -87,4 +90,10 @@ def flexible(folder: Path, **changes: Any) -> Path:
         "points": [{"name": "tip", "link": "a", "node": "tip"}],
         "contacts": [{**contact, "stiffness": 2e3, "restitution": 0.8, "exponent": 1.0}],
     }
-    return scenes.write_toml(folder / "scene.toml", scenes.merged(data, changes))
+    return scenes.merged(data, changes)
+
+
+def flexible(folder: Path, **changes: Any) -> Path:
+    """A file of it, beside its link."""
+    scenes.arm_link(folder)
+    return scenes.write_toml(folder / "scene.toml", falling_arm(**changes))

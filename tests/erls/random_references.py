@@ -132,8 +132,9 @@ class Judge:
 
     def places(self, run: ChainRun, end: float) -> Array:
         """(times, points, 3) up to a time that the run covers [m]."""
-        times = np.linspace(0.0, end, _TIMES)
-        return np.stack([run.position(name, times) for name in self.names], axis=1)
+        states = run.series(np.linspace(0.0, end, _TIMES))
+        points = [run.point_position(states, run.point_names.index(name)) for name in self.names]
+        return np.stack(points, axis=1)
 
     def reference(self, name: str, scene: RandomScene, end: float) -> Array | None:
         """Places of a better run, None where it failed."""

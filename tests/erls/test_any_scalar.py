@@ -104,19 +104,20 @@ def test_complex_steps_through_addresses(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("cases", "name"), CASES, ids=[name for _, name in CASES])
 def test_complex_steps_agree_with_differences(cases: Any, name: str, tmp_path: Path) -> None:
+    """Of the source in Python, in a tenth of the time that compilation takes: `test_dense_chain` has compiled ones."""
     chain: Any = cases.equations(tmp_path, name)
     warm = chain_cases.warm(chain.mechanism)
     chain = Ffr(warm, ffr_cases.body_frame(name)) if isinstance(chain, Ffr) else Erls(warm)
     system = chain.compiled if isinstance(chain, Ffr) else pack_chain(chain.mechanism)
-    residual = any_scalar(system.residual)
+    residual = plain(system.residual)
     at = (chain_cases if isinstance(chain, Ffr) else cases).states(chain, name)[0]
     arguments = [at.y, at.v, at.a]
     base = _real(system, at.t, arguments, system.reals)
-    plain = np.zeros(system.size, dtype=complex)
+    unmoved = np.zeros(system.size, dtype=complex)
     complexes = [x.astype(complex) for x in arguments]
     whole = system.reals.astype(complex)
-    residual(whole, system.integers, system.scratch.astype(complex), at.t, *complexes, plain)
-    np.testing.assert_allclose(plain.real, base, rtol=1e-9, atol=1e-11 * np.abs(base).max())
+    residual(whole, system.integers, system.scratch.astype(complex), at.t, *complexes, unmoved)
+    np.testing.assert_allclose(unmoved.real, base, rtol=1e-9, atol=1e-11 * np.abs(base).max())
     for number, values in enumerate(arguments):
         for place in range(len(values)):
             size = 1e-5 * max(1e-3, abs(values[place]))

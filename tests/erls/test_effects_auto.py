@@ -109,12 +109,14 @@ def test_certified_errors_hold_on_random_chains(tmp_path: Path, seed: int) -> No
     """What auto leaves out, and one effect that is not small; benchmarks/effects_certified.py does many."""
     path = random_chain(tmp_path, seed)
     changes = ["simulation.duration=0.2"]
-    reference = erls.simulate(load_scene(path, changes))
+    reference = erls.simulate(load_scene(path, changes), verdict=False)
     mechanism = reference.formulation.mechanism
-    run = erls.simulate(load_scene(path, [*changes, "effects=auto", "simulation.effects_tolerance=2e-3"]))
+    run = erls.simulate(
+        load_scene(path, [*changes, "effects=auto", "simulation.effects_tolerance=2e-3"]), verdict=False
+    )
     assert run.certificate is not None
     assert _distance(run, reference) <= max(WITHIN * run.certificate.error, 1e-8)
-    less = erls.simulate(load_scene(path, [*changes, "effects=-centrifugal_load"]))
+    less = erls.simulate(load_scene(path, [*changes, "effects=-centrifugal_load"]), verdict=False)
     actual, certified = _distance(less, reference), certify(less, mechanism).error
     assert actual / WITHIN <= certified <= actual * WITHIN or max(actual, certified) < 1e-7
 
@@ -200,7 +202,7 @@ def test_one_stiff_link_becomes_rigid(tmp_path: Path, formulation: str) -> None:
     run, told = _auto(path)
     assert [link.elastic_modes for link in run.formulation.mechanism.links] == [0, 7]
     assert any("flexibility of 'thick'" in text for text in told)
-    reference = erls.simulate(load_scene(path))
+    reference = erls.simulate(load_scene(path), verdict=False)
     assert reference.formulation.size == run.formulation.size + 7
     assert run.certificate is not None
     assert run.certificate.ok
@@ -251,7 +253,7 @@ def test_a_run_that_fails_is_repeated_with_all(pendulum: Path, monkeypatch: pyte
         def integrate(scene: Scene, mechanism: Mechanism) -> ChainRun:
             if mechanism.effects != whole.effects:
                 raise SimulationError(cause, "as the test wants")
-            return erls.simulate(replace(scene))
+            return erls.simulate(replace(scene), verdict=False)
 
         return integrate
 

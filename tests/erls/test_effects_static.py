@@ -161,9 +161,9 @@ def test_drive_forces_of_a_vibrating_link(led: Path) -> None:
     found, _ = needed(scene.record.simulation, formulation)
     assert found.forced is not None
     estimated = vibrating_efforts(scene, formulation, found.forced)
-    still = erls.simulate(load_scene(led, ["simulation.duration=2.0", "simulation.step=2e-4"]))
+    still = erls.simulate(load_scene(led, ["simulation.duration=2.0", "simulation.step=2e-4"]), verdict=False)
     times = np.linspace(0.01, 2.0, 800)
-    efforts = [run.joint_effort("shoulder", times) for run in (erls.simulate(scene), still)]
+    efforts = [run.joint_effort("shoulder", times) for run in (erls.simulate(scene, verdict=False), still)]
     actual = np.abs(efforts[0] - efforts[1]).max() / np.abs(efforts[1]).max()
     assert estimated is not None
     assert actual <= 1.1 * estimated  # what starts undeformed swings about it, to 1 % of second order in deflection
@@ -184,14 +184,14 @@ def _distance(run: ChainRun, reference: ChainRun) -> float:
 def test_static_links_take_no_steps(led: Path, tmp_path: Path, formulation: str) -> None:
     """Nothing is integrated; what the run says holds against all effects, and in the file."""
     changes = [f"simulation.formulation={formulation}"]
-    run = erls.simulate(load_scene(led, ["effects=auto", *changes]))
+    run = erls.simulate(load_scene(led, ["effects=auto", *changes]), verdict=False)
     assert isinstance(run.formulation, QuasiStatic)
     assert run.formulation.size == 0
     assert run.solution.work.steps <= 2  # one between breakpoints
     assert run.certificate is not None
     assert run.certificate.ok
     assert not run.warnings
-    reference = erls.simulate(load_scene(led, changes))
+    reference = erls.simulate(load_scene(led, changes), verdict=False)
     assert reference.solution.work.steps >= 60_000
     assert _distance(run, reference) <= max(WITHIN * run.certificate.error, 1e-8)
     times = np.linspace(0.5, 29.5, 60)
@@ -215,7 +215,10 @@ def test_certified_errors_of_static_links_hold_on_random_chains(tmp_path: Path, 
     assert found.forced is not None
     cut = static_cut(scene, formulation, found.forced)
     assert cut is not None
-    reference, run = erls.simulate(scene), erls.simulate(named(scene, whole, Choice((cut,))))
+    reference, run = (
+        erls.simulate(scene, verdict=False),
+        erls.simulate(named(scene, whole, Choice((cut,))), verdict=False),
+    )
     actual, certified = _distance(run, reference), certify(run, whole).error
     assert 1e-7 < actual <= WITHIN * certified
     assert actual <= WITHIN * cut.error
@@ -226,7 +229,7 @@ def test_a_wrong_choice_of_static_links_is_noticed(led: Path, monkeypatch: pytes
     changes = ["joints.shoulder.drive.motion.duration=0.4", "simulation.duration=0.6", "effects=auto"]
     misjudged = Choice((Cut(bandwidth=3.0, error=1e-7),))
     monkeypatch.setattr(automatic_module, "choose_effects", lambda scene, mechanism: misjudged)
-    run = erls.simulate(load_scene(led, changes))
+    run = erls.simulate(load_scene(led, changes), verdict=False)
     assert run.certificate is not None
     assert not run.certificate.ok
     assert any("use --strict" in w for w in run.warnings)
@@ -245,7 +248,7 @@ def test_a_static_run_that_fails_is_repeated(led: Path, monkeypatch: pytest.Monk
     def integrate(scene: Any, mechanism: Any) -> ChainRun:
         if mechanism.bandwidth is not None:
             raise SimulationError(Cause.NO_EQUILIBRIUM, "as the test wants")
-        return erls.simulate(replace(scene))
+        return erls.simulate(replace(scene), verdict=False)
 
     automatic(scene, build_mechanism(scene).mechanism, integrate, told.append, False)
     assert any("failed without vibrations of links" in text for text in told)
@@ -254,6 +257,6 @@ def test_a_static_run_that_fails_is_repeated(led: Path, monkeypatch: pytest.Monk
 def test_the_end_of_a_static_run_is_its_own(led: Path) -> None:
     """A motion that ends with the run: loads that would jump there do not move its last instant."""
     changes = ["simulation.duration=15.0", "simulation.bandwidth=3.0", "joints.shoulder.drive.motion.degree=3"]
-    run = erls.simulate(load_scene(led, changes))
+    run = erls.simulate(load_scene(led, changes), verdict=False)
     ends = run.position("tip", [15.0 - 1e-6, 15.0])
     assert np.abs(ends[1] - ends[0]).max() < 1e-8

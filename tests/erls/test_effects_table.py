@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 import scenes
@@ -12,6 +13,7 @@ from effect_scenes import random_chain
 
 from erls.auto import sizes as sizes_module
 from erls.auto.sizes import FAILS, UNSTABLE
+from erls.auto.survey import survey
 from erls.cli.main import main
 from erls.errors import Cause, SimulationError
 from erls.mechanism.effects import EFFECTS
@@ -25,10 +27,17 @@ def _arguments(path: Path, *changes: str) -> list[str]:
 
 
 def _table(capsys: pytest.CaptureFixture[str], path: Path, *changes: str) -> tuple[dict[str, Any], dict[str, Any], str]:
-    """The JSON, its rows by name, and the text."""
-    assert main([*_arguments(path, *changes), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert main(_arguments(path, *changes)) == 0
+    """The JSON, its rows by name, and the text, of one survey: both commands would make the same."""
+    made: list[Any] = []
+
+    def once(*given: Any) -> Any:
+        made.extend([] if made else [survey(*given)])
+        return made[0]
+
+    with mock.patch("erls.auto.survey.survey", once):
+        assert main([*_arguments(path, *changes), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert main(_arguments(path, *changes)) == 0
     return found, {row["name"]: row for row in found["effects"] if not row["link"]}, capsys.readouterr().out
 
 

@@ -22,7 +22,7 @@ PIECES = {n: (f"links.rod.substructures={n}", "simulation.effects=linear") for n
 
 @cache
 def run(*overrides: str) -> ChainRun:
-    return erls.simulate(erls.load_scene(SCENE, overrides))
+    return erls.simulate(erls.load_scene(SCENE, overrides), verdict=False)
 
 
 def errors(pin: Array, middle: Array, slider: Array) -> tuple[Array, Array]:

@@ -47,7 +47,7 @@ def _distance(run: ChainRun, point: str, table: dict[str, Array], prefix: str) -
 )
 def test_against_nonlinear_beam(scene: str, table: str, point: str, prefix: str, limit: float) -> None:
     """By the defaults; converged linear links stay within 3.2e-5, 1.5e-4, 3.9e-4 and 3.0e-4 m."""
-    run = erls.simulate(erls.load_scene(DATA / f"{scene}.toml", ["simulation.formulation=ffr"]))
+    run = erls.simulate(erls.load_scene(DATA / f"{scene}.toml", ["simulation.formulation=ffr"]), verdict=False)
     assert run.end >= 1.5
     assert _distance(run, point, _table(f"{table}_nonlinear_beam"), prefix) <= limit
 
@@ -56,7 +56,7 @@ def test_against_an_independent_prototype(tmp_path: Path) -> None:
     """Tip of the L with 12 elastic modes over 0.3 s; 2e-6: 1e-6 of the prototype and 1e-6 of the step."""
     scenes.l_link(tmp_path, 2, frame=EULER, reduction={"fixed_interface_modes": 18, "elastic_modes": 12})
     simulation = {"duration": 0.3, "step": 1e-4, "spectral_radius": 1.0, "formulation": "ffr", "effects": "linear"}
-    run = erls.simulate(scenes.l_scene(tmp_path, simulation=simulation))
+    run = erls.simulate(scenes.l_scene(tmp_path, simulation=simulation), verdict=False)
     assert _distance(run, "tip", _table("l_shape_modal_ffr"), "tip") <= 2e-6
 
 
@@ -84,7 +84,7 @@ def test_two_links_swing_as_in_erls(tmp_path: Path) -> None:
     """End of two free aluminium links over 0.3 s: within 3e-5 m (9e-6 with an explicit reference integrator)."""
     times = np.linspace(0, 0.3, 151)
     ends = [
-        erls.simulate(_two_links(tmp_path, 1.0, simulation={"formulation": name})).position("end", times)
+        erls.simulate(_two_links(tmp_path, 1.0, simulation={"formulation": name}), verdict=False).position("end", times)
         for name in ("erls", "ffr")
     ]
     assert np.linalg.norm(np.ptp(ends[0], axis=0)) > 0.3
@@ -93,7 +93,7 @@ def test_two_links_swing_as_in_erls(tmp_path: Path) -> None:
 
 def _held(scene: Path, point: str, joints: list[str]) -> Array:
     """(3,) world position of a point in static equilibrium with the joints held."""
-    run = erls.simulate(erls.load_scene(scene, [f"joints.{name}.drive={HELD}" for name in joints]))
+    run = erls.simulate(erls.load_scene(scene, [f"joints.{name}.drive={HELD}" for name in joints]), verdict=False)
     return run.position(point, 0.0)
 
 
@@ -140,7 +140,9 @@ def test_torques_of_the_robot_are_those_of_erls(body_frame: str) -> None:
     """
     changes = ["initial.deformation=static", "simulation.duration=0.5", "simulation.step=1e-3"]
     ours = ["simulation.formulation=ffr", f"simulation.body_frame={body_frame}"]
-    runs = [erls.simulate(erls.load_scene(DATA / "robot/two_link.toml", [*changes, *c])) for c in ([], ours)]
+    runs = [
+        erls.simulate(erls.load_scene(DATA / "robot/two_link.toml", [*changes, *c]), verdict=False) for c in ([], ours)
+    ]
     times = np.linspace(0, 0.5, 101)
     for joint in runs[0].joint_names:
         expected, found = (run.joint_effort(joint, times) for run in runs)
@@ -188,9 +190,7 @@ def test_free_link_keeps_momentum_and_energy(tmp_path: Path, body_frame: str) ->
 
 @pytest.mark.parametrize("scene", SHIPPED)
 @pytest.mark.parametrize("body_frame", BODY_FRAMES)
-def test_every_shipped_scene_runs(
-    tmp_path: Path, scene: str, body_frame: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_shipped_scene_runs(tmp_path: Path, scene: str, body_frame: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """All scenes of data/, reported, written and read again; few of the curves in files, which have tests of their own.
     """
     monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 5)

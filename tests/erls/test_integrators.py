@@ -199,7 +199,7 @@ def test_failures_at_the_start_leave_one_knot(name: str) -> None:
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_a_motion_without_bound_ends_in_a_failure(name: str) -> None:
     """ÿ = 6 y² from rest at 1 is infinite at t = ∫₁^∞ dy/√(4 (y³ − 1)) = 1.214325..."""
-    given = Options(tolerance=1e-4) if name == "lobatto" else options(name)  # half a million steps, not a million
+    given = Options(tolerance=1e-2) if name == "lobatto" else options(name)  # 2e5 steps, not a million
     found = integrator_named(name)(Law(lambda t, y, v: 6 * y * y), (0, 2), ONE, ZERO, given)
     assert found.failure is not None
     expected = Cause.NEWTON_FAILED if name == "generalized_alpha" else Cause.STEP_TOO_SMALL

@@ -17,6 +17,7 @@ from erls.run.chain.places import point_position
 from erls.scene.build import build_mechanism
 from erls.scene.read import load_scene
 
+AXIAL = 7e10 * 0.02 * 0.01  # N, E A
 STILL = "loads.1.force=[0.0, 0.0, 1e-9]"  # no push from the side
 
 
@@ -30,7 +31,8 @@ def test_cantilever_against_closed_forms(more: tuple[str, ...]) -> None:
     """F L³/(3 E I) and M L²/(2 E I) at the tip; what the clamp gives is in balance.
 
     Second order in a slope of 1e-3 is 1e-6 of them; the equilibrium of nodes is found to as much of the load. Elements
-    of constant strain bend the less under a force by 1/(4 n²): the moment between the ends of each is its mean.
+    of constant strain bend the less under a force by 1/(4 n²): the moment between the ends of each is its mean. Their
+    places are known to rounding, which n elements feel n times, some ten of them at the clamp.
     """
     load, elements = BENDING / 1000, 24
     for what, deflection, moment in (("force", load / (3 * BENDING), load), ("moment", -load / (2 * BENDING), -load)):
@@ -42,7 +44,8 @@ def test_cantilever_against_closed_forms(more: tuple[str, ...]) -> None:
         softer = 1 - (what == "force" and isinstance(equations, Nodal)) / (4 * elements**2)
         assert tip[2] == pytest.approx(deflection * softer, rel=2e-6)
         held = equations.reactions(0.0, y, v)[0]
-        assert held.force == pytest.approx([0.0, 0.0, -load * (what == "force")], abs=2e-6 * load)
+        rounding = 10 * elements * np.finfo(float).eps * AXIAL * isinstance(equations, Nodal)
+        assert held.force == pytest.approx([0.0, 0.0, -load * (what == "force")], abs=2e-6 * load + rounding)
         assert held.moment == pytest.approx([0.0, moment, 0.0], abs=2e-6 * load)
 
 

@@ -277,7 +277,7 @@ def test_formulations_agree_to_second_order(tmp_path: Path) -> None:
             changes.append(f"simulation.formulation={name}")
             changes += ["joints.left_motor.drive.motion.duration=2.0", "loops.right_motor.drive.motion.duration=2.0"]
             changes += [f"links.{link}.flexible=false" for link in NAMES if rigid]
-            runs.append(simulate(load_scene(tmp_path / "robot.toml", changes)).position("hand", t))
+            runs.append(simulate(load_scene(tmp_path / "robot.toml", changes), verdict=False).position("hand", t))
         distances.append(np.abs(runs[0] - runs[1]).max())
         deflections.append(np.abs(runs[0] - runs[2]).max())
     assert 1.9 < deflections[0] / deflections[1] < 2.1

@@ -250,7 +250,7 @@ def test_shipped_flexible_scenes_start(path: str) -> None:
 
     changes = ["simulation.duration=0.01", "simulation.step=1e-3"]
     runs = [
-        simulate(load_scene(scenes.ROOT / "data" / path, [*changes, f"simulation.formulation={name}"]))
+        simulate(load_scene(scenes.ROOT / "data" / path, [*changes, f"simulation.formulation={name}"]), verdict=False)
         for name in ("erls", "ffr")
     ]
     assert runs[0].warnings == runs[1].warnings == ()

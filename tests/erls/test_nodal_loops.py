@@ -15,16 +15,18 @@ from loop_scenes import LENGTHS
 from test_loops_rigid import RATE, one_coordinate, planar
 from test_trees import two_arms
 
+from erls.equations.dead_points import dead_point
 from erls.equations.formulation import Formulation, LoopFormulation
 from erls.equations.nodal.equations import Nodal
 from erls.equations.registry import formulate
-from erls.errors import Cause
+from erls.errors import Cause, SimulationError
 from erls.integrate.base import Solution, Work
 from erls.integrate.nodal_chain import closed
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.without_effects import with_rigid
 from erls.run.chain.run import ChainRun
+from erls.scene.build import build_mechanism
 from erls.scene.read import load_scene
 from erls.scene.settings import Simulation
 from erls.simulation.simulate import simulate
@@ -210,7 +212,7 @@ def test_flexible_four_bar_from_static_equilibrium() -> None:
     changes = ["simulation.duration=0.03", "simulation.step=5e-4", *undamped]
 
     def run(name: str, *more: str) -> ChainRun:
-        return simulate(load_scene(pages, [*changes, f"simulation.formulation={name}", *more]))
+        return simulate(load_scene(pages, [*changes, f"simulation.formulation={name}", *more]), verdict=False)
 
     straight = run("nodal", "initial.deformation=zero", "simulation.duration=5e-4").position("coupler_middle", 0.0)
     nodal, erls = run("nodal"), run("erls")
@@ -234,9 +236,40 @@ def test_flexible_tree(tmp_path: Path) -> None:
     runs = []
     for name in ("nodal", "erls"):
         path = two_arms(tmp_path, simulation={"duration": 0.03, "step": 5e-4, "formulation": name, "effects": ["all"]})
-        runs.append(simulate(load_scene(path)))
+        runs.append(simulate(load_scene(path), verdict=False))
     t = np.linspace(0.0, 0.03, 16)
     for point in ("left", "right"):
         moved = np.abs(runs[0].position(point, t) - runs[0].position(point, 0.0)).max()
         assert moved > 3e-3
         assert np.abs(runs[0].position(point, t) - runs[1].position(point, t)).max() < moved**2 / 0.4
+
+
+@pytest.mark.parametrize("rate", [180.0, -100.0])
+def test_dead_points_are_named_when_they_are_reached(tmp_path: Path, rate: float) -> None:
+    """A four-bar driven by its rocker locks where crank and coupler are in line, by the law of cosines, to 1e-6 s."""
+    first, second, third = LENGTHS
+    path = scenes.write_toml(tmp_path / "rocker.toml", loop_scenes.rocker_first(rate))
+    with pytest.raises(SimulationError, match=r"locks.*'pivot' cannot follow joint 'j0'") as caught:
+        simulate(load_scene(path, ["simulation.formulation=nodal", "simulation.duration=1.0"]), verdict=False)
+    assert caught.value.cause is Cause.LOOP_OPEN
+    reached = caught.value.run
+    assert isinstance(reached, ChainRun)
+    line = first + second if rate > 0 else second - first
+    between = np.degrees(np.arccos((0.5**2 + third**2 - line**2) / (2 * 0.5 * third)))
+    assert reached.end == pytest.approx((between - 80.0) / rate, abs=1e-6)
+    equations = reached.formulation
+    assert isinstance(equations, Nodal)
+    halfway = len(reached.solution.t) // 2
+    q, _ = equations.configuration(reached.solution.y[halfway], reached.solution.v[halfway])
+    assert dead_point(equations.system, float(reached.solution.t[halfway]), q) is None
+
+
+def test_a_change_point_is_no_dead_point(tmp_path: Path) -> None:
+    """A drive turns a parallelogram through the positions in which its links are in line, and is followed."""
+    data = loop_scenes.parallelogram()
+    for given, angle in zip(data["joints"], (0.0, 0.0, -180.0), strict=True):
+        given["initial"] = {"position_deg": angle}
+    path = scenes.write_toml(tmp_path / "line.toml", loop_scenes.driven(data, loop_scenes.steady(0.0, 360.0)))
+    equations = Nodal(build_mechanism(load_scene(path)).mechanism)
+    assert np.abs(equations.system.constraint_rate(0.0, equations.system.start)).max() > 1.0
+    assert dead_point(equations.system, 0.0, equations.system.start) is None

@@ -108,7 +108,8 @@ def test_a_scene_keeps_what_it_asks_for(formulation: str) -> None:
     """At least 201 states; those of steps to the bit."""
     settings = ["simulation.duration=0.02", f"simulation.formulation={formulation}", "simulation.step=2e-5"]
     every, few = (
-        erls.simulate(erls.load_scene(ROBOT, [*settings, *more])) for more in ((), ("simulation.output_step=5e-3",))
+        erls.simulate(erls.load_scene(ROBOT, [*settings, *more]), verdict=False)
+        for more in ((), ("simulation.output_step=5e-3",))
     )
     assert (len(every.solution.t), len(few.solution.t)) == (1001, FEWEST + 1)
     np.testing.assert_array_equal(few.solution.y[:, :12], every.solution.y[::5, :12])
@@ -133,7 +134,8 @@ def test_events_are_found_within_the_steps(integrator: str) -> None:
     for events in ([{**LOW, "stop": True}], [LOW, far]):
         settings = ["simulation.duration=0.3", f"simulation.integrator={integrator}", f"events={scenes.toml(events)}"]
         every, few = (
-            erls.simulate(erls.load_scene(FLAT, [*settings, *more])) for more in ((), ("simulation.output_step=0.5",))
+            erls.simulate(erls.load_scene(FLAT, [*settings, *more]), verdict=False)
+            for more in ((), ("simulation.output_step=0.5",))
         )
         assert every.events
         assert [h.name for h in few.events] == [h.name for h in every.events]
@@ -151,7 +153,7 @@ def test_events_are_found_within_the_steps(integrator: str) -> None:
 def test_energies_and_warnings_are_those_of_the_steps(apart: float) -> None:
     """States at multiples are those of the run that keeps all; the rest says that it is interpolated."""
     every, few = (
-        erls.simulate(erls.load_scene(FLAT, ["simulation.duration=1.0", *more]))
+        erls.simulate(erls.load_scene(FLAT, ["simulation.duration=1.0", *more]), verdict=False)
         for more in ((), (f"simulation.output_step={apart}",))
     )
     times = np.arange(11) / 10
@@ -168,10 +170,10 @@ def test_energies_and_warnings_are_those_of_the_steps(apart: float) -> None:
 def test_what_is_not_resolved_is_told_once() -> None:
     """30 s of the L, of which states every 0.2 s say little: about as much as its tip is really off between them."""
     settings = ["simulation.duration=30", "simulation.output_step=0.2"]
-    few = erls.simulate(erls.load_scene(FLAT, settings))
+    few = erls.simulate(erls.load_scene(FLAT, settings), verdict=False)
     (text,) = few.warnings
     assert text.startswith("simulation.output_step = 0.2 s: between stored states, 0.1 s apart, interpolation is off")
-    every = erls.simulate(erls.load_scene(FLAT, settings[:1]))
+    every = erls.simulate(erls.load_scene(FLAT, settings[:1]), verdict=False)
     between = np.linspace(0, 30, 3001)
     off = np.linalg.norm(few.position("tip", between) - every.position("tip", between), axis=1).max()
     assert 0.1 * off <= output_error(few) <= 10 * off

@@ -50,7 +50,7 @@ def test_section_forces_balance_the_reaction(tmp_path: Path, formulation: str) -
     scenes.l_link(tmp_path, 20, **ENDS)
     link = {"name": "l", "model": "link.toml", "elastic_modes": 6}
     simulation = {"duration": 0.2, "formulation": formulation}
-    run = erls.simulate(scenes.l_scene(tmp_path, simulation=simulation, links=[link]))
+    run = erls.simulate(scenes.l_scene(tmp_path, simulation=simulation, links=[link]), verdict=False)
     t = np.linspace(0.01, 0.2, 41)
     reaction = -in_link_axes(run, 0, "shoulder", t)  # what the link does to the ground
     force, moment = relative(at_node(run, "l", t, "root"), reaction)
@@ -65,7 +65,7 @@ def test_section_forces_balance_the_reaction(tmp_path: Path, formulation: str) -
 def test_a_run_file_recovers_the_same(tmp_path: Path) -> None:
     """Maps travel with the run; scalars and arrays of times agree; the CSV holds the numbers."""
     scenes.l_link(tmp_path, 4, **ENDS)
-    run = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.02}))
+    run = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.02}), verdict=False)
     erls.save_run(tmp_path / "l.run.h5", run)
     again = erls.load_run(tmp_path / "l.run.h5")
     values = erls.section_forces(run, "l", [0.0, 0.01])
@@ -86,7 +86,7 @@ def test_the_outer_joint_loads_the_inner_link(tmp_path: Path) -> None:
     changes: dict[str, Any] = {"frame": {"members": [{**scenes.ARM_LINK["frame"]["members"][0], "elements": 40}]}}
     path = scenes.three_links(tmp_path)
     scenes.arm_link(tmp_path, **changes, **ENDS)
-    run = erls.simulate(erls.load_scene(path, ["simulation.duration=0.1"]))
+    run = erls.simulate(erls.load_scene(path, ["simulation.duration=0.1"]), verdict=False)
     t = np.linspace(0.01, 0.1, 11)
     last = run.formulation.mechanism.links[2].inboard.node
     states = run.states(t)
@@ -138,7 +138,7 @@ def turning(folder: Path, rate: float, gravity: float, payload: dict[str, Any], 
         "payloads": [{"point": "end", **payload}],
         **more,
     }
-    return erls.simulate(scenes.write_toml(folder / "turning.toml", data))
+    return erls.simulate(scenes.write_toml(folder / "turning.toml", data), verdict=False)
 
 
 @pytest.mark.parametrize("given", ["gravity", "load"])
@@ -175,7 +175,7 @@ def test_a_load_at_rest_loads_the_tip(tmp_path: Path, given: dict[str, object]) 
         initial={"deformation": "static"},
         simulation={"duration": 1e-3, "step": 1e-3},
     )
-    run = erls.simulate(path)
+    run = erls.simulate(path, verdict=False)
     t = np.zeros(1)
     expected = np.array([[-2.0, -1.0, 3.0, 0.3, -0.4, -0.2]])  # the last leg lies along y
     assert max(relative(at_node(run, "l", t, "tip"), expected)) < 2e-3
@@ -198,7 +198,7 @@ def test_a_turning_payload_pulls(tmp_path: Path) -> None:
 def test_what_cannot_be_recovered_is_said(tmp_path: Path) -> None:
     """A link without maps, the other quantity, an unknown link, a time outside the run."""
     scenes.l_link(tmp_path, 2, **ENDS)
-    run = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.01}))
+    run = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.01}), verdict=False)
     for ask, cause, said in (
         (lambda: erls.stress(run, "l", 0.0), Cause.BAD_FIELD, "section_forces"),
         (lambda: erls.section_forces(run, "arm", 0.0), Cause.BAD_REFERENCE, "arm"),
@@ -210,7 +210,7 @@ def test_what_cannot_be_recovered_is_said(tmp_path: Path) -> None:
         assert str(caught.value.cause) == str(cause)
         assert said in str(caught.value)
     scenes.l_link(tmp_path, 2)
-    bare = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.01}))
+    bare = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.01}), verdict=False)
     with pytest.raises(ReportedError, match=r"\[recovery\]"):
         erls.section_forces(bare, "l", 0.0)
 
@@ -236,7 +236,7 @@ def test_stress_of_a_solid_at_rest(tmp_path: Path) -> None:
         ],
         "links": [{"name": "l", "model": "solid.toml"}],
     }
-    run = erls.simulate(scenes.write_toml(tmp_path / "scene.toml", scene))
+    run = erls.simulate(scenes.write_toml(tmp_path / "scene.toml", scene), verdict=False)
     maps = recovery_places(run, "l")
     at = run.formulation.mechanism.links[0].model.nodes[maps.nodes]
     x = at[np.abs(at[:, 0] - 0.25).argmin(), 0]

@@ -25,7 +25,7 @@ def failed(scene: Path, changes: list[str]) -> tuple[SimulationError, ChainRun, 
     """How a run fails, what was computed, and what was told."""
     told: list[str] = []
     with pytest.raises(SimulationError) as caught:
-        erls.simulate(erls.load_scene(scene, changes), tell=told.append)
+        erls.simulate(erls.load_scene(scene, changes), tell=told.append, verdict=False)
     assert caught.value.cause is Cause.RUNAWAY
     assert caught.value.exit_code == 3
     return caught.value, caught.value.run, told
@@ -92,7 +92,9 @@ def test_pieces_of_a_link() -> None:
 
 def test_rates_without_bound_are_no_matter_of_spin() -> None:
     """Of what is not finite no eigenvalue is asked."""
-    mechanism = erls.simulate(erls.load_scene(TALL, [scenes.LINEAR, "simulation.duration=1e-3"])).formulation.mechanism
+    mechanism = erls.simulate(
+        erls.load_scene(TALL, [scenes.LINEAR, "simulation.duration=1e-3"]), verdict=False
+    ).formulation.mechanism
     states = [(t, np.zeros(1), np.array([rate])) for t, rate in enumerate((np.nan, np.inf, 1e200, 1e3))]
     (text,) = spin_warnings(mechanism, states)
     assert "reached at t = 3 s" in text
@@ -100,5 +102,5 @@ def test_rates_without_bound_are_no_matter_of_spin() -> None:
 
 def test_far_deflections_are_no_failure() -> None:
     """A hundred times its weight is a matter of warnings."""
-    run = erls.simulate(erls.load_scene(TALL, ["gravity=[0, 0, -1e3]", "simulation.duration=0.02"]))
+    run = erls.simulate(erls.load_scene(TALL, ["gravity=[0, 0, -1e3]", "simulation.duration=0.02"]), verdict=False)
     assert run.failure is None

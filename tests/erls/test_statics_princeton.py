@@ -91,7 +91,7 @@ def test_princeton_beam(tmp_path: Path, load: float) -> None:
     """Deflections both ways against the rod, within 1 % of the larger, in one load step of at most nine iterations."""
     for angle in ANGLES:
         force = _force(load, angle)
-        found = simulate(body_scene(tmp_path, _scene(force)))
+        found = simulate(body_scene(tmp_path, _scene(force)), verdict=False)
         assert isinstance(found, BodyRest)
         exact = _rod(force)
         np.testing.assert_allclose(found.position("tip", 1.0), exact, atol=0.01 * float(np.abs(exact[1:]).max()))

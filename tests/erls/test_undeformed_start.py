@@ -35,7 +35,7 @@ def _apart(folder: Path, stiffer: float, effects: str = "linear") -> float:
     torques = []
     for name in ("erls", "ffr"):
         scene = erls.load_scene(folder / "two_link.toml", [*changes, f"simulation.formulation={name}"])
-        torques.append(erls.simulate(scene).joint_effort("elbow_joint", times))
+        torques.append(erls.simulate(scene, verdict=False).joint_effort("elbow_joint", times))
     return float(np.abs(torques[0] - torques[1]).max() / np.abs(torques[0]).max())
 
 

@@ -27,7 +27,7 @@ SIZE = (400, 250)
 
 
 def simulated(scene, *changes):
-    return erls.simulate(erls.load_scene(ROOT / "data" / scene, ["simulation.duration=0.05", *changes]))
+    return erls.simulate(erls.load_scene(ROOT / "data" / scene, ["simulation.duration=0.05", *changes]), verdict=False)
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +88,16 @@ def test_magnification_changes_the_picture(robot, tmp_path):
     for factor in (1, 50):
         picture(robot, tmp_path / f"{factor}.png", [0.05], magnification=factor, size=SIZE)
     assert (pixels(tmp_path / "1.png") != pixels(tmp_path / "50.png")).any(axis=2).mean() > 0.02
+
+
+@pytest.mark.parametrize("magnification", [0.0, 1.0, 30.0])
+@pytest.mark.parametrize("formulation", ["erls", "nodal"])
+def test_paths_of_all_times_are_those_of_each(formulation, magnification):
+    figure = figure_of(simulated("robot/two_link.toml", f"simulation.formulation={formulation}"))
+    times = figure.run.spread(7)
+    each = [pose.points(magnification) for pose in figure.poses(times)]
+    for k, path in enumerate(figure.paths(times, magnification)):
+        np.testing.assert_allclose(path, [points[k] for points in each], rtol=0, atol=1e-14)
 
 
 def test_no_display_needed(tmp_path):

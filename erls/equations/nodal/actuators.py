@@ -27,14 +27,14 @@ class Actuator:
     inner_frame, outer_frame : (4, 4) array
         Pose of the joint in the frame of each node, in the world for the ground; z is its axis.
     lead : callable
-        Torque over time that the drive adds (feed-forward).
+        Torques (k,) at times (k,) that the drive adds (feed-forward).
     """
 
     joint: Joint
     nodes: tuple[int, ...]
     inner_frame: Array
     outer_frame: Array
-    lead: Callable[[float], float]
+    lead: Callable[[Array], Array]
 
 
 class Actuators:
@@ -64,15 +64,18 @@ class Actuators:
             found.append([joint.rotor_inertia, *law, *stops])
         return np.array(found, dtype=float).reshape(-1, 15)
 
-    def wanted(self, t: float) -> Array:
-        """(e, 3) wanted coordinates, wanted rates, and torques besides."""
-        result = np.zeros((len(self.joints), 3))
+    def wanted(self, times: Array) -> Array:
+        """(k, e, 3) wanted coordinates, wanted rates, and torques besides, at times (k,)."""
+        result = np.zeros((len(times), len(self.joints), 3))
         for k, (joint, lead) in enumerate(zip(self.joints, self.leads, strict=True)):
             drive = joint.drive
             if not self.acting[k]:
                 continue
-            coordinate, rate, _ = (0.0, 0.0, 0.0) if drive.motion is None else drive.motion.derivatives(t)
-            result[k] = coordinate, rate, lead(t) + (0.0 if drive.load is None else drive.load.value(t))
+            if drive.motion is not None:
+                result[:, k, :2] = [drive.motion.derivatives(t)[:2] for t in times.tolist()]
+            result[:, k, 2] = lead(times)
+            if drive.load is not None:
+                result[:, k, 2] += [drive.load.value(t) for t in times.tolist()]
         return result
 
     @property

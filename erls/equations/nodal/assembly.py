@@ -277,7 +277,7 @@ class NodalSystem:
         first = 3 * len(joints) + len(loads)
         for group in self.kinds.actuators:
             after = first + 3 * len(group.joints)
-            result[:, first:after] = [group.wanted(t).ravel() for t in times.tolist()]
+            result[:, first:after] = group.wanted(times).reshape(len(times), -1)
             first = after
         return result
 

@@ -115,9 +115,11 @@ class Beams:
         return found
 
     def sections_at(self, poses: Array, bent: Array, elements: IntArray, fractions: Array) -> Array:
-        """(p, 4, 4) sections of elements (p,), at these fractions (p,) of their lengths, at node poses (k, 4, 4)."""
-        first = poses[self.nodes[elements, 0]] @ self.frames[elements, 0]
-        result: Array = first @ motions.exp(fractions[:, None] * bent[elements])
+        """(..., p, 4, 4) sections of elements (p,), at these fractions (p,) of their lengths, at node poses
+        (..., k, 4, 4) with twists d (..., e, 6).
+        """
+        first = poses[..., self.nodes[elements, 0], :, :] @ self.frames[elements, 0]
+        result: Array = first @ motions.exp(fractions[:, None] * bent[..., elements, :])
         return result
 
 

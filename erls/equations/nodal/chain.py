@@ -35,7 +35,7 @@ from erls.mechanism.joint_types import Freedom, single
 from erls.mechanism.joints import Joint as MechanismJoint
 from erls.mechanism.loads import CENTRE, PointLoad
 from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
-from erls.mechanism.rigid_dynamics import inverse_dynamics
+from erls.mechanism.rigid_dynamics import feed_forward
 
 
 class ChainSystem(NodalSystem):
@@ -289,32 +289,31 @@ def _closing_actuators(mechanism: Mechanism, seats: Sequence[Seat], start: Close
     for loop, seat, position in zip(mechanism.loops, seats, start.coordinates.tolist(), strict=True):
         if (free := loop.freedom) is not None:
             own = free.freedom, still, still, free.forces, free.rotor_inertia, free.drive
-            found.append(_actuator(MechanismJoint(loop.name, *own, position, 0.0), seat, lambda t: 0.0))
+            found.append(_actuator(MechanismJoint(loop.name, *own, position, 0.0), seat, np.zeros_like))
     return found
 
 
-def _actuator(joint: MechanismJoint, seat: Seat, lead: Callable[[float], float]) -> Actuator:
+def _actuator(joint: MechanismJoint, seat: Seat, lead: Callable[[Array], Array]) -> Actuator:
     nodes = (seat.outer,) if seat.inner == GROUND else (seat.inner, seat.outer)
     return Actuator(joint, nodes, seat.inner_frame, seat.outer_frame, lead)
 
 
 class _FeedForward:
-    """What the rigid chain needs for the wanted motions; joints without one are held where they begin."""
+    """What wanted motions ask of the rigid chain, found once for all joints."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._known: tuple[float, Array] = (np.nan, np.zeros(0))
+        self._known: tuple[bytes, Array] = (b"", np.zeros((0, 0)))
 
-    def of(self, k: int) -> Callable[[float], float]:
-        """Torque of joint ``k`` over time."""
+    def of(self, k: int) -> Callable[[Array], Array]:
+        """Torques (k,) of joint ``k`` at times (k,)."""
         if not self._mechanism.joints[k].drive.feed_forward:
-            return lambda t: 0.0
-        return lambda t: float(self._at(t)[k])
+            return np.zeros_like
+        return lambda times: self._at(times)[:, k]
 
-    def _at(self, t: float) -> Array:
-        if self._known[0] != t:
-            wanted = np.array([j.drive.reference(t) or (j.position, 0.0, 0.0) for j in self._mechanism.joints])
-            self._known = (t, inverse_dynamics(self._mechanism, *wanted.T))
+    def _at(self, times: Array) -> Array:
+        if self._known[0] != times.tobytes():
+            self._known = times.tobytes(), feed_forward(self._mechanism, times)
         return self._known[1]
 
 

@@ -32,6 +32,7 @@ from erls.equations.nodal.seat import Seat
 from erls.equations.nodal.spinning import SpinningNeighbours, spinning_neighbours
 from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
+from erls.equations.serial.state_series import StateSeries
 from erls.equations.stability import LARGEST, Stability, stability_of
 from erls.maths import rotation_maps as rotations
 from erls.maths.saddle import Matrix
@@ -188,16 +189,24 @@ class Nodal:
 
     def state(self, t: float, y: Array, v: Array) -> State:
         """Positions of all nodes; link frames at the inboard nodes, modal coordinates as near as modes come."""
-        q, velocity = self.configuration(y, v)
-        found = [view.at(q.poses, self.chain.beams, q.bent) for view in self.views]
-        _, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
-        angles, rates = y[self._joints].copy(), rates[: len(self.mechanism.joints)].copy()
-        for k in self.mechanism.rotation_vectors:
-            psi = self.chain.seats[k].vector(q)
-            angles[k : k + 3] = psi
-            rates[k : k + 3] = rotations.tangent_inverse(psi) @ self.chain.seats[k].spin(q, velocity)
+        return self.series(np.array([t]), y[None], v[None]).states()[0]
+
+    def series(self, t: Array, y: Array, v: Array) -> StateSeries:
+        """The same at times (k,), of all together."""
+        at = [self.configuration(*stored) for stored in zip(y, v, strict=True)]
+        start = self.system.start
+        poses = np.array([q.poses for q, _ in at]).reshape(len(t), *start.poses.shape)
+        bent = np.array([q.bent for q, _ in at]).reshape(len(t), *start.bent.shape)
+        found = [view.at(poses, self.chain.beams, bent) for view in self.views]
+        angles, rates = y[:, self._joints].copy(), np.zeros((len(t), len(self.mechanism.joints)))
+        for n, (q, velocity) in enumerate(at):
+            rates[n] = self.system.joint_motion(q, velocity, np.zeros(self.system.size))[1][: rates.shape[1]]
+            for k in self.mechanism.rotation_vectors:
+                psi = self.chain.seats[k].vector(q)
+                angles[n, k : k + 3] = psi
+                rates[n, k : k + 3] = rotations.tangent_inverse(psi) @ self.chain.seats[k].spin(q, velocity)
         frames, modal = [x.frame for x in found], [x.modal for x in found]
-        return State(t, frames, modal, angles, angles, rates, [x.nodes for x in found], [x.turns for x in found])
+        return StateSeries(t, frames, modal, angles, angles, rates, [x.nodes for x in found], [x.turns for x in found])
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""

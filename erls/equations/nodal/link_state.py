@@ -16,8 +16,9 @@ from erls.mechanism.links import Link
 
 @dataclass(frozen=True)
 class LinkState:
-    """Link frame in the world (4, 4), which goes with the inboard node; places of the model's nodes (n, 3) in the world
-    [m], and how they have turned there (n, 3, 3); the modal coordinates (m,) that come nearest to both.
+    """Link frame in the world (..., 4, 4), which goes with the inboard node; places of the model's nodes (..., n, 3) in
+    the world [m], and how they have turned there (..., n, 3, 3); the modal coordinates (..., m) that come nearest to
+    both.
     """
 
     frame: Array
@@ -51,15 +52,19 @@ class LinkView:
         self._nearest = np.linalg.pinv(shapes)
 
     def at(self, poses: Array, beams: Beams | None, bent: Array) -> LinkState:
-        """At poses (k, 4, 4) of all nodes, with the twists d (e, 6) of the beams."""
-        frame = poses[self._inboard] @ self._back
+        """At poses (..., k, 4, 4) of all nodes, with the twists d (..., e, 6) of the beams."""
+        frame = poses[..., self._inboard, :, :] @ self._back
+        turn, place = frame[..., :3, :3], frame[..., None, :3, 3]
         model = self._model
         if self._axes is None or beams is None:
-            turns = np.tile(frame[:3, :3], (len(model.nodes), 1, 1))
-            return LinkState(frame, model.nodes @ frame[:3, :3].T + frame[:3, 3], turns, np.zeros(model.modes))
+            turns = np.repeat(turn[..., None, :, :], len(model.nodes), axis=-3)
+            nodes = model.nodes @ np.swapaxes(turn, -2, -1) + place
+            return LinkState(frame, nodes, turns, np.zeros((*frame.shape[:-2], model.modes)))
         sections = beams.sections_at(poses, bent, self._elements, self._fractions)
-        nodes = sections[:, :3, 3]
-        moved = (nodes - frame[:3, 3]) @ frame[:3, :3] - model.nodes
-        turns = sections[:, :3, :3] @ np.swapaxes(self._axes, 1, 2)
-        turned = self._reach * rotations.log(frame[:3, :3].T @ turns[model.rotation_nodes])
-        return LinkState(frame, nodes, turns, self._nearest @ np.concatenate([moved, turned]).ravel())
+        nodes = sections[..., :3, 3]
+        moved = (nodes - place) @ turn - model.nodes
+        turns = sections[..., :3, :3] @ np.swapaxes(self._axes, 1, 2)
+        back = np.swapaxes(turn, -2, -1)[..., None, :, :]
+        turned = self._reach * rotations.log(back @ turns[..., model.rotation_nodes, :, :])
+        shape = np.concatenate([moved, turned], axis=-2).reshape(*frame.shape[:-2], self._nearest.shape[1])
+        return LinkState(frame, nodes, turns, shape @ self._nearest.T)

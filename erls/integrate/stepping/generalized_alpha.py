@@ -82,6 +82,8 @@ if ENABLED:
         contract.MATRIX,
     )
 
+ONE_DIGIT = 1 / 16  # of the rounding of `Settings`, which is that of sixteen
+
 
 @part
 def predict(settings: Settings, memory: Memory) -> None:
@@ -263,7 +265,8 @@ def advance(
     What the system keeps of each goes into ``knots`` (k, 3, s), accelerations and multipliers into ``beside`` unless it
     has no columns. Iterations have converged when the remaining error, rate/(1 − rate) |Δ|, is estimated within
     tolerance, with the rate of earlier steps at first (E. Hairer & G. Wanner, Solving ODEs II, sec. IV.8), which counts
-    for less the older it gets; or when the residual is small against its terms.
+    for less the older it gets; or when the residual is small against its terms. Where rounding is what the tolerance
+    allows, one more iteration brings the error to the last digit: what is left has a sign, and adds up over many steps.
     """
     use, progress = read_settings(own, places, places[0]), read_course(own, places, places[1])
     memory, rates, counts = read_memory(own, places, places[2]), progress.rates, progress.counts
@@ -282,7 +285,8 @@ def advance(
             predict(use, memory)
             fresh, found = begin_fresh, 0
             rate = max(rates[RATE], use.fastest) ** 0.8
-            before = earlier = largest = size = rounding = goal = 0.0
+            before = earlier = largest = size = rounding = goal = steady = 0.0
+            once_more = False
             rates[BEFORE] = 0.0
             for k in range(most + 1):
                 extent = call_compose(
@@ -345,11 +349,22 @@ def advance(
                 if k > 0:
                     rate = math.sqrt(size / earlier) if use.over == 2 and k > 1 else size / before
                 rates[SIZE] = size
-                if size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate)):
+                close = size <= rounding or (rate < 1 and size * rate <= goal * (1 - rate))
+                within = size <= rounding or size * rate <= (use.tolerance + ONE_DIGIT * rounding) * (1 - rate)
+                if close and not (within or once_more or k + 1 == most):
+                    once_more, steady = True, rate
+                    fresh = use.matrix == UPDATE
+                    earlier, before = before, size
+                    rates[BEFORE] = before
+                    continue
+                if close or once_more:
                     call_compose(
                         system.compose, reals, integers, scratch, memory.metres, start, memory.increment, tried
                     )
-                    note(use, progress, k + 1, rate)
+                    if once_more:  # whose rate may be that of rounding
+                        note(use, progress, k, steady)
+                    else:
+                        note(use, progress, k + 1, rate)
                     converged = True
                     break
                 # a first correction may be small by luck; later ones must lead to the goal in time

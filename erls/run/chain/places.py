@@ -54,9 +54,6 @@ def rigid_frames(mechanism: Mechanism, state: State | StateSeries) -> list[Array
     """
     if state.nodes is not None:
         return list(state.poses)
-    if isinstance(state, StateSeries):
-        at = [poses(mechanism, theta) for theta in state.coordinates]
-        return [np.array(frames) for frames in zip(*at, strict=True)]
     return poses(mechanism, state.coordinates)
 
 

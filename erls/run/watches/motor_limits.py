@@ -11,7 +11,7 @@ from erls.equations.substructures import solved
 from erls.integrate.base import Solution
 from erls.integrate.choice import options_of
 from erls.maths.so3 import Array
-from erls.mechanism.rigid_dynamics import inverse_dynamics
+from erls.mechanism.rigid_dynamics import feed_forward
 from erls.run.watches.base import Ended, Finding, Plan, Watch
 
 _LOOKS = 500  # at most
@@ -70,12 +70,7 @@ def _wanted(formulation: Formulation, solution: Solution, place: int, k: int) ->
     """Force that the drive of joint k, coordinate ``place``, asks of its motor, at some knots."""
     mechanism = formulation.mechanism
     drive = mechanism.joints[k].drive
-    every = max(1, len(solution.t) // _LOOKS)
-    result = []
-    for t, y, v in zip(solution.t[::every], solution.y[::every, place], solution.v[::every, place], strict=True):
-        torque = drive.torque(float(t), float(y), float(v))
-        if drive.feed_forward:
-            goals = [j.drive.reference(float(t)) or (j.position, 0.0, 0.0) for j in mechanism.joints]
-            torque += float(inverse_dynamics(mechanism, *np.array(goals).T)[k])
-        result.append(torque)
-    return np.array(result)
+    every = slice(None, None, max(1, len(solution.t) // _LOOKS))
+    t, y, v = solution.t[every], solution.y[every, place], solution.v[every, place]
+    result = np.array([drive.torque(*at) for at in zip(t.tolist(), y.tolist(), v.tolist(), strict=True)])
+    return result + feed_forward(mechanism, t)[:, k] if drive.feed_forward else result

@@ -95,7 +95,9 @@ class Made:
         """(k, points, 3) of this run or another [m]."""
         at = self.times if times is None else times
         chosen = self.run if run is None else run
-        return np.stack([chosen.position(name, at) for name in self.run.point_names], axis=1)
+        states = chosen.series(at)
+        numbers = [chosen.point_names.index(name) for name in self.run.point_names]
+        return np.stack([chosen.point_position(states, k) for k in numbers], axis=1)
 
     def other(self, case: Case) -> ChainRun:
         """A run of another case in this formulation, unless its changes say otherwise; it states nothing."""

@@ -63,14 +63,21 @@ def _as_rigid(length: float) -> Truth:
     return closed(lambda t: ends_of_bars([length], (swing(t) - np.pi / 2)[None]), "elliptic function", 1e-9)
 
 
-def _better(formulation: str, tolerance: float, times: int = 1, **links: dict[str, Any]) -> Any:
+def better(formulation: str, tolerance: float, times: int = 1, **links: dict[str, Any]) -> Any:
     """The case with a formulation, a tolerance, other links, and so many elements in place of each."""
 
-    def better(case: Case) -> Case:
+    def changed(case: Case) -> Case:
         changes = (f"simulation.formulation={formulation}", f"simulation.tolerance={tolerance:g}")
         return dataclasses.replace(case.changed(*changes), links={**case.links, **links})
 
-    return better
+    return changed
+
+
+def _let_go(name: str, **more: Any) -> Case:
+    """Two flexible bars let go, judged by beam elements."""
+    truth = fine("beam elements, tolerance / 30", better("nodal", 1e-5), better("nodal", 3e-6))
+    scene = arms((0.4, 0.4), ("soft", "soft"), (0.0, 0.0), simulation={"duration": 0.3})
+    return Case(name, scene, truth, links={"soft": beam(0.4, 2e10)}, **more)
 
 
 def _cantilever(name: str, **more: Any) -> Case:
@@ -103,7 +110,7 @@ _SPIN_UP = scenes.ROOT / "data/spin_up/beam.toml"
 def _spun(name: str, rate: float, **more: Any) -> Case:
     """The beam of Kane, Ryan and Banerjee, first bending frequency 3.8 rad/s, judged by beam elements."""
     changes = (f"joints.hub.drive.motion.rate={rate}", "simulation.duration=16.0", *more.pop("changes", ()))
-    good = (_better("nodal", 1e-4), _better("nodal", 2e-5))
+    good = (better("nodal", 1e-4), better("nodal", 2e-5))
     return Case(name, _SPIN_UP, fine("beam elements, a fifth of the tolerance", *good), changes=changes, **more)
 
 
@@ -122,13 +129,13 @@ CASES = of_subject(
         Case(
             "links of stiffness 1e6 : 1 on each other",
             arms((0.4, 0.4), ("stiff", "soft"), (0.0, 0.0), simulation={"duration": 0.3}),
-            fine("beam elements, tolerance / 30", _better("nodal", 1e-5), _better("nodal", 3e-6)),
+            fine("beam elements, tolerance / 30", better("nodal", 1e-5), better("nodal", 3e-6)),
             links={"stiff": beam(0.4, 1e15), "soft": beam(0.4, 1e9)},
         ),
         Case(
             "links of stiffness 1e9 : 1 on each other",
             arms((0.4, 0.4), ("stiff", "soft"), (0.0, 0.0), simulation={"duration": 0.3}),
-            fine("beam elements, tolerance / 30", _better("nodal", 1e-5), _better("nodal", 3e-6)),
+            fine("beam elements, tolerance / 30", better("nodal", 1e-5), better("nodal", 3e-6)),
             links={"stiff": beam(0.4, 1e18), "soft": beam(0.4, 1e9)},
         ),
         Case(
@@ -136,11 +143,26 @@ CASES = of_subject(
             arms((0.5,), ("bar",), (0.0,), simulation={"duration": 0.2}),
             fine(
                 "60 modes, tolerance / 100",
-                _better("erls", 1e-5, bar=beam(0.5, elements=80, modes=54)),
-                _better("erls", 1e-6, bar=beam(0.5, elements=80, modes=54)),
+                better("erls", 1e-5, bar=beam(0.5, elements=80, modes=54)),
+                better("erls", 1e-6, bar=beam(0.5, elements=80, modes=54)),
             ),
             links={"bar": beam(0.5, elements=80, modes=394)},
             not_here={"nodal": "has no modes"},
+        ),
+        _let_go(
+            "two flexible bars in the minimum-norm gauge",
+            also={"erls": ("simulation.gauge=minimum-norm",)},
+            not_here={"ffr": "frames are where links say", "nodal": "has no modes"},
+        ),
+        _let_go(
+            "two flexible bars on mean axes",
+            also={"ffr": ("simulation.body_frame=mean-axis",)},
+            not_here={"erls": "its frames follow from the gauge", "nodal": "has no modes"},
+        ),
+        _let_go(
+            "two flexible bars in absolute coordinates",
+            also={"ffr": ("simulation.coordinates=absolute",)},
+            not_here={"erls": "has joint coordinates alone", "nodal": "has no others"},
         ),
         _cantilever("equal frequencies: a square bar that meets its weight", fast=("erls", "ffr")),
         Case(

@@ -9,7 +9,8 @@ import numpy as np
 
 from erls.errors import Cause
 from erls.maths.so3 import Array
-from hard_cases.case import Case, closed, energy_kept, of_subject
+from hard_cases.case import Case, Made, Measure, closed, energy_kept, measured, of_subject
+from hard_cases.flexible import beam
 from hard_cases.truths import swinging
 
 _G = 9.81
@@ -86,29 +87,40 @@ def _driven(data: dict[str, Any], start: float, rate: float) -> dict[str, Any]:
     return loop_scenes.driven(data, loop_scenes.steady(start, rate))
 
 
-def _rocker_first(rate: float) -> dict[str, Any]:
-    """The four-bar from its other end: what drives the rocker meets a dead point at 88°."""
-    first, second, third = loop_scenes.LENGTHS
-    joints = [
-        loop_scenes.joint(f"j{k}", length, angle)
-        for k, (length, angle) in enumerate(((third, 80.0), (second, -100.0), (first, -40.0)))
-    ]
-    links = [
-        {"name": name, "rigid": loop_scenes.bar(length, 0.5), "mesh_pose": {"frame": "joint"}}
-        for name, length in (("rocker", third), ("coupler", second), ("crank", first))
-    ]
-    ends = {"points": [], "loops": [{"name": "pivot", "link": "crank", "node": "tip", "position": [0.5, 0.0, 0.0]}]}
-    return _driven({**loop_scenes.four_bar(), "joints": joints, "links": links, **ends}, 80.0, rate)
-
-
 def _swung(name: str, degrees: float, kept: float, legs: int = 2, **more: Any) -> Case:
     """Energy is kept to a share of what is exchanged."""
     truth = closed(_translated(degrees, legs), "elliptic function", 0.0, energy_kept(kept))
     return Case(name, _parallelogram(degrees, legs == 3, **more.pop("simulation", {})), truth, **more)
 
 
+_GAP, _SPAN, _STIFF = 1e-3, 0.5, 2e11 * 0.01**4 / 12  # m, m, N m²
+
+
+def _bent_into_place(made: Made) -> Measure:
+    """3 E I δ / L³ in the slot, but for terms of (δ / L)²."""
+    force = float(made.run.loop_reaction("slot", 0.0)[0][2])
+    return Measure("force, off by", abs(force / (3 * _STIFF * _GAP / _SPAN**3) - 1), 2 * (_GAP / _SPAN) ** 2)
+
+
+def _stays(made: Made) -> Measure:
+    off = made.places()[:, 0, 2] - _GAP
+    return Measure("off the line / m", float(np.abs(off).max()), 1e-9)
+
+
+_BENT: dict[str, Any] = {
+    "gravity": [0.0, 0.0, 0.0],
+    "simulation": {"duration": 0.1},
+    "initial": {"assemble": "elastic"},
+    "joints": [{"name": "clamp", "type": "fixed", "dh": {"convention": "standard", "a": _SPAN}}],
+    "links": [{"name": "beam", "model": "beam.toml", "mesh_pose": {"frame": "joint"}}],
+    "points": [{"name": "tip", "link": "beam", "node": "tip"}],
+    "loops": [
+        {"name": "slot", "type": "line", "link": "beam", "node": "tip", "axis": [1.0, 0.0, 0.0]}
+        | {"position": [_SPAN, 0.0, _GAP]}
+    ],
+}
+_PIVOT = {"name": "pivot", "type": "spherical", "link": "beam", "node": "tip", "position": [_SPAN + _GAP, 0.0, 0.0]}
 _TURNED = _driven(loop_scenes.four_bar(), 60.0, 720.0)
-_LOCKED = {"erls": Cause.LOOP_OPEN, "ffr": Cause.LOOP_OPEN, "nodal": Cause.NEWTON_FAILED}
 CASES = of_subject(
     "loops",
     [
@@ -125,7 +137,27 @@ CASES = of_subject(
             fast=("erls",),
         ),
         Case(
-            "a drive that meets a dead point", _rocker_first(180.0), ends=_LOCKED, told="pivot|j2", fast=("erls", "ffr")
+            "a drive that meets a dead point",
+            loop_scenes.rocker_first(180.0),
+            ends={"all": Cause.LOOP_OPEN},
+            told="'pivot'.*locks|locks.*'pivot'",
+            fast=("erls", "ffr", "nodal"),
+        ),
+        Case(
+            "a beam bent by 1 mm into its slot",
+            _BENT,
+            measured("3 E I δ / L³", _bent_into_place, _stays),
+            links={"beam": beam(_SPAN)},
+            ends={"nodal": Cause.BAD_FIELD},
+            fast=("erls", "ffr"),
+        ),
+        Case(
+            "a beam that no mode lengthens to its pivot",
+            {**_BENT, "loops": [_PIVOT]},
+            links={"beam": beam(_SPAN)},
+            changes=("links.beam.elastic_modes=2",),
+            ends={"all": Cause.LOOP_OPEN, "nodal": Cause.BAD_FIELD},
+            told="no link gives way.*along x|assemble",
         ),
         _swung("parallelogram that swings", -60.0, 1e-4),
         _swung("parallelogram with a third leg", -60.0, 1e-4, legs=3),

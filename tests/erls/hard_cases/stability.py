@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import scenes
+import scipy.integrate
 
 from erls.equations.stability import Stability
 from erls.errors import Cause
+from erls.maths.so3 import Array
 from hard_cases.case import Case, Made, Measure, measured, of_subject
 from hard_cases.flexible import beam
 from hard_cases.pendulums import G, planar, thin
 from hard_cases.tops import CRITICAL, SLEEPING, spinning
 
 _GREENHILL, _EULER = 7.8373, np.pi**2 / 4  # E I / L²: weight, and load at the tip, at which a clamped column buckles
+_LEAN = 1.0  # degrees
 _BENDING = 2e11 * 1e-8 / 12  # N m², of a square bar of 1 cm
 _BEAM = {"elements": 16, "modes": 8}
 
@@ -68,6 +72,30 @@ def _column(name: str, weight: float = 0.0, load: float = 0.0, tilt_deg: float =
     return Case(name, scene, links={"column": beam(1.0, **_BEAM)}, **more)
 
 
+def _hanging_over(made: Made) -> Measure:
+    """Where the elastica under its own weight has its tip: E I φ'' = -w (1 - s) sin φ of the angle from upright."""
+    lean, weight = np.radians(_LEAN), 1.2 * _GREENHILL
+
+    def slope(s: Array, x: Array) -> Array:
+        return np.stack([x[1], -weight * (1 - s) * np.sin(x[0])])
+
+    s = np.linspace(0.0, 1.0, 201)
+    guess = np.stack([lean + 1.5 * s, 1.5 * (1 - s)])
+    found = scipy.integrate.solve_bvp(slope, lambda a, b: np.array([a[0] - lean, b[1]]), s, guess, tol=1e-9)
+    angle = found.sol(np.linspace(0.0, 1.0, 2001))[0]
+    tip = np.trapezoid(np.sin(angle), dx=1 / 2000), np.trapezoid(np.cos(angle), dx=1 / 2000)
+    place = made.run.position("tip", 0.0)
+    return Measure("tip, off by / length", float(np.hypot(abs(place[0]) - tip[0], place[2] - tip[1])), 3e-3)
+
+
+def _leaning(name: str, **more: Any) -> Case:
+    """A column twenty times as long as thick, of as much E I, that leans by 1°."""
+    case = _column(name, 1.2, tilt_deg=_LEAN, **more)
+    thick = {"materials": {"m": {"youngs_modulus": 2e11 / 5**4, "density": 7800.0 / 5**2}}}
+    thick["sections"] = {"s": {"width": 0.05, "height": 0.05}}
+    return dataclasses.replace(case, links={"column": scenes.merged(case.links["column"], thick)})
+
+
 def _beck(share: float, growth: Callable[[Made], Measure]) -> Case:
     changes = (f"loads.0.force=[{-2105.0 / 0.9 * share}, 0.0, 0.0]", "simulation.duration=0.02")
     finer = {"nodal": ("simulation.elements_per_member=20",)}
@@ -115,6 +143,12 @@ CASES = of_subject(
             1.2,
             initial={"allow_unstable": True},
             truth=measured("1 - P / P_c", _left(-0.2)),
+        ),
+        _leaning(
+            "column at 1.2 of Greenhill's weight, leaning by 1°",
+            truth=measured("elastica under its weight", _hanging_over),
+            also={"nodal": ("simulation.elements_per_member=32",)},
+            ends=dict.fromkeys(("erls", "ffr"), Cause.UNSTABLE_START),
         ),
         _beck(0.9, _growth(-1e-6, 1e-6)),
         _beck(1.1, _growth(0.05, 1.0)),
