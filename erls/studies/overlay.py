@@ -74,7 +74,7 @@ def overlay(run: Run, record: Path) -> Overlay:
     Raises
     ------
     SceneError
-        The file is missing or faulty; it has no heads, none that the run knows, or no time within the run.
+        The file is missing or faulty; it has no heads, none that the run knows, one twice, or no time within the run.
     """
     held = matched(run, record, "--overlay")
     known = run.columns(held.times)
@@ -120,12 +120,20 @@ def matched(run: Run, record: Path, where: str) -> Matched:
         raise SceneError(Cause.TABLE, message, where=str(record), value=float(table[0, 0]), limit=limit, remedy=remedy)
     known = run.columns(kept[:1, 0])
     short = {name.rpartition(" [")[0]: name for name in known}
-    names = {title: title if title in known else short.get(title) for title in titles[1:]}
-    found = {name: kept[:, k] for k, name in enumerate(names.values(), 1) if name is not None}
-    unknown = tuple(title for title, name in names.items() if name is None)
+    found: dict[str, Array] = {}
+    unknown: list[str] = []
+    for title, values in zip(titles[1:], kept[:, 1:].T, strict=True):
+        name = title if title in known else short.get(title)
+        if name is None:
+            unknown.append(title)
+        elif name in found:
+            message, remedy = "two columns of the record are the same one of the run", "keep one of them"
+            raise SceneError(Cause.TABLE, message, where=f"{record}: first line", value=title, remedy=remedy)
+        else:
+            found[name] = values
     if not found:
         choose(unknown[0], [name for name in short if name != run.axis.symbol], f"{record}: first line", SceneError)
-    return Matched(kept[:, 0], found, unknown, int((~inside).sum()), every)
+    return Matched(kept[:, 0], found, tuple(unknown), int((~inside).sum()), every)
 
 
 def _overlaid(name: str, times: Array, measured: Array, simulated: Array) -> Overlaid:

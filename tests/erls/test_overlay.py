@@ -91,11 +91,20 @@ def test_figures_are_what_they_are_called(run_file: Path, tmp_path: Path, monkey
     assert (second.correlation, second.lag) == (None, None)
 
 
+def test_columns_keep_their_places_beside_unknown_ones_of_one_name(run_file: Path, tmp_path: Path) -> None:
+    """Two columns without a head that the run knows, alike: the one behind them is still that of the tip."""
+    found = overlay(erls.load_run(run_file), record(tmp_path, run_file, "t,note,note,tip.z"))
+    (column,) = found.columns
+    assert found.unknown == ("note", "note")
+    assert column.measured.tolist() == [300.0] * len(column.times)
+
+
 @pytest.mark.parametrize(
     ("heads", "said"),
     [
         ("t,ium.z,a,b", "imu.z"),
         ("t,imu.z [m/s2]", "a head for each column"),
+        ("t,tip.z,imu.z,tip.z [m]", "two columns.*tip.z"),
         ("0.0,1.0,2.0,3.0", "times do not rise"),
     ],
 )
