@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, Any
 
 from erls.errors import Cause, SceneError
+from erls.files.input import text_of
 
-_MOST_BYTES = 500e6
+_MOST_BYTES = 500_000_000
 
 _EXECUTED = ("=", "+", "-", "@", "\t", "\r")
 
@@ -41,18 +43,12 @@ def read_rows(path: Path) -> tuple[tuple[str, ...], list[list[str]]]:
     Raises
     ------
     SceneError
-        FILE_NOT_FOUND, NOT_READABLE or TABLE: no head, a name twice, or a row of another length, which is named.
+        FILE_NOT_FOUND, NOT_READABLE; TABLE: no head, a name twice, or a row of another length, which is named.
     """
+    text = text_of(path, "a table (CSV)", _MOST_BYTES, remedy="split the table")
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise _faulty(path, "too large", f"{_MOST_BYTES:.0f} bytes", "split the table")
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            found = [(number, row) for number, row in enumerate(csv.reader(file, strict=True), 1) if any(row)]
-    except FileNotFoundError:
-        raise SceneError(Cause.FILE_NOT_FOUND, "no such file", where=str(path), remedy="check the path") from None
-    except (OSError, UnicodeDecodeError) as problem:
-        message, remedy = f"cannot be read: {problem}", "give a CSV table in UTF-8"
-        raise SceneError(Cause.NOT_READABLE, message, where=str(path), remedy=remedy) from None
+        lines = csv.reader(io.StringIO(text, newline=""), strict=True)
+        found = [(number, row) for number, row in enumerate(lines, 1) if any(row)]
     except csv.Error as problem:
         raise _faulty(path, str(problem), None, "give a CSV table") from None
     head = tuple(cell.strip() for cell in found[0][1]) if found else ()

@@ -269,7 +269,9 @@ def _link(body: Body, seats: Mapping[str, Array], model: str, files: dict[str, s
     back = np.degrees(angles_of(_upright(body.joint.axis).T))
     lines = ["[[links]]", f"name = {_text(body.name)}", f"mesh_pose = {{ rotation_deg = {_numbers(back)} }}"]
     if _is_tube(model):
-        file = "".join(c if c.isalnum() or c in "-_" else "_" for c in body.name) + ".toml"
+        stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in body.name)
+        while (file := f"{stem}.toml") in files:  # of another name that differs in what a file's cannot have
+            stem += "_"
         files[file], said = _tube(body, seats, model)
         told.append(said)
         lines.append(f"model = {_text('links/' + file)}")

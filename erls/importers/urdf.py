@@ -17,7 +17,8 @@ from xml.parsers import expat
 import numpy as np
 
 from erls.errors import Cause, SceneError
-from erls.maths.so3 import Array
+from erls.files.input import content_of
+from erls.maths.so3 import Array, fixed_axes, rotation_x
 
 _MOST_BYTES = 50_000_000
 _MOST = 1e6  # m, kg, N: larger numbers are slips
@@ -140,16 +141,7 @@ def read_urdf(path: Path) -> UrdfRobot:
 
 
 def _parsed(path: Path) -> ET.Element:
-    try:
-        if path.stat().st_size > _MOST_BYTES:
-            message = "file is too large for a robot"
-            raise SceneError(Cause.NOT_READABLE, message, where=str(path), limit="50 MB", remedy="give a URDF file")
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise SceneError(Cause.FILE_NOT_FOUND, "no such file", where=str(path), remedy="check the path") from None
-    except OSError as problem:
-        message = f"cannot be read: {problem}"
-        raise SceneError(Cause.NOT_READABLE, message, where=str(path), remedy="give a URDF file") from None
+    content = content_of(path, "a URDF file", _MOST_BYTES)
     try:
         root = _elements(content)
     except (expat.ExpatError, ValueError, LookupError) as problem:
@@ -266,21 +258,12 @@ def _tree(links: dict[str, UrdfLink], joints: list[UrdfJoint], path: Path) -> tu
     return ordered, roots[0]
 
 
-def turned(rpy: Array) -> Array:
-    """(3, 3) turn about fixed x, then y, then z [rad]."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos(rpy), np.sin(rpy)
-    x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return np.asarray(z @ y @ x)
-
-
 def angles_of(turn: Array) -> Array:
-    """(3,) angles about fixed x, then y, then z of `turned` [rad]; to rounding also where x and z are one axis."""
+    """(3,) angles [rad] of which `fixed_axes` makes a turn, to rounding also where x and z are one axis."""
     level = math.hypot(turn[2, 1], turn[2, 2])
     y = math.atan2(-turn[2, 0], level)
     x = math.atan2(turn[2, 1], turn[2, 2]) if level > 1e-9 else 0.0
-    rest = turn @ turned(np.array([x, 0.0, 0.0])).T  # about y, then z
+    rest = turn @ rotation_x(x).T  # about y, then z
     return np.array([x, y, math.atan2(-rest[0, 1], rest[1, 1])])
 
 
@@ -288,7 +271,7 @@ def _pose(element: ET.Element | None, path: Path, where: str) -> Array:
     pose = np.eye(4)
     if element is not None:
         pose[:3, 3] = _vector(element, "xyz", path, f"{where}: origin", np.zeros(3))
-        pose[:3, :3] = turned(_vector(element, "rpy", path, f"{where}: origin", np.zeros(3)))
+        pose[:3, :3] = fixed_axes(*_vector(element, "rpy", path, f"{where}: origin", np.zeros(3)))
     return pose
 
 

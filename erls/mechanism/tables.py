@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import stat
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from erls.errors import Cause, SceneError
+from erls.files.input import text_of
 from erls.mechanism.place import LARGEST, LATEST, SHORTEST, Place
 
 MAX_BYTES = 50_000_000
@@ -48,7 +48,8 @@ def read_titled_csv(path: Path, where: str) -> tuple[list[str], NDArray[np.float
     """
     rows: list[list[float]] = []
     titles: list[str] = []
-    for number, raw in enumerate(_read_text(path, where).split("\n"), start=1):
+    text = text_of(path, "a table", MAX_BYTES, where, "leave out samples or columns")
+    for number, raw in enumerate(text.split("\n"), start=1):
         line, mark, _ = raw.partition("#")
         if mark and line and not line[-1].isspace():
             remedy = "put a blank before a comment"
@@ -137,31 +138,6 @@ def samples(
             remedy="column 0 is the time, values start at column 1",
         )
     return table[:, 0], table[:, column]
-
-
-def _read_text(path: Path, where: str) -> str:
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise SceneError(
-                Cause.NOT_READABLE, f"{path} is not a file", where=where, remedy="name a CSV file"
-            )
-        if status.st_size > MAX_BYTES:
-            raise SceneError(
-                Cause.NOT_READABLE,
-                f"{path} is too large for a table",
-                where=where,
-                value=status.st_size,
-                limit=f"{MAX_BYTES} bytes",
-                remedy="leave out samples or columns",
-            )
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        remedy = "check the path, relative paths start at the scene file"
-        raise SceneError(Cause.FILE_NOT_FOUND, f"no such file: {path}", where=where, remedy=remedy) from None
-    except (OSError, ValueError) as problem:
-        message = f"{path} cannot be read: {problem}"
-        raise SceneError(Cause.NOT_READABLE, message, where=where, remedy="give a UTF-8 text file") from None
 
 
 def _split(line: str) -> list[str]:

@@ -32,9 +32,14 @@ def apply_override(data: dict[str, Any], text: str) -> None:
     where = f"--set {text}"
     if not equals or not all(key.strip().split(".")):
         raise SceneError(Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4")
-    try:
-        found = tomllib.loads(f"value = {value}")
-    except (ValueError, RecursionError):
-        found = {}
     at, place = place_of(data, in_scene(_SHORT.get(key.strip(), key.strip())), where, SceneError)
-    at[place] = found["value"] if len(found) == 1 else value.strip()  # a bare word is a string
+    at[place] = value_of(value)
+
+
+def value_of(text: str) -> Any:
+    """What a value on the command line says, as TOML has it; a bare word is a string."""
+    try:
+        found = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text.strip()
+    return found["value"] if len(found) == 1 else text.strip()

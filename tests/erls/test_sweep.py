@@ -107,6 +107,9 @@ def test_tables_give_points(tmp_path: Path) -> None:
         file.write_text(text, encoding="utf-8")
         with pytest.raises(SceneError, match=words):
             points_of([], table=file)
+    with pytest.raises(SceneError, match="is not a file") as refused:  # nor is a pipe, which would never end
+        points_of([], table=tmp_path)
+    assert refused.value.cause == Cause.NOT_READABLE
 
 
 # ----- quantities

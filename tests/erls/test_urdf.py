@@ -22,7 +22,8 @@ from erls.cli.main import main
 from erls.equations.registry import formulate
 from erls.errors import Cause, SceneError
 from erls.importers.robot_scene import bodies_of, imported
-from erls.importers.urdf import angles_of, read_urdf, turned
+from erls.importers.urdf import angles_of, read_urdf
+from erls.maths.so3 import fixed_axes
 from erls.scene.build import build_mechanism
 
 FOLDER = ROOT / "tests/data/urdf"
@@ -103,8 +104,8 @@ def _order(path: Path, names: Any) -> list[int]:
 )
 def test_angles_are_those_of_a_turn(angles: tuple[float, float, float]) -> None:
     """Where two axes fall together, too."""
-    turn = turned(np.array(angles))
-    np.testing.assert_allclose(turned(angles_of(turn)), turn, atol=1e-15)
+    turn = fixed_axes(*angles)
+    np.testing.assert_allclose(fixed_axes(*angles_of(turn)), turn, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -237,6 +238,26 @@ def test_links_that_cannot_be_flexible(
     assert main(["import", str(file), "-o", str(tmp_path / "s.toml"), "--flexible", flexible]) == 2
     assert words in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["r.urdf"]
+
+
+def test_tubes_of_links_whose_names_differ_in_signs_alone(tmp_path: Path) -> None:
+    """Each has its own file."""
+    inertial = '<inertial><mass value="1"/></inertial>'
+    joints = "".join(
+        f'<joint name="{a}{b}" type="revolute"><origin xyz="1 0 0"/><parent link="{a}"/><child link="{b}"/></joint>'
+        for a, b in (("a", "b.1"), ("b.1", "b:1"), ("b:1", "c"))
+    )
+    links = "".join(f'<link name="{name}">{inertial}</link>' for name in ("a", "b.1", "b:1", "c"))
+    file = tmp_path / "r.urdf"
+    file.write_text(f'<robot name="r">{links}{joints}</robot>', encoding="utf-8")
+    made = imported(read_urdf(file), file, tmp_path, {"b.1": "tube", "b:1": "tube"})
+    assert list(made.links) == ["b_1.toml", "b_1_.toml"]
+    assert [tomllib.loads(text)["name"] for text in made.links.values()] == ["b.1", "b:1"]
+    assert [link.get("model") for link in tomllib.loads(made.scene)["links"]] == [
+        "links/b_1.toml",
+        "links/b_1_.toml",
+        None,
+    ]
 
 
 def test_the_good_file_is_good(tmp_path: Path) -> None:

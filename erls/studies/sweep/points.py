@@ -10,7 +10,6 @@ Rules for a further kind of points:
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ import numpy as np
 from erls.errors import Cause, SceneError
 from erls.files.csv_table import read_rows
 from erls.maths.so3 import Array
+from erls.scene.overrides import value_of
 
 MOST = 10_000_000
 """Points of one sweep."""
@@ -147,7 +147,7 @@ def points_of(vary: Sequence[str], sample: str = "", seed: int = 0, table: Path 
         if vary or sample:
             raise _bad("--points", str(table), "a table gives all points", "leave --vary and --sample out")
         head, rows = read_rows(table)
-        return _checked(Listed(head, [[_value(cell) for cell in row] for row in rows]), str(table))
+        return _checked(Listed(head, [[value_of(cell) for cell in row] for row in rows]), str(table))
     axes = dict(_axis(text, bool(sample)) for text in vary)
     if len(axes) < len(vary) or not axes:
         remedy = "e.g. --vary joints.hip.damping=0:1:5"
@@ -179,7 +179,7 @@ def _axis(text: str, as_range: bool) -> tuple[str, tuple[Any, ...]]:
     except ValueError:
         form = "KEY=A:B with a sample" if as_range else "KEY=A:B:N or KEY=V,W"
         raise _bad("--vary", text, f"not of the form {form}", "e.g. --vary gravity.2=-9.81:0:5") from None
-    return key.strip(), tuple(_value(part) for part in _split(said))
+    return key.strip(), tuple(value_of(part) for part in _split(said))
 
 
 def _number(text: str) -> float:
@@ -199,15 +199,6 @@ def _split(text: str) -> list[str]:
         else:
             parts[-1] += letter
     return [part.strip() for part in parts]
-
-
-def _value(text: str) -> Any:
-    """As ``--set`` reads it: TOML, or a bare word."""
-    try:
-        found = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
-        return text.strip()
-    return found["value"] if len(found) == 1 else text.strip()
 
 
 def _checked(points: Points, where: str) -> Points:
