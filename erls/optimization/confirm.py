@@ -17,7 +17,7 @@ from erls.optimization.result import Confirmed
 from erls.simulation.simulate import simulate
 from fe_import.errors import ReportedError
 
-_MOST_STEPS = 20_000  # that are looked at
+_MOST_STEPS = 20_000  # that are looked at; of more some, and the name says so
 _FINE = 4  # elements in each member
 
 
@@ -64,7 +64,10 @@ def _looked(
 ) -> Confirmed:
     scene = scene_at(problem, x, changes)
     run = simulate(scene, verdict=False)
-    times = run.times[:: 1 + len(run.times) // _MOST_STEPS]
+    every_step = -(-len(run.times) // _MOST_STEPS)
+    times = run.times[::every_step]
+    if every_step > 1:
+        name += f", one step in {every_step}"
     every = [msgspec.structs.replace(c, samples=2) for c in problem.record.constraints]
     record = msgspec.structs.replace(problem.record, constraints=every)
     own = Problem(problem.path, record, scene, x, problem.parameters, problem.factors, problem.powers)

@@ -88,11 +88,8 @@ class Rules:
     objective: Objective
 
     def beside(self, x: Array, share: float) -> Iterator[tuple[Array, Array, float]]:
-        """Designs on both sides of one, variable by variable, and how far away."""
-        for k in range(len(x)):
-            step = share * max(abs(float(x[k])), 1e-2 * float(self.upper[k] - self.lower[k]))
-            way = step * np.eye(len(x))[k]
-            yield x + way, x - way, step
+        """See `beside`."""
+        return beside(x, self.upper - self.lower, share)
 
     def shares(self, components: Sequence[Array]) -> list[Array]:
         """(n,) values of each constraint over its limit; empty for those without one."""
@@ -116,6 +113,16 @@ class Rules:
         own = tuple(jacobians if flexible is None else flexible)
         quadratic = self.objective.quadratic(found.x)
         return replace(found, jacobians=tuple(jacobians), flexible=own, quadratic=quadratic)
+
+
+def beside(x: Array, span: Array, share: float) -> Iterator[tuple[Array, Array, float]]:
+    """Designs (v,) on both sides of one, variable by variable, and how far away: a share of the variable, or of a
+    hundredth of the distance ``span`` of its bounds where that is larger.
+    """
+    for k in range(len(x)):
+        step = share * max(abs(float(x[k])), 1e-2 * float(span[k]))
+        way = step * np.eye(len(x))[k]
+        yield x + way, x - way, step
 
 
 _KS = 200.0  # of the Kreisselmeier-Steinhauser function of shares: ln(n)/200 above their largest

@@ -11,6 +11,7 @@ import numpy as np
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.optimization.design import Design, Designs, run_of
+from erls.optimization.evaluation import beside
 from erls.optimization.problem import Problem
 from erls.run.chain.run import ChainRun
 from erls.scene.integrators import FIXED_STEP
@@ -56,13 +57,7 @@ def derivatives(
 
 def _differences(designs: Designs, design: Design, asked: Asked) -> Array:
     problem, columns = designs.problem, []
-    span = problem.upper - problem.lower
-    for k in range(len(design.x)):
-        step = _STEP * max(abs(float(design.x[k])), 1e-2 * float(span[k]))
-        sides = []
-        for sign in (1.0, -1.0):
-            x = design.x.copy()
-            x[k] += sign * step
-            sides.append(asked(run_of(designs.at(x))))
-        columns.append((sides[0] - sides[1]) / (2 * step))
+    for above, below, step in beside(design.x, problem.upper - problem.lower, _STEP):
+        more, less = (asked(run_of(designs.at(x))) for x in (above, below))
+        columns.append((more - less) / (2 * step))
     return np.stack(columns, axis=-1)

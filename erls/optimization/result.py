@@ -52,6 +52,7 @@ class Confirmed:
     Attributes
     ----------
     formulation : str
+        With what else is not that of the scene: fine elements, some of the steps.
     values : dict of str to float
         By constraint.
     times : dict of str to float

@@ -12,6 +12,7 @@ from erls.report.html import table as html_table
 from erls.report.tables import table
 
 Rows = list[tuple[str, ...]]
+_AGAIN = "Simulated again, all steps unless said"
 _SHOWN = 12  # active constraints
 
 
@@ -19,7 +20,7 @@ def optimum_text(found: Optimization) -> str:
     """What came out, beside what is published."""
     parts = [_about(found), table(_header(found), _rows(found))]
     if any(o.confirmed for o in found.outcomes):
-        parts.append("Simulated again, all steps\n" + table(_confirmed_header(found), _confirmed_rows(found)))
+        parts.append(f"{_AGAIN}\n" + table(_confirmed_header(found), _confirmed_rows(found)))
     for o in found.outcomes:
         if o.active:
             parts.append(f"{o.method}: what holds the design\n" + table(_ACTIVE, _active_rows(found, o)))
@@ -35,7 +36,7 @@ def optimum_page(found: Optimization) -> str:
     for o in found.outcomes:
         parts.append(paragraph(f"{o.method}: {_reason(o)}", "good" if o.status == "converged" else "bad"))
     parts += [heading("Designs"), html_table(_header(found), _rows(found))]
-    parts += [heading("Simulated again, all steps"), html_table(_confirmed_header(found), _confirmed_rows(found))]
+    parts += [heading(_AGAIN), html_table(_confirmed_header(found), _confirmed_rows(found))]
     parts += [figure(plot) for plot in _motions(found)]
     for o in found.outcomes:
         parts += [heading(f"{o.method}: what holds the design"), html_table(_ACTIVE, _active_rows(found, o))]
