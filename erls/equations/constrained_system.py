@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array
 
-if TYPE_CHECKING:  # it imports the compiler
+if TYPE_CHECKING:  # they import the compiler
     from erls.equations.stepped import Stepped
+    from erls.equations.switches.base import Switches
 
 Configuration: TypeAlias = Any  # never changed in place
 
@@ -26,6 +27,11 @@ class ConstrainedSystem(Protocol):
     @property
     def compiled(self) -> Stepped | None:
         """The same in compiled form, for one run; None where there is none."""
+        return None
+
+    @property
+    def switches(self) -> Switches | None:
+        """Modes of what acts in joints (`erls.equations.switches.base`), at what is stored of knots; None of none."""
         return None
 
     @property
@@ -79,6 +85,10 @@ class ConstrainedSystem(Protocol):
 
     def constraint_bias(self, t: float, q: Configuration, v: Array) -> Array:
         """(m,) Φ̈ - B a."""
+
+    def driven(self, t: float, q: Configuration, v: Array) -> tuple[Array, Array]:
+        """Accelerations (n,) and multipliers (m,) with the present modes of `switches`."""
+        raise NotImplementedError
 
     def stored(self, t: float, q: Configuration, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """(s,) three times: what a `Solution` keeps of a knot, with its first and second derivative by time.

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 from erls.equations.formulation import Formulation, Modular
 from erls.equations.registry import system_of
-from erls.equations.sticking import Rubbing, Sticking
 from erls.equations.substructures import solved
+from erls.equations.switched import switched
 from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.charts import in_charts
 from erls.integrate.constrained import ConstrainedOptions
@@ -108,21 +108,20 @@ def _named(mechanism: Mechanism, settings: Simulation) -> Integrate:
 
 def _tree(mechanism: Mechanism, settings: Simulation) -> Integrate:
     integrate = integrator_named(settings.integrator)
-    if not mechanism.sticks:
+    if not mechanism.switches:
         return integrate
-    if any(link.elastic_modes for link in mechanism.links):
+    if mechanism.sticks and any(link.elastic_modes for link in mechanism.links):
         integrate = _aimed(integrate, _STICKING)
 
     def integrated(
-        system: Rubbing,
+        system: Formulation,
         times: tuple[float, float],
         y: Array,
         v: Array,
         options: Options,
         observer: Observer | None = None,
     ) -> Solution:
-        moving = system if system.dry is None else Sticking(system)  # None: their motions are prescribed
-        return integrate(moving, times, y, v, options, observer)
+        return integrate(switched(system), times, y, v, options, observer)
 
     return integrated
 
@@ -144,7 +143,7 @@ def _compile_named(system: Any, settings: Simulation) -> None:
 def _compile_tree(system: Any, settings: Simulation) -> None:
     _compile_named(system, settings)
     if system.mechanism.sticks:
-        import_module("erls.equations.sticking_kernels")
+        import_module("erls.equations.switches.kernels")
 
 
 INTEGRATIONS: dict[str, Integration] = {

@@ -33,6 +33,7 @@ from erls.integrate.constrained_run import ConstrainedRecorder, tell_again
 from erls.integrate.driver import Recorder, not_finite, run_to_end
 from erls.integrate.memory import Keeping
 from erls.integrate.step_plans import Plan, planned
+from erls.integrate.switching import Switch
 from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
 
@@ -86,25 +87,39 @@ def _run(
             equal_steps(steps, part, width, options.iteration_matrix != "frozen", recorder, given=plan is None)
             steps.part += 1
 
+    def begin(steps: Steps, leg: Leg, place: Configuration, rate: Array) -> None:
+        start = _start_of_leg(system, leg, place, rate, recorder)
+        steps.begin(place, start.v, np.concatenate([start.a, start.multipliers]))
+
     def go(walk: list[Leg]) -> None:
         if known is not None:
             tell_again(known, recorder)
             return
         refuse_redundant(system, walk[0].first, q)
         place, rate = consistent_start(system, walk[0].first, q, given.v, recorder.warnings)
+        if recorder.switching is not None:
+            recorder.switching.coarse = True
+            rate = np.where(given.v == 0.0, 0.0, rate)  # who rests does
         steps = steps_of(system, options, recorder, recorder.kept)
         keeping = Keeping(options.keeper, recorder, steps)
         for number, leg in enumerate(walk):
             if keeping.passed(number):
                 continue
             if not keeping.resumes(number):
-                start = _start_of_leg(system, leg, place, rate, recorder)
-                steps.begin(place, rate, np.concatenate([start.a, start.multipliers]))
-            if leg.end > leg.start:
+                begin(steps, leg, place, rate)
+            elif recorder.switching is not None:
+                leg = recorder.switching.leg
+            while leg.end > leg.start:
                 before = recorder.steps
-                advance(steps, leg)
-                if options.project_velocity:
-                    recorder.work.factorizations += recorder.steps - before
+                try:
+                    advance(steps, leg)
+                    break
+                except Switch as switch:
+                    leg = Leg(switch.t, leg.end, switch.t, leg.last)
+                    begin(steps, leg, switch.y, switch.v)
+                finally:
+                    if options.project_velocity:
+                        recorder.work.factorizations += recorder.steps - before
             place, rate = steps.end()
 
     found = run_to_end(system, times, recorder, go, lambda: recorder.add(times[0], given))
@@ -143,7 +158,12 @@ def _start_of_leg(
     """Acceleration and multipliers at the start of a leg, which becomes a knot."""
     recorder.work.rhs_calls += 1
     recorder.work.factorizations += 1
-    a, multipliers = consistent_acceleration(system, leg.first, q, v)
+    switching = recorder.switching
+    if switching is None:
+        a, multipliers = consistent_acceleration(system, leg.first, q, v)
+    else:
+        v, _ = switching.stand(leg, q, v)
+        a, multipliers = system.driven(leg.first, q, v)
     if not np.isfinite(a).all():
         raise not_finite(leg.start, a)
     state = ConstrainedState(q, v, a, multipliers)

@@ -1,7 +1,7 @@
-"""Switches of a motion whose joints stick and slide: found between the knots of a step, and located in time.
+"""Switches of a motion whose modes change: found between the knots of a step, and located in time.
 
-A switch is where a joint that slides comes to rest, or where friction that holds one reaches what it can hold. Steps go
-on with the modes that they began with, so that what they interpolate is smooth, and a switch is as accurate as the
+A switch is where a joint that slides comes to rest, where friction that holds one reaches what it can hold, or where a
+motor comes to its limit or leaves it (`erls.equations.switches.base`). Steps go on with the modes that they began with, so that what they interpolate is smooth, and a switch is as accurate as the
 knots (rule 4 of `erls.integrate.base`): it becomes the last knot of a leg, and another leg begins there with the modes
 that the set-valued law gives. What falls below zero and comes back between two looks is not seen.
 """
@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from erls.equations.sticking import Sticking
+from erls.equations.switches.base import Switches
 from erls.equations.system import MovingSystem
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, hermite_knots
@@ -42,26 +42,34 @@ class Switching:
 
     Parameters
     ----------
-    system : Sticking
+    system : Switches
     """
 
-    def __init__(self, system: Sticking) -> None:
+    def __init__(self, system: Switches) -> None:
         self.system = system
-        self._released = np.zeros(len(system.dry.places))
+        self._decided = system.undecided
         self._recent: deque[float] = deque(maxlen=_MANY)
-        self._knot = np.zeros((3, system.size))  # the last one
+        self._knot = np.zeros((3, len(system.still)))  # the last one
         self._t = 0.0
+        self._begun = False
         self.leg = Leg(0.0, 0.0, 0.0, 0.0)
         """What is being walked over: a leg, or what a switch leaves of one."""
         self.coarse = False
         """Whether steps need not resolve vibrations, so that accelerations at knots tell nothing of what is between."""
 
-    def stand(self, leg: Leg, y: Array, v: Array) -> Array:
-        """Set the modes at the start of a leg; its accelerations (n,)."""
-        a = self.system.settle(leg.first, y, v, self._released)
-        self._released[:] = 0.0
+    def stand(self, leg: Leg, y: Array, v: Array) -> tuple[Array, Array]:
+        """Set the modes at the start of a leg; rates and accelerations (n,)."""
+        if self._begun:  # who rests because others do keeps no rounding
+            v = np.where(self.system.still, 0.0, v)
+        self._begun = True
+        a = self.system.settle(leg.first, y, v, self._decided)
+        self._decided = self.system.undecided
         self.leg, self._t, self._knot = leg, leg.start, np.array([y, v, a])
-        return a
+        return v, a
+
+    def rest(self, knots: Array) -> None:
+        """Take from knots (k, 3, n) what rounding leaves of the motion of joints that rest."""
+        knots[:, 1:, self.system.still] = 0.0
 
     def first(self, t: Array, knots: Array) -> tuple[int, Array | None, Switch | None]:
         """The first switch in new knots.
@@ -81,13 +89,13 @@ class Switching:
         switch : Switch or None
         """
         times, states = np.append(self._t, t), np.concatenate([self._knot[None], knots])
-        slides = self.coarse or bool(self.system.modes.all())
+        slides = self.coarse or self.system.steady
         looks, (y, v, a) = (times, states.swapaxes(0, 1)) if slides else _looks(times, states)
         ended = self.system.left(looks, y, v, a) < 0.0
         ended[0] = False  # there the law has just spoken
         if ended.any():
             every = 1 if slides else _LOOKS  # looks from knot to knot; rates are looked at at knots alone
-            ended &= (self.system.modes == 0.0) | (np.arange(len(looks)) % every == 0)[:, None]
+            ended &= ~self.system.slides | (np.arange(len(looks)) % every == 0)[:, None]
             for at in np.flatnonzero(ended.any(axis=1)).tolist():
                 since = looks[at - (every if at % every == 0 else 1)]
                 found = self._located(times, states, since, looks[at], np.flatnonzero(ended[at]))
@@ -117,35 +125,33 @@ class Switching:
 
             return value
 
-        slides = self.system.modes[joints] != 0.0
+        slides = self.system.slides[joints]
         roots = np.array([_root(left(int(k)), start, end, bool(s)) for k, s in zip(joints, slides, strict=True)])
         t = float(roots.min())
         if not t < self.leg.end - _HAIR * max(abs(self.leg.end), 1.0):
             return None
         now = joints[roots <= t + _ROUNDING * max(abs(t), 1.0)]
-        y, v = state(t)
-        v = self.system.brought_to_rest(t, y, v, now[self.system.modes[now] != 0.0])
+        y, v = self.system.closed(t, *state(t))
+        v = self.system.brought_to_rest(t, y, v, now[self.system.slides[now]])
         a = self.system.acceleration(t, y, v)
-        self._end_modes(t, now, self.system.holding(np.array([t]), y[None], v[None], a[None])[0])
+        self._end_modes(t, y, v, now)
         before = max(int(np.searchsorted(times, t)) - 1, 0)
         return before, np.array([y, v, a]) if t > times[0] else None, Switch(t, y, v)
 
-    def _end_modes(self, t: float, joints: IntArray, holding: Array) -> None:
-        """Some joints come to rest, or break away where they stick, and then slide as ``holding`` (m,) forces them to.
+    def _end_modes(self, t: float, y: Array, v: Array, ended: IntArray) -> None:
+        """What follows of some modes is decided.
 
         Raises
         ------
         SimulationError
             STEP_TOO_SMALL, where that goes on and on at one instant.
         """
-        gone = joints[self.system.modes[joints] == 0.0]
-        self._released[gone] = -np.sign(holding[gone])
+        self._decided = self.system.after(t, y, v, ended)
         self._recent.append(t)
         if len(self._recent) == _MANY and t - self._recent[0] < _AT_ONCE:
             raise SimulationError(
                 Cause.STEP_TOO_SMALL,
-                f"friction of joint {self.system.dry.names[int(joints[0])]!r} switches between sticking and sliding "
-                f"{_MANY} times at once",
+                f"{self.system.names[int(ended[0])]} {_MANY} times at once",
                 where=f"t = {t:.9g} s",
                 value=f"{t - self._recent[0]:.3g} s",
                 limit=f"{_AT_ONCE:g} s for {_MANY} switches",
@@ -156,6 +162,7 @@ class Switching:
         """Between two steps, see `erls.integrate.memory`."""
         return {
             "switching.modes": self.system.modes.copy(),
+            "switching.fixed": self.system.fixed.copy(),
             "switching.leg": np.array(self.leg),
             "switching.t": np.array([self._t]),
             "switching.knot": self._knot,
@@ -164,16 +171,19 @@ class Switching:
 
     def restore(self, memory: Memory) -> None:
         """As another run left it."""
-        self.system.modes[:] = taken(memory, "switching.modes", self._released)
+        modes = taken(memory, "switching.modes", self.system.modes)
+        self.system.set(modes, taken(memory, "switching.fixed", self.system.fixed, axis=0))
         self.leg = Leg(*taken(memory, "switching.leg", np.zeros(4)).tolist())
         self._t = float(taken(memory, "switching.t", np.zeros(1))[0])
         self._knot = taken(memory, "switching.knot", self._knot).copy()
         self._recent = deque(taken(memory, "switching.recent", np.zeros(0), axis=0).tolist(), maxlen=_MANY)
+        self._begun = True
 
 
 def switching_of(system: MovingSystem) -> Switching | None:
-    """What looks for switches; None where nothing sticks."""
-    return Switching(system) if isinstance(system, Sticking) else None
+    """What looks for switches; None where there are none."""
+    found = system if isinstance(system, Switches) else getattr(system, "switches", None)
+    return Switching(found) if found is not None else None
 
 
 def _cubic(times: Array, states: Array, x: float) -> tuple[Array, Array]:

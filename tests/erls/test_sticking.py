@@ -14,9 +14,9 @@ import scenes
 import erls
 from erls.accuracy.energy_balance import energy_balance
 from erls.accuracy.looked_at import LookedAt
-from erls.equations.dry_friction import at_rest
 from erls.equations.registry import formulate
-from erls.equations.sticking import Sticking
+from erls.equations.switched import switched
+from erls.equations.switches.law import at_rest
 from erls.errors import Cause, SceneError, SimulationError
 from erls.integrate.switching import Switching
 from erls.run.chain.run import ChainRun
@@ -280,15 +280,15 @@ def test_what_sticking_does_not_go_with(settings: dict[str, Any], tmp_path: Path
 
 
 def _switch_on_and_on(looking: Switching) -> None:
+    at_rest = np.zeros(2)
     for _ in range(1000):
-        looking._end_modes(0.25, np.array([1]), np.ones(2))
+        looking._end_modes(0.25, at_rest, at_rest, np.array([1]))
 
 
 def test_chatter_ends(tmp_path: Path) -> None:
     """As many switches at one instant end the run, with the joint's name."""
     scene = erls.load_scene(arm(tmp_path, (20.0, 5.0)))
-    formulation: Any = formulate(scenes.mechanism(scene.path), scene.record.simulation)
-    looking = Switching(Sticking(formulation))
+    looking = Switching(switched(formulate(scenes.mechanism(scene.path), scene.record.simulation)))
     with pytest.raises(SimulationError, match="'second' switches") as caught:
         _switch_on_and_on(looking)
     assert caught.value.cause == Cause.STEP_TOO_SMALL

@@ -61,7 +61,7 @@ def force_record(
     """
     gain, rate_gain = drive.gains
     friction, transition = forces.friction, forces.transition_rate
-    if forces.law == "stick":  # of a coordinate that is free others take care (`erls.equations.dry_friction`)
+    if forces.law == "stick":  # of a coordinate that is free others take care (`erls.equations.switches`)
         friction, transition = friction if drive.prescribed else 0.0, _SUDDEN
     return Joint(
         place=-1,
@@ -79,7 +79,9 @@ def force_record(
         rotor=rotor_inertia,
         gain=gain,
         rate_gain=rate_gain,
-        limit=drive.torque_limit,
+        least=-drive.torque_limit,
+        most=drive.torque_limit,
+        rubbing=0.0,
         held=0.0,
         step=np.zeros((4, 12)),
         screw=np.zeros(6),
