@@ -69,7 +69,8 @@ class Switching:
 
     def rest(self, knots: Array) -> None:
         """Take from knots (k, 3, n) what rounding leaves of the motion of joints that rest."""
-        knots[:, 1:, self.system.still] = 0.0
+        still = self.system.still
+        knots[:, 0, still], knots[:, 1:, still] = self._knot[0, still], 0.0
 
     def first(self, t: Array, knots: Array) -> tuple[int, Array | None, Switch | None]:
         """The first switch in new knots.

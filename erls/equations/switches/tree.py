@@ -9,7 +9,6 @@ import numpy as np
 
 from erls.equations.switches.base import NO_FRICTION, Switches
 from erls.equations.switches.law import Freely, Settled, settled
-from erls.equations.system import SecondOrderSystem
 from erls.maths.so3 import Array
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from erls.equations.serial.formulation import SerialFormulation
 
 
-class SwitchedTree(Switches, SecondOrderSystem):
+class SwitchedTree(Switches):
     """A `SecondOrderSystem` with modes.
 
     Parameters
