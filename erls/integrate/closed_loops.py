@@ -17,7 +17,6 @@ from erls.equations.loops.branching import AT, Kind, singular_at
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.loops.failures import ends_singular
 from erls.equations.loops.tied import OPEN
-from erls.equations.switched import switched
 from erls.equations.switches.base import Switches
 from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause, SimulationError
@@ -142,7 +141,6 @@ def loop_integrator(name: str) -> Integrator:
         observer: Observer | None = None,
     ) -> Solution:
         assert isinstance(system, ClosedChain)
-        system = switched(system)
         if name == "generalized_alpha" and len(system.kept):
             solution: Solution = lie_generalized_alpha(
                 TiedCoordinates(system), times, y, v, tied_options(options), observer

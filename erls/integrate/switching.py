@@ -126,8 +126,8 @@ class Switching:
 
             return value
 
-        slides = self.system.slides[joints]
-        roots = np.array([_root(left(int(k)), start, end, bool(s)) for k, s in zip(joints, slides, strict=True)])
+        zero = self.system.begins_at_zero[joints]
+        roots = np.array([_root(left(int(k)), start, end, bool(s)) for k, s in zip(joints, zero, strict=True)])
         t = float(roots.min())
         if not t < self.leg.end - _HAIR * max(abs(self.leg.end), 1.0):
             return None
@@ -217,17 +217,19 @@ def _shapes() -> Array:
     return np.array(hermite_knots(ends, y, v, a, at))
 
 
-def _root(value: Callable[[float], float], start: float, end: float, slides: bool) -> float:
-    """Where a value that is positive after ``start`` falls below zero; infinite where it does not."""
+def _root(value: Callable[[float], float], start: float, end: float, from_zero: bool) -> float:
+    """Where a value that is positive after ``start``, and there unless it begins ``from_zero``, falls below zero;
+    infinite where it does not.
+    """
     from scipy.optimize import brentq  # here: only switches need it
 
     if value(end) >= 0.0:
         return math.inf
     first = start
     if value(first) <= 0.0:
-        if not slides:
+        if not from_zero:
             return start
-        last = end  # it starts from rest, as a joint does that has just broken away
+        last = end  # it starts from rest, as a joint does that has just broken away, or from the limit of a motor
         while value(first) <= 0.0:
             end = first if first > start else end
             first = start + (end - start) / 2

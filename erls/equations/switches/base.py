@@ -67,6 +67,13 @@ class Switches:
         return np.asarray(result)
 
     @property
+    def begins_at_zero(self) -> Array:
+        """(m + c,) which modes begin where they end: of joints that slide from rest, and of motors."""
+        result = self.slides
+        result[self._rubs :] = True
+        return result
+
+    @property
     def steady(self) -> bool:
         """Whether all modes are those of joints that slide."""
         return bool(self.slides.all())
