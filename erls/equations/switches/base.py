@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from erls.equations.switches.law import DryFriction, Freely, Settled
-from erls.equations.switches.shares import Shares, independent, shared
+from erls.equations.switches.shares import Shares, following, independent, shared
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -164,12 +164,10 @@ class Switches:
         held = at_rest[independent(compliance[np.ix_(at_rest, at_rest)], free.alone[at_rest])]
         impulses = np.linalg.solve(compliance[np.ix_(held, held)], v[self.rubbing.places[held]])
         result = np.array(v - free.answers[:, held] @ impulses)
-        rest = self.rubbing.places[at_rest]
         others = np.setdiff1d(np.arange(self._rubs), at_rest)
-        follow = [k for k in others.tolist() if k not in _chosen(compliance, free.alone, held, k)]
+        follow = others[following(compliance, free.alone, held, others)]
         slow = np.abs(result[self.rubbing.places[follow]]) < _AT_REST
-        rest = np.append(rest, self.rubbing.places[np.array(follow, dtype=np.int64)[slow]])
-        result[rest] = 0.0
+        result[self.rubbing.places[np.append(at_rest, follow[slow])]] = 0.0
         return result
 
     def left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
@@ -210,10 +208,3 @@ class Switches:
             at = int(np.flatnonzero(rest == k)[0])
             result[k] = -np.sign(found.forces[at]) if full[at] else 0.0
         return result
-
-
-def _chosen(compliance: Array, alone: Array, held: IntArray, k: int) -> list[int]:
-    """Of joints held and one more, those that are independent."""
-    every = np.append(held, k)
-    return every[independent(compliance[np.ix_(every, every)], alone[every])].tolist()  # type: ignore[no-any-return]
-

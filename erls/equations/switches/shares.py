@@ -61,6 +61,16 @@ def independent(compliance: Array, alone: Array) -> IntArray:
     return np.array(sorted(chosen), dtype=np.int64)
 
 
+def following(compliance: Array, alone: Array, held: IntArray, others: IntArray) -> Array:
+    """Which of ``others`` (k,) cannot move while joints ``held`` rest, which are independent; W and its diagonal without
+    loops as of `independent`.
+    """
+    scaled = _correlations(compliance, alone)[0]
+    across = scaled[np.ix_(held, others)]
+    left = scaled[others, others] - np.sum(across * np.linalg.solve(scaled[np.ix_(held, held)], across), axis=0)
+    return np.asarray(left <= DEPENDENT)
+
+
 def shared(compliance: Array, free: Array, static: Array, alone: Array) -> Shares:
     """Forces λ with b + W λ = 0, of the least largest share of ``static``, which may be more than 1.
 
