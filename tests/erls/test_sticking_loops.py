@@ -190,11 +190,11 @@ def flexible_linkage(folder: Path, **settings: Any) -> ChainRun:
     joints = [
         {"name": f"j{k}", "dh": {"convention": "modified", "a": a}, "initial": {"position": angle}, "friction": rub}
         for k, (a, angle, rub) in enumerate(
-            zip((0.0, 0.3, 0.5), angles, (_stick(0.1, 0.15), _stick(0.05), _stick(0.05)), strict=True)
+            zip((0.0, 0.3, 0.5), angles, (_stick(0.4, 0.6), _stick(0.3), _stick(0.2)), strict=True)
         )
     ]
     loop = {"name": "close", "link": "c", "node": "tip", "type": "revolute", "axis": [0.0, 0.0, 1.0]}
-    joints[0]["initial"] |= {"rate": 6.0}
+    joints[0]["initial"] |= {"rate": 3.0}
     data = {
         "gravity": [0.0] * 3,
         "simulation": {"duration": 0.16, "integrator": "lobatto", "tolerance": 1e-5, **settings},

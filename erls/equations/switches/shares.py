@@ -105,7 +105,14 @@ def shared(compliance: Array, free: Array, static: Array, alone: Array) -> Share
 
 
 def _least_largest(shares: Array, ways: Array) -> tuple[Array, Array]:
-    """Shares s + N z (m,) whose largest is least, and the sign (m,) of the motion that is dual to them."""
+    """Shares s + N z (m,) whose largest is least, and the sign (m,) of the motion that is dual to them.
+
+    Where only one motion is left, u · s is all that matters, and all shares are alike: u · s / Σ |u_k|.
+    """
+    if ways.shape[1] == len(shares) - 1:
+        across = np.linalg.svd(ways)[0][:, -1]
+        sides, pushed = np.sign(np.where(np.abs(across) > _OWN, across, 0.0)), float(across @ shares)
+        return sides * pushed / np.abs(across).sum(), -sides * np.sign(pushed)
     from scipy.optimize import linprog  # here: only loops at rest need it
 
     count, choices = ways.shape
