@@ -86,6 +86,15 @@ class ConstrainedSystem(Protocol):
     def constraint_bias(self, t: float, q: Configuration, v: Array) -> Array:
         """(m,) Φ̈ - B a."""
 
+    @property
+    def unlocked(self) -> ConstrainedSystem:
+        """The same without conditions that come and go with modes."""
+        return self
+
+    def from_stored(self, y: Array, v: Array) -> tuple[Configuration, Array]:
+        """Configuration and velocity from what `stored` gives, interpolated or not; asked of those with `switches`."""
+        raise NotImplementedError
+
     def driven(self, t: float, q: Configuration, v: Array) -> tuple[Array, Array]:
         """Accelerations (n,) and multipliers (m,) with the present modes of `switches`."""
         raise NotImplementedError

@@ -85,6 +85,15 @@ class TiedCoordinates:
         """(m,) Φ̈ at zero accelerations."""
         return np.asarray(self.chain.closure(t, q, v).bias[self.kept])
 
+    @property
+    def unlocked(self) -> TiedCoordinates:
+        """The same, whose rows take nothing of what friction holds."""
+        return self
+
+    def from_stored(self, y: Array, v: Array) -> tuple[Array, Array]:
+        """The coordinates themselves."""
+        return y, v
+
     def driven(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Accelerations and multipliers with the present modes, see `erls.equations.switches.base`."""
         a = self.chain.acceleration(t, q, v)

@@ -69,6 +69,7 @@ _TOLD = 64  # knots of a run that is told again, between looks of the observer
 
 def tell_again(found: ConstrainedSolution, recorder: Recorder) -> None:
     """Record a run that was made before anybody looked on."""
+    recorder.switching = None  # its switches are known
     recorder.work = replace(found.work, steps=0)
     recorder.warnings += found.warnings
     beside = np.concatenate([found.accelerations, found.multipliers], axis=1)

@@ -73,6 +73,8 @@ class Recorder:
     def begin(self, t: float, *parts: Array) -> None:
         """Add a copy of the knot y, v, a (and what is kept beside it) at which a leg begins; the last leg ends."""
         row = np.concatenate(parts)[None]
+        if self.switching is not None:
+            self.switching.rest(row[:, : 3 * self._size].reshape(1, 3, self._size))
         if not self._kept[0]:
             self._begun = t
         times, rows = self._waiting()
@@ -111,9 +113,7 @@ class Recorder:
         count, knot, switch = self.switching.first(t, knots)
         t, rows = t[:count], rows[:count]
         if switch is not None and knot is not None:
-            beside = np.zeros(self.beside)
-            beside[: self._size] = knot[2, : self.beside]  # accelerations; multipliers of loops are found anew
-            t, rows = np.append(t, switch.t), np.concatenate([rows, np.append(knot, beside)[None]])
+            t, rows = np.append(t, switch.t), np.concatenate([rows, knot[None, : rows.shape[1]]])
         self._keep(t, rows, steps if switch is None else 1)
         if switch is not None:
             self._look(switch.t)  # nothing is offered: the steps stand beyond it

@@ -95,8 +95,9 @@ def _run(
         if known is not None:
             tell_again(known, recorder)
             return
-        refuse_redundant(system, walk[0].first, q)
-        place, rate = consistent_start(system, walk[0].first, q, given.v, recorder.warnings)
+        free = system if recorder.switching is None else system.unlocked
+        refuse_redundant(free, walk[0].first, q)
+        place, rate = consistent_start(free, walk[0].first, q, given.v, recorder.warnings)
         if recorder.switching is not None:
             recorder.switching.coarse = True
             rate = np.where(given.v == 0.0, 0.0, rate)  # who rests does
@@ -116,7 +117,7 @@ def _run(
                     break
                 except Switch as switch:
                     leg = Leg(switch.t, leg.end, switch.t, leg.last)
-                    begin(steps, leg, switch.y, switch.v)
+                    begin(steps, leg, *system.from_stored(switch.y, switch.v))
                 finally:
                     if options.project_velocity:
                         recorder.work.factorizations += recorder.steps - before
@@ -162,7 +163,8 @@ def _start_of_leg(
     if switching is None:
         a, multipliers = consistent_acceleration(system, leg.first, q, v)
     else:
-        v, _ = switching.stand(leg, q, v)
+        place, rate, _ = system.stored(leg.first, q, v, np.zeros(system.size))
+        switching.stand(leg, place, rate)
         a, multipliers = system.driven(leg.first, q, v)
     if not np.isfinite(a).all():
         raise not_finite(leg.start, a)

@@ -85,8 +85,8 @@ class Switching:
         -------
         count : int
             Of knots before it; all of them where there is none.
-        knot : (3, n) array or None
-            At the switch; None where that is the last knot before.
+        knot : (3 n + b,) array or None
+            At the switch, with what is kept beside; None where that is the last knot before.
         switch : Switch or None
         """
         times, states = np.append(self._t, t), np.concatenate([self._knot[None], knots])
@@ -134,10 +134,10 @@ class Switching:
         now = joints[roots <= t + _ROUNDING * max(abs(t), 1.0)]
         y, v = self.system.closed(t, *state(t))
         v = self.system.brought_to_rest(t, y, v, now[self.system.slides[now]])
-        a = self.system.acceleration(t, y, v)
+        knot, beside = self.system.knot(t, y, v)
         self._end_modes(t, y, v, now)
         before = max(int(np.searchsorted(times, t)) - 1, 0)
-        return before, np.array([y, v, a]) if t > times[0] else None, Switch(t, y, v)
+        return before, np.append(knot, beside) if t > times[0] else None, Switch(t, y, v)
 
     def _end_modes(self, t: float, y: Array, v: Array, ended: IntArray) -> None:
         """What follows of some modes is decided.
@@ -173,10 +173,10 @@ class Switching:
     def restore(self, memory: Memory) -> None:
         """As another run left it."""
         modes = taken(memory, "switching.modes", self.system.modes)
-        self.system.set(modes, taken(memory, "switching.fixed", self.system.fixed, axis=0))
+        self._knot = taken(memory, "switching.knot", self._knot).copy()
+        self.system.set(modes, taken(memory, "switching.fixed", self.system.fixed, axis=0), self._knot[0])
         self.leg = Leg(*taken(memory, "switching.leg", np.zeros(4)).tolist())
         self._t = float(taken(memory, "switching.t", np.zeros(1))[0])
-        self._knot = taken(memory, "switching.knot", self._knot).copy()
         self._recent = deque(taken(memory, "switching.recent", np.zeros(0), axis=0).tolist(), maxlen=_MANY)
         self._begun = True
 

@@ -35,12 +35,11 @@ def check_sticking(scene: SceneRecord, file: str) -> None:
         return bad(f"{file}: {place}.friction.law", message, "stick", remedy)
 
     closing = _sticking("loops", scene.loops)
-    if closing:
+    if closing and scene.simulation.formulation != "nodal":
         remedy = "close the loop by another joint, and list this one under [[joints]]; or use law = 'smooth'"
-        raise refused(closing[0], "a joint of [[loops]]", remedy)
+        raise refused(closing[0], "a joint of [[loops]] but in simulation.formulation = 'nodal'", remedy)
     places, s = _sticking("joints", scene.joints), scene.simulation
     for found, what in (
-        (s.formulation == "nodal", "simulation.formulation = 'nodal'"),
         (s.coordinates == "absolute", "simulation.coordinates = 'absolute'"),
         (s.gauge == "minimum-norm", "simulation.gauge = 'minimum-norm'"),
         (s.bandwidth is not None, "simulation.bandwidth"),

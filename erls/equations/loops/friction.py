@@ -37,7 +37,8 @@ def freely(chain: ClosedChain, t: float, y: Array, v: Array) -> Freely:
     basis = la.qr(conditions, mode="economic")[0]
     alone = np.sum(moved**2, axis=0)
     moved = moved - basis @ (basis.T @ moved)
-    return Freely(a, la.solve_triangular(upper, moved), alone)
+    answers = la.solve_triangular(upper, moved)
+    return Freely(a, answers, a[places], answers[places], alone)
 
 
 def forced(chain: ClosedChain, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:

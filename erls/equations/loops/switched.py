@@ -44,7 +44,7 @@ class SwitchedChain(ClosedChain, Switches):
         """See `ClosedChain`."""
         return self._chain
 
-    def put(self) -> None:
+    def put(self, y: Array) -> None:
         """Into constants and memory of the equations."""
         system, rubs = self.loops, len(self.rubbing.places)
         self.motors.put(self.modes[rubs:], system.reals, system.integers)
@@ -52,6 +52,11 @@ class SwitchedChain(ClosedChain, Switches):
         held = system.room.held
         held[:] = 0.0
         held[self.fixed] = 1.0
+
+    def knot(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """See `Switches`: accelerations and multipliers of the conditions in use."""
+        a = self.acceleration(t, y, v)
+        return np.array([y, v, a]), np.concatenate([a, self.loops.room.multipliers])
 
     def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
         """See `Switches`."""

@@ -23,6 +23,7 @@ from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain, Seat, build_chain
 from erls.equations.nodal.joints import GROUND
 from erls.equations.nodal.link_state import LinkView
+from erls.equations.nodal.locks import LockedSystem, dry_joints
 from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import link_parts
@@ -31,6 +32,7 @@ from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
 from erls.equations.serial.equilibrium import size_of
 from erls.equations.stability import LARGEST, Stability, stability_of
+from erls.equations.switches.law import DryFriction
 from erls.maths import motion_maps as motions
 from erls.maths import rotation_maps as rotations
 from erls.maths.saddle import Matrix
@@ -109,8 +111,19 @@ class Nodal:
 
     @property
     def size(self) -> int:
-        """18 numbers for each node, one for each joint and each of its conditions."""
-        return self._kept + self.system.size + self.system.constraints
+        """18 numbers for each node, one for each joint and each of its conditions, and one for what holds it at rest."""
+        return self._kept + self.system.size + self.system.constraints + len(self.dry.places)
+
+    @cached_property
+    def dry(self) -> DryFriction:
+        """Friction of joints that may stick; places are those of their coordinates in y."""
+        return dry_joints(self.system)
+
+    @cached_property
+    def locked(self) -> LockedSystem | None:
+        """What is integrated, with modes of what acts in joints; None where nothing has any."""
+        switches = len(self.dry.places) or self.mechanism.limited
+        return LockedSystem(self.system) if switches else None
 
     def configuration(self, y: Array, v: Array) -> tuple[Nodes, Array]:
         """Configuration and twists of the nodes (n,)."""
@@ -118,7 +131,15 @@ class Nodal:
 
     def _found(self, y: Array) -> tuple[Array, Array]:
         """Rates of twists and multipliers."""
-        return y[self._kept : self._kept + self.system.size], y[self._kept + self.system.size :]
+        first = self._kept + self.system.size
+        return y[self._kept : first], y[first : first + self.system.constraints]
+
+    def _rubbing(self, y: Array, v: Array) -> Array:
+        """(m,) friction of joints that may stick."""
+        if self.locked is None or not len(self.dry.places):
+            return np.zeros(0)
+        holding = self.locked.friction_of(y[-len(self.dry.places) :])
+        return self.dry.given(v[None], holding[None])[0]
 
     def initial_state(self) -> tuple[Array, Array]:
         """Frames and joint coordinates at time 0; links turn with the joints as they are.
@@ -149,6 +170,7 @@ class Nodal:
         if self.chain.closing:  # links that bend at the start do not move as rigid ones do
             velocity = consistent_velocity(self.system, 0.0, q, velocity)
         a, multipliers = consistent_acceleration(self.system, 0.0, q, velocity)
+        multipliers = np.append(multipliers, np.zeros(len(self.dry.places)))
         return _stored(self.system, 0.0, q, velocity, a, lambda: multipliers)[:2]
 
     def neighbours(self, t: float, y: Array, v: Array) -> NodalNeighbours:
@@ -291,6 +313,10 @@ class Nodal:
             force = np.asarray(self.system.constraint_matrix(t, q).T @ multipliers).ravel()
             multipliers = smallest_multipliers(full, t, q, force, self._units)
         along = self.system.in_joints(t, q, velocity, a)
+        if self.locked is not None and len(self.dry.places):
+            numbers, friction = self.locked.numbers, self._rubbing(y, v)
+            along[numbers, 3] += friction
+            along[numbers, 4:] += friction[:, None] * self.locked.outward(t, q)
         return _Acting(q, full.rows.joint_of_row, full.constraint_matrix(t, q), multipliers, along)
 
     @cached_property

@@ -135,7 +135,8 @@ class SerialFormulation(TreeFormulation):
         both[:, 0] = -self.residual(t, y, v, np.zeros(0))
         both[places, 1 + np.arange(len(places))] = 1.0
         both = self._solver(t, y)(both)
-        return Freely(both[:, 0], both[:, 1:], both[places, 1 + np.arange(len(places))])
+        compliance = both[places, 1:]
+        return Freely(both[:, 0], both[:, 1:], both[places, 0], compliance, compliance.diagonal())
 
     def _solver(self, t: float, y: Array) -> Callable[[Array], Array]:
         """M⁻¹ of forces."""

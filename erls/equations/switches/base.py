@@ -100,8 +100,8 @@ class Switches:
         """(k, m) friction that holds each joint that sticks at states of a motion."""
 
     @abstractmethod
-    def put(self) -> None:
-        """Say to the equations what modes are, and which coordinates do not move."""
+    def put(self, y: Array) -> None:
+        """Say to the equations what modes are, and which coordinates do not move from where they are in ``y``."""
 
     @abstractmethod
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
@@ -111,13 +111,13 @@ class Switches:
         """The nearest state that a motion may have."""
         return y, v
 
-    def set(self, modes: Array, fixed: IntArray) -> None:
-        """Set modes (m + c,), and which coordinates do not move."""
+    def set(self, modes: Array, fixed: IntArray, y: Array) -> None:
+        """Set modes (m + c,), and which coordinates do not move, at a state (n,)."""
         self.modes[:] = modes
         self._still[:] = False
         self._still[self.rubbing.places[modes[: self._rubs] == 0.0]] = True
         self.fixed = np.array(fixed, dtype=np.int64)
-        self.put()
+        self.put(y)
 
     @property
     def undecided(self) -> Array:
@@ -137,18 +137,18 @@ class Switches:
         motors = self.motors.by_value(self.asked(np.array([t]), y[None], v[None])[0])
         motors = np.where(np.isnan(given), motors, given)
         if not self._rubs:
-            self.set(motors, self.rubbing.places)
-            return self.acceleration(t, y, v)
-        found = self.settled(t, y, v, np.where(np.isnan(rubs), 0.0, rubs))
-        self.set(np.concatenate([found.modes, motors]), self.rubbing.places[found.held])
-        return found.accelerations
+            self.set(motors, self.rubbing.places, y)
+        else:
+            found = self.settled(t, y, v, np.where(np.isnan(rubs), 0.0, rubs))
+            self.set(np.concatenate([found.modes, motors]), self.rubbing.places[found.held], y)
+        return self.acceleration(t, y, v)
 
     def holding_at(self, t: float, y: Array, v: Array) -> Shares:
         """Friction that holds the joints that stick, in their order, at a state, and the motion that would begin."""
         free, modes = self.freely(t, y, v), self.modes[: self._rubs]
-        compliance, rest = free.answers[self.rubbing.places], np.flatnonzero(modes == 0.0)
-        along = free.accelerations[self.rubbing.places] - compliance @ (modes * self.rubbing.sliding)
-        own, static = compliance[np.ix_(rest, rest)], self.rubbing.static[rest]
+        rest = np.flatnonzero(modes == 0.0)
+        along = free.along - free.compliance @ (modes * self.rubbing.sliding)
+        own, static = free.compliance[np.ix_(rest, rest)], self.rubbing.static[rest]
         return shared(own, along[rest], static, free.alone[rest])
 
     def brought_to_rest(self, t: float, y: Array, v: Array, joints: IntArray) -> Array:
@@ -158,17 +158,25 @@ class Switches:
         """
         if not len(joints):
             return v
-        free = self.freely(t, y, v)
-        compliance = free.answers[self.rubbing.places]
+        free, rates = self.freely(t, y, v), v[self.rubbing.places]
         at_rest = np.union1d(np.flatnonzero(self.modes[: self._rubs] == 0.0), joints)
-        held = at_rest[independent(compliance[np.ix_(at_rest, at_rest)], free.alone[at_rest])]
-        impulses = np.linalg.solve(compliance[np.ix_(held, held)], v[self.rubbing.places[held]])
-        result = np.array(v - free.answers[:, held] @ impulses)
+        held = at_rest[independent(free.compliance[np.ix_(at_rest, at_rest)], free.alone[at_rest])]
+        impulses = np.linalg.solve(free.compliance[np.ix_(held, held)], rates[held])
+        rates = rates - free.compliance[:, held] @ impulses
         others = np.setdiff1d(np.arange(self._rubs), at_rest)
-        follow = others[following(compliance, free.alone, held, others)]
-        slow = np.abs(result[self.rubbing.places[follow]]) < _AT_REST
-        result[self.rubbing.places[np.append(at_rest, follow[slow])]] = 0.0
+        follow = others[following(free.compliance, free.alone, held, others)]
+        at_rest = np.append(at_rest, follow[np.abs(rates[follow]) < _AT_REST])
+        result = self.pushed(t, y, v, -free.answers[:, held] @ impulses)
+        result[self.rubbing.places[at_rest]] = 0.0
         return result
+
+    def pushed(self, t: float, y: Array, v: Array, change: Array) -> Array:
+        """(n,) rates after a change of velocities (n,), of those that `freely` has accelerations of."""
+        return np.asarray(v + change)
+
+    def knot(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
+        """(3, n) y, v and a at a state with the present modes, and what is kept beside them."""
+        return np.array([y, v, self.acceleration(t, y, v)]), np.zeros(0)
 
     def left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
         """(k, m + c) of states of a motion with these modes: rate in the direction of a joint that slides, static force

@@ -87,12 +87,18 @@ class Freely(NamedTuple):
     accelerations : (n,) array
     answers : (n, m) array
         Accelerations by a unit of friction in each joint.
+    along : (m,) array
+        Accelerations of the joints.
+    compliance : (m, m) array
+        W: those by a unit of friction in each.
     alone : (m,) array
         How each joint gives way to a unit of force, were there no loops: of W the diagonal then.
     """
 
     accelerations: Array
     answers: Array
+    along: Array
+    compliance: Array
     alone: Array
 
 
@@ -128,33 +134,37 @@ class Rubbing(Protocol):
 
 
 def settled(system: Rubbing, t: float, y: Array, v: Array, released: Array | None = None) -> Settled:
+    """Apply the law to joints whose rates are coordinates' (n,), exactly zero at rest; see `settle`."""
+    dry = system.dry
+    assert dry is not None
+    found = settle(system.freely(t, y, v), v[dry.places], dry, released)
+    found.accelerations[dry.places[found.modes == 0.0]] = 0.0
+    return found
+
+
+def settle(free: Freely, rates: Array, dry: DryFriction, released: Array | None = None) -> Settled:
     """Apply the law.
 
     Parameters
     ----------
-    system : Rubbing
-    t : float
-    y, v : (n,) arrays
-        Rates are exactly zero of a joint at rest.
+    free : Freely
+    rates : (m,) array
+        Of the joints, exactly zero at rest.
+    dry : DryFriction
     released : (m,) array, optional
         -1 or 1 of a joint at rest that has broken away, and so slides in that direction.
     """
-    dry, free = system.dry, system.freely(t, y, v)
-    assert dry is not None
-    rates = v[dry.places]
     modes = np.where(rates == 0.0, 0.0 if released is None else released, np.sign(rates))
-    given, compliance = -modes * dry.sliding, free.answers[dry.places]
+    given = -modes * dry.sliding
     rest = np.flatnonzero(modes == 0.0)
     held = rest
     if len(rest):
-        along = (free.accelerations[dry.places] + compliance @ given)[rest]
-        own = compliance[np.ix_(rest, rest)]
+        along = (free.along + free.compliance @ given)[rest]
+        own = free.compliance[np.ix_(rest, rest)]
         modes[rest], given[rest] = at_rest(own, along, dry.sliding[rest], dry.static[rest], free.alone[rest])
         rest = np.flatnonzero(modes == 0.0)
-        held = rest[independent(compliance[np.ix_(rest, rest)], free.alone[rest])]
-    accelerations = free.accelerations + free.answers @ given
-    accelerations[dry.places[rest]] = 0.0
-    return Settled(modes, accelerations, given, held)
+        held = rest[independent(free.compliance[np.ix_(rest, rest)], free.alone[rest])]
+    return Settled(modes, free.accelerations + free.answers @ given, given, held)
 
 
 def at_rest(

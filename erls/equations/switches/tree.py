@@ -78,7 +78,7 @@ class SwitchedTree(Switches):
         frictions = python_reader(own.Frictions)(system.reals, system.integers, int(system.integers[-1]))
         return python_reader(own.Room)(system.scratch, system.integers, frictions.room).held
 
-    def put(self) -> None:
+    def put(self, y: Array) -> None:
         """Into constants and memory of the equations."""
         from erls.equations.switches.motors import put_friction  # here: it imports the compiler
 
