@@ -90,7 +90,7 @@ def consistent_position(system: ConstrainedSystem, t: float, q: Configuration) -
 
 def consistent_velocity(system: ConstrainedSystem, t: float, q: Configuration, v: Array) -> Array:
     """(n,) velocity with B v + Φ_t = 0 that an impulse of the constraints makes of ``v``."""
-    saddle = saddle_of_masses(system, t, q)
+    saddle = _masses(system, t, q)
     wrong = system.constraint_matrix(t, q) @ v + system.constraint_rate(t, q)
     change, _ = saddle.unscaled(saddle.solve(saddle.scaled(np.zeros(system.size), -wrong)))
     result: Array = v + change
@@ -99,7 +99,7 @@ def consistent_velocity(system: ConstrainedSystem, t: float, q: Configuration, v
 
 def consistent_acceleration(system: ConstrainedSystem, t: float, q: Configuration, v: Array) -> tuple[Array, Array]:
     """Acceleration (n,) and multipliers (m,) from the equations of motion and Φ̈ = 0."""
-    saddle = saddle_of_masses(system, t, q)
+    saddle = _masses(system, t, q)
     forces = -system.residual(t, q, v, np.zeros(system.size))
     return saddle.unscaled(saddle.solve(saddle.scaled(forces, -system.constraint_bias(t, q, v))))
 
@@ -119,14 +119,7 @@ def consistent_start(
     return q, better
 
 
-def saddle_of_masses(system: ConstrainedSystem, t: float, q: Configuration) -> Saddle:
-    """[[M, Bᵀ], [B, 0]]: what solves for accelerations and multipliers.
-
-    Raises
-    ------
-    SimulationError
-        SINGULAR_MASS, naming the coordinate or the condition.
-    """
+def _masses(system: ConstrainedSystem, t: float, q: Configuration) -> Saddle:
     rows, mass = system.constraint_matrix(t, q), system.mass_matrix(t, q)
     metres = metre_scales(system)
     saddle = Saddle(mass, rows.T, rows, Scales(metres, mass, rows), 1.0)

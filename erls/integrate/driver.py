@@ -110,7 +110,7 @@ class Recorder:
         knots = rows[:, : 3 * self._size].reshape(len(t), 3, self._size)
         self.switching.rest(knots)
         rows[:, : 3 * self._size] = knots.reshape(len(t), 3 * self._size)
-        count, knot, switch = self.switching.first(t, knots)
+        count, knot, switch = self.switching.first(t, knots, rows[:, 3 * self._size :])
         t, rows = t[:count], rows[:count]
         if switch is not None and knot is not None:
             t, rows = np.append(t, switch.t), np.concatenate([rows, knot[None, : rows.shape[1]]])

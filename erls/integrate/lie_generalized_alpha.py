@@ -24,7 +24,7 @@ import numpy as np
 from erls.equations.consistency import consistent_acceleration, consistent_start, refuse_redundant
 from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
 from erls.equations.system import metre_scales
-from erls.integrate.alpha_rules import Rules, Words
+from erls.integrate.alpha_rules import Formulas, Rules, Words
 from erls.integrate.alpha_steps import Steps, adaptive_steps, equal_steps, rough_steps
 from erls.integrate.alpha_to_tolerance import to_tolerance
 from erls.integrate.base import Leg, Observer
@@ -87,8 +87,13 @@ def _run(
             equal_steps(steps, part, width, options.iteration_matrix != "frozen", recorder, given=plan is None)
             steps.part += 1
 
-    def begin(steps: Steps, leg: Leg, place: Configuration, rate: Array) -> None:
-        start = _start_of_leg(system, leg, place, rate, recorder)
+    def begin(
+        steps: Steps, leg: Leg, place: Configuration, rate: Array, stored: tuple[Array, Array] | None = None
+    ) -> None:
+        if recorder.switching is not None:
+            beta = Formulas.of(Rules(options.spectral_radius, 0.0), step).beta
+            recorder.switching.system.seen_by = beta * (steps.h or step) ** 2
+        start = _start_of_leg(system, leg, place, rate, recorder, stored)
         steps.begin(place, start.v, np.concatenate([start.a, start.multipliers]))
 
     def go(walk: list[Leg]) -> None:
@@ -117,7 +122,7 @@ def _run(
                     break
                 except Switch as switch:
                     leg = Leg(switch.t, leg.end, switch.t, leg.last)
-                    begin(steps, leg, *system.from_stored(switch.y, switch.v))
+                    begin(steps, leg, *system.from_stored(switch.y, switch.v), (switch.y, switch.v))
                 finally:
                     if options.project_velocity:
                         recorder.work.factorizations += recorder.steps - before
@@ -154,17 +159,23 @@ def steps_of(system: ConstrainedSystem, options: ConstrainedOptions, recorder: R
 
 
 def _start_of_leg(
-    system: ConstrainedSystem, leg: Leg, q: Configuration, v: Array, recorder: ConstrainedRecorder
+    system: ConstrainedSystem,
+    leg: Leg,
+    q: Configuration,
+    v: Array,
+    recorder: ConstrainedRecorder,
+    stored: tuple[Array, Array] | None,
 ) -> ConstrainedState:
-    """Acceleration and multipliers at the start of a leg, which becomes a knot."""
+    """Acceleration and multipliers at the start of a leg, which becomes a knot; places and rates that are ``stored`` of
+    one are those of a switch.
+    """
     recorder.work.rhs_calls += 1
     recorder.work.factorizations += 1
     switching = recorder.switching
     if switching is None:
         a, multipliers = consistent_acceleration(system, leg.first, q, v)
     else:
-        place, rate, _ = system.stored(leg.first, q, v, np.zeros(system.size))
-        switching.stand(leg, place, rate)
+        switching.stand(leg, *(stored or system.stored(leg.first, q, v, np.zeros(system.size))[:2]))
         a, multipliers = system.driven(leg.first, q, v)
     if not np.isfinite(a).all():
         raise not_finite(leg.start, a)

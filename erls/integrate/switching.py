@@ -64,7 +64,7 @@ class Switching:
         self._begun = True
         a = self.system.settle(leg.first, y, v, self._decided)
         self._decided = self.system.undecided
-        self.leg, self._t, self._knot = leg, leg.start, np.array([y, v, a])
+        self.leg, self._t, self._knot = leg, leg.start, self.system.seen_at_start(np.array([y, v, a]))
         return v, a
 
     def rest(self, knots: Array) -> None:
@@ -72,7 +72,7 @@ class Switching:
         still = self.system.still
         knots[:, 0, still], knots[:, 1:, still] = self._knot[0, still], 0.0
 
-    def first(self, t: Array, knots: Array) -> tuple[int, Array | None, Switch | None]:
+    def first(self, t: Array, knots: Array, beside: Array) -> tuple[int, Array | None, Switch | None]:
         """The first switch in new knots.
 
         Parameters
@@ -80,6 +80,8 @@ class Switching:
         t : (k,) array
         knots : (k, 3, n) array
             y, v and a.
+        beside : (k, b) array
+            What is kept beside them.
 
         Returns
         -------
@@ -89,6 +91,7 @@ class Switching:
             At the switch, with what is kept beside; None where that is the last knot before.
         switch : Switch or None
         """
+        knots = self.system.seen(knots, beside)
         times, states = np.append(self._t, t), np.concatenate([self._knot[None], knots])
         slides = self.coarse or self.system.steady
         looks, (y, v, a) = (times, states.swapaxes(0, 1)) if slides else _looks(times, states)
@@ -118,10 +121,15 @@ class Switching:
             y, v, _ = hermite_knots(times, states[:, 0], states[:, 1], states[:, 2], np.array([x]))
             return y[0], v[0]
 
+        def accelerations(x: float, y: Array, v: Array) -> Array:
+            if self.system.sees:
+                return _between(times, states[:, 2], x)
+            return self.system.acceleration(x, y, v)
+
         def left(joint: int) -> Callable[[float], float]:
             def value(x: float) -> float:
                 y, v = state(x)
-                a = self.system.acceleration(x, y, v)
+                a = accelerations(x, y, v)
                 return float(self.system.left(np.array([x]), y[None], v[None], a[None])[0, joint])
 
             return value
@@ -133,13 +141,14 @@ class Switching:
             return None
         now = joints[roots <= t + _ROUNDING * max(abs(t), 1.0)]
         y, v = self.system.closed(t, *state(t))
+        a = accelerations(t, y, v)
         v = self.system.brought_to_rest(t, y, v, now[self.system.slides[now]])
         knot, beside = self.system.knot(t, y, v)
-        self._end_modes(t, y, v, now)
+        self._end_modes(t, y, v, a, now)
         before = max(int(np.searchsorted(times, t)) - 1, 0)
         return before, np.append(knot, beside) if t > times[0] else None, Switch(t, y, v)
 
-    def _end_modes(self, t: float, y: Array, v: Array, ended: IntArray) -> None:
+    def _end_modes(self, t: float, y: Array, v: Array, a: Array, ended: IntArray) -> None:
         """What follows of some modes is decided.
 
         Raises
@@ -147,7 +156,7 @@ class Switching:
         SimulationError
             STEP_TOO_SMALL, where that goes on and on at one instant.
         """
-        self._decided = self.system.after(t, y, v, ended)
+        self._decided = self.system.after(t, y, v, a, ended)
         self._recent.append(t)
         if len(self._recent) == _MANY and t - self._recent[0] < _AT_ONCE:
             raise SimulationError(
@@ -196,6 +205,14 @@ def _cubic(times: Array, states: Array, x: float) -> tuple[Array, Array]:
     rise = (y1 - y0) / h
     c, d = 3 * rise - 2 * v0 - v1, v0 + v1 - 2 * rise
     return y0 + h * s * (v0 + s * (c + s * d)), v0 + s * (2 * c + 3 * s * d)
+
+
+def _between(times: Array, values: Array, x: float) -> Array:
+    """(n,) a straight line from knot to knot; constant from one that is not known."""
+    k = int(np.clip(np.searchsorted(times, x), 1, len(times) - 1))
+    s = (x - float(times[k - 1])) / float(times[k] - times[k - 1])
+    before = np.where(np.isnan(values[k - 1]), values[k], values[k - 1])
+    return np.asarray(before + s * (values[k] - before))
 
 
 def _looks(times: Array, states: Array) -> tuple[Array, Array]:

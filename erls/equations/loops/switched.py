@@ -70,5 +70,5 @@ class SwitchedChain(ClosedChain, Switches):
         """See `Switches`."""
         result, rest = np.zeros((len(t), len(self.rubbing.places))), self.modes[: len(self.rubbing.places)] == 0.0
         for k, at in enumerate(t.tolist()):
-            result[k, rest] = self.holding_at(at, y[k], v[k]).forces
+            result[k, rest] = self.holding_at(at, y[k], v[k], a[k]).forces
         return result

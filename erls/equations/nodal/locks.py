@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.equations.consistency import consistent_position, consistent_velocity, saddle_of_masses
+from erls.equations.consistency import consistent_position, consistent_velocity
 from erls.equations.nodal.actuators import Actuators
 from erls.equations.nodal.chain import ChainSystem
 from erls.equations.nodal.joints import Joint, Motion
@@ -17,7 +17,9 @@ from erls.equations.nodal.nodes import Nodes
 from erls.equations.switches.base import Switches
 from erls.equations.switches.law import DryFriction, Freely, Settled, settle
 from erls.equations.switches.motors import Acting, motors_among
-from erls.maths.saddle import Matrix
+from erls.equations.switches.shares import Shares, independent, shared
+from erls.equations.system import metre_scales
+from erls.maths.saddle import Saddle, Scales
 from erls.maths.so3 import Array
 from erls.mechanism.joint_types import JOINT_TYPES
 from fe_import.model import IntArray
@@ -56,19 +58,19 @@ class LockedSystem(ChainSystem):
     ----------
     numbers : (m,) int array
         Actuators of these joints.
-    places : (m,) array
+    held_at : (m,) array
         Coordinates at which they are held.
     """
 
     def __init__(self, unlocked: ChainSystem) -> None:
         self.unlocked, self.numbers = unlocked, switching_joints(unlocked)
-        self.places = np.zeros(len(self.numbers))
+        self.held_at = np.zeros(len(self.numbers))
         passive = unlocked.elements[: len(unlocked.elements) - len(unlocked.actuators)]
         joints = [*unlocked.rows.joints, *self._locks()]
         super().__init__(unlocked.start.poses, passive, unlocked.actuators, joints)
         self.arms = unlocked.arms
         self._first = unlocked.constraints
-        self.places[:] = self.start.turned[self.numbers]
+        self.held_at[:] = self.start.turned[self.numbers]
         self._signs = self._measured()
         self.switches = NodalSwitches(self)
 
@@ -80,7 +82,7 @@ class LockedSystem(ChainSystem):
             kept = {condition.name for condition in JOINT_TYPES[kind].conditions}
             nodes, frames = group.nodes[k].tolist(), (group.inner_frames[k], group.outer_frames[k])
             number = len(found)
-            motion = _held(self.places, number)
+            motion = _held(self.held_at, number)
             found.append(Joint(name, kind, *nodes, *frames, motion=motion, left_out=frozenset(kept)))
         return found
 
@@ -95,7 +97,7 @@ class LockedSystem(ChainSystem):
 
     def along(self, t: float, q: Nodes) -> Array:
         """(m, n) rates of the joint coordinates over the velocities."""
-        flags, places = self.model.released.copy(), self.places.copy()
+        flags, places = self.model.released.copy(), self.held_at.copy()
         self.model.released[:] = 0.0
         self.hold(q.turned[self.numbers])
         rows = self.constraint_matrix(t, q)[self._first :]
@@ -111,7 +113,7 @@ class LockedSystem(ChainSystem):
 
     def hold(self, places: Array) -> None:
         """Where joints are held."""
-        self.places[:] = places
+        self.held_at[:] = places
         self._sampled, self._tied = np.nan, (np.nan, None, ())
 
     def friction_of(self, multipliers: Array) -> Array:
@@ -140,6 +142,8 @@ class NodalSwitches(Switches):
     ----------
     system : LockedSystem
     """
+
+    sees = True
 
     def __init__(self, system: LockedSystem) -> None:
         self._system, self._free = system, system.unlocked
@@ -176,23 +180,50 @@ class NodalSwitches(Switches):
         return self._freely(t, *self._free.from_stored(y, v))
 
     def _freely(self, t: float, q: Nodes, v: Array) -> Freely:
-        free, along = self._free, self._system.along(t, q)
-        saddle = saddle_of_masses(free, t, q)
+        """Of (M + β h² K) a + Bᵀ λ = f: as steps see it. What vibrates faster is left as it is."""
+        free, along, n = self._free, self._system.along(t, q), self._free.size
+        still, none = np.zeros(n), np.zeros(free.constraints)
+        rows, mass = free.constraint_matrix(t, q), free.mass_matrix(t, q)
+        metres = metre_scales(free)
+        stiffness, _ = free.stiffness_and_damping(t, q, v, still, none)
+        saddle = Saddle(mass + self.seen_by * stiffness, rows.T, rows, Scales(metres, mass, rows), 1.0)
 
         def solved(forces: Array, bias: Array) -> Array:
             return np.concatenate(saddle.unscaled(saddle.solve(saddle.scaled(forces, bias))))
 
-        n, none = free.size, np.zeros(free.constraints)
-        forces = -free.residual(t, q, v, np.zeros(n))
-        whole = solved(forces, -free.constraint_bias(t, q, v))
+        whole = solved(-free.residual(t, q, v, still), -free.constraint_bias(t, q, v))
         answers = np.array([solved(row, none) for row in along]).reshape(len(along), len(whole)).T
         moves = free.joint_motion(q, v, whole[:n])[2][self._system.numbers]
         compliance = along @ answers[:n]
+        compliance = (compliance + compliance.T) / 2
         return Freely(whole, answers, moves, compliance, compliance.diagonal())
 
     def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
         """See `Switches`."""
         return settle(self.freely(t, y, v), v[self.rubbing.places], self.rubbing, released)
+
+    def seen(self, knots: Array, beside: Array) -> Array:
+        """See `Switches`."""
+        result, rubs = knots.copy(), len(self.rubbing.places)
+        if rubs:
+            result[:, 2, self.rubbing.places] = self._system.friction_of(beside[:, beside.shape[1] - rubs :])
+        return result
+
+    def seen_at_start(self, knot: Array) -> Array:
+        """See `Switches`."""
+        knot[2, self.rubbing.places] = np.nan
+        return knot
+
+    def holding_at(self, t: float, y: Array, v: Array, a: Array) -> Shares:
+        """See `Switches`."""
+        given, modes = a[self.rubbing.places], self.modes[: len(self.rubbing.places)]
+        rest, fixed = np.flatnonzero(modes == 0.0), np.isin(self.rubbing.places, self.fixed)
+        if len(rest) == np.count_nonzero(fixed):
+            shares = np.abs(given[rest]) / self.rubbing.static[rest]
+            return Shares(given[rest], -np.sign(np.where(shares >= shares.max(initial=0.0), given[rest], 0.0)))
+        free = self.freely(t, y, v)
+        own, pushed = free.compliance[np.ix_(rest, rest)], free.compliance[np.ix_(rest, fixed)] @ given[fixed]
+        return shared(own, -pushed, self.rubbing.static[rest], free.alone[rest])
 
     def _present(self, free: Freely) -> tuple[Array, Array]:
         """Accelerations and multipliers (n + m,) with the present modes, and friction that holds joints (m,)."""
@@ -230,7 +261,7 @@ class NodalSwitches(Switches):
         """See `Switches`."""
         result, rest = np.zeros((len(t), len(self.rubbing.places))), self.modes[: len(self.rubbing.places)] == 0.0
         for k, at in enumerate(t.tolist()):
-            result[k, rest] = self.holding_at(at, y[k], v[k]).forces
+            result[k, rest] = self.holding_at(at, y[k], v[k], a[k]).forces
         return result
 
     def closed(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:

@@ -43,14 +43,22 @@ class Switches:
     ----------
     modes : (m + c,) array
         See the module's docstring; change them by `set`.
+    sees : bool
+        See `seen`.
+    seen_by : float
+        β h² of steps that do not resolve all vibrations [s²]: accelerations are then those of M + β h² K, where a system
+        knows how.
     fixed : int array
         Coordinates that do not move in the equations: of those that rest as many as are independent.
     """
+
+    sees = False
 
     def __init__(self, rubbing: DryFriction, motors: Motors, size: int) -> None:
         self.rubbing, self.motors = rubbing, motors
         self.modes = np.zeros(len(rubbing.places) + len(motors.limits))
         self._rubs = len(rubbing.places)
+        self.seen_by = 0.0
         self._still, self.fixed = np.zeros(size, dtype=bool), np.zeros(0, dtype=np.int64)
 
     @property
@@ -143,7 +151,7 @@ class Switches:
             self.set(np.concatenate([found.modes, motors]), self.rubbing.places[found.held], y)
         return self.acceleration(t, y, v)
 
-    def holding_at(self, t: float, y: Array, v: Array) -> Shares:
+    def holding_at(self, t: float, y: Array, v: Array, a: Array) -> Shares:
         """Friction that holds the joints that stick, in their order, at a state, and the motion that would begin."""
         free, modes = self.freely(t, y, v), self.modes[: self._rubs]
         rest = np.flatnonzero(modes == 0.0)
@@ -178,6 +186,16 @@ class Switches:
         """(3, n) y, v and a at a state with the present modes, and what is kept beside them."""
         return np.array([y, v, self.acceleration(t, y, v)]), np.zeros(0)
 
+    def seen(self, knots: Array, beside: Array) -> Array:
+        """(k, 3, n) knots as modes are looked for in: where `sees` is set, friction that holds joints that stick stands
+        in place of their accelerations, as steps have found it.
+        """
+        return knots
+
+    def seen_at_start(self, knot: Array) -> Array:
+        """(3, n) that of a leg, of which no step has found anything."""
+        return knot
+
     def left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
         """(k, m + c) of states of a motion with these modes: rate in the direction of a joint that slides, static force
         less friction of one that sticks; of a motor how far it is from its limit, or beyond. A mode ends where it falls
@@ -192,22 +210,21 @@ class Switches:
         asked = self.motors.left(self.modes[self._rubs :], self.asked(t, y, v))
         return np.concatenate([result, asked], axis=1)
 
-    def after(self, t: float, y: Array, v: Array, ended: IntArray) -> Array:
-        """(m + c,) what is decided by modes that have ended at a state, see `settle`."""
+    def after(self, t: float, y: Array, v: Array, a: Array, ended: IntArray) -> Array:
+        """(m + c,) what is decided by modes that have ended at a state, see `settle` and `left`."""
         decided = self.undecided
         sticks = ended[(ended < self._rubs) & (self.modes[ended] == 0.0)]
         if len(sticks):
-            motion = self._begun(t, y, v, sticks)
+            motion = self._begun(self.holding_at(t, y, v, a), sticks)
             decided[np.flatnonzero(motion)] = motion[motion != 0]
         for k in ended[ended >= self._rubs].tolist():
             asked = self.asked(np.array([t]), y[None], v[None])[0]
             decided[k] = np.sign(asked[k - self._rubs]) if self.modes[k] == 0.0 else 0.0
         return decided
 
-    def _begun(self, t: float, y: Array, v: Array, ended: IntArray) -> Array:
+    def _begun(self, found: Shares, ended: IntArray) -> Array:
         """(m,) -1, 1 of joints at rest that begin to move, 0 of others, where friction can no longer hold some."""
         rest = np.flatnonzero(self.modes[: self._rubs] == 0.0)
-        found = self.holding_at(t, y, v)
         result = np.zeros(self._rubs)
         result[rest] = found.motion
         full = np.abs(found.forces) >= self.rubbing.static[rest] * (1 - _AT_ONCE)
