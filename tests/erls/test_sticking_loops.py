@@ -34,7 +34,7 @@ def run_scene(folder: Path, data: dict[str, Any], verdict: bool = True) -> Chain
     return cast(ChainRun, erls.simulate(erls.load_scene(scenes.write_toml(folder / "scene.toml", data)), verdict=verdict))
 
 
-def _stick(force: float, static: float | None = None) -> dict[str, Any]:
+def stick(force: float, static: float | None = None) -> dict[str, Any]:
     return {"law": "stick", "force": force} | ({} if static is None else {"static_force": static})
 
 
@@ -46,7 +46,7 @@ def _guided(folder: Path, forces: tuple[float, float], pull: dict[str, Any] | No
     joints[1]["initial"] = joints[0].get("initial", {})
     for joint, force in zip(joints, forces, strict=True):
         if force:
-            joint["friction"] = _stick(force, force if pull is None else 5 / 3 * force)
+            joint["friction"] = stick(force, force if pull is None else 5 / 3 * force)
     data = {
         "gravity": [0.0] * 3,
         "simulation": {"duration": 1.1, **settings},
@@ -58,7 +58,7 @@ def _guided(folder: Path, forces: tuple[float, float], pull: dict[str, Any] | No
     return run_scene(folder, data)
 
 
-def _on_spring(t: float, start: float, shift: float, omega: float) -> float:
+def on_spring(t: float, start: float, shift: float, omega: float) -> float:
     """Half cycles about ± shift, whose amplitude falls by twice that, until it rests."""
     x, half = start, math.pi / omega
     for number in itertools.count():
@@ -80,7 +80,7 @@ def test_blocks_on_a_spring_between_guides(formulation: str, integrator: str, tm
     forces = 2.0, 1.0
     run = _guided(tmp_path, forces, integrator=integrator, formulation=formulation, **TIGHT[integrator])
     times = np.linspace(0.0, run.end, 151)
-    exact = np.array([_on_spring(t, START, FORCE / STIFFNESS, OMEGA) for t in times.tolist()])
+    exact = np.array([on_spring(t, START, FORCE / STIFFNESS, OMEGA) for t in times.tolist()])
     off = float(np.abs(run.position("block", times)[:, 2] - exact).max())
     assert off < 1e-6
     assert run.accuracy is not None
@@ -158,13 +158,13 @@ def test_four_bar_comes_to_rest(formulation: str, rub: tuple[float, float], tmp_
     """A sticking joint, and three of them, of a linkage with one coordinate."""
     spring, force = 40.0, rub[0] + 2 * rub[1]
     start = LEVEL + 0.07
-    others = {"friction": _stick(rub[1])} if rub[1] else {}
-    crank = {"stiffness": spring, "rest": LEVEL, "friction": _stick(rub[0])}
+    others = {"friction": stick(rub[1])} if rub[1] else {}
+    crank = {"stiffness": spring, "rest": LEVEL, "friction": stick(rub[0])}
     settings = {"duration": 1.5, "formulation": formulation, "integrator": "lobatto", "tolerance": 1e-6}
     run = run_scene(tmp_path, {**parallelogram(crank, others, {}, start), "simulation": settings})
     omega = math.sqrt(spring / INERTIA)
     times = np.linspace(0.0, run.end, 101)
-    exact = LEVEL + np.array([_on_spring(t, 0.07, force / spring, omega) for t in times.tolist()])
+    exact = LEVEL + np.array([on_spring(t, 0.07, force / spring, omega) for t in times.tolist()])
     off = float(np.abs(run.position("pin", times) - pin(exact)).max())
     assert off < 1e-6
     assert run.accuracy is not None
@@ -190,7 +190,7 @@ def flexible_linkage(folder: Path, **settings: Any) -> ChainRun:
     joints = [
         {"name": f"j{k}", "dh": {"convention": "modified", "a": a}, "initial": {"position": angle}, "friction": rub}
         for k, (a, angle, rub) in enumerate(
-            zip((0.0, 0.3, 0.5), angles, (_stick(0.4, 0.6), _stick(0.3), _stick(0.2)), strict=True)
+            zip((0.0, 0.3, 0.5), angles, (stick(0.4, 0.6), stick(0.3), stick(0.2)), strict=True)
         )
     ]
     loop = {"name": "close", "link": "c", "node": "tip", "type": "revolute", "axis": [0.0, 0.0, 1.0]}
@@ -267,7 +267,7 @@ def test_law_of_joints_in_loops(seed: int) -> None:
 
 
 def test_closing_joint_that_sticks_is_refused(tmp_path: Path) -> None:
-    data = parallelogram({}, {}, {"friction": _stick(1.0)}, LEVEL)
+    data = parallelogram({}, {}, {"friction": stick(1.0)}, LEVEL)
     with pytest.raises(SceneError, match=r"a joint of \[\[loops\]\]") as caught:
         run_scene(tmp_path, {**data, "simulation": {"duration": 0.1}})
     assert caught.value.where.endswith("loops[0].friction.law")

@@ -134,12 +134,11 @@ class Nodal:
         first = self._kept + self.system.size
         return y[self._kept : first], y[first : first + self.system.constraints]
 
-    def _rubbing(self, y: Array, v: Array) -> Array:
+    def _rubbing(self, y: Array) -> Array:
         """(m,) friction of joints that may stick."""
         if self.locked is None or not len(self.dry.places):
             return np.zeros(0)
-        holding = self.locked.friction_of(y[-len(self.dry.places) :])
-        return self.dry.given(v[None], holding[None])[0]
+        return self.locked.friction_of(y[-len(self.dry.places) :])
 
     def initial_state(self) -> tuple[Array, Array]:
         """Frames and joint coordinates at time 0; links turn with the joints as they are.
@@ -176,7 +175,28 @@ class Nodal:
     def neighbours(self, t: float, y: Array, v: Array) -> NodalNeighbours:
         """States beside one, with accelerations and multipliers that go with it."""
         q, velocity = self.configuration(y, v)
-        return nodal_neighbours(self.system, t, q, velocity, _stored, self._names)
+        if self.locked is None:
+            return nodal_neighbours(self.system, t, q, velocity, _stored, self._names)
+        settled, kept = self.locked.settled(t, y[: self._kept], v[: self._kept]), self.system.constraints
+
+        locked = self.locked
+
+        def stored(
+            system: NodalSystem, t: float, q: Nodes, v: Array, a: Array, multipliers: Callable[[], Array]
+        ) -> tuple[Array, Array, Array]:
+            def every() -> Array:
+                found, given = multipliers(), -settled.modes * self.dry.sliding
+                result = np.concatenate([found[:kept], locked.friction_of(given)])
+                result[kept + settled.held] = found[kept:]
+                return result
+
+            return _stored(system, t, q, v, a, every)
+
+        def frozen(of: Nodal) -> NodalSystem:
+            assert of.locked is not None
+            return of.locked.frozen(settled, q)
+
+        return nodal_neighbours(frozen(self), t, q, velocity, stored, self._names, frozen)
 
     @property
     def _names(self) -> tuple[str, ...]:
@@ -212,6 +232,7 @@ class Nodal:
         q, velocity = self.configuration(y, v)
         found = [view.at(q.poses, self.chain.beams, q.bent) for view in self.views]
         _, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
+        rates[self.dry.places - self._frames] = v[self.dry.places]  # exactly zero at rest
         angles, rates = y[self._joints].copy(), rates[: len(self.mechanism.joints)].copy()
         for k in self.mechanism.rotation_vectors:
             psi = self._vector(q, k)
@@ -296,6 +317,7 @@ class Nodal:
         """Coordinate of a closing joint that has one, and its rate."""
         q, velocity = self.configuration(y, v)
         coordinates, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
+        rates[self.dry.places - self._frames] = v[self.dry.places]
         return float(coordinates[self._moving[loop]]), float(rates[self._moving[loop]])
 
     def loop_effort(self, t: float, y: Array, v: Array, loop: int) -> float:
@@ -314,7 +336,7 @@ class Nodal:
             multipliers = smallest_multipliers(full, t, q, force, self._units)
         along = self.system.in_joints(t, q, velocity, a)
         if self.locked is not None and len(self.dry.places):
-            numbers, friction = self.locked.numbers, self._rubbing(y, v)
+            numbers, friction = self.locked.numbers, self._rubbing(y)
             along[numbers, 3] += friction
             along[numbers, 4:] += friction[:, None] * self.locked.outward(t, q)
         return _Acting(q, full.rows.joint_of_row, full.constraint_matrix(t, q), multipliers, along)

@@ -214,6 +214,8 @@ def joint_stiffness(model: Model, work: Work, sample: Array, j: int, block: Arra
     p, r = vector(model.joint_frames, j, 12), nine(model.joint_frames, j, 15)
     pull, entries, thread = _ZERO, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0
     for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
+        if model.released[row].real != 0.0:
+            continue
         strength = work.multipliers[row]
         pull = plus(pull, scaled(strength, vector(model.conditions, row, 0)))
         thread += strength * model.pitches[row]

@@ -7,6 +7,8 @@ there joints that stick have exactly no rate.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from erls.equations.consistency import consistent_position, consistent_velocity
@@ -65,9 +67,9 @@ class LockedSystem(ChainSystem):
     def __init__(self, unlocked: ChainSystem) -> None:
         self.unlocked, self.numbers = unlocked, switching_joints(unlocked)
         self.held_at = np.zeros(len(self.numbers))
-        passive = unlocked.elements[: len(unlocked.elements) - len(unlocked.actuators)]
+        self._passive = unlocked.elements[: len(unlocked.elements) - len(unlocked.actuators)]
         joints = [*unlocked.rows.joints, *self._locks()]
-        super().__init__(unlocked.start.poses, passive, unlocked.actuators, joints)
+        super().__init__(unlocked.start.poses, self._passive, unlocked.actuators, joints)
         self.arms = unlocked.arms
         self._first = unlocked.constraints
         self.held_at[:] = self.start.turned[self.numbers]
@@ -88,6 +90,19 @@ class LockedSystem(ChainSystem):
 
     def _names(self) -> list[str]:
         return [group.joints[k].name for group, k in _actuators(self.unlocked, self.numbers)]
+
+    def settled(self, t: float, y: Array, v: Array) -> Settled:
+        """What the law says of a knot by what is stored of it, all vibrations taken into account."""
+        self.switches.seen_by = 0.0
+        return self.switches.settled(t, y, v, np.zeros(len(self.numbers)))
+
+    def frozen(self, found: Settled, q: Nodes) -> ChainSystem:
+        """Without locks: joints that stick are held where they are, others rub as they do."""
+        places, rows, held = q.turned[self.numbers[found.held]], self.unlocked.rows, found.held.tolist()
+        locks = [replace(self.rows.joints[len(rows.joints) + k], motion=_held(places, i)) for i, k in enumerate(held)]
+        system = ChainSystem(self.unlocked.start.poses, self._passive, self.actuators, [*rows.joints, *locks])
+        system.model.actuators[self.numbers, _RUBBING] = -found.modes * self.switches.rubbing.sliding
+        return system
 
     def _measured(self) -> Array:
         """(m,) 1 or -1: by which the conditions change as the coordinates grow."""
@@ -117,7 +132,7 @@ class LockedSystem(ChainSystem):
         self._sampled, self._tied = np.nan, (np.nan, None, ())
 
     def friction_of(self, multipliers: Array) -> Array:
-        """(m,) friction that holds joints, of the multipliers of their conditions."""
+        """(m,) friction, of the multipliers of their conditions; the other way by the same signs."""
         return np.asarray(-self._signs * multipliers)
 
     def driven(self, t: float, q: Nodes, v: Array) -> tuple[Array, Array]:
@@ -226,20 +241,19 @@ class NodalSwitches(Switches):
         return shared(own, -pushed, self.rubbing.static[rest], free.alone[rest])
 
     def _present(self, free: Freely) -> tuple[Array, Array]:
-        """Accelerations and multipliers (n + m,) with the present modes, and friction that holds joints (m,)."""
+        """Accelerations and multipliers (n + m,) with the present modes, and friction (m,)."""
         modes = self.modes[: len(self.rubbing.places)]
         given = -modes * self.rubbing.sliding
         held = np.flatnonzero(np.isin(self.rubbing.places, self.fixed))
         rest = (free.along + free.compliance @ given)[held]
         given[held] = -np.linalg.solve(free.compliance[np.ix_(held, held)], rest)
-        holding = np.where(modes == 0.0, given, 0.0)
-        return free.accelerations + free.answers @ given, holding
+        return free.accelerations + free.answers @ given, given
 
     def driven(self, t: float, q: Nodes, v: Array) -> tuple[Array, Array]:
-        """Accelerations (n,) and all multipliers."""
-        found, holding = self._present(self._freely(t, q, v))
+        """Accelerations (n,) and all multipliers; those out of use tell the friction of joints that slide, too."""
+        found, given = self._present(self._freely(t, q, v))
         n = self._free.size
-        return found[:n], np.concatenate([found[n:], self._system.friction_of(holding)])
+        return found[:n], np.concatenate([found[n:], self._system.friction_of(given)])
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """See `Switches`."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from erls.errors import Cause, SceneError
 from erls.maths.saddle import dense
 from erls.maths.so3 import Array
 
+SystemOf = Callable[[Any], NodalSystem]
 Stored = Callable[[NodalSystem, float, Nodes, Array, Array, Callable[[], Array]], tuple[Array, Array, Array]]
 
 
@@ -36,6 +38,8 @@ class NodalNeighbours:
         go with them.
     names : tuple of str
         (n,)
+    system_of : callable
+        What of a formulation is a system like this one.
     """
 
     system: NodalSystem
@@ -46,6 +50,7 @@ class NodalNeighbours:
     multipliers: Array
     stored: Stored
     names: tuple[str, ...]
+    system_of: SystemOf
 
     @cached_property
     def metres(self) -> Array:
@@ -145,14 +150,20 @@ class NodalNeighbours:
 
     def of(self, formulation: Formulation) -> NodalNeighbours:
         """See `Neighbours`."""
-        return replace(self, system=formulation.system)  # type: ignore[attr-defined]  # of nodes like this one
+        return replace(self, system=self.system_of(formulation))
+
+
+def system_in(formulation: Any) -> NodalSystem:
+    """The system of a formulation of nodes."""
+    return formulation.system  # type: ignore[no-any-return]
 
 
 def nodal_neighbours(
-    system: NodalSystem, t: float, q: Nodes, v: Array, stored: Stored, names: tuple[str, ...]
-) -> NodalNeighbours:
+    system: NodalSystem, t: float, q: Nodes, v: Array, stored: Stored, names: tuple[str, ...],
+    system_of: SystemOf = system_in,
+) -> NodalNeighbours:  # fmt: skip
     """Of a state with the acceleration and the multipliers of the equations of motion."""
-    return NodalNeighbours(system, t, q, v, *consistent_acceleration(system, t, q, v), stored, names)
+    return NodalNeighbours(system, t, q, v, *consistent_acceleration(system, t, q, v), stored, names, system_of)
 
 
 def names_of_nodes(owners: Sequence[str]) -> tuple[str, ...]:
