@@ -7,42 +7,21 @@ The command line in three lines::
     scene = erls.load_scene("data/l_shape/steel_tall.toml")
     run = erls.simulate(scene)
     run.position("tip", [0.5, 1.0])  # dense output, at any time
+
+The public names stand in ``__init__.pyi``; each is imported when it is first used, so that importing the package is
+cheap.
 """
 
 from typing import Any
 
-__all__ = [
-    "linearize",
-    "load_run",
-    "load_scene",
-    "save_run",
-    "section_forces",
-    "sensitivities",
-    "simulate",
-    "simulate_many",
-    "stepper",
-    "stress",
-]
+import lazy_loader
 
-_HOME = {
-    "load_scene": ("erls.scene.read", "load_scene"),
-    "linearize": ("erls.linear.linearize", "linearize"),
-    "simulate": ("erls.simulation.simulate", "simulate"),
-    "simulate_many": ("erls.simulation.batch", "simulate_many"),
-    "load_run": ("erls.run.file", "load_run"),
-    "save_run": ("erls.run.file", "write_run"),
-    "sensitivities": ("erls.sensitivity.sensitivities", "sensitivities"),
-    "section_forces": ("erls.run.recovery", "section_forces"),
-    "stepper": ("erls.simulation.stepper", "Stepper"),
-    "stress": ("erls.run.recovery", "stress"),
-}
+_named, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
-    """Load the public names when first used: importing the package stays cheap."""
-    import importlib
+    if name == "__version__":
+        from fe_import.files.versions import package_version
 
-    if name in _HOME:
-        module, attribute = _HOME[name]
-        return getattr(importlib.import_module(module), attribute)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return package_version("erls")
+    return _named(name)

@@ -1,22 +1,8 @@
-"""A link's finite-element model into a modal file."""
+"""A link's finite-element model into a modal file.
 
-from typing import Any
+The public names stand in ``__init__.pyi``; each is imported when it is first used.
+"""
 
-__all__ = ["load_link", "modal_derivatives", "read_modal_file", "reduce_link", "write_modal_file"]
+import lazy_loader
 
-_HOME = {
-    "load_link": "fe_import.description.link",
-    "modal_derivatives": "fe_import.derivatives",
-    "reduce_link": "fe_import.reduce",
-    "read_modal_file": "fe_import.modal.file",
-    "write_modal_file": "fe_import.modal.file",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Load the public names when first used: importing the package stays cheap."""
-    import importlib
-
-    if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -37,7 +37,7 @@ def test_shell_blocks_hold_only_what_is_run_here() -> None:
 def test_first_line_does_the_main_job(folder: Path) -> None:
     """The part of the first line that follows the installation, as it stands."""
     steps = [s.strip() for s in SETUP[0].split("&&")]
-    assert steps[:2] == ["python3 -m venv .venv", ".venv/bin/pip install -q -e ."]
+    assert steps[:2] == ["python3 -m venv .venv", ".venv/bin/pip install -q -e '.[view]'"]
     for step in steps[2:]:
         assert step.startswith(".venv/bin/erls ")
         run(step, folder)

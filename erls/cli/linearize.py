@@ -107,7 +107,7 @@ def _mode(
     from erls.files.results import RUN, claim
     from erls.linear.mode_run import mode_run
     from erls.run.chain.run import ChainRun
-    from erls.run.file import write_run
+    from erls.run.file import save_run
     from erls.scene.chain import Scene
 
     if output is None:
@@ -117,7 +117,7 @@ def _mode(
     if not isinstance(loaded, (Scene, ChainRun)):
         raise bad("a scene of bodies and beams", "--mode", number, "simulate it with type = 'frequencies'")
     found = mode_run(loaded, number, at, tell)
-    write_run(output, found)
+    save_run(output, found)
     if json:
         return print_json({"scene": found.scene.name, "output": str(output)})
     print(f"{found.scene.name}\nwritten to {output}")

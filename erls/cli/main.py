@@ -19,9 +19,11 @@ from erls.cli.address_space import address_space, require_address_space
 from erls.cli.compare import compare
 from erls.cli.effects import effects
 from erls.cli.files import info, view
+from erls.cli.importing import import_
 from erls.cli.linearize import linearize
 from erls.cli.reduce import reduce
 from erls.cli.simulate import simulate
+from erls.cli.starting import examples, new, schema
 from erls.cli.streams import StdoutLost, prepare_streams
 from erls.cli.studies import study
 from erls.cli.terminal import print_json, tell
@@ -42,9 +44,12 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-for command in (reduce, simulate, info, view, compare, effects, linearize):
+for command in (reduce, simulate, info, view, compare, effects, linearize, new, schema):
     app.command(command)
-app.command(study)
+app.command(import_, name="import")
+for group in (study, examples):
+    app.command(group)
+app.register_install_completion_command(help="Install completion for the shell in use.")
 
 
 def _report(error: ReportedError, as_json: bool) -> None:
@@ -94,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except StdoutLost as problem:
         failure, as_json = _of_stdout(problem), False
     except (MemoryError, ImportError, OSError) as problem:
-        failure = _of_memory(problem)
+        failure = _of_memory(problem) or _of_extra(problem)
         if failure is None:
             raise
     if failure is not None:
@@ -120,6 +125,13 @@ def _of_stdout(problem: StdoutLost) -> ReportedError | None:
     from erls.files.output import not_writable
 
     return not_writable("stdout", problem.strerror, "free disk space, or send it elsewhere")
+
+
+def _of_extra(problem: Exception) -> ReportedError | None:
+    """The error where an extra of the installation is missing."""
+    from erls.files.optional import missing_package
+
+    return missing_package(problem)
 
 
 def _of_memory(problem: Exception) -> ReportedError | None:

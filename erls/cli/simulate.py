@@ -65,7 +65,7 @@ def simulate(
     from erls.files.results import RUN, claim
     from erls.report.runs import run_report
     from erls.run.checkpoints import Checkpoints
-    from erls.run.file import write_run
+    from erls.run.file import save_run
     from erls.scene.inputs import files_of
     from erls.scene.read import load_scene
     from erls.simulation.extension import extend, refuse_other
@@ -101,7 +101,7 @@ def simulate(
         elif before is not None and output == resume:
             tell(f"{output} stays as it was; the same command goes on from the last checkpoint, if there was one")
         elif output is not None and problem.run is not None and problem.run.worth_a_file:
-            write_run(output, problem.run)
+            save_run(output, problem.run)
             axis = problem.run.axis
             tell(f"what was computed, up to {axis.symbol} = {axis.text(f'{problem.run.end:.6g}')}, is in {output}")
             going_on = problem.cause in (Cause.INTERRUPTED, Cause.OUT_OF_MEMORY)
@@ -111,7 +111,7 @@ def simulate(
                 remove(partial)
         raise
     if output is not None:
-        write_run(output, run)
+        save_run(output, run)
         remove(partial)
     if json:
         return print_json({**run.summary(times), "output": None if output is None else str(output)})

@@ -212,3 +212,109 @@ def _counts(text: str, option: str = "--counts") -> list[int] | None:
         return [int(part) for part in text.split(",") if part.strip()] or None
     except ValueError:
         raise bad("not whole numbers", option, text, "separate them by commas, e.g. 1,2,6,12") from None
+
+
+@study.command
+def sweep(
+    scene: Path,
+    /,
+    *,
+    vary: Annotated[list[str] | None, Parameter(name="--vary", negative="")] = None,
+    get: Annotated[list[str] | None, Parameter(name="--get", negative="")] = None,
+    sample: str = "",
+    seed: int = 0,
+    points: Path | None = None,
+    output: Output = None,
+    table: Path | None = None,
+    resume: Annotated[bool, Parameter(name="--resume", negative="")] = False,
+    retry_failed: Annotated[bool, Parameter(name="--retry-failed", negative="")] = False,
+    verdict: Annotated[bool, Parameter(name="--verdict", negative="")] = False,
+    scheduler: str = "",
+    set_: Set = None,
+    workers: Workers = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Many variants of a scene: numbers of each run over a grid, a sample or a table of parameters.
+
+    With -o every finished point is kept as it comes, and --resume computes nothing twice.
+
+    Parameters
+    ----------
+    scene
+        Scene (TOML).
+    vary
+        What varies, KEY=A:B:N for N even values or KEY=V,W for a list, keys as of --set; may be repeated: all
+        combinations are run. With --sample KEY=A:B, a range.
+    get
+        A number of each run; may be repeated: tip.z@0.5, elbow.angle@end, max(tip.distance), rms(elbow.effort),
+        energy.total@end: columns of the table of erls view -o RUN.csv at a time, or max, min, mean, rms, range over
+        time. tip.distance is how far a point is from its start, error the stated one (--verdict).
+    sample
+        Draw points instead: latin-hypercube:N, sobol:N or random:N.
+    seed
+        Of the sample.
+    points
+        CSV table of points instead; its head holds keys.
+    output
+        Store to write, RUNS.sweep.
+    table
+        CSV table to write: a line for each point.
+    resume
+        Go on with the store.
+    retry_failed
+        With --resume: run again what failed.
+    verdict
+        Have every run state its error.
+    scheduler
+        Address of a Dask scheduler whose workers run the points; they must see the files of the scene.
+    set_
+        Change a field of the scene for all points, KEY=VALUE; may be repeated.
+    workers
+        Runs at a time; as many as cores unless given.
+    force
+        Replace an existing file that is no store of a sweep, or no such table.
+    json
+        Print one JSON object.
+    """
+    from erls.files.results import claim
+    from erls.report.sweep_table import sweep_summary, sweep_text, write_sweep_table
+    from erls.studies.sweep.executors import dask_client
+    from erls.studies.sweep.points import points_of
+    from erls.studies.sweep.store import SUFFIX
+    from erls.studies.sweep.sweep import sweep
+
+    if resume and output is None:
+        raise bad("there is nothing to go on with", "--resume", "no store", "give -o RUNS.sweep")
+    if not get:
+        raise bad("nothing is kept of the runs", "--get", "nothing", "e.g. --get 'max(tip.distance)'")
+    asked = points_of(vary or [], sample, seed, points)
+    check_output(output, [scene], set_ or [], (SUFFIX,), force, [] if points is None else [points])
+    if table is not None:
+        claim(table, ".csv", read_by([scene], set_ or []), force)
+    if force and output is not None and not resume:
+        output.unlink(missing_ok=True)
+    executor = dask_client(scheduler) if scheduler else None
+    with Progress("sweep") as advance:
+        found = sweep(
+            scene,
+            asked,
+            get,
+            overrides=set_ or (),
+            store=output,
+            resume=resume,
+            retry=retry_failed,
+            executor=executor,
+            workers=workers,
+            verdict=verdict,
+            progress=advance,
+        )
+    if table is not None:
+        write_sweep_table(table, found)
+    if json:
+        print_json({**sweep_summary(found), "output": None if output is None else str(output)})
+    else:
+        print(sweep_text(found))
+        tell_written(output)
+        tell_written(table)
+    return exit_code(not found.interrupted, [3 for _ in found.failed])

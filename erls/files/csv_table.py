@@ -1,10 +1,15 @@
-"""Tables (CSV) of names and numbers that a spreadsheet takes for nothing else."""
+"""Tables (CSV) of names and numbers: those that are written are what a spreadsheet takes for nothing else."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterable
+from pathlib import Path
 from typing import IO, Any
+
+from erls.errors import Cause, SceneError
+
+_MOST_BYTES = 500e6
 
 _EXECUTED = ("=", "+", "-", "@", "\t", "\r")
 
@@ -28,3 +33,36 @@ def _harmless(cell: Any) -> Any:
     except ValueError:
         return f"'{cell}"
     return cell
+
+
+def read_rows(path: Path) -> tuple[tuple[str, ...], list[list[str]]]:
+    """A head, and rows of as many cells, as texts; commas separate, quotes surround.
+
+    Raises
+    ------
+    SceneError
+        FILE_NOT_FOUND, NOT_READABLE or TABLE: no head, a name twice, or a row of another length, which is named.
+    """
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise _faulty(path, "too large", f"{_MOST_BYTES:.0f} bytes", "split the table")
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            found = [(number, row) for number, row in enumerate(csv.reader(file, strict=True), 1) if any(row)]
+    except FileNotFoundError:
+        raise SceneError(Cause.FILE_NOT_FOUND, "no such file", where=str(path), remedy="check the path") from None
+    except (OSError, UnicodeDecodeError) as problem:
+        message, remedy = f"cannot be read: {problem}", "give a CSV table in UTF-8"
+        raise SceneError(Cause.NOT_READABLE, message, where=str(path), remedy=remedy) from None
+    except csv.Error as problem:
+        raise _faulty(path, str(problem), None, "give a CSV table") from None
+    head = tuple(cell.strip() for cell in found[0][1]) if found else ()
+    if not all(head) or len(set(head)) != len(head) or not head:
+        raise _faulty(path, "the head must hold a name for each column, each once", list(head), "mend the first line")
+    for number, row in found[1:]:
+        if len(row) != len(head):
+            raise _faulty(path, f"line {number} has {len(row)} cells", len(head), "give as many as the head has")
+    return head, [[cell.strip() for cell in row] for _, row in found[1:]]
+
+
+def _faulty(path: Path, message: str, limit: object, remedy: str) -> SceneError:
+    return SceneError(Cause.TABLE, message, where=str(path), limit=limit, remedy=remedy)

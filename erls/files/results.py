@@ -32,6 +32,7 @@ _BEGINS = {
     ".mp4": b"",
     ".npz": b"PK",
     ".mat": b"MATLAB",
+    ".sweep": b"SQLite format 3",
 }
 _TABLE = re.compile(
     rb'"?(t \[s\]|load \[1\]),.*(energy\.\w+ \[J\]|: energy \[J\])"?\r?\n'  # of a run, or of several

@@ -12,6 +12,7 @@ import scipy.linalg as la
 
 from erls.equations.linearization import Linearization, small_modes
 from erls.errors import Cause, SceneError, SimulationError
+from erls.files.optional import optional_package
 from erls.linear.inputs import checked
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -271,11 +272,7 @@ class LinearModel:
         SceneError
             BAD_FIELD: the package is not there.
         """
-        try:
-            import control
-        except ImportError:
-            message, remedy = "the package 'control' is not installed", "pip install 'erls[control]'"
-            raise SceneError(Cause.BAD_FIELD, message, where="LinearModel.control", remedy=remedy) from None
+        control = optional_package("control", "LinearModel.control")
         own = ([c.name for c in self.inputs], [c.name for c in self.outputs], self.states)
         inputs, outputs, states = ([name.replace(".", "_") for name in names] for names in own)
         return control.ss(self.A, self.B, self.C, self.D, inputs=inputs, outputs=outputs, states=states)

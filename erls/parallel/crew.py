@@ -26,7 +26,7 @@ class Crew:
     work : callable
         Importable by name from a module other than the script; its argument and result can be pickled.
     tasks : sequence
-        Arguments of ``work``.
+        Arguments of ``work``; each is asked for when its turn comes.
     order : iterable of int, optional
         Numbers of the tasks as they are to be taken.
     prepare : callable, optional
@@ -41,7 +41,8 @@ class Crew:
         prepare: Callable[[Any], Any] = bool,
         preparation: Any = None,
     ) -> None:
-        self._calls = [pickle.dumps((work, task)) for task in tasks]
+        self._work, self._tasks = work, tasks
+        pickle.dumps((work, tasks[0] if len(tasks) else None))  # what cannot be sent is found here
         self._prepare = pickle.dumps((prepare, preparation))
         self._waiting = deque(range(len(tasks)) if order is None else order)
         self._given: set[int] = set()
@@ -156,7 +157,7 @@ class Crew:
         most, answered, begun = 1, 0, time.perf_counter()
         while True:
             while len(outstanding) < most and (number := self._give()) is not None:
-                worker.send(number, self._calls[number])
+                worker.send(number, pickle.dumps((self._work, self._tasks[number])))
                 outstanding.append(number)
             if not outstanding:
                 return

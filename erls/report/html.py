@@ -7,12 +7,15 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from erls.files.results import MARK
 from erls.maths.so3 import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _STYLE = """
 :root { color-scheme: light dark; }
@@ -75,6 +78,8 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def figure(plot: Plot) -> str:
     """A plot as inline SVG, text kept as text."""
+    from matplotlib.figure import Figure  # here: texts of the same reports do without it
+
     canvas = Figure(figsize=(6.0, 3.1), layout="constrained")
     axes = canvas.subplots()
     for curve in plot.curves:

@@ -23,7 +23,7 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.integrate.memory import Memory
-from erls.run.file import write_run
+from erls.run.file import save_run
 from erls.run.record import Run
 from erls.scene.records import SceneFile
 from fe_import.files.hdf5.files import open_for_reading, write_array, write_attribute, write_strings
@@ -127,7 +127,7 @@ class Checkpoints:
             NOT_WRITABLE.
         """
         parts = {**self.finished, **({} if part is None else {key: part})}
-        write_run(self.path, run, UNFINISHED, lambda group: self._fill(group.create_group(_GROUP), parts))
+        save_run(self.path, run, UNFINISHED, lambda group: self._fill(group.create_group(_GROUP), parts))
 
     def _fill(self, group: h5py.Group, parts: Mapping[str, Part]) -> None:
         write_attribute(group, "made_with", made_with())

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 import h5py
@@ -32,11 +33,12 @@ SCHEMA = "erls run"
 SCHEMA_VERSION = 1
 EARLIER = "erls result of bodies"  # what scenes of bodies had before they gave runs
 _OUTPUT_TIMES = 1001
+_SENT = "sent.run.h5"
 
 S = TypeVar("S", bound=SceneFile)
 
 
-def write_run(
+def save_run(
     path: Path | str, run: Run, status: str = "", beside: Callable[[h5py.Group], None] | None = None
 ) -> None:
     """Write a run, completely or not at all.
@@ -66,6 +68,22 @@ def write_run(
             beside(group)
 
     write_atomically(path, fill, SceneError, Cause.NOT_WRITABLE)
+
+
+def run_content(run: Run) -> bytes:
+    """The bytes of its file, without curves for other programs."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / _SENT
+        save_run(path, run, beside=lambda group: None)
+        return path.read_bytes()
+
+
+def run_of(content: bytes) -> Run:
+    """A run from the bytes of its file."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / _SENT
+        path.write_bytes(content)
+        return load_run(path)
 
 
 def _fill(group: h5py.Group, run: Run, status: str) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from html import escape
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike
 from erls.errors import Cause, SceneError, SimulationError
 from erls.maths.so3 import Array
 from erls.run.accuracy import Accuracy, Trust
+from erls.run.tables import data_frame, dataset, plot
 from erls.scene.records import SceneFile
 
 
@@ -120,6 +122,79 @@ class Run(ABC):
     def title(self) -> str:
         """Above its pictures."""
         return self.scene.name
+
+    def to_pandas(self, times: ArrayLike | None = None) -> Any:
+        """Its table as a ``pandas.DataFrame`` over the axis; columns are those of `columns`, units in their names.
+
+        Parameters
+        ----------
+        times : array_like, optional
+            Values of the axis; up to 1001 even ones unless given.
+
+        Raises
+        ------
+        SceneError
+            TIME_OUT_OF_RANGE; BAD_FIELD: pandas is not installed.
+        """
+        return data_frame(self, times)
+
+    def to_xarray(self, times: ArrayLike | None = None) -> Any:
+        """Its table as an ``xarray.Dataset``: vectors over the axis and ``axis`` (x, y, z), units as attributes.
+
+        Parameters and errors are those of `to_pandas`.
+        """
+        return dataset(self, times)
+
+    def plot(self, *names: str, times: ArrayLike | None = None, axes: Any = None) -> Any:
+        """Draw columns of its table with matplotlib.
+
+        Parameters
+        ----------
+        *names : str
+            Without units, patterns such as ``elbow.*`` too; a vector is drawn with its three parts. The places of its
+            points unless given.
+        times : array_like, optional
+            Values of the axis; up to 1001 even ones unless given.
+        axes : matplotlib.axes.Axes, optional
+            To draw into.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        SceneError
+            TIME_OUT_OF_RANGE; BAD_REFERENCE: a name that the table does not have.
+        """
+        return plot(self, names, times, axes)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles hold the bytes of a run file."""
+        from erls.run.file import run_content, run_of  # here: files know all kinds of runs
+
+        return run_of, (run_content(self),)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.title!r}: {', '.join(self._said().values())}>"
+
+    def _repr_html_(self) -> str:
+        rows = {"run": self.title, **self._said(), **{f"warning {k}": text for k, text in enumerate(self.warnings, 1)}}
+        cells = (f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows.items())
+        return f"<table>{''.join(cells)}</table>"
+
+    def _said(self) -> dict[str, str]:
+        """In a few words, by subject."""
+        reached = self.axis.text(f"{self.start:.6g} to {self.end:.6g}")
+        said = {self.axis.name: reached, "steps": f"{len(self.times)} knots"}
+        if self.trust is not None:
+            said["verdict"] = self.trust.verdict
+        if self.accuracy is not None:
+            total = self.accuracy.total
+            said["error"] = "error not known" if total is None else f"error at most {total:.1e} m"
+        if self.failure is not None:
+            said["failure"] = str(self.failure.cause)
+        return said
 
     @property
     def worth_a_file(self) -> bool:

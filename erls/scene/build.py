@@ -286,7 +286,9 @@ def _seat(scene: Scene, k: int, links: Sequence[Link]) -> InterfaceNode | None:
             "this link has no second interface for the next joint",
             where=f"{file}: links[{parent}].outboard",
             value=link.name,
-            remedy="add an interface to the link description",
+            remedy="add an interface to the link description"
+            if record.rigid is None
+            else f"give links[{parent}].rigid.points two points: the first where its own joint sits, then this one",
         )
     return _interface(link.model, record.outboard or others[0], f"{file}: links[{parent}].outboard")
 

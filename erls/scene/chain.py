@@ -196,7 +196,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     sensors: list[AnySensor] = []
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene(SceneFile):
     """A checked chain and its file."""
 

@@ -47,7 +47,7 @@ class SceneTables(Record, frozen=True, kw_only=True):
     gravity: Vector = (0.0, 0.0, -9.81)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SceneFile:
     """A checked scene and its file; relative paths start at ``folder``."""
 
@@ -63,3 +63,6 @@ class SceneFile:
     def folder(self) -> Path:
         """Folder of the file."""
         return self.path.parent
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name!r} of {self.path}>"

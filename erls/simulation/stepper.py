@@ -277,3 +277,8 @@ def _refuse_system(scene: Scene, kind: str) -> None:
     where, value = f"{scene.path}: simulation.{field}", getattr(scene.record.simulation, field)
     message = "a stepper moves chains in independent coordinates, with all modes"
     raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)
+
+
+def stepper(scene: AnyScene | Path | str, *, tell: Message = lambda text: None) -> Stepper:
+    """A mechanism at its start, which moves on when it is told to (`Stepper`)."""
+    return Stepper(scene, tell=tell)

@@ -35,7 +35,7 @@ class Variants:
         self.scene = scene
         self._runs: dict[tuple[bytes, bool], ChainRun] = {}
 
-    def run(self, overrides: Sequence[str], progress: Progress) -> Run | ReportedError:
+    def run(self, overrides: Sequence[str], progress: Progress, verdict: bool = True) -> Run | ReportedError:
         """The run of a variant, or its failure.
 
         Parameters
@@ -43,11 +43,13 @@ class Variants:
         overrides : sequence of str
         progress : callable
             As of `erls.simulation.simulate.simulate`; called once before the start, too.
+        verdict : bool
+            Whether the run states its error.
         """
         try:
             progress(0.0, 0.0)
             scene = load_scene(self.scene, overrides)
-            run = simulate(scene, progress=progress, like=self._alike(scene))
+            run = simulate(scene, progress=progress, like=self._alike(scene), verdict=verdict)
         except ReportedError as problem:
             return problem
         self._know(run)

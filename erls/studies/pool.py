@@ -58,18 +58,27 @@ def run_all(
     SceneError
         ``workers`` is not positive.
     """
-    if workers is not None and workers < 1:
-        message = "the number of workers must be positive"
-        raise SceneError(Cause.BAD_FIELD, message, where="workers", value=workers, remedy="give 1 or more")
-    count = min(workers or os.cpu_count() or 1, len(tasks))
     finished: list[Finished] = []
     try:
-        for one in _spread(work, tasks, count, longest_last) if count > 1 and possible() else _here(work, tasks):
+        for one in each(work, tasks, workers, longest_last):
             finished.append(one)
             progress(len(finished), len(tasks))
     except KeyboardInterrupt:
         return sorted(finished, key=lambda f: f.number), False
     return sorted(finished, key=lambda f: f.number), True
+
+
+def each(
+    work: Callable[[A], R], tasks: Sequence[A], workers: int | None = None, longest_last: bool = False
+) -> Iterator[Finished]:
+    """The same one by one, as they come; an interrupt goes on to who asks. See `run_all`."""
+    if workers is not None and workers < 1:
+        message = "the number of workers must be positive"
+        raise SceneError(Cause.BAD_FIELD, message, where="workers", value=workers, remedy="give 1 or more")
+    count = min(workers or os.cpu_count() or 1, len(tasks))
+    if count > 1 and possible():
+        return _spread(work, tasks, count, longest_last)
+    return _here(work, tasks)
 
 
 def _here(work: Callable[[A], R], tasks: Sequence[A]) -> Iterator[Finished]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from erls.errors import Cause, SceneError, SimulationError
+from erls.files.optional import optional_package
 from erls.view.camera import Size
 from erls.view.figure import Figure, Pose
 from erls.view.stage import Motion
@@ -54,8 +55,7 @@ def no_picture(message: str) -> SimulationError:
 @contextlib.contextmanager
 def drawing() -> Iterator[None]:
     """Failures of the graphics library as one error, and its chatter about missing X servers kept quiet."""
-    import pyvista as pv
-
+    pv = optional_package("pyvista", "view")
     try:
         with pv.vtk_verbosity("off"):
             yield

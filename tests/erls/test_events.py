@@ -13,7 +13,7 @@ import scenes
 import erls
 from erls.cli.main import main
 from erls.errors import SceneError
-from erls.run.file import load_run, write_run
+from erls.run.file import load_run, save_run
 
 SPRING, LENGTH = 40.0, 0.1
 FOUR_BAR = scenes.ROOT / "data/four_bar/flexible.toml"
@@ -89,7 +89,7 @@ def test_a_run_ends_at_an_event(tmp_path: Path, settings: dict[str, Any]) -> Non
     times = np.linspace(0, happening.time, 5)
     np.testing.assert_allclose(run.position("tip", times), whole.position("tip", times), atol=1e-9)
     assert run.summary()["events"] == [{"name": "middle", "time": happening.time, "rising": False}]
-    write_run(tmp_path / "r.h5", run)
+    save_run(tmp_path / "r.h5", run)
     assert load_run(tmp_path / "r.h5").events == run.events
 
 

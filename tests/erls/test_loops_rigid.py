@@ -16,7 +16,7 @@ from erls.equations.loops.closed_chain import ClosedChain
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
-from erls.run.file import load_run, write_run
+from erls.run.file import load_run, save_run
 
 RATE = 360.0  # deg/s
 PLANAR = ("translation along z", "rotation about x", "rotation about y")
@@ -263,7 +263,7 @@ def test_run_file_keeps_loops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     """A run read again answers alike, reactions of loops included."""
     run = loop_scenes.run(tmp_path, loop_scenes.four_bar(), duration=0.02)
     monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 5)
-    write_run(tmp_path / "loop.run.h5", run)
+    save_run(tmp_path / "loop.run.h5", run)
     again = load_run(tmp_path / "loop.run.h5")
     assert again.loop_names == ("pivot",)
     np.testing.assert_array_equal(again.loop_reaction("pivot", 0.01)[0], run.loop_reaction("pivot", 0.01)[0])

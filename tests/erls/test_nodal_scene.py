@@ -17,7 +17,7 @@ from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 from erls.run.chain.run import ChainRun
-from erls.run.file import load_run, write_run
+from erls.run.file import load_run, save_run
 from erls.scene.read import load_scene
 from erls.simulation.simulate import simulate
 from erls.studies.outputs import run_outputs
@@ -243,7 +243,7 @@ def test_run_files_reload(tmp_path: Path) -> None:
     """A run answers as before without its link description."""
     link = scenes.l_link(tmp_path, 2)
     run = _run(scenes.l_scene(tmp_path, **_simulation(0.01, 1e-3)), "nodal", "simulation.elements_per_member=3")
-    write_run(tmp_path / "run.h5", run)
+    save_run(tmp_path / "run.h5", run)
     link.unlink()
     again = load_run(tmp_path / "run.h5")
     np.testing.assert_array_equal(again.position("tip", 0.0077), run.position("tip", 0.0077))
@@ -286,7 +286,7 @@ def test_a_damaged_description_in_a_run_file(tmp_path: Path) -> None:
     from fe_import.files.hdf5.files import write_strings
 
     scenes.l_link(tmp_path)
-    write_run(tmp_path / "run.h5", _run(scenes.l_scene(tmp_path, **_simulation(2e-3, 1e-3))))
+    save_run(tmp_path / "run.h5", _run(scenes.l_scene(tmp_path, **_simulation(2e-3, 1e-3))))
     with h5py.File(tmp_path / "run.h5", "a") as file:
         del file["descriptions"]
         write_strings(file, "descriptions", ("{",), "broken")

@@ -14,7 +14,7 @@ import erls
 from erls.cli.main import main
 from erls.errors import ReportedError
 from erls.report.runs import run_report
-from erls.run.file import write_run
+from erls.run.file import save_run
 from erls.studies import overlay as studies
 from erls.studies.overlay import overlay
 
@@ -29,7 +29,7 @@ def run_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     sensors = [{"name": "imu", "type": "accelerometer", "point": "tip"}]
     scene = erls.load_scene(scenes.l_scene(folder, sensors=sensors, simulation={"duration": 0.2}))
     run = erls.simulate(scene, verdict=False)
-    write_run(folder / "l.run.h5", run, beside=lambda group: None)
+    save_run(folder / "l.run.h5", run, beside=lambda group: None)
     return folder / "l.run.h5"
 
 

@@ -17,7 +17,7 @@ from erls.equations.registry import formulate
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import hermite
 from erls.run.chain.run import ChainRun
-from erls.run.file import load_run, write_run
+from erls.run.file import load_run, save_run
 from erls.run.watches.static_following import static_error
 from erls.scene.build import build_mechanism
 
@@ -360,7 +360,7 @@ def test_run_files_hold_what_does_not_depend_on_the_modes(tmp_path: Path) -> Non
     """Written and read: the same states, from knots in the coordinates of all modes."""
     run = _run(ROBOT, "simulation.duration=0.1", "simulation.bandwidth=60")
     path = tmp_path / "run.h5"
-    write_run(path, run)
+    save_run(path, run)
     again = load_run(path)
     times = np.linspace(0.005, 0.095, 5)
     np.testing.assert_allclose(_points(again, times), _points(run, times), atol=1e-12)

@@ -16,7 +16,7 @@ import scenes
 import erls
 from erls.errors import Cause, SceneError, SimulationError
 from erls.run.chain.run import ChainRun
-from erls.run.file import load_run, write_run
+from erls.run.file import load_run, save_run
 from erls.scene.read import load_scene
 from fe_import.errors import ReportedError
 from fe_import.files.hdf5.files import write_strings
@@ -70,7 +70,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> ChainRun:
 def file(run: ChainRun) -> Path:
     """Its run file; the files that the scene names are gone."""
     folder = run.scene.folder
-    write_run(folder / "run.h5", run)
+    save_run(folder / "run.h5", run)
     for name in ("chain.toml", "arm.toml", "motion.csv", "torque.csv"):
         (folder / name).unlink()
     return folder / "run.h5"
@@ -112,7 +112,7 @@ def test_equal_answers_without_the_files(run: ChainRun, file: Path) -> None:
 
 def test_reading_and_writing_is_the_identity(file: Path, tmp_path: Path) -> None:
     """A run that was read writes the same bytes."""
-    write_run(tmp_path / "again.h5", load_run(file))
+    save_run(tmp_path / "again.h5", load_run(file))
     assert (tmp_path / "again.h5").read_bytes() == file.read_bytes()
 
 
@@ -135,7 +135,7 @@ def test_tables_are_those_of_the_start(tmp_path: Path) -> None:
         (tmp_path / "torque.csv").write_text("0, 9, 9\n1, 9, 9\n", encoding="utf-8")
 
     run = erls.simulate(path, progress=remove)
-    write_run(tmp_path / "run.h5", run)
+    save_run(tmp_path / "run.h5", run)
     assert_equal_runs(run, load_run(tmp_path / "run.h5"))
 
 
@@ -184,7 +184,7 @@ def failed(run: ChainRun, cause: Cause = Cause.NEWTON_FAILED, knots: int = 20) -
 def test_status_and_failure_survive(run: ChainRun, tmp_path: Path, cause: Cause, knots: int) -> None:
     """Cause, whole message, warnings and the knots up to then."""
     stopped = failed(run, cause, knots)
-    write_run(tmp_path / "r.h5", stopped)
+    save_run(tmp_path / "r.h5", stopped)
     loaded = load_run(tmp_path / "r.h5")
     assert loaded.failure is not None
     assert loaded.failure.cause == cause
@@ -194,13 +194,13 @@ def test_status_and_failure_survive(run: ChainRun, tmp_path: Path, cause: Cause,
     assert loaded.warnings == ("careful", "zweite ü")
     assert loaded.end == run.solution.t[knots - 1]
     np.testing.assert_array_equal(loaded.solution.a, stopped.solution.a)
-    write_run(tmp_path / "again.h5", loaded)
+    save_run(tmp_path / "again.h5", loaded)
     assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "r.h5").read_bytes()
 
 
 def test_an_unfinished_run_counts_as_interrupted(run: ChainRun, tmp_path: Path) -> None:
     """What a checkpoint leaves behind when the process is killed."""
-    write_run(tmp_path / "r.h5", run, "unfinished")
+    save_run(tmp_path / "r.h5", run, "unfinished")
     failure = load_run(tmp_path / "r.h5").failure
     assert failure is not None
     assert failure.cause == Cause.INTERRUPTED
@@ -213,7 +213,7 @@ def test_an_unfinished_run_counts_as_interrupted(run: ChainRun, tmp_path: Path) 
 def test_a_failing_write_leaves_the_old_file(run: ChainRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Disk full in the middle, an interrupt, a missing folder: the old file is whole, nothing else lies there."""
     path = tmp_path / "r.h5"
-    write_run(path, run)
+    save_run(path, run)
     before = path.read_bytes()
 
     for problem, expected in ((OSError(28, "No space left"), SceneError), (KeyboardInterrupt(), KeyboardInterrupt)):
@@ -224,14 +224,14 @@ def test_a_failing_write_leaves_the_old_file(run: ChainRun, tmp_path: Path, monk
         with monkeypatch.context() as patch:
             patch.setattr("erls.run.file._fill_output", fail)
             with pytest.raises(expected) as caught:
-                write_run(path, failed(run))
+                save_run(path, failed(run))
         if isinstance(caught.value, SceneError):
             assert caught.value.cause == Cause.NOT_WRITABLE
             assert caught.value.remedy
         assert path.read_bytes() == before
         assert [p.name for p in tmp_path.iterdir()] == ["r.h5"]
     with pytest.raises(SceneError, match="make the folder first") as missing:
-        write_run(tmp_path / "nix" / "r.h5", run)
+        save_run(tmp_path / "nix" / "r.h5", run)
     assert missing.value.cause == Cause.NOT_WRITABLE
 
 

@@ -11,7 +11,7 @@ import scenes
 import erls
 from erls.errors import Cause, SimulationError
 from erls.run.chain.run import ChainRun
-from erls.run.file import load_run, write_run
+from erls.run.file import load_run, save_run
 from erls.run.watches.runaway import LARGEST
 from erls.run.watches.spin_stability import spin_warnings
 
@@ -66,7 +66,7 @@ def test_whatever_the_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     for other in (second, third):
         assert other.end == pytest.approx(first.end, abs=1e-9)
     np.testing.assert_array_equal(first.solution.t, third.solution.t)
-    write_run(tmp_path / "r.h5", first)
+    save_run(tmp_path / "r.h5", first)
     assert load_run(tmp_path / "r.h5").end == first.end
 
 

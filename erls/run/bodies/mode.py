@@ -24,7 +24,7 @@ _FARTHEST = 0.5  # turn [rad]
 _PHASES = 49
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BodyMode(BodyRun):
     """A mode about the last equilibrium; its amplitude, which means nothing, is a tenth of the size, or turns by 0.5.
 
@@ -38,6 +38,10 @@ class BodyMode(BodyRun):
     axis: ClassVar[Axis] = Axis("phase", "phase", "")
     rest: BodyRest
     number: int
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Of its equilibrium, which files hold."""
+        return mode_of, (self.rest, self.number)
 
     @property
     def failure(self) -> None:

@@ -27,7 +27,7 @@ from fe_import.model import IntArray
 _MOST_ENERGIES = 2001
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BodyMotion(BodyRun):
     """A motion with dense output.
 

@@ -35,7 +35,7 @@ class Modes:
     turned: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BodyRest(BodyRun):
     """Equilibria over the load parameter, known at the load steps.
 

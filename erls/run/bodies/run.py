@@ -26,7 +26,7 @@ from fe_import.files.toml import choose
 _WALK = 201  # looks along a run, so that elements are wound up as far as they are
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BodyRun(Run):
     """What motions and equilibria share.
 

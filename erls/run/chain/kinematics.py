@@ -23,7 +23,7 @@ from erls.scene.chain import Scene
 from fe_import.files.toml import choose
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ChainMotion(Run):
     """The part of `erls.run.chain.run.ChainRun` that needs no forces."""
 

@@ -30,7 +30,7 @@ _MOST_KNOTS = 4000
 _ENERGIES = ("kinetic", "elastic", "gravity", "springs")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ChainRun(ChainMotion):
     """A motion with dense output; times are scalars or arrays [s], results have their shape in front.
 

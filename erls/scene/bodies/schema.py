@@ -269,7 +269,7 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
     sensors: list[AnySensor] = []
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BodyScene(SceneFile):
     """A checked scene of bodies and its file."""
 

@@ -1,0 +1,1 @@
+"""Robots described for other programs, into scenes."""

@@ -1,0 +1,1 @@
+"""One scene at many points of a space of parameters: points, quantities, the store, the engine."""

@@ -1,0 +1,89 @@
+"""Points of a sweep as worker processes see them: a few at a time, links shared with those before."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from erls.errors import Cause, SimulationError
+from erls.run.record import Run
+from erls.simulation.variants import Variants
+from erls.studies.sweep.quantities import quantity, values_of
+from erls.studies.sweep.store import Row
+from fe_import.errors import ReportedError
+
+Reduction = Callable[[Run], Mapping[str, float]]
+"""Numbers of a run by name, of one's own; workers import it by its name."""
+
+_known = threading.local()
+
+
+@dataclass(frozen=True)
+class Task:
+    """Some points.
+
+    Attributes
+    ----------
+    scene : Path
+    overrides : tuple of str
+        Of all points.
+    keys : tuple of str
+    rows : list of (number, values)
+        Values for the keys.
+    quantities : tuple of str, or callable
+    verdict : bool
+        Whether runs state their error.
+    """
+
+    scene: Path
+    overrides: tuple[str, ...]
+    keys: tuple[str, ...]
+    rows: list[tuple[int, tuple[Any, ...]]]
+    quantities: tuple[str, ...] | Reduction
+    verdict: bool
+
+
+def evaluate(task: Task) -> list[Row]:
+    """Run them; what fails is a row, too."""
+    return [row_of(task, number, values, run_point(task, values)) for number, values in task.rows]
+
+
+def run_point(task: Task, values: Sequence[Any]) -> Run | ReportedError:
+    """The run of a point, or its failure."""
+    own = [f"{key}={json.dumps(value)}" for key, value in zip(task.keys, values, strict=True)]
+    return _variants(task.scene).run([*task.overrides, *own], lambda t, duration: None, task.verdict)
+
+
+def numbers_of(run: Run, quantities: Sequence[str] | Reduction) -> dict[str, float]:
+    """What is kept of a run, by name."""
+    if callable(quantities):
+        return {str(name): float(value) for name, value in quantities(run).items()}
+    return dict(zip(quantities, values_of(run, [quantity(text) for text in quantities]), strict=True))
+
+
+def row_of(task: Task, number: int, values: Sequence[Any], found: Run | ReportedError) -> Row:
+    """What is kept of a point."""
+    parameters = list(values)
+    if isinstance(found, Run):
+        try:
+            numbers = np.array(list(numbers_of(found, task.quantities).values()))
+            return Row(number, parameters, numbers, warnings=found.warnings, wall_s=found.wall_s)
+        except ReportedError as problem:
+            found = problem
+    if found.cause == Cause.INTERRUPTED:
+        raise SimulationError(Cause.INTERRUPTED, "the sweep was interrupted", remedy="go on with it")
+    return Row(number, parameters, None, str(found.cause), str(found))
+
+
+def _variants(scene: Path) -> Variants:
+    """One for each thread, and for the scene at hand."""
+    if getattr(_known, "scene", None) != scene:
+        _known.scene, _known.variants = scene, Variants(scene)
+    found: Variants = _known.variants
+    return found

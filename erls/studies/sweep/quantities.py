@@ -1,0 +1,173 @@
+"""What a sweep keeps of each run: numbers, named as columns of the run's table with a time or a function over time.
+
+    tip.z@0.5   elbow.angle@end   max(tip.distance)   rms(elbow.effort)   range(energy.total)   error   knots
+
+Names are those of `Run.columns` without their units; ``point.`` and ``joint.`` before them change nothing.
+``tip.distance`` is how far a point is from where it was at the start.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from erls.errors import Cause, SceneError
+from erls.maths.so3 import Array
+from erls.run.chain.run import ChainRun
+from erls.run.record import Run
+from erls.run.tables import HEAD
+
+TIMES = 1001
+"""Even times over which functions are taken, ends included."""
+
+FUNCTIONS: dict[str, Callable[[Array], float]] = {
+    "max": lambda values: float(values.max()),
+    "min": lambda values: float(values.min()),
+    "mean": lambda values: float(values.mean()),
+    "rms": lambda values: float(np.sqrt(np.mean(values**2))),
+    "range": lambda values: float(np.ptp(values)),
+}
+"""Over time: one line each."""
+
+_OF_RUN: dict[str, tuple[str, Callable[[Run], float]]] = {
+    "error": ("m", lambda run: _total(run)),
+    "knots": ("1", lambda run: float(len(run.times))),
+    "wall_s": ("s", lambda run: run.wall_s),
+}
+_OVER = re.compile(rf"({'|'.join(FUNCTIONS)})\((.+)\)")
+_JOINT = {
+    "coordinate": "joint_coordinate",
+    "angle": "joint_angle",
+    "rate": "joint_rate",
+    "effort": "joint_effort",
+}
+
+
+def _total(run: Run) -> float:
+    total = None if run.accuracy is None else run.accuracy.total
+    return math.nan if total is None else total
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a run.
+
+    Attributes
+    ----------
+    text : str
+        As it was asked for.
+    name : str
+        Of a column without its unit; empty where it is of the run itself.
+    over : str
+        A name from `FUNCTIONS`; empty for a time.
+    time : float
+        [s], or the end where it is infinite.
+    """
+
+    text: str
+    name: str = ""
+    over: str = ""
+    time: float = math.nan
+
+    def of(self, run: Run, seen: dict[str, Array]) -> float:
+        """Its value.
+
+        Parameters
+        ----------
+        run : Run
+        seen : dict
+            Histories that other quantities of this run have asked for; filled.
+        """
+        if not self.name:
+            return _OF_RUN[self.text][1](run)
+        if not self.over:
+            return float(history(run, self.name, [run.end if math.isinf(self.time) else self.time])[0])
+        if self.name not in seen:
+            seen[self.name] = history(run, self.name, run.spread(TIMES))
+        return FUNCTIONS[self.over](seen[self.name])
+
+    def unit(self, run: Run) -> str:
+        """Of its value."""
+        if not self.name:
+            return _OF_RUN[self.text][0]
+        base, _, part = self.name.rpartition(".")
+        return "m" if part == "distance" and base in run.point_names else _heads(run)[self.name][1]
+
+
+def quantity(text: str) -> Quantity:
+    """Read what is asked for.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: not of one of the forms.
+    """
+    asked = text.strip()
+    if asked in _OF_RUN:
+        return Quantity(asked)
+    if found := _OVER.fullmatch(asked):
+        return Quantity(asked, _plain(found[2]), found[1])
+    name, at, time = asked.partition("@")
+    try:
+        value = math.inf if time == "end" else float(time)
+    except ValueError:
+        value = math.nan
+    if not at or not name or math.isnan(value) or value < 0:
+        message = "says neither at which time nor over all times"
+        remedy = f"e.g. tip.z@0.5, tip.z@end, max(tip.z); functions are {', '.join(FUNCTIONS)}"
+        raise SceneError(Cause.BAD_FIELD, message, where="--get", value=text, remedy=remedy)
+    return Quantity(asked, _plain(name), time=value)
+
+
+def values_of(run: Run, quantities: Sequence[Quantity]) -> list[float]:
+    """Each of them.
+
+    Raises
+    ------
+    SceneError
+        BAD_REFERENCE, TIME_OUT_OF_RANGE.
+    """
+    seen: dict[str, Array] = {}
+    return [each.of(run, seen) for each in quantities]
+
+
+def history(run: Run, name: str, times: ArrayLike) -> Array:
+    """(k,) values of a column at times, without the other columns where that can be.
+
+    Raises
+    ------
+    SceneError
+        BAD_REFERENCE: there is none of this name.
+    """
+    base, _, part = name.rpartition(".")
+    if base in run.point_names and part in ("x", "y", "z", "distance"):
+        places = run.position(base, times)
+        if part != "distance":
+            return np.asarray(places[..., "xyz".index(part)])
+        return np.asarray(np.linalg.norm(places - run.position(base, run.start), axis=-1))
+    if isinstance(run, ChainRun) and base in run.joint_names and part in _JOINT:
+        values = np.asarray(getattr(run, _JOINT[part])(base, times))
+        if values.ndim == 1:
+            return values
+    heads = _heads(run)
+    if name not in heads:
+        known = [*heads, *(f"{point}.distance" for point in run.point_names)]
+        message, remedy = "the table of the run has no such column", "name one of its columns"
+        raise SceneError(Cause.BAD_REFERENCE, message, where="--get", value=name, limit=known, remedy=remedy)
+    return run.columns(np.asarray(times, dtype=float))[heads[name][0]]
+
+
+def _heads(run: Run) -> dict[str, tuple[str, str]]:
+    """Head and unit of each column, by its name."""
+    found = (HEAD.fullmatch(head) for head in run.columns(np.array([run.start])))
+    return {match["name"]: (match[0], match["unit"]) for match in found if match}
+
+
+def _plain(name: str) -> str:
+    """Without the word for its kind."""
+    return re.sub(r"^\s*(point|joint)\.", "", name).strip()
