@@ -174,7 +174,7 @@ class Switching:
             "switching.modes": self.system.modes.copy(),
             "switching.fixed": self.system.fixed.copy(),
             "switching.leg": np.array(self.leg),
-            "switching.t": np.array([self._t]),
+            "switching.t": np.array([self._t, self.system.seen_by]),
             "switching.knot": self._knot,
             "switching.recent": np.array(self._recent, dtype=float),
         }
@@ -185,7 +185,7 @@ class Switching:
         self._knot = taken(memory, "switching.knot", self._knot).copy()
         self.system.set(modes, taken(memory, "switching.fixed", self.system.fixed, axis=0), self._knot[0])
         self.leg = Leg(*taken(memory, "switching.leg", np.zeros(4)).tolist())
-        self._t = float(taken(memory, "switching.t", np.zeros(1))[0])
+        self._t, self.system.seen_by = taken(memory, "switching.t", np.zeros(2)).tolist()
         self._recent = deque(taken(memory, "switching.recent", np.zeros(0), axis=0).tolist(), maxlen=_MANY)
         self._begun = True
 
