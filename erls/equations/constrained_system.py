@@ -9,7 +9,7 @@ The rules 2 to 7 of `erls.integrate.base` hold here too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array
@@ -27,11 +27,6 @@ class ConstrainedSystem(Protocol):
     @property
     def compiled(self) -> Stepped | None:
         """The same in compiled form, for one run; None where there is none."""
-        return None
-
-    @property
-    def switches(self) -> Switches | None:
-        """Modes of what acts in joints (`erls.equations.switches.base`), at what is stored of knots; None of none."""
         return None
 
     @property
@@ -86,19 +81,6 @@ class ConstrainedSystem(Protocol):
     def constraint_bias(self, t: float, q: Configuration, v: Array) -> Array:
         """(m,) Φ̈ - B a."""
 
-    @property
-    def unlocked(self) -> ConstrainedSystem:
-        """The same without conditions that come and go with modes."""
-        return self
-
-    def from_stored(self, y: Array, v: Array) -> tuple[Configuration, Array]:
-        """Configuration and velocity from what `stored` gives, interpolated or not; asked of those with `switches`."""
-        raise NotImplementedError
-
-    def driven(self, t: float, q: Configuration, v: Array) -> tuple[Array, Array]:
-        """Accelerations (n,) and multipliers (m,) with the present modes of `switches`."""
-        raise NotImplementedError
-
     def stored(self, t: float, q: Configuration, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """(s,) three times: what a `Solution` keeps of a knot, with its first and second derivative by time.
 
@@ -108,6 +90,25 @@ class ConstrainedSystem(Protocol):
 
     def places(self, stored: Array) -> Array:
         """(k, p, 3) points [m] of what is stored of k knots (k, s): the error of a run is told at these."""
+
+
+@runtime_checkable
+class SwitchedSystem(ConstrainedSystem, Protocol):
+    """A system what acts in whose joints has modes."""
+
+    @property
+    def switches(self) -> Switches | None:
+        """Modes (`erls.equations.switches.base`), at what is stored of knots; None where there are none after all."""
+
+    @property
+    def unlocked(self) -> ConstrainedSystem:
+        """The same without conditions that come and go with modes."""
+
+    def from_stored(self, y: Array, v: Array) -> tuple[Configuration, Array]:
+        """Configuration and velocity from what `stored` gives, interpolated or not."""
+
+    def driven(self, t: float, q: Configuration, v: Array) -> tuple[Array, Array]:
+        """Accelerations (n,) and multipliers (m,) with the present modes."""
 
 
 class ConstrainedState(NamedTuple):

@@ -23,4 +23,4 @@ def switched(system: Any) -> Any:
         return SwitchedChain(system)
     from erls.equations.switches.tree import SwitchedTree  # here: as much as it takes
 
-    return SwitchedTree(tree)
+    return SwitchedTree(system)

@@ -44,8 +44,8 @@ a tenth, random scenes had up to a thousand switches of vibrations alone, and to
 
 _LIMITED = 0.1
 """Of that again, where motors have limits on flexible links: vibrations decide when these are reached, and an error of
-them becomes one of the impulse that the motor gives. Measured on an arm that swings to a stop under its limit: off by up
-to thirty times of what was aimed at."""
+them becomes one of the impulse that the motor gives. Measured on an arm that swings to a stop under its limit: off by
+up to thirty times of what was aimed at."""
 
 Integrate: TypeAlias = Callable[..., Solution]
 """An `erls.integrate.base.Integrator` for one kind of system."""

@@ -22,7 +22,12 @@ from functools import partial
 import numpy as np
 
 from erls.equations.consistency import consistent_acceleration, consistent_start, refuse_redundant
-from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
+from erls.equations.constrained_system import (
+    Configuration,
+    ConstrainedState,
+    ConstrainedSystem,
+    SwitchedSystem,
+)
 from erls.equations.system import metre_scales
 from erls.integrate.alpha_rules import Formulas, Rules, Words
 from erls.integrate.alpha_steps import Steps, adaptive_steps, equal_steps, rough_steps
@@ -87,10 +92,12 @@ def _run(
             equal_steps(steps, part, width, options.iteration_matrix != "frozen", recorder, given=plan is None)
             steps.part += 1
 
+    moving = system if recorder.switching is not None and isinstance(system, SwitchedSystem) else None
+
     def begin(
         steps: Steps, leg: Leg, place: Configuration, rate: Array, stored: tuple[Array, Array] | None = None
     ) -> None:
-        if recorder.switching is not None:
+        if recorder.switching is not None:  # which `tell_again` does without
             beta = Formulas.of(Rules(options.spectral_radius, 0.0), step).beta
             recorder.switching.system.seen_by = beta * (steps.h or step) ** 2
         start = _start_of_leg(system, leg, place, rate, recorder, stored)
@@ -100,7 +107,7 @@ def _run(
         if known is not None:
             tell_again(known, recorder)
             return
-        free = system if recorder.switching is None else system.unlocked
+        free = system if moving is None else moving.unlocked
         refuse_redundant(free, walk[0].first, q)
         place, rate = consistent_start(free, walk[0].first, q, given.v, recorder.warnings)
         if recorder.switching is not None:
@@ -121,8 +128,9 @@ def _run(
                     advance(steps, leg)
                     break
                 except Switch as switch:
+                    assert moving is not None
                     leg = Leg(switch.t, leg.end, switch.t, leg.last)
-                    begin(steps, leg, *system.from_stored(switch.y, switch.v), (switch.y, switch.v))
+                    begin(steps, leg, *moving.from_stored(switch.y, switch.v), (switch.y, switch.v))
                 finally:
                     if options.project_velocity:
                         recorder.work.factorizations += recorder.steps - before
@@ -176,6 +184,7 @@ def _start_of_leg(
         a, multipliers = consistent_acceleration(system, leg.first, q, v)
     else:
         switching.stand(leg, *(stored or system.stored(leg.first, q, v, np.zeros(system.size))[:2]))
+        assert isinstance(system, SwitchedSystem)
         a, multipliers = system.driven(leg.first, q, v)
     if not np.isfinite(a).all():
         raise not_finite(leg.start, a)

@@ -1,9 +1,10 @@
 """Switches of a motion whose modes change: found between the knots of a step, and located in time.
 
 A switch is where a joint that slides comes to rest, where friction that holds one reaches what it can hold, or where a
-motor comes to its limit or leaves it (`erls.equations.switches.base`). Steps go on with the modes that they began with, so that what they interpolate is smooth, and a switch is as accurate as the
-knots (rule 4 of `erls.integrate.base`): it becomes the last knot of a leg, and another leg begins there with the modes
-that the set-valued law gives. What falls below zero and comes back between two looks is not seen.
+motor comes to its limit or leaves it (`erls.equations.switches.base`). Steps go on with the modes that they began with,
+so that what they interpolate is smooth, and a switch is as accurate as the knots (rule 4 of `erls.integrate.base`): it
+becomes the last knot of a leg, and another leg begins there with the modes that follow. What falls below zero and comes
+back between two looks is not seen.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ class Switching:
         ended[0] = False  # there the law has just spoken
         if ended.any():
             every = 1 if slides else _LOOKS  # looks from knot to knot; rates are looked at at knots alone
-            ended &= ~self.system.slides | (np.arange(len(looks)) % every == 0)[:, None]
+            ended &= np.logical_not(self.system.slides) | (np.arange(len(looks)) % every == 0)[:, None]
             for at in np.flatnonzero(ended.any(axis=1)).tolist():
                 since = looks[at - (every if at % every == 0 else 1)]
                 found = self._located(times, states, since, looks[at], np.flatnonzero(ended[at]))
@@ -193,7 +194,7 @@ class Switching:
 def switching_of(system: MovingSystem) -> Switching | None:
     """What looks for switches; None where there are none."""
     found = system if isinstance(system, Switches) else getattr(system, "switches", None)
-    return Switching(found) if found is not None else None
+    return Switching(found) if isinstance(found, Switches) else None
 
 
 def _cubic(times: Array, states: Array, x: float) -> tuple[Array, Array]:

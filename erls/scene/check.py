@@ -12,7 +12,7 @@ from erls.scene.check_settings import check_settings
 from erls.scene.check_sticking import check_sticking
 from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
 from erls.scene.contacts import WORLD, Contact
-from erls.scene.joints import Coordinate, Joint, Loop
+from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
 from fe_import.description.check import check_damping, check_temperature
 from fe_import.files.toml import choose

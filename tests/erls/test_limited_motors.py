@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -61,7 +62,7 @@ def bang_bang(inertia: float, start: float) -> list[Piece]:
 
 def places(pieces: list[Piece], times: Array) -> Array:
     """(k,) x less its goal."""
-    return np.array([max((p for p in pieces if p.start <= t)).move(t - max(p.start for p in pieces if p.start <= t))[0]
+    return np.array([max(p for p in pieces if p.start <= t).move(t - max(p.start for p in pieces if p.start <= t))[0]
                      for t in times.tolist()])  # fmt: skip
 
 
@@ -99,7 +100,7 @@ def test_arm_under_its_limit(integrator: str, tmp_path: Path) -> None:
     expected = [piece.start for piece in pieces[1:]]
     assert len(expected) >= 4
     assert switches(run) == pytest.approx(expected, abs=1e-6)
-    middle = [(a.start + b.start) / 2 for a, b in zip(pieces, pieces[1:], strict=False)]
+    middle = [(a.start + b.start) / 2 for a, b in pairwise(pieces)]
     efforts = np.abs(run.joint_effort("hub", np.array(middle)))
     assert efforts[::2] == pytest.approx(LIMIT, rel=1e-12)  # parabolas and vibrations take turns
     assert (efforts[1::2] < LIMIT).all()

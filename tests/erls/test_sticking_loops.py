@@ -1,4 +1,4 @@
-"""Exact sticking and limited motors in closed loops: closed forms, formulations against one another, shares of loads."""
+"""Exact sticking in closed loops: closed forms, formulations against one another, shares of loads."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def _body(mass: float) -> dict[str, Any]:
 
 
 def run_scene(folder: Path, data: dict[str, Any], verdict: bool = True) -> ChainRun:
-    return cast(ChainRun, erls.simulate(erls.load_scene(scenes.write_toml(folder / "scene.toml", data)), verdict=verdict))
+    path = scenes.write_toml(folder / "scene.toml", data)
+    return cast(ChainRun, erls.simulate(erls.load_scene(path), verdict=verdict))
 
 
 def stick(force: float, static: float | None = None) -> dict[str, Any]:
@@ -127,7 +128,9 @@ INERTIA = (MASSES[0] + MASSES[2]) * LENGTHS[0] ** 2 / 3 + MASSES[1] * LENGTHS[0]
 LEVEL = math.radians(70.0)
 
 
-def parallelogram(crank: dict[str, Any], others: dict[str, Any], closing: dict[str, Any], start: float) -> dict[str, Any]:
+def parallelogram(
+    crank: dict[str, Any], others: dict[str, Any], closing: dict[str, Any], start: float
+) -> dict[str, Any]:
     """A four-bar whose coupler does not turn: J q̈ = what acts along its joints, q the angle of both cranks."""
     angles = start, -start, start - math.pi
     lengths = LENGTHS[0], LENGTHS[1], LENGTHS[0]

@@ -106,7 +106,8 @@ def test_flexible_arm(tmp_path: Path) -> None:
         run = erls.simulate(erls.load_scene(path), verdict=False)
         times = np.linspace(0.0, 0.25, 51)
         ends[name] = run.position("end", times)
-        resting = [float(np.mean(run.joint_rate(joint, np.linspace(0, 0.25, 501)) == 0)) for joint in ("first", "second")]
+        looks = np.linspace(0.0, 0.25, 501)
+        resting = [float(np.mean(run.joint_rate(joint, looks) == 0)) for joint in ("first", "second")]
         assert all(0.02 < share < 0.9 for share in resting), (name, resting)
     moved = float(np.ptp(ends["erls"], axis=0).max())
     assert np.abs(ends["nodal"] - ends["erls"]).max() < 2e-3 * moved
@@ -123,7 +124,8 @@ def test_small_motions_leave_out_what_sticks(tmp_path: Path) -> None:
         joints[0]["friction"] = stick(force)
         poles = {}
         for formulation in ("erls", "nodal"):
-            path = arm(tmp_path, (force, 1.0), simulation={"formulation": formulation, "integrator": "auto"}, joints=joints)
+            settings = {"formulation": formulation, "integrator": "auto"}
+            path = arm(tmp_path, (force, 1.0), simulation=settings, joints=joints)
             poles[formulation] = np.sort_complex(erls.linearize(erls.load_scene(path)).poles)
         assert poles["nodal"] == pytest.approx(poles["erls"], abs=1e-5)
         assert len(poles["erls"]) == (2 if force == 40.0 else 4)

@@ -52,4 +52,5 @@ def forced(chain: ClosedChain, t: float, y: Array, v: Array) -> tuple[Array, Arr
     force = -chain.exact.forces(t, y, v, found.accelerations)
     force[chain.dry.places] += found.given
     gradient, metres = chain.exact.room.gradient.copy(), chain.metres
-    return found.accelerations, np.linalg.lstsq((gradient / metres).T, force / metres, rcond=None)[0], gradient
+    multipliers = np.linalg.lstsq((gradient / metres).T, force / metres, rcond=None)[0]
+    return found.accelerations, np.asarray(multipliers, dtype=float), gradient

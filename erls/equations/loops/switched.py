@@ -34,7 +34,8 @@ class SwitchedChain(ClosedChain, Switches):
         closing = [loop for loop in self.mechanism.loops if loop.freedom is not None and loop.freedom.active]
         joints = self.mechanism.joints
         drives = [joint.drive for joint in joints] + [loop.freedom.drive for loop in closing if loop.freedom]
-        motors = motors_among(drives, [joint.name for joint in (*joints, *closing)], acting)
+        names = [*(joint.name for joint in joints), *(loop.name for loop in closing)]
+        motors = motors_among(drives, names, acting)
         Switches.__init__(self, self.dry or NO_FRICTION, motors, self.size)
         self._joints = tree.joints[self.bare.free_joints[self.rubbing.places]]
         self._asked = Asked(motors, self.exact, actuated.forces)

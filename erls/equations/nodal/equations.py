@@ -111,7 +111,7 @@ class Nodal:
 
     @property
     def size(self) -> int:
-        """18 numbers for each node, one for each joint and each of its conditions, and one for what holds it at rest."""
+        """18 numbers for each node, one for each joint and each of its conditions, and one for dry friction."""
         return self._kept + self.system.size + self.system.constraints + len(self.dry.places)
 
     @cached_property

@@ -19,7 +19,7 @@ from erls.equations.nodal.nodes import Nodes
 from erls.equations.switches.base import Switches
 from erls.equations.switches.law import DryFriction, Freely, Settled, settle
 from erls.equations.switches.motors import Acting, motors_among
-from erls.equations.switches.shares import Shares, independent, shared
+from erls.equations.switches.shares import Shares, shared
 from erls.equations.system import metre_scales
 from erls.maths.saddle import Saddle, Scales
 from erls.maths.so3 import Array
@@ -78,14 +78,13 @@ class LockedSystem(ChainSystem):
 
     def _locks(self) -> list[Joint]:
         """Of each joint the condition that would fix it."""
-        found = []
+        found: list[Joint] = []
         for (group, k), name in zip(_actuators(self.unlocked, self.numbers), self._names(), strict=True):
             kind = "revolute" if group.along[k] == 5 else "prismatic"
             kept = {condition.name for condition in JOINT_TYPES[kind].conditions}
-            nodes, frames = group.nodes[k].tolist(), (group.inner_frames[k], group.outer_frames[k])
-            number = len(found)
-            motion = _held(self.held_at, number)
-            found.append(Joint(name, kind, *nodes, *frames, motion=motion, left_out=frozenset(kept)))
+            inner, outer = (int(node) for node in group.nodes[k])
+            frames, motion = (group.inner_frames[k], group.outer_frames[k]), _held(self.held_at, len(found))
+            found.append(Joint(name, kind, inner, outer, *frames, motion, left_out=frozenset(kept)))
         return found
 
     def _names(self) -> list[str]:
@@ -257,7 +256,7 @@ class NodalSwitches(Switches):
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """See `Switches`."""
-        return self.knot(t, y, v)[0][2]
+        return np.asarray(self.knot(t, y, v)[0][2])
 
     def knot(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
         """See `Switches`: accelerations and multipliers are kept beside."""
@@ -282,7 +281,8 @@ class NodalSwitches(Switches):
         """See `Switches`: joints closed, which interpolation leaves open."""
         q, twists = self._free.from_stored(y, v)
         q, _ = consistent_position(self._free, t, q)
-        place, rate, _ = self._free.stored(t, q, consistent_velocity(self._free, t, q, twists), np.zeros(self._free.size))
+        twists = consistent_velocity(self._free, t, q, twists)
+        place, rate, _ = self._free.stored(t, q, twists, np.zeros(self._free.size))
         place[self.still], rate[self.still] = y[self.still], 0.0
         return place, rate
 

@@ -27,6 +27,11 @@ SystemOf = Callable[[Any], NodalSystem]
 Stored = Callable[[NodalSystem, float, Nodes, Array, Array, Callable[[], Array]], tuple[Array, Array, Array]]
 
 
+def system_in(formulation: Any) -> NodalSystem:
+    """The system of a formulation of nodes."""
+    return formulation.system  # type: ignore[no-any-return]
+
+
 @dataclass(frozen=True)
 class NodalNeighbours:
     """Of a configuration with velocity and acceleration (n,) and multipliers (m,).
@@ -50,7 +55,7 @@ class NodalNeighbours:
     multipliers: Array
     stored: Stored
     names: tuple[str, ...]
-    system_of: SystemOf
+    system_of: SystemOf = system_in
 
     @cached_property
     def metres(self) -> Array:
@@ -151,11 +156,6 @@ class NodalNeighbours:
     def of(self, formulation: Formulation) -> NodalNeighbours:
         """See `Neighbours`."""
         return replace(self, system=self.system_of(formulation))
-
-
-def system_in(formulation: Any) -> NodalSystem:
-    """The system of a formulation of nodes."""
-    return formulation.system  # type: ignore[no-any-return]
 
 
 def nodal_neighbours(

@@ -46,8 +46,8 @@ class Switches:
     sees : bool
         See `seen`.
     seen_by : float
-        β h² of steps that do not resolve all vibrations [s²]: accelerations are then those of M + β h² K, where a system
-        knows how.
+        β h² of steps that do not resolve all vibrations [s²]: accelerations are then those of M + β h² K, where a
+        system knows how.
     fixed : int array
         Coordinates that do not move in the equations: of those that rest as many as are independent.
     """

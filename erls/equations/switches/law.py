@@ -8,11 +8,11 @@ S_k ≥ F_k that holds one at rest,
 
 Of joints at rest a = b + W λ, where b are their accelerations without friction in them and W = Gᵀ M⁻¹ G, M⁻¹ under the
 conditions of loops. It is symmetric and positive definite in a tree. With S_k = F_k that is a linear complementarity
-problem between bounds, which then has one solution whatever the number of joints (R. W. Cottle, J.-S. Pang, R. E. Stone,
-The Linear Complementarity Problem, 1992, theorem 3.3.7). It is found by exchanging one joint at a time, the first that
-contradicts the law (K. G. Murty's least index, which ends). With S_k > F_k the law has more than one solution where one
-joint that breaks away may carry others along; here whoever S_k cannot hold slides, feels F_k from then on, and the rest
-is asked again.
+problem between bounds, which then has one solution whatever the number of joints (R. W. Cottle, J.-S. Pang, R. E.
+Stone, The Linear Complementarity Problem, 1992, theorem 3.3.7). It is found by exchanging one joint at a time, the
+first that contradicts the law (K. G. Murty's least index, which ends). With S_k > F_k the law has more than one
+solution where one joint that breaks away may carry others along; here whoever S_k cannot hold slides, feels F_k from
+then on, and the rest is asked again.
 
 In a loop one joint may rest because others do. Then W is singular: accelerations are still one, the forces of friction
 that hold are not. `erls.equations.switches.shares` says which are taken.
@@ -20,10 +20,10 @@ that hold are not. `erls.equations.switches.shares` says which are taken.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from erls.equations.switches.shares import independent, shared
 from erls.maths.so3 import Array
@@ -198,7 +198,9 @@ def at_rest(
         modes[gone] = -np.sign(given[gone])
 
 
-def _among_dependent(compliance: Array, free: Array, static: Array, alone: Array) -> tuple[Array, Array]:
+def _among_dependent(
+    compliance: Array, free: Array, static: Array, alone: Array
+) -> tuple[Array, NDArray[np.bool_]]:
     """(m,) forces, and which joints they cannot hold, where W is singular."""
     more = _MADE_DEFINITE * np.maximum(compliance.diagonal(), 1e-4 * alone)
     given = _between(compliance + np.diag(more), free, static)

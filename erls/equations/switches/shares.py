@@ -50,7 +50,7 @@ def independent(compliance: Array, alone: Array) -> IntArray:
     """
     if not len(alone):
         return np.zeros(0, dtype=np.int64)
-    left, chosen = _correlations(compliance, alone)[0].copy(), []
+    left, chosen = _correlations(compliance, alone)[0].copy(), list[int]()
     while len(chosen) < len(alone):
         k = int(np.argmax(left.diagonal()))
         if left[k, k] <= DEPENDENT:
@@ -62,8 +62,8 @@ def independent(compliance: Array, alone: Array) -> IntArray:
 
 
 def following(compliance: Array, alone: Array, held: IntArray, others: IntArray) -> Array:
-    """Which of ``others`` (k,) cannot move while joints ``held`` rest, which are independent; W and its diagonal without
-    loops as of `independent`.
+    """Which of ``others`` (k,) cannot move while joints ``held`` rest, which are independent; W and its diagonal
+    without loops as of `independent`.
     """
     scaled = _correlations(compliance, alone)[0]
     across = scaled[np.ix_(held, others)]
