@@ -263,7 +263,6 @@ def test_faulty_friction(changes: dict[str, Any], field: str, words: str, tmp_pa
 @pytest.mark.parametrize(
     "settings",
     [
-        {"formulation": "nodal", "integrator": "auto"},
         {"formulation": "ffr", "coordinates": "absolute", "integrator": "auto"},
         {"gauge": "minimum-norm"},
         {"bandwidth": 100.0},
