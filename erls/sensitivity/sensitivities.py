@@ -160,6 +160,9 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
         raise _refusal(_UNKNOWN[kind], where, "use erls or ffr with independent coordinates and links in one piece")
     if settings.gauge == "minimum-norm":
         raise _refusal("the minimum-norm gauge", f"{where}.gauge", "use the joint-angle gauge")
+    if mechanism.sticks:
+        remedy = "use friction.law = 'smooth'"
+        raise _refusal("motions of joints that stick", f"{scene.path}: friction.law", remedy)
     if mechanism.rotation_vectors:
         raise _refusal("coordinates that are rotation vectors", f"{scene.path}: joints", "use universal joints")
     if kind == "loops" and settings.integrator == FIXED_STEP:

@@ -278,10 +278,20 @@ def test_what_sticking_does_not_go_with(settings: dict[str, Any], tmp_path: Path
     assert caught.value.where.endswith("joints[0].friction.law")
 
 
+def test_what_makes_steps_of_its_own_refuses_it(tmp_path: Path) -> None:
+    """Steppers and derivatives take the compiled equations, which leave this friction out."""
+    scene = erls.load_scene(arm(tmp_path, (20.0, 5.0)))
+    with pytest.raises(SceneError, match="where a joint sticks") as caught:
+        erls.stepper(scene)
+    assert caught.value.where.endswith("friction.law")
+    with pytest.raises(SceneError, match="joints that stick are not known yet"):
+        erls.sensitivities(scene, {"end": lambda run: run.position("end", 0.1)}, ["joints.second.friction.force"])
+
+
 def _switch_on_and_on(looking: Switching) -> None:
     at_rest = np.zeros(2)
     for _ in range(1000):
-        looking._end_modes(0.25, at_rest, at_rest, np.array([1]))
+        looking._end_modes(0.25, at_rest, at_rest, at_rest, np.array([1]))
 
 
 def test_chatter_ends(tmp_path: Path) -> None:
