@@ -59,7 +59,7 @@ class Actuators:
         for joint, acts in zip(self.joints, self.acting, strict=True):
             own, drive = joint.forces, joint.drive
             gains = drive.gains if acts else (0.0, 0.0)
-            law = (own.stiffness, own.rest, own.damping, *own.smooth_friction(drive.prescribed), *gains)
+            law = (own.stiffness, own.rest, own.damping, *own.smooth_friction(False), *gains)
             bounds = -drive.torque_limit, drive.torque_limit, 0.0
             stops = NO_STOPS if own.stops is None else own.stops.numbers
             found.append([joint.rotor_inertia, *law, *bounds, *stops])
@@ -73,7 +73,10 @@ class Actuators:
             if not self.acting[k]:
                 continue
             coordinate, rate, _ = (0.0, 0.0, 0.0) if drive.motion is None else drive.motion.derivatives(t)
-            result[k] = coordinate, rate, lead(t) + (0.0 if drive.load is None else drive.load.value(t))
+            push = lead(t) + (0.0 if drive.load is None else drive.load.value(t))
+            if drive.prescribed and joint.forces.sticks:  # by the rate that is prescribed, which no iteration changes
+                push -= joint.forces.friction * np.sign(rate)
+            result[k] = coordinate, rate, push
         return result
 
     @property

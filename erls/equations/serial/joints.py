@@ -85,7 +85,7 @@ def effort(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any,
         force = 0.0 * force + joint.most
     elif force.real < joint.least.real:
         force = 0.0 * force + joint.least
-    force += joint.rubbing - joint.stiffness * (angle - joint.rest) - joint.damping * rate
+    force -= joint.stiffness * (angle - joint.rest) + joint.damping * rate - joint.rubbing
     if joint.friction != 0.0:
         force -= joint.friction * _saturated(rate / joint.transition)
     if len(joint.stops) > 0:
