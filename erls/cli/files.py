@@ -50,8 +50,8 @@ def view(
     """Make a picture, film or export of a run; without -o, open a window.
 
     The ending of the output decides: .png or .jpg a picture, .mp4 or .gif a film, .pvd the deformed links, or beams and
-    bodies, for ParaView, .csv a table of joints, points, forces, sensors and energies, .html a page with a measured
-    record over the run (--overlay).
+    bodies, for ParaView, .csv a table of joints, points, forces, sensors and energies, .html a report: plots, the
+    mechanism in space, what the run states of its error; or a measured record over the run (--overlay).
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def view(
     loaded = load_run(run)
     if mode is not None:
         loaded = mode_of(loaded, mode)
-    if overlay is not None or (output is not None and output.suffix == ".html"):
+    if overlay is not None:
         return _overlaid(loaded, run, overlay, output, force, json)
     if output is None:
         show(loaded)
@@ -109,15 +109,13 @@ def view(
     print(f"written to {output}")
 
 
-def _overlaid(loaded: Run, run: Path, record: Path | None, output: Path | None, force: bool, json: bool) -> None:
+def _overlaid(loaded: Run, run: Path, record: Path, output: Path | None, force: bool, json: bool) -> None:
     """The part of `view` for a measured record."""
     from erls.cli.reports import bad, tell_written, write
     from erls.files.results import claim
     from erls.report.overlay_page import overlay_page, overlay_text
     from erls.studies.overlay import overlay, overlay_summary
 
-    if record is None:
-        raise bad("a page shows a measured record over the run", "--output", str(output), "give --overlay MEASURED.csv")
     if output is not None:
         if output.suffix != ".html":
             raise bad("a record is drawn on a page", "--output", output.name, "end in .html")

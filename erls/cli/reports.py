@@ -37,14 +37,11 @@ def check_output(
     """
     if output is None:
         return
-    from erls.files.optional import require_package
     from erls.files.results import claim
 
     if output.suffix not in suffixes:
         remedy = "end in " + ", ".join(suffixes)
         raise bad("the ending of the report decides its form", "--output", output.name, remedy)
-    if output.suffix == ".html":
-        require_package("matplotlib", "--output")
     claim(output, output.suffix, [*read_by(scenes, changes), *more], force)
 
 

@@ -26,6 +26,7 @@ def simulate(
     verdict: bool = True,
     resume: Path | None = None,
     until: float | None = None,
+    report: Path | None = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -55,11 +56,14 @@ def simulate(
     until
         Go on beyond simulation.duration up to this time in seconds, with what was settled for it; with --resume RUN.h5
         also from the end of a finished run.
+    report
+        Page to write (.html): plots, the mechanism in space, error and verdict, settings, how to repeat it.
     force
-        Replace an existing file that is no run file.
+        Replace an existing file that is no run file, or no page.
     json
         Print one JSON object.
     """
+    from erls.cli.reports import bad
     from erls.cli.resuming import checkpoint_of, left_by, refuse_together
     from erls.errors import Cause, SimulationError
     from erls.files.results import RUN, claim
@@ -85,6 +89,10 @@ def simulate(
     for path in (output, partial):
         if path is not None:
             claim(path, RUN, files_of(loaded), force)
+    if report is not None:
+        if report.suffix != ".html":
+            raise bad("a report is a page", "--report", report.name, "end it in .html")
+        claim(report, ".html", files_of(loaded), force)
     saving = None if partial is None else Checkpoints(partial, tuple(changes), saved)
     try:
         with Progress("simulating") as advance:
@@ -113,11 +121,18 @@ def simulate(
     if output is not None:
         save_run(output, run)
         remove(partial)
+    if report is not None:
+        from erls.view import write_view  # here: nobody else needs it
+
+        sets = [word for text in set_ or [] for word in ("--set", text)]
+        sets += [] if formulation is None else ["--formulation", formulation]
+        write_view(run, report, repeat=["simulate", str(scene), *sets])
     if json:
         return print_json({**run.summary(times), "output": None if output is None else str(output)})
     print(run_report(run, times))
-    if output is not None:
-        print(f"\nwritten to {output}")
+    for path in (output, report):
+        if path is not None:
+            print(f"\nwritten to {path}")
 
 
 def _asked(at: str, settings: Record, until: float | None) -> list[float]:

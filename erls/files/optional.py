@@ -11,7 +11,7 @@ from erls.errors import Cause, SceneError
 EXTRAS = {
     "pyvista": "view",
     "vtkmodules": "view",
-    "matplotlib": "report",
+    "matplotlib": "plot",
     "PIL": "view",
     "imageio_ffmpeg": "film",
     "pandas": "tables",

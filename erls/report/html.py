@@ -1,37 +1,32 @@
-"""One self-contained HTML page: text, tables and plots that open without a network, on a phone too."""
+"""One self-contained HTML page: text, tables that sort and plots one can look into, without a network, on a phone too.
+
+Plots and views are drawn by plotly.js (MIT), of which the part for lines and scenes in space lies beside this file: the
+package of the same name for Python brings three times as much, more than a page may have. Matplotlib draws pictures
+that cannot be asked; uPlot is a tenth as large, and knows no space. What a page shows is JSON within it.
+"""
 
 from __future__ import annotations
 
+import base64
+import gzip
 import html
-import io
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cache
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
 from erls.files.results import MARK
 from erls.maths.so3 import Array
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_STYLE = """
-:root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 60rem; padding: 1rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2rem; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #8884; white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; }
-figure { margin: 1.5rem 0; }
-figure div { overflow-x: auto; background: white; border-radius: 4px; }
-figure svg { width: 100%; min-width: 22rem; height: auto; display: block; }
-figcaption { padding-bottom: .3rem; font-weight: 600; }
-.good::before { content: "\\2713  "; color: #2a7d2a; } .bad::before { content: "\\2717  "; color: #b3261e; }
-.note { font-size: .9rem; opacity: .85; }
-""".strip()
+_DIGITS = 7  # of numbers in plots
+_MOST_NUMBERS = 120_000  # of a view, times two
+_BOX = "@box@"  # for the name of what a part draws, which the page gives
+_SHORT = 3  # sections from which on a page has a list of contents
 
 
 @dataclass(frozen=True)
@@ -65,72 +60,169 @@ def paragraph(text: str, kind: str = "") -> str:
 
 
 def heading(text: str) -> str:
-    """A section heading."""
-    return f"<h2>{html.escape(text)}</h2>"
+    """A section heading; where there are several, the list of contents leads to it."""
+    return f'<h2 id="{_anchor(text)}">{html.escape(text)}</h2>'
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table that scrolls by itself where the page is narrow."""
-    head = "".join(f"<th>{html.escape(c)}</th>" for c in header)
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in row) + "</tr>" for row in rows)
+def _anchor(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "section"
+
+
+def code(text: str) -> str:
+    """Lines to copy."""
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], explained: Sequence[str] = ()) -> str:
+    """A table that scrolls by itself where the page is narrow; ``explained`` says what each column is."""
+    told = list(explained) or [""] * len(header)
+    texts = [not any(any(c.isdigit() for c in row[k]) for row in rows) for k in range(len(header))]
+    kinds = [' class="text"' if text else "" for text in texts]  # columns without any number stand on the left
+    titles = [f' title="{html.escape(text)}"' if text else "" for text in told]
+    head = "".join(f"<th{k}{t}>{html.escape(c)}</th>" for c, k, t in zip(header, kinds, titles, strict=True))
+    body = "".join(
+        "<tr>" + "".join(f"<td{k}>{html.escape(c)}</td>" for c, k in zip(row, kinds, strict=True)) + "</tr>"
+        for row in rows
+    )
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def figure(plot: Plot) -> str:
-    """A plot as inline SVG, text kept as text."""
-    from matplotlib.figure import Figure  # here: texts of the same reports do without it
+    """A plot: pointing at it tells values, dragging zooms in, a name in the legend hides its curve."""
+    told = {
+        "x": plot.x_label,
+        "y": plot.y_label,
+        "logarithmic": "".join(axis for axis in plot.logarithmic if _positive(plot, axis)),
+        "limit": plot.limit,
+        "curves": [
+            {
+                "label": curve.label,
+                "x": _numbers(curve.x),
+                "y": _numbers(curve.y),
+                "dashed": curve.dashed,
+                "mode": "markers" if curve.points else "lines+markers" if curve.marked else "lines",
+            }
+            for curve in plot.curves
+        ],
+    }
+    caption = f"<figcaption>{html.escape(plot.title)}{_note(plot)}</figcaption>" if plot.title else ""
+    box = _box("plot", told, f"plot of {plot.y_label} over {plot.x_label}")
+    return f"<figure>{caption}{box}</figure>"
 
-    canvas = Figure(figsize=(6.0, 3.1), layout="constrained")
-    axes = canvas.subplots()
-    for curve in plot.curves:
-        line = "" if curve.points else "--" if curve.dashed else "-"
-        marker = "." if curve.points else "o" if curve.marked else ""
-        axes.plot(curve.x, curve.y, label=curve.label, linewidth=1.2, linestyle=line, marker=marker, markersize=4)
-    if plot.limit is not None:
-        axes.axhline(plot.limit, color="0.4", linewidth=0.8, linestyle=":")
-    for axis in plot.logarithmic:
-        values = np.concatenate([c.x if axis == "x" else c.y for c in plot.curves] or [np.zeros(0)])
-        if (values > 0).any():
-            (axes.set_xscale if axis == "x" else axes.set_yscale)("log")
-    axes.set_xlabel(plot.x_label)
-    axes.set_ylabel(plot.y_label)
-    axes.grid(alpha=0.3)
-    if plot.curves:
-        axes.legend(fontsize=8, loc="best")
-    caption = f"<figcaption>{html.escape(plot.title)}{_note(plot)}</figcaption>"
-    return f"<figure>{caption}<div>{_svg(canvas)}</div></figure>"
+
+def _positive(plot: Plot, axis: str) -> bool:
+    """Whether an axis has something to show on a logarithmic scale."""
+    return any((np.asarray(curve.x if axis == "x" else curve.y) > 0).any() for curve in plot.curves)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A part of a mechanism in a view.
+
+    Attributes
+    ----------
+    name : str
+    lines : list of lists of int
+        Nodes that lines run through.
+    triangles : list of (3,) lists of int
+        Of nodes.
+    rest, moved : (f, n, 3) arrays
+        Places of nodes without displacement, and displacements [m], in each frame.
+    """
+
+    name: str
+    lines: list[list[int]]
+    triangles: list[list[int]]
+    rest: Array
+    moved: Array
+
+
+def frames_of(nodes: int, most: int = 121) -> int:
+    """How many frames a view of so many nodes may have."""
+    return int(min(most, max(2, _MOST_NUMBERS // max(3 * nodes, 1))))
+
+
+def view(title: str, axis: str, unit: str, times: Array, shapes: Sequence[Shape]) -> str:
+    """A mechanism in space that one can turn and play, its displacements magnified by a slider.
+
+    Parameters
+    ----------
+    title : str
+    axis, unit : str
+        Symbol and unit of what it goes along.
+    times : (f,) array
+    shapes : sequence of Shape
+    """
+    parts = [
+        {
+            "name": shape.name,
+            "nodes": shape.rest.shape[1],
+            "lines": shape.lines,
+            "triangles": shape.triangles,
+            "rest": _packed(shape.rest),
+            "moved": _packed(shape.moved),
+        }
+        for shape in shapes
+    ]
+    told = {"axis": axis, "unit": unit, "times": _numbers(times), "parts": parts}
+    box = _box("view", told, "the mechanism in space", _CONTROLS)
+    return f"<figure><figcaption>{html.escape(title)}</figcaption>{box}</figure>"
+
+
+_CONTROLS = (
+    '<div class="controls" id="@box@-controls"><button class="play" type="button">Play</button>'
+    '<label>time <input type="range" min="0" value="0" step="1"><output></output></label>'
+    '<label>displacement <input type="range" min="0" max="3" value="0" step="0.05"><output></output></label></div>'
+)
+
+
+def _box(kind: str, told: dict[str, Any], label: str, controls: str = "") -> str:
+    text = json.dumps(told, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")  # ends no script
+    data = f'<script type="application/json" id="{_BOX}-data">{text}</script>'
+    said = f'role="img" aria-label="{html.escape(label)}"'
+    return f'{controls}<div class="{kind}" id="{_BOX}" {said}></div>{data}'
+
+
+def _numbers(values: Any) -> list[float | None]:
+    array = np.asarray(values, dtype=float)
+    return [float(f"{x:.{_DIGITS}g}") if np.isfinite(x) else None for x in array.tolist()]
+
+
+def _packed(values: Array) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
 
 
 def _note(plot: Plot) -> str:
     return f'<br><span class="note">{html.escape(plot.note)}</span>' if plot.note else ""
 
 
-_drawn = 0
+@cache
+def _asset(name: str) -> str:
+    content = files(__package__).joinpath("assets", name).read_bytes()
+    return (gzip.decompress(content) if name.endswith(".gz") else content).decode("utf-8")
 
 
-def _svg(canvas: Figure) -> str:
-    import matplotlib as mpl
-
-    global _drawn
-    _drawn += 1  # ids must differ between the drawings of one page
-    out = io.StringIO()
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": f"erls{_drawn}", "font.family": "sans-serif"}):
-        canvas.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
-    text = out.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r'\b(id="|href="#|url\(#)', rf"\g<1>f{_drawn}-", text)
-    return re.sub(
-        r'(<svg[^>]*?) width="[^"]*"', r"\1", re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1), count=1
-    )
+def _contents(parts: Sequence[str]) -> str:
+    """A list that leads to the sections."""
+    found = [match for part in parts for match in re.findall(r'^<h2 id="([^"]+)">(.*?)</h2>$', part)]
+    if len(found) < _SHORT:
+        return ""
+    lines = "".join(f'<li><a href="#{name}">{text}</a></li>' for name, text in found)
+    return f'<nav aria-label="contents"><ul>{lines}</ul></nav>\n'
 
 
 def page(title: str, parts: Sequence[str]) -> str:
     """The whole document."""
+    body = "\n".join(part.replace(_BOX, f"box-{number}") for number, part in enumerate(parts, 1))
+    drawn = 'class="plot"' in body or 'class="view"' in body
+    scripts = [_asset("plotly-gl3d.min.js.gz")] if drawn else []
+    scripts += [_asset("page.js")] if drawn or "<table>" in body else []
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="generator" content="{MARK}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<link rel="icon" href="data:,"><title>{html.escape(title)}</title><style>{_STYLE}</style></head>\n'
-        f"<body><h1>{html.escape(title)}</h1>\n" + "\n".join(parts) + "\n</body></html>\n"
+        f'<link rel="icon" href="data:,"><title>{html.escape(title)}</title>'
+        f"<style>{_asset('page.css')}</style></head>\n"
+        f"<body><h1>{html.escape(title)}</h1>\n{_contents(parts)}{body}\n"
+        + "".join(f"<script>{text}</script>\n" for text in scripts)
+        + "</body></html>\n"
     )
-
-

@@ -18,6 +18,7 @@ from erls.view.checks import Progress, bad, check, drawing, no_picture, surveyed
 from erls.view.export import export_csv, export_paraview
 from erls.view.figures import figure_of
 from erls.view.film import FILMS, film
+from erls.view.run_page import run_page
 from erls.view.stage import Stage
 from erls.view.text import caption, displacement, point_labels, time_labels, written
 from erls.view.window import Window
@@ -130,8 +131,8 @@ def view_kind(path: Path | str) -> str:
         BAD_FIELD.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in (*PICTURES, *FILMS, ".pvd", ".csv"):
-        remedy = "end it in .png or .jpg (picture), .mp4 or .gif (film), .pvd (ParaView) or .csv (table)"
+    if suffix not in (*PICTURES, *FILMS, ".pvd", ".csv", ".html"):
+        remedy = "end it in .png, .jpg (picture), .mp4, .gif (film), .html (report), .pvd (ParaView) or .csv (table)"
         raise bad("-o", "the ending of the name does not say what to write", str(path), None, remedy)
     return suffix
 
@@ -145,8 +146,9 @@ def write_view(
     fps: int = 30,
     speed: float = 1.0,
     progress: Progress | None = None,
+    repeat: Sequence[str] = (),
 ) -> None:
-    """Write a picture (.png, .jpg), film (.mp4, .gif), export for ParaView (.pvd) or table (.csv) of a run.
+    """Write a picture (.png, .jpg), film (.mp4, .gif), report (.html), export for ParaView (.pvd) or table (.csv).
 
     Parameters
     ----------
@@ -156,11 +158,13 @@ def write_view(
     times : sequence of float, optional
         [s]; not for films.
     magnification : float
-        Of the displacement against the Equivalent Rigid Link System; not for tables.
+        Of the displacement against the Equivalent Rigid Link System; not for tables and reports.
     fps, speed : int, float
         Of films.
     progress : callable, optional
         Told how much is done, and the total.
+    repeat : sequence of str
+        Words of the command that made the run, for a report.
 
     Raises
     ------
@@ -179,9 +183,16 @@ def write_view(
         picture(run, path, times, magnification)
     elif suffix == ".pvd":
         export_paraview(run, path, times, magnification, progress)
+    elif magnification != 1.0:
+        what = "a table holds" if suffix == ".csv" else "a report has a slider for it and shows"
+        raise bad("magnification", f"{what} true values", magnification, None, "leave it at 1")
+    elif suffix == ".html":
+        if times is not None and len(times):
+            raise bad("times", "a report shows the whole run", list(times), None, "leave the times out")
+        text = run_page(run, repeat)
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
     else:
-        if magnification != 1.0:
-            raise bad("magnification", "a table holds true values", magnification, None, "leave it at 1")
         export_csv(run, path, times)
 
 

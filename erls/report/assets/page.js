@@ -1,0 +1,214 @@
+"use strict";
+// Plots and the view of a page: drawn when they come into sight, in the colours of the page, with one cursor over time.
+(() => {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const read = (box) => JSON.parse(document.getElementById(box.id + "-data").textContent);
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+  const LIGHT = ["#3d55c8", "#c25b00", "#1f7a4d", "#b3261e", "#7a3fa0", "#5a6169", "#0a7d8c", "#a0206e"];
+  const DARK = ["#9db0ff", "#ffb066", "#7fd3a3", "#f28b82", "#cfa3f0", "#b8bec4", "#6fd3e0", "#f29ac8"];
+  const drawn = [];
+  const still = { displaylogo: false, displayModeBar: matchMedia("(hover: hover)").matches ? "hover" : false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+
+  const bar = () => ({ bgcolor: "rgba(0,0,0,0)", color: colour("soft"), activecolor: colour("text") });
+  const axis = (title, log) => ({
+    title: { text: title, standoff: 8 }, type: log ? "log" : "linear", gridcolor: colour("grid"), zeroline: false,
+    linecolor: colour("grid"), automargin: true, exponentformat: "power", fixedrange: false,
+  });
+
+  function shapes(plot, x) {
+    const line = { color: colour("soft"), width: 1 }, found = [];
+    if (plot.limit !== null) {
+      found.push({ type: "line", xref: "paper", x0: 0, x1: 1, y0: plot.limit, y1: plot.limit, line: { ...line, dash: "dot" } });
+    }
+    if (x !== null) found.push({ type: "line", yref: "paper", y0: 0, y1: 1, x0: x, x1: x, line });
+    return found;
+  }
+
+  function layout(plot) {
+    return {
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", colorway: dark.matches ? DARK : LIGHT,
+      font: { color: colour("text"), size: 12, family: "system-ui, sans-serif" }, margin: { l: 62, r: 12, t: 12, b: 48 },
+      xaxis: { ...axis(plot.x, plot.logarithmic.includes("x")), showspikes: true, spikemode: "across", spikesnap: "cursor",
+        spikethickness: 1, spikecolor: colour("soft"), spikedash: "solid" },
+      yaxis: axis(plot.y, plot.logarithmic.includes("y")), hovermode: "x unified", shapes: shapes(plot, null),
+      hoverlabel: { bgcolor: colour("paper"), font: { color: colour("text") } },
+      modebar: bar(), legend: { orientation: "h", y: -0.22, x: 0 }, showlegend: plot.curves.length > 1,
+    };
+  }
+
+  function traces(plot) {
+    return plot.curves.map((curve) => ({
+      type: "scatter", name: curve.label, x: curve.x, y: curve.y, mode: curve.mode,
+      line: { width: 1.6, dash: curve.dashed ? "dash" : "solid", simplify: false }, marker: { size: 5 }, connectgaps: false,
+      hovertemplate: "%{y:.5~g}", showlegend: true,
+    }));
+  }
+
+  function drawPlot(box) {
+    const plot = read(box);
+    Plotly.newPlot(box, traces(plot), layout(plot), still);
+    const entry = { box, plot };
+    drawn.push(entry);
+    box.on("plotly_hover", (event) => { if (event.points.length) point(plot.x, event.points[0].x, entry); });
+    box.on("plotly_unhover", () => point(plot.x, null, entry));
+  }
+
+  // One cursor in all plots over the same axis: set by pointing at one of them, or by the time of the view.
+  let pointed = 0;
+  function point(label, x, except) {
+    cancelAnimationFrame(pointed);
+    pointed = requestAnimationFrame(() => {
+      for (const { box, plot } of drawn) {
+        if (plot === null || plot.x !== label || except?.box === box || plot.logarithmic.includes("x")) continue;
+        const { top, bottom } = box.getBoundingClientRect();
+        if (bottom < -200 || top > innerHeight + 200) continue;
+        Plotly.relayout(box, { shapes: shapes(plot, x) });
+      }
+    });
+  }
+
+  // ----- the mechanism, which one can turn and play
+
+  const numbers = (text) => {
+    const raw = atob(text), bytes = new Uint8Array(raw.length);
+    for (let k = 0; k < raw.length; k++) bytes[k] = raw.charCodeAt(k);
+    return new Float32Array(bytes.buffer);
+  };
+
+  function drawView(box) {
+    const told = read(box), frames = told.times.length;
+    const parts = told.parts.map((part) => ({ ...part, rest: numbers(part.rest), moved: numbers(part.moved) }));
+    const controls = document.getElementById(box.id + "-controls");
+    const [time, factor] = controls.querySelectorAll("input"), [timeText, factorText] = controls.querySelectorAll("output");
+    const play = controls.querySelector("button");
+    time.max = frames - 1;
+    let largest = 0;
+    for (const part of parts) {
+      for (let k = 0; k < part.moved.length; k += 3) {
+        largest = Math.max(largest, Math.hypot(part.moved[k], part.moved[k + 1], part.moved[k + 2]));
+      }
+    }
+    const magnification = () => Math.pow(10, Number(factor.value));
+
+    function places(part, frame) {
+      const scale = magnification(), at = frame * part.nodes * 3, found = { x: [], y: [], z: [], size: [] };
+      for (let k = 0; k < part.nodes; k++) {
+        const i = at + 3 * k, dx = part.moved[i], dy = part.moved[i + 1], dz = part.moved[i + 2];
+        found.x.push(part.rest[i] + scale * dx); found.y.push(part.rest[i + 1] + scale * dy);
+        found.z.push(part.rest[i + 2] + scale * dz); found.size.push(1e3 * Math.hypot(dx, dy, dz));
+      }
+      return found;
+    }
+
+    function along(found, lines) {
+      const path = { x: [], y: [], z: [], size: [] };
+      for (const run of lines) {
+        for (const k of run) for (const name of ["x", "y", "z", "size"]) path[name].push(found[name][k]);
+        for (const name of ["x", "y", "z"]) path[name].push(null);
+        path.size.push(0);
+      }
+      return path;
+    }
+
+    const COLOURS = ["#4c5bd4", "#29a9d8", "#5cc26a", "#e8b03a", "#c62828"].map((c, k) => [k / 4, c]);
+    const scale = { colorscale: COLOURS, cmin: 0, cmax: 1e3 * largest || 1 };
+    const legend = { title: { text: "deflection [mm]", side: "right" }, thickness: 12, len: 0.7, outlinewidth: 0 };
+    function trace(part, frame, first) {
+      const found = places(part, frame);
+      if (part.triangles.length) {
+        const [i, j, k] = [0, 1, 2].map((n) => part.triangles.map((t) => t[n]));
+        return { type: "mesh3d", name: part.name, x: found.x, y: found.y, z: found.z, i, j, k, intensity: found.size, ...scale,
+          showscale: first, colorbar: legend, hoverinfo: "name", flatshading: false };
+      }
+      const path = along(found, part.lines);
+      const told = { type: "scatter3d", name: part.name, x: path.x, y: path.y, z: path.z, hoverinfo: "name", showlegend: false };
+      if (!part.lines.length) {
+        return { ...told, ...found, mode: "markers", marker: { size: 5, color: found.size, ...scale, showscale: first, colorbar: legend } };
+      }
+      return { ...told, mode: "lines", line: { width: 7, color: path.size, ...scale, showscale: first, colorbar: legend } };
+    }
+
+    const all = (frame) => parts.map((part, k) => trace(part, frame, k === 0));
+    const side = (title) => ({ title: { text: title }, gridcolor: colour("grid"), color: colour("text"), backgroundcolor: "rgba(0,0,0,0)",
+      showbackground: false });
+    function ranges() {
+      const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], s = magnification();
+      for (const part of parts) {
+        for (let k = 0; k < part.rest.length; k++) {
+          const value = part.rest[k] + s * part.moved[k];
+          low[k % 3] = Math.min(low[k % 3], value); high[k % 3] = Math.max(high[k % 3], value);
+        }
+      }
+      const reach = Math.max(...high.map((value, k) => value - low[k])) || 1;
+      return low.map((value, k) => { const m = (value + high[k]) / 2, r = Math.max((high[k] - value) / 2, 0.12 * reach); return [m - 1.05 * r, m + 1.05 * r]; });
+    }
+    function ratio(...sides) { // true to scale, the longest side always as large
+      const lengths = sides.map(([low, high]) => high - low), longest = Math.max(...lengths);
+      const [x, y, z] = lengths.map((length) => (1.3 * length) / longest);
+      return { x, y, z };
+    }
+    function scene() {
+      const [x, y, z] = ranges();
+      return { xaxis: { ...side("x [m]"), range: x }, yaxis: { ...side("y [m]"), range: y }, zaxis: { ...side("z [m]"), range: z },
+        aspectmode: "manual", aspectratio: ratio(x, y, z), camera: box.layout?.scene?.camera ?? { eye: { x: 1.4, y: -1.6, z: 0.9 } }, dragmode: "orbit" };
+    }
+    const whole = () => ({ scene: scene(), margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", showlegend: false, modebar: bar(),
+      font: { color: colour("text"), family: "system-ui, sans-serif" }, uirevision: "kept" });
+
+    function show() {
+      const frame = Number(time.value);
+      timeText.value = `${told.axis} ${told.times[frame].toPrecision(4)} ${told.unit}`;
+      factorText.value = `× ${magnification().toPrecision(3)}`;
+      Plotly.react(box, all(frame), whole(), still);
+      box.dataset.frame = String(frame);
+      if (frame || playing) point(`${told.axis} [${told.unit}]`, told.times[frame], null);
+    }
+    let playing = 0;
+    function step() {
+      time.value = String((Number(time.value) + 1) % frames);
+      show();
+      playing = setTimeout(() => requestAnimationFrame(step), Math.max(40, 4000 / frames));
+    }
+    play.addEventListener("click", () => {
+      if (playing) { clearTimeout(playing); playing = 0; play.textContent = "Play"; } else { play.textContent = "Pause"; step(); }
+    });
+    time.addEventListener("input", show);
+    factor.addEventListener("input", show);
+    drawn.push({ box, plot: null, again: show });
+    show();
+  }
+
+  // ----- tables that sort
+
+  const amount = (text) => { const found = parseFloat(text.replace(/[^0-9eE.+-]/g, "")); return Number.isNaN(found) ? null : found; };
+  function sortable(table) {
+    const heads = [...table.tHead.rows[0].cells];
+    heads.forEach((cell, column) => {
+      const button = document.createElement("button");
+      button.type = "button"; button.append(...cell.childNodes); cell.append(button);
+      button.addEventListener("click", () => {
+        const up = cell.getAttribute("aria-sort") !== "ascending";
+        heads.forEach((other) => other.removeAttribute("aria-sort"));
+        cell.setAttribute("aria-sort", up ? "ascending" : "descending");
+        const rows = [...table.tBodies[0].rows].map((row) => [row.cells[column].textContent, row]);
+        const counted = rows.every(([text]) => amount(text) !== null || text.trim() === "-" || text.trim() === "");
+        rows.sort(([a], [b]) => (counted ? (amount(a) ?? Infinity) - (amount(b) ?? Infinity) : a.localeCompare(b)) * (up ? 1 : -1));
+        table.tBodies[0].append(...rows.map(([, row]) => row));
+      });
+    });
+  }
+
+  function start() {
+    document.querySelectorAll("table").forEach((table) => { if (table.tBodies[0]?.rows.length > 2) sortable(table); });
+    const draw = (box) => { if (box.dataset.drawn) return; box.dataset.drawn = "1"; (box.className === "view" ? drawView : drawPlot)(box); };
+    const seen = new IntersectionObserver((entries) => {
+      for (const entry of entries) if (entry.isIntersecting) { seen.unobserve(entry.target); draw(entry.target); }
+    }, { rootMargin: "400px" });
+    document.querySelectorAll(".plot, .view").forEach((box) => seen.observe(box));
+    addEventListener("beforeprint", () => document.querySelectorAll(".plot, .view").forEach(draw));
+    dark.addEventListener("change", () => drawn.forEach(({ box, plot, again }) => {
+      if (again) again(); else Plotly.react(box, traces(plot), layout(plot), still);
+    }));
+  }
+  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start); else start();
+})();

@@ -1,0 +1,187 @@
+"""The report of a run: one page with what it did, what it states of its error, and how to repeat it."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator, Sequence
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from erls.maths.so3 import Array
+from erls.report.html import Curve, Plot, Shape, code, figure, frames_of, heading, page, paragraph, table, view
+from erls.report.runs import run_report
+from erls.run.chain.run import ChainRun
+from erls.run.record import Run
+from erls.run.tables import Quantity, quantities
+from erls.studies.outputs import run_outputs
+from erls.studies.spectrum import amplitude_spectrum, peaks
+from erls.view.figures import figure_of
+from fe_import.files.versions import package_version
+
+_TIMES = 1001
+_PROGRAMS = ("erls", "numpy", "scipy", "numba", "h5py")
+_PARTS = {
+    "integration": "steps and iterations, over the whole run",
+    "modes": "modes of links that are left out",
+    "effects": "physical effects that are left out",
+    "links": "what links of small deformation leave out",
+    "output": "interpolation between stored states",
+}
+_GROUPS = {
+    "angle": "Joint angles",
+    "coordinate": "Joint coordinates",
+    "rate": "Joint rates",
+    "effort": "Joint efforts",
+}
+
+
+def run_page(run: Run, repeat: Sequence[str] = ()) -> str:
+    """One self-contained HTML page.
+
+    Parameters
+    ----------
+    run : Run
+    repeat : sequence of str
+        Words of the command that made it.
+    """
+    times = run.spread(_TIMES)
+    (axis, along), *found = quantities(run.columns(times))
+    x = f"{axis} [{along.unit}]"
+    parts = [*_verdict(run), *_moving(run), *_histories(x, along.values, found)]
+    if isinstance(run, ChainRun) and len(times) > 2:
+        parts += _modes(run, times)
+    parts += _solver(run, repeat)
+    return page(run.title, parts)
+
+
+def _verdict(run: Run) -> Iterator[str]:
+    """What it states of its error, and its warnings."""
+    yield heading("Result")
+    if run.failure is not None:
+        yield paragraph(f"The run ended at {run.axis.text(f'{run.end:.6g}')}: {run.failure}", "bad")
+    if run.accuracy is None or run.trust is None:
+        yield paragraph("The run was not judged: its error is not known.", "note")
+    else:
+        total, good = run.accuracy.total, run.trust.verdict == "good"
+        stated = "no bound is known" if total is None else f"named points are off by at most {total:.2g} m"
+        yield paragraph(f"{run.trust.verdict}: {stated}", "good" if good else "bad")
+        yield from (paragraph(reason, "note") for reason in run.trust.reasons)
+        summary = run.accuracy.summary()
+        rows = [(name, _metres(summary.get(name)), words) for name, words in _PARTS.items()]
+        places = ", ".join(summary.get("judged_at") or ["named points"])
+        rows.append(("total", _metres(total), f"their sum, at {places}"))
+        yield table(("part of the error", "at most [m]", "of what"), rows)
+    yield from (paragraph(text, "bad") for text in run.warnings)
+
+
+def _metres(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float | int) else "not judged"
+
+
+def _moving(run: Run) -> Iterator[str]:
+    """The mechanism in space."""
+    drawn = figure_of(run)
+    first = drawn.poses([run.start])[0].meshes(0.0)
+    kept = [_cells(mesh.cells, len(mesh.points)) for mesh in first]
+    times = run.spread(frames_of(sum(len(nodes) for nodes, _, _ in kept)))
+    poses = [pose.meshes(0.0) for pose in drawn.poses(times)]
+    shapes = [
+        Shape(
+            mesh.name,
+            lines,
+            triangles,
+            np.array([pose[k].points[nodes] for pose in poses]),
+            np.array([pose[k].displacement[nodes] for pose in poses]),
+        )
+        for k, (mesh, (nodes, lines, triangles)) in enumerate(zip(first, kept, strict=True))
+    ]
+    yield heading("Motion" if run.axis.unit == "s" else "Path")
+    title = "Turn it by dragging; colours show how far links are bent"
+    yield view(title, run.axis.symbol, run.axis.unit, times, shapes)
+
+
+def _cells(
+    cells: Sequence[tuple[str, Array]], count: int
+) -> tuple[NDArray[np.int64], list[list[int]], list[list[int]]]:
+    """Nodes that are drawn, and lines and triangles of these."""
+    by_kind = {kind: np.asarray(found, dtype=int) for kind, found in cells}
+    triangles, lines = (by_kind.get(kind, np.zeros((0, n), dtype=int)) for kind, n in (("triangle", 3), ("line", 2)))
+    nodes = np.unique(np.concatenate([triangles.ravel(), lines.ravel()])) if len(triangles) or len(lines) else None
+    if nodes is None:
+        return np.arange(count), [], []
+    number = np.full(count, -1)
+    number[nodes] = np.arange(len(nodes))
+    return nodes, number[lines].tolist(), number[triangles].tolist()
+
+
+def _histories(x: str, along: Array, found: Sequence[tuple[str, Quantity]]) -> Iterator[str]:
+    """Plots of all columns: vectors by themselves, scalars of a kind together."""
+    vectors = [(name, q) for name, q in found if q.values.ndim == 2]
+    grouped: dict[tuple[str, str], list[Curve]] = {}
+    for name, q in found:
+        if q.values.ndim == 1:
+            base, _, last = name.rpartition(".")
+            kind = "Energy" if base == "energy" else _GROUPS.get(last, "Further readings")
+            label = last if kind == "Energy" else base if kind in _GROUPS.values() else name
+            grouped.setdefault((kind, q.unit), []).append(Curve(label, along, q.values))
+    places = [(name, q) for name, q in vectors if q.unit == "m"]
+    if places:
+        yield heading("Places")
+        yield from (_vector(x, along, name, q) for name, q in places)
+    for kind in dict.fromkeys(kind for kind, _ in grouped):
+        yield heading(kind)
+        for (one, unit), curves in grouped.items():
+            if one == kind:
+                yield figure(Plot("", x, f"{kind.lower()} [{unit}]", curves))
+    loads = [(name, q) for name, q in vectors if q.unit != "m"]
+    if loads:
+        yield heading("Forces and moments")
+        yield from (_vector(x, along, name, q) for name, q in loads)
+
+
+def _vector(x: str, along: Array, name: str, q: Quantity) -> str:
+    curves = [Curve(axis, along, q.values[:, k]) for k, axis in enumerate("xyz")]
+    return figure(Plot(name, x, f"[{q.unit}]", curves, note="world axes"))
+
+
+def _modes(run: ChainRun, times: Array) -> Iterator[str]:
+    """Spectra, and which modes take part."""
+    outputs = run_outputs(run, times)
+    spectra = {name: amplitude_spectrum(times, values) for name, values in outputs.accelerations.items()}
+    if spectra:
+        yield heading("Spectra")
+        curves = [Curve(name, s.frequencies[1:], s.amplitudes[1:]) for name, s in spectra.items()]
+        yield figure(Plot("Accelerations of points", "frequency [Hz]", "amplitude [m/s²]", curves, "xy"))
+        found = [(name, peak) for name, s in spectra.items() for peak in peaks(s)]
+        highest = [(name, f"{peak.frequency:.5g}", f"{peak.amplitude:.4g}") for name, peak in found]
+        if highest:
+            yield table(("point", "peak at [Hz]", "amplitude [m/s²]"), highest)
+    rows = [
+        (link, str(k), f"{frequency:.5g}", kind, f"{100 * share:.3g}")
+        for link, shares in outputs.mode_energy.items()
+        for k, (share, kind, frequency) in enumerate(
+            zip(shares, outputs.mode_kinds[link], outputs.mode_frequencies[link], strict=True), 1
+        )
+        if share > 0
+    ]
+    if rows:
+        yield heading("Modes")
+        yield paragraph("Share of each elastic mode in the elastic energy of its link, mean over time.", "note")
+        yield table(("link", "mode", "frequency of the free link [Hz]", "kind", "share [%]"), rows)
+
+
+def _solver(run: Run, repeat: Sequence[str]) -> Iterator[str]:
+    """What it took, and what it was."""
+    yield heading("Summary")
+    yield code(run_report(run))
+    yield heading("Repeat it")
+    if repeat:
+        yield code("erls " + " ".join(shlex.quote(word) for word in repeat))
+    rows = [(name, package_version(name)) for name in _PROGRAMS]
+    yield table(("program", "version"), rows)
+    settings = json.dumps(json.loads(msgspec.json.encode(run.scene.record)), indent=1)
+    yield paragraph("The scene, with all defaults:", "note")
+    yield code(settings)

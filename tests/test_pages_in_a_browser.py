@@ -1,0 +1,185 @@
+"""Reports in a real browser: nothing is complained of, plots answer, the view draws, nothing sticks out.
+
+Chromium through Selenium, as Debian has them; skipped where they are not.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pages import ROOT
+from PIL import Image
+
+import erls
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+pytestmark = [
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="no chromium with its driver (Debian: chromium-driver)"),
+    pytest.mark.xdist_group("browser"),
+]
+PAGES = {
+    "steel_tall": ("data/l_shape/steel_tall.toml", ["simulation.duration=0.2"]),
+    "two_link": ("data/robot/two_link.toml", ["simulation.duration=0.2"]),
+    "solid": ("data/l_shape/solid.toml", ["simulation.duration=0.02"]),
+    "roll_up": ("data/statics/roll_up.toml", []),
+}
+DESKTOP, PHONE = (1280, 900), (360, 780)
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Addresses of reports."""
+    folder = tmp_path_factory.mktemp("pages")
+    for name, (scene, settings) in PAGES.items():
+        erls.write_view(erls.simulate(erls.load_scene(ROOT / scene, settings)), folder / f"{name}.html")
+    return {name: (folder / f"{name}.html").as_uri() for name in PAGES}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Without a window; drawing in space by software."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for argument in ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    found = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    found.set_script_timeout(60)
+    yield found
+    found.quit()
+
+
+def opened(browser: Any, page: str, size: tuple[int, int], scheme: str = "light") -> None:
+    """A page, everything in it drawn."""
+    width, height = size
+    screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == PHONE}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+    media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+    browser.get(page)
+    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
+
+
+def said(browser: Any) -> list[str]:
+    """Complaints; those of software drawing about its own speed are none of the page's."""
+    messages = [entry["message"] for entry in browser.get_log("browser")]
+    return [text for text in messages if "GL Driver Message" not in text and "willReadFrequently" not in text]
+
+
+@pytest.mark.parametrize("name", ["steel_tall", "solid", "roll_up"])
+def test_pages_draw_everything_without_a_complaint(name: str, browser: Any, pages: dict[str, str]) -> None:
+    """Every plot has its curves, the view shows something bent; dark pages are dark."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    for scheme in ("light", "dark") if name == "steel_tall" else ("light",):
+        opened(browser, pages[name], DESKTOP, scheme)
+        wait = WebDriverWait(browser, 30, 0.2)
+        wait.until(lambda browser: _curves(browser) and all(found == asked for found, asked in _curves(browser)))
+        browser.execute_script(
+            "document.querySelector('.view').scrollIntoView({block: 'center'});"
+            "const slider = document.querySelector('.controls input');"
+            "slider.value = slider.max; slider.dispatchEvent(new Event('input'))"
+        )
+        wait.until(lambda browser: _colours(browser) >= 2)
+        shade = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
+        assert (sum(int(x) for x in shade[4:-1].split(",")) < 200) == (scheme == "dark")
+        assert said(browser) == []
+
+
+def _curves(browser: Any) -> list[list[int]]:
+    """Of each plot: curves that are drawn, and that are asked for."""
+    found: list[list[int]] = browser.execute_script(
+        "const asked = box => JSON.parse(document.getElementById(box.id + '-data').textContent).curves.length;"
+        "const drawn = box => box.querySelectorAll('.scatterlayer .trace').length;"
+        "return [...document.querySelectorAll('.plot')].map(box => [drawn(box), asked(box)])"
+    )
+    return found
+
+
+def _colours(browser: Any) -> int:
+    """How many clearly different colours a view has in its middle."""
+    view = browser.find_element("css selector", ".view")
+    with Image.open(BytesIO(view.screenshot_as_png)) as image:
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+    high, wide = pixels.shape[:2]
+    middle = pixels[high // 5 : -high // 5, wide // 5 : -wide // 5].reshape(-1, 3)
+    coloured = middle[np.ptp(middle, axis=1) > 25]
+    return len(np.unique(coloured // 32, axis=0)) if len(coloured) > 30 else 0
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_nothing_sticks_out(size: tuple[int, int], browser: Any, pages: dict[str, str]) -> None:
+    """No sideways scroll, also on a phone; tables that are wider scroll by themselves."""
+    opened(browser, pages["two_link"], size)
+    assert browser.execute_script("return document.documentElement.scrollWidth") <= size[0]
+    widest = browser.execute_script(
+        "const boxes = [...document.querySelectorAll('.plot, .view, p, .wide')];"
+        "return Math.max(...boxes.map(box => box.getBoundingClientRect().right))"
+    )
+    assert widest <= size[0]
+
+
+def test_pointing_tells_values_and_moves_one_cursor(browser: Any, pages: dict[str, str]) -> None:
+    """Values of the run at that time; the other plots over time show it, too; a name in the legend hides its curve."""
+    from selenium.webdriver import ActionChains
+
+    opened(browser, pages["two_link"], DESKTOP)
+    plots = browser.find_elements("css selector", ".plot")
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", plots[0])
+    ActionChains(browser).move_to_element_with_offset(plots[0], 40, -20).pause(0.5).perform()
+    told = plots[0].find_element("css selector", ".hoverlayer .legend, .hoverlayer").text
+    assert "x" in told
+    cursors = browser.execute_script(
+        "return [...document.querySelectorAll('.plot')].slice(0, 2).map(b => (b.layout.shapes || []).length)"
+    )
+    assert cursors == [0, 1]
+    toggle = plots[0].find_element("css selector", ".legendtoggle")
+    ActionChains(browser).move_to_element(toggle).click().pause(0.8).perform()
+    assert browser.execute_script("return arguments[0].data[0].visible", plots[0]) == "legendonly"
+
+
+def test_the_view_plays_and_magnifies(browser: Any, pages: dict[str, str]) -> None:
+    """Time goes on, stops, and the displacement grows as it is told."""
+    opened(browser, pages["two_link"], DESKTOP)
+    view = browser.find_element("css selector", ".view")
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", view)
+    play = browser.find_element("css selector", "button.play")
+    play.click()
+    browser.execute_async_script("setTimeout(arguments[0], 1500)")
+    play.click()
+    frame = int(view.get_attribute("data-frame"))
+    assert frame > 0
+    reach = "const z = document.querySelector('.view').data[1].z.filter(v => v !== null); return z[z.length - 1]"
+    before = browser.execute_script(reach)
+    browser.execute_script(
+        "const slider = document.querySelectorAll('.controls input')[1];"
+        "slider.value = 1; slider.dispatchEvent(new Event('input'))"
+    )
+    assert browser.execute_script("return document.querySelectorAll('.controls output')[1].value") == "× 10.0"
+    assert abs(browser.execute_script(reach) - before) > 1e-6
+
+
+def test_tables_sort_by_their_heads(browser: Any, pages: dict[str, str]) -> None:
+    """Numbers as numbers; once more turns the order."""
+    opened(browser, pages["two_link"], DESKTOP)
+    column = "return [...document.querySelectorAll('table')[0].tBodies[0].rows].map(r => r.cells[1].textContent)"
+    head = browser.find_elements("css selector", "table th button")[1]
+    for turned in (False, True):
+        browser.execute_script("arguments[0].click()", head)
+        values = [float(text) for text in browser.execute_script(column)]
+        assert values == sorted(values, reverse=turned)
+
+
+def test_pages_of_links_stay_small(pages: dict[str, str]) -> None:
+    """At most 5 MB; no address of a network in them but those in remarks."""
+    for address in pages.values():
+        text = Path(address.removeprefix("file://")).read_text(encoding="utf-8")
+        assert len(text.encode()) < 5e6
+        assert 'src="http' not in text
