@@ -166,7 +166,7 @@ class Switching:
                 where=f"t = {t:.9g} s",
                 value=f"{t - self._recent[0]:.3g} s",
                 limit=f"{_AT_ONCE:g} s for {_MANY} switches",
-                remedy="look for forces without bound on this joint; or use friction.law = 'smooth'",
+                remedy="look for forces without bound on this joint; or use friction.law = 'smooth', or another limit",
             )
 
     def memory(self) -> Memory:

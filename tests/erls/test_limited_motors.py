@@ -125,8 +125,8 @@ def test_flexible_arm_under_its_limit(tmp_path: Path) -> None:
     """Vibrations decide when: ERLS and FFR, and equal steps, against a run at a tenth of the tolerance."""
     scenes.arm_link(tmp_path, damping={"ratio": 0.002})
     motion = {"shape": "polynomial", "from": 0.0, "to": 1.5, "duration": 0.2}
-    drive: dict[str, Any] = {"type": "pd", "motion": motion, "proportional_gain": 60.0, "derivative_gain": 2.0, "torque_limit": 1.5}
-    drive["feed_forward"] = True
+    gains = {"proportional_gain": 60.0, "derivative_gain": 2.0, "torque_limit": 1.5}
+    drive = {"type": "pd", "motion": motion, **gains, "feed_forward": True}
     data = {
         "gravity": [0.0] * 3,
         "joints": [{"name": "hub", "dh": {"convention": "modified"}, "drive": drive}],

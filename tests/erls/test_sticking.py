@@ -323,4 +323,5 @@ def test_friction_on_a_prescribed_motion(formulation: str, tmp_path: Path) -> No
     run = sliding(tmp_path, {"force": FORCE}, {"drive": {"type": "motion", "motion": motion}}, **settings)
     t, omega = np.array([0.1, 0.3]), 2 * math.pi
     expected = -MASS * 0.1 * omega**2 * np.sin(omega * t) + FORCE * np.sign(np.cos(omega * t))
-    assert run.joint_effort("slide", t) == pytest.approx(expected, rel=1e-9 if formulation == "erls" else 1e-4)  # steps of 1 ms
+    precise = 1e-9 if formulation == "erls" else 1e-4  # steps of 1 ms
+    assert run.joint_effort("slide", t) == pytest.approx(expected, rel=precise)
