@@ -275,3 +275,25 @@ def test_closing_joint_that_sticks_is_refused(tmp_path: Path) -> None:
         run_scene(tmp_path, {**data, "simulation": {"duration": 0.1}})
     assert caught.value.where.endswith("loops[0].friction.law")
     assert caught.value.exit_code == 2
+
+
+def test_static_start_that_friction_holds(tmp_path: Path) -> None:
+    """A linkage of flexible links that would fall: it stays where it is put, and joints bear what that takes."""
+    efforts = {}
+    for name, settings in {"erls": {}, "nodal": {"integrator": "generalized_alpha", "step": 5e-3}}.items():
+        data = parallelogram({"friction": stick(5.0)}, {"friction": stick(5.0)}, {}, LEVEL)
+        data |= {"gravity": [0.0, -9.81, 0.0], "initial": {"deformation": "static"}}
+        data["simulation"] = {"duration": 0.05, "formulation": name, **settings}
+        for link, length in zip(data["links"], (LENGTHS[0], LENGTHS[1], LENGTHS[0]), strict=True):
+            beam = {"frame": {"nodes": {"root": [0.0] * 3, "tip": [length, 0.0, 0.0]}}}
+            scenes.write_toml(tmp_path / f"{link['name']}.toml", scenes.merged(scenes.ARM_LINK, beam))
+            link.pop("rigid")
+            link["model"] = f"{link['name']}.toml"
+        run = run_scene(tmp_path, data, False)
+        assert not any(float(run.joint_rate(f"j{k}", 0.05)) for k in range(3))
+        assert run.stability is not None
+        assert run.stability.root is not None
+        assert run.stability.root.real <= 1e-6  # what friction holds does not grow
+        efforts[name] = [float(run.joint_effort(f"j{k}", 0.04)) for k in range(3)]
+    assert abs(efforts["erls"][0]) > 0.1
+    assert efforts["nodal"] == pytest.approx(efforts["erls"], abs=1e-3)
