@@ -1,3 +1,5 @@
+from .identify.identify import identify as identify
+from .inverse.invert import invert as invert
 from .linear.linearize import linearize as linearize
 from .run.chain.run import ChainRun as ChainRun
 from .run.file import load_run as load_run

@@ -35,6 +35,11 @@ class Cause(enum.StrEnum):
     NO_PICTURE = "picture could not be made"
     OUT_OF_MEMORY = "out of memory"
     RUNAWAY = "deflection beyond any meaning"
+    OUT_OF_REACH = "demanded place out of reach"
+    SINGULAR_SERVO = "demanded direction that no drive moves"
+    TOO_FEW_DRIVES = "fewer drives than conditions"
+    UNSTABLE_INVERSE = "internal dynamics that grow"
+    UNDAMPED_INVERSE = "internal dynamics that neither grow nor decay"
     BEYOND_TOLERANCE = "estimated error beyond the tolerance"
     INTERRUPTED = "interrupted"
     BUDGET = "time budget used up"
@@ -50,6 +55,8 @@ _NUMERICAL = {
     Cause.NOT_FINITE,
     Cause.STEP_TOO_SMALL,
     Cause.RUNAWAY,
+    Cause.OUT_OF_REACH,
+    Cause.SINGULAR_SERVO,
     Cause.OUT_OF_MEMORY,
     Cause.NO_PICTURE,
 }

@@ -12,10 +12,14 @@ import numpy as np
 
 from fe_import.description.link import LinkFile, load_link
 from fe_import.description.records import Material
+from fe_import.errors import FEImportError
 from fe_import.files.toml import choose
 from fe_import.files.versions import package_version
-from fe_import.health.plausibility import plausible_link, plausible_materials
-from fe_import.health.report import check_basis, check_model, check_reduction, mode_residuals
+from fe_import.health.materials import check_materials
+from fe_import.health.matrix_scale import speed_of_sound
+from fe_import.health.mechanisms import NOT_CLEAR, mechanism
+from fe_import.health.plausibility import SOUND_IN_MATRICES, plausible_link, plausible_materials, refuse_slips
+from fe_import.health.report import RIGID, ROUNDING, check_basis, check_model, check_reduction, mode_residuals
 from fe_import.health.static_flexibility import check_static
 from fe_import.health.thermal_expansion import check_expansion
 from fe_import.modal.damping import damping_ratios
@@ -30,6 +34,7 @@ from fe_import.reduction.modes import mode_kinds, mode_shapes, orthonormal_modes
 from fe_import.reduction.thermal import with_thermal_shape
 from fe_import.second_order.compute import second_order
 from fe_import.solver import chosen_solver
+from fe_import.solver.dense import MECHANISM, singular_matrix
 from fe_import.solver.watch import say, telling
 
 
@@ -69,17 +74,33 @@ def reduce_link(link: LinkFile | Path | str, tell: Callable[[str], None] | None 
 
 def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     """Reduce a model as the description of its link says. See `reduce_link`."""
+    try:
+        return _reduced(model, link)
+    except FEImportError as problem:
+        slender, loose = problem.message.startswith(ROUNDING), problem.message.startswith(RIGID)
+        if (slender or loose or MECHANISM in problem.message) and (found := mechanism(model)):
+            if slender and found != NOT_CLEAR:  # a mechanism has the frequency 0, so that rounding is all of it
+                raise singular_matrix(f"stiffness of the link, {found}") from None
+            problem.message += "" if slender else f" ({found})"
+        raise
+
+
+def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
     where, options, wanted = str(link.path), link.description.reduction, link.description.recovery
     choose(options.method, REDUCTIONS, f"{where}: reduction.method")
     units = unit_factors(link.description, where)
     materials = {**link.description.materials, **{name: Material(*m) for name, m in model.materials.items()}}
-    checks = plausible_materials(materials, *units, where) + check_model(model, where)
-    _unit_checks(model, np.zeros(0), where)  # a slipped unit is named before the work is done
+    unusual = link.description.units.unusual
+    checks = (*plausible_materials(materials, *units, where), *check_materials(materials, *units))
+    checks = refuse_slips(checks, unusual, where) + check_model(model, where)
+    refuse_slips(_unit_checks(model, np.zeros(0), where), unusual, where)  # named before the work is done
     basis = with_thermal_shape(model, REDUCTIONS[options.method](model, options, where))
     mass, stiffness = reduced_matrices(model, basis)
     interfaces, inboard = basis.vectors[model.interface_dofs], _inboard(model, options.inboard)
     modes = orthonormal_modes(mass, stiffness, basis, options, interfaces, where, inboard)
-    checks += check_basis(model, basis, mass, stiffness, modes.omega, where)
+    basis_checks = check_basis(model, basis, mass, stiffness, modes.omega, where)
+    rounding = basis_checks[0].value
+    checks += basis_checks
     shapes, modes = mode_shapes(model, basis, modes)
     counts = [text for text in ((basis.selection or {}).get("whole", ""), modes.told) if text]
     for text in counts:
@@ -92,8 +113,8 @@ def reduce_model(model: FEModel, link: LinkFile) -> ModalModel:
     checks += check_static(reference, shapes[model.interface_dofs], modes.omega, promised)
     thermal = thermal_expansion(model, shapes, wanted, where)
     checks += check_expansion(model, None if thermal is None else thermal.force, modes.omega)
-    checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, where)
-    checks += _unit_checks(model, modes.omega, where)
+    checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, rounding, where)
+    checks += refuse_slips(_unit_checks(model, modes.omega, where), unusual, where)
     checks += _mesh_checks(model, link, shapes, modes.omega)
     residuals = mode_residuals(model, shapes, modes.omega)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
@@ -141,18 +162,24 @@ def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) ->
     if link.description.solid is None:
         return ()
     from fe_import.elements.solid_stress import SolidStress  # frames have no use for it
+    from fe_import.health.incompressible import check_incompressible
     from fe_import.health.mesh_error import check_mesh_error
+    from fe_import.health.mesh_shape import check_mesh_shape
 
     assert isinstance(model.stress, SolidStress)
     limit = link.description.solid.mesh_error
-    return check_mesh_error(model, model.stress, shapes, omega, limit, str(link.path))
+    shape = (*check_mesh_shape(model.stress.mesh), *check_incompressible(model.stress))
+    return (*shape, *check_mesh_error(model, model.stress, shapes, omega, limit, str(link.path)))
 
 
 def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck, ...]:
     rigid = model.rigid_body_modes()
     mass = mass_properties(rigid.T @ (model.mass @ rigid)).mass
     first = float(omega[6] / (2 * np.pi)) if len(omega) > 6 else None
-    return plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
+    checks = plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
+    if model.kind != "matrices" or (speed := speed_of_sound(model)) is None:
+        return checks
+    return (*checks, SOUND_IN_MATRICES.check(speed, f"{where}: units"))
 
 
 def _nodal(shapes: Array, rows: IntArray) -> Array:

@@ -1,4 +1,4 @@
-"""The command ``erls``: reduce, simulate, linearize, compare, study, info, view.
+"""The command ``erls``: reduce, export, simulate, linearize, invert, identify, compare, study, info, view.
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 2 bad input, 3 numerical failure, 4 did not
 converge where convergence was asked for, 130 interrupted. Heavy packages are imported inside the commands, so that
@@ -18,8 +18,11 @@ from cyclopts import App, CycloptsError, Parameter
 from erls.cli.address_space import address_space, require_address_space
 from erls.cli.compare import compare
 from erls.cli.effects import effects
+from erls.cli.export import export
 from erls.cli.files import info, view
+from erls.cli.identify import identify
 from erls.cli.importing import import_
+from erls.cli.invert import invert
 from erls.cli.linearize import linearize
 from erls.cli.reduce import reduce
 from erls.cli.simulate import simulate
@@ -44,7 +47,7 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-for command in (reduce, simulate, info, view, compare, effects, linearize, new, schema):
+for command in (reduce, export, simulate, info, view, compare, effects, linearize, invert, identify, new, schema):
     app.command(command)
 app.command(import_, name="import")
 for group in (study, examples):

@@ -122,6 +122,14 @@ class Linearizable(Protocol):
         """With the accelerations of the equations of motion."""
 
 
+@runtime_checkable
+class Spinnable(Protocol):
+    """A formulation whose coordinates are never at rest where a joint turns, but that knows its steady motions."""
+
+    def spinning(self, joint: str, speed: float) -> Neighbours:
+        """Of a steady motion about or along a joint [rad/s or m/s], seen from axes that go along."""
+
+
 @dataclass(frozen=True)
 class Moving:
     """Directions W (n, c) that change along a motion, with first and second derivatives."""

@@ -33,9 +33,15 @@ _BEGINS = {
     ".npz": b"PK",
     ".mat": b"MATLAB",
     ".sweep": b"SQLite format 3",
+    ".mtx": b"",
+    ".txt": b"#",
+    ".pch": b"$",
+    ".inp": b"**",
+    ".op4": b"\x18",  # has no place for a mark
 }
 _TABLE = re.compile(
     rb'"?(t \[s\]|load \[1\]),.*(energy\.\w+ \[J\]|: energy \[J\])"?\r?\n'  # of a run, or of several
+    rb'|t \[s\],"?[^\r\n]*\.inverse_effort \[N( m)?\]'  # of an inversion
     rb'|phase \[1\],(.*\.z \[m\]"?)?\r?\n'  # of a mode
     rb"|formulation,elastic_modes,integrator,effects,"
     rb"|scene,formulation,deflection \[m\],"

@@ -40,6 +40,7 @@ from erls.equations.system import MovingSystem, SecondOrderSystem
 from erls.errors import Cause, SceneError, SimulationError
 from erls.integrate.memory import Keeper
 from erls.maths.so3 import Array
+from fe_import.model import IntArray
 
 _HAIR = 1e-12  # of the largest time, or of 1 s: breakpoints this close are one
 
@@ -259,13 +260,18 @@ def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, A
     return position, velocity
 
 
+def knots_after(t: Array, at: Array) -> IntArray:
+    """(m,) numbers of the knots that end the stretches in which times lie; those before them begin these."""
+    right = np.clip(np.searchsorted(t, at, side="right"), 1, len(t) - 1)
+    # a zero-length interval (a jump) is never asked for: step back over it at the end of the knots
+    return np.asarray(np.where(t[right] == t[right - 1], right - 1, right).clip(1))
+
+
 def hermite_knots(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, Array, Array]:
     """The same with (m, n) accelerations, the second derivative of the interpolant."""
     if len(t) == 1:  # a run that failed at once
         return np.repeat(y, len(at), axis=0), np.repeat(v, len(at), axis=0), np.repeat(a, len(at), axis=0)
-    right = np.clip(np.searchsorted(t, at, side="right"), 1, len(t) - 1)
-    # a zero-length interval (a jump) is never asked for: step back over it at the end of the knots
-    right = np.where(t[right] == t[right - 1], right - 1, right).clip(1)
+    right = knots_after(t, at)
     left = right - 1
     h = (t[right] - t[left])[:, None]
     h = np.where(h > 0, h, 1.0)

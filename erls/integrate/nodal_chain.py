@@ -54,7 +54,7 @@ def nodal_generalized_alpha(
     def complete(found: ConstrainedSolution) -> Solution:
         more = [np.concatenate([found.accelerations, found.multipliers], axis=1)]
         for _ in range(2):
-            more.append(_slopes(found.t, more[-1]))
+            more.append(slopes_in_time(found.t, more[-1]))
         full = [np.concatenate(pair, axis=1) for pair in zip((found.y, found.v, found.a), more, strict=True)]
         known = found.work, found.failure, found.warnings
         return Solution(found.t, full[0], full[1], full[2], *known, companion=found.companion, halved=found.halved)
@@ -79,7 +79,7 @@ def closed(system: Nodal, found: Solution) -> Solution:
     return found
 
 
-def _slopes(t: Array, values: Array) -> Array:
+def slopes_in_time(t: Array, values: Array) -> Array:
     """(knots, n) derivatives by time, from differences that reach over no jump."""
     result = np.zeros_like(values)
     ends = np.flatnonzero(np.diff(t) == 0) + 1

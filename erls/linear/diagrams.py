@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from erls.equations.neighbours import Linearizable
+from erls.equations.formulation import Formulation
+from erls.equations.neighbours import Linearizable, Neighbours, Spinnable
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved
 from erls.linear.assembly import linear_model
@@ -98,14 +99,19 @@ def campbell(
         warnings = (*built.warnings, *_gravity_across(mechanism, joint))
         for speed in speeds:
             equations = formulate(_spun(mechanism, joint, speed), own.record.simulation)
-            inner = solved(equations)
-            assert isinstance(inner, Linearizable)
-            y, v = inner.initial_state()
-            near = at_rest(inner.neighbours(0.0, y, v))
+            near = at_rest(_turning(solved(equations), joint, speed))
             named = loaded.name, f"{joint} at {speed:g}"
             models.append(linear_model(ChainPlant(equations, own.record.simulation, near), (), (), named, ()))
     unit = next(each.freedom.units[0] for each in mechanism.joints if each.name == joint)
     return Diagram(loaded.name, f"speed of {joint}", f"{unit}/s", np.array(speeds), tuple(models), True, warnings)
+
+
+def _turning(equations: Formulation, joint: str, speed: float) -> Neighbours:
+    """States beside the start of a steady motion, as its axes see them."""
+    if isinstance(equations, Spinnable):
+        return equations.spinning(joint, speed)
+    assert isinstance(equations, Linearizable)
+    return equations.neighbours(0.0, *equations.initial_state())
 
 
 def _spun(mechanism: Mechanism, name: str, speed: float) -> Mechanism:

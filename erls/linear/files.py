@@ -22,9 +22,8 @@ def _pairs(values: Array) -> list[list[float]]:
 
 
 def summary(model: LinearModel) -> dict[str, Any]:
-    """The JSON of ``erls linearize``; ``zeros`` is None unless there are as many inputs as outputs."""
+    """The JSON of ``erls linearize``; ``zeros`` is None without inputs or outputs."""
     oscillating = [mode for mode in model.modes if mode.pole.imag > 0]
-    square = len(model.inputs) == len(model.outputs) and len(model.inputs) > 0
     return {
         "scene": model.scene,
         "at": model.at,
@@ -47,11 +46,12 @@ def summary(model: LinearModel) -> dict[str, Any]:
         "frequencies_hz": [mode.frequency_hz for mode in oscillating],
         "damped_frequencies_hz": [mode.damped_frequency_hz for mode in oscillating],
         "damping_ratios": [mode.damping_ratio for mode in oscillating],
-        "zeros": _pairs(model.zeros()) if square else None,
+        "zeros": _pairs(model.zeros()) if model.inputs and model.outputs else None,
         "unstable": [{"pole": [mode.pole.real, mode.pole.imag], "moves": mode.moves} for mode in model.unstable],
         "modes": [
             {
                 "pole": [mode.pole.real, mode.pole.imag],
+                "real_part_is_noise": model.noise(mode.pole),
                 "moves": mode.moves,
                 "coordinates": _pairs(mode.shape),
                 "outputs": _pairs(mode.seen),

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from erls.errors import Cause, SceneError
-from erls.linear.plants import Plant, unknown
+from erls.linear.channels import Bound, bound, checked
+from erls.linear.plants import Plant
 
 _PUSHED = ("free", "torque", "pd")
 _MOVED = ("motion", "pd")
@@ -39,18 +38,8 @@ class InputKind(NamedTuple):
     applied: Callable[[Plant, str, tuple[float, float, float]], Plant]
 
 
-@dataclass(frozen=True)
-class Input:
+class Input(Bound[InputKind]):
     """One input of a plant."""
-
-    kind: InputKind
-    subject: str
-    unit: str
-
-    @property
-    def name(self) -> str:
-        """As it is asked for."""
-        return f"{self.kind.subject}.{self.subject}.{self.kind.quantity}"
 
     def applied(self, plant: Plant, place: float, rate: float, last: float) -> Plant:
         """The plant under it."""
@@ -114,12 +103,7 @@ def inputs_of(plant: Plant, names: Sequence[str] | None = None) -> tuple[Input, 
     SceneError
         BAD_REFERENCE: there is no such input, or it is named twice.
     """
-    known = {
-        found.name: found
-        for kind in INPUTS
-        for name in kind.names(plant)
-        for found in (Input(kind, name, kind.unit(plant, name)),)
-    }
+    known = {found.name: found for found in bound(plant, INPUTS, Input)}
     if names is None:
         return tuple(
             found
@@ -127,19 +111,3 @@ def inputs_of(plant: Plant, names: Sequence[str] | None = None) -> tuple[Input, 
             if found.kind.subject == "joint" and found.kind.motion == (plant.joints[found.subject] == "motion")
         )
     return tuple(known[name] for name in checked("input", names, list(known)))
-
-
-def checked(what: str, names: Sequence[str], known: list[str]) -> Sequence[str]:
-    """Names that are known, each once.
-
-    Raises
-    ------
-    SceneError
-        BAD_REFERENCE.
-    """
-    for k, name in enumerate(names):
-        if name not in known:
-            raise unknown(what, name, known)
-        if name in names[:k]:
-            raise SceneError(Cause.BAD_REFERENCE, f"this {what} is named twice", where=what, value=name, remedy="once")
-    return names

@@ -13,13 +13,13 @@ import scipy.linalg as la
 from erls.equations.linearization import Linearization, small_modes
 from erls.errors import Cause, SceneError, SimulationError
 from erls.files.optional import optional_package
-from erls.linear.inputs import checked
+from erls.linear.channels import checked
+from erls.linear.zeros import off_poles, transmission_zeros
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 _ZERO = 1e-9  # of the fastest pole: a real part that rounding and differences may leave
-_SAME = 1e-6  # of a pole: distance of a zero that lies on it
-_FAR = 1e4  # times the fastest pole: a zero at infinity
+_INSTANT = 1e-5  # of a pole: the same in a state that moves, where rates of directions are right to 1e-7
 
 
 class Channel(NamedTuple):
@@ -219,9 +219,18 @@ class LinearModel:
 
     @property
     def unstable(self) -> tuple[Mode, ...]:
-        """Modes that grow."""
-        fastest = float(np.abs(self.poles).max(initial=0.0))
-        return tuple(mode for mode in self.modes if mode.pole.real > _ZERO * fastest)
+        """Modes that grow, by more than noise."""
+        return tuple(mode for mode in self.modes if mode.pole.real > 0 and not self.noise(mode.pole))
+
+    def noise(self, pole: complex) -> bool:
+        """Whether the real part of a pole is no more than what rounding and differences make: it neither grows nor
+        decays, as far as the model tells.
+        """
+        return abs(pole.real) <= max(_ZERO * self._fastest, 0.0 if self.steady else _INSTANT * abs(pole))
+
+    @cached_property
+    def _fastest(self) -> float:
+        return float(np.abs(self.poles).max(initial=0.0))
 
     def part(
         self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
@@ -241,22 +250,25 @@ class LinearModel:
         return found[0], found[1]
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Array:
-        """(k,) complex transmission zeros [1/s] between as many inputs as outputs, all unless given.
+        """(k,) complex transmission zeros [1/s] between inputs and outputs, all unless given.
 
-        At a zero s the pencil [A - s, B; C, D] is singular. Left out are those on poles, of modes that these inputs do
+        At a zero s the pencil [A - s, B; C, D] loses rank: some motion of the inputs is not seen at any of the outputs,
+        or some combination of the outputs is not moved by any of the inputs. More of one than of the other have few
+        zeros or none. Left out are those on poles, of modes that these inputs do
         not move or these outputs do not see, and those beyond 1e4 times the fastest pole, which count as infinite.
 
         Raises
         ------
         SceneError
-            BAD_FIELD: not as many inputs as outputs; BAD_REFERENCE: there is no such input or output.
+            BAD_FIELD: no inputs, or no outputs; BAD_REFERENCE: there is no such input or output.
         """
         own, seen = self.part(inputs, outputs)
-        if len(own) != len(seen) or not len(own):
-            message, remedy = "zeros are those of as many outputs as inputs", "name inputs and outputs, one each"
-            raise SceneError(Cause.BAD_FIELD, message, where="inputs", value=len(own), limit=len(seen), remedy=remedy)
+        if not len(own) or not len(seen):
+            message, remedy = "zeros are those from inputs to outputs", "name one of each at least"
+            where = "outputs" if len(own) else "inputs"
+            raise SceneError(Cause.BAD_FIELD, message, where=where, value=0, limit=1, remedy=remedy)
         found = transmission_zeros(self.A, self.B[:, own], self.C[seen], self.D[np.ix_(seen, own)])
-        return _without(found, self.poles)
+        return off_poles(found, self.poles)
 
     def state_space(self) -> Any:
         """As a `scipy.signal.StateSpace`."""
@@ -276,35 +288,3 @@ class LinearModel:
         own = ([c.name for c in self.inputs], [c.name for c in self.outputs], self.states)
         inputs, outputs, states = ([name.replace(".", "_") for name in names] for names in own)
         return control.ss(self.A, self.B, self.C, self.D, inputs=inputs, outputs=outputs, states=states)
-
-
-def _without(zeros: Array, poles: Array) -> Array:
-    """Zeros that lie on no pole, each pole taken once."""
-    left, kept = list(poles.tolist()), []
-    for zero in zeros.tolist():
-        near = [k for k, pole in enumerate(left) if abs(zero - pole) <= _SAME * abs(pole)]
-        if near:
-            left.pop(near[0])
-        else:
-            kept.append(zero)
-    return np.array(kept, dtype=complex)
-
-
-def transmission_zeros(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """(k,) finite zeros of the pencil [A - s, B; C, D], in rising order of size."""
-    n, r = len(a), b.shape[1]
-    if not n:
-        return np.zeros(0, dtype=complex)
-    fastest = float(np.abs(np.linalg.eigvals(a)).max()) or 1.0
-    _, (scale, _) = la.matrix_balance(a, permute=False, separate=True)
-    a, b, c = a / scale[:, None] * scale, b / scale[:, None], c * scale
-    columns, rows = (np.abs(x).max(axis=k, initial=0.0) for k, x in ((0, b), (1, c)))
-    columns, rows = (fastest / np.where(x > 0, x, fastest) for x in (columns, rows))  # like a
-    b, c, d = b * columns, c * rows[:, None], d * columns * rows[:, None]
-    pencil = np.block([[a, b], [c, d]])
-    weight = np.zeros((n + r, n + r))
-    weight[:n, :n] = np.eye(n)
-    alpha, beta = la.eig(pencil, weight, right=False, homogeneous_eigvals=True)
-    finite = np.abs(beta) * _FAR * fastest > np.abs(alpha)
-    found = alpha[finite] / beta[finite]
-    return np.asarray(found[np.lexsort((found.imag, np.abs(found)))])

@@ -7,10 +7,9 @@ that they are exact at any state; every other output is a function of time, coor
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from erls.linear.inputs import checked
+from erls.linear.channels import Bound, bound, checked
 from erls.linear.plants import Plant, Sight
 from erls.maths.so3 import Array
 
@@ -39,18 +38,8 @@ class OutputKind(NamedTuple):
     value: Callable[[Sight, str], Array]
 
 
-@dataclass(frozen=True)
-class Output:
+class Output(Bound[OutputKind]):
     """One output of a plant."""
-
-    kind: OutputKind
-    subject: str
-    unit: str
-
-    @property
-    def name(self) -> str:
-        """As it is asked for."""
-        return f"{self.kind.subject}.{self.subject}.{self.kind.quantity}".rstrip(".")
 
     def value(self, sight: Sight) -> Array:
         """(k,) of states."""
@@ -114,12 +103,7 @@ def outputs_of(plant: Plant, names: Sequence[str] | None = None) -> tuple[Output
     SceneError
         BAD_REFERENCE: there is no such output, or it is named twice.
     """
-    known = {
-        found.name: found
-        for kind in OUTPUTS
-        for name in kind.names(plant)
-        for found in (Output(kind, name, kind.unit(plant, name)),)
-    }
+    known = {found.name: found for found in bound(plant, OUTPUTS, Output)}
     if names is None:
         return tuple(x for x in known.values() if x.kind.order == 0 or x.kind.subject == "sensor")
     return tuple(known[name] for name in checked("output", names, list(known)))

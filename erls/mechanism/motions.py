@@ -24,8 +24,9 @@ _REST_TO_REST: dict[int, tuple[float, ...]] = {
     3: (0.0, 0.0, 3.0, -2.0),
     5: (0.0, 0.0, 0.0, 10.0, -15.0, 6.0),
     7: (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0),
+    9: (0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0),
 }
-"""From 0 to 1 over x = 0..1, with 1, 2 and 3 vanishing derivatives at both ends; rising powers of x."""
+"""From 0 to 1 over x = 0..1, with 1, 2, 3 and 4 vanishing derivatives at both ends; rising powers of x."""
 
 
 class Polynomial(ProfileRecord, frozen=True, tag="polynomial"):
@@ -42,7 +43,8 @@ class Polynomial(ProfileRecord, frozen=True, tag="polynomial"):
     duration : float
         How long it takes [s].
     degree : int
-        3 (acceleration jumps at the ends), 5 (acceleration is continuous) or 7 (jerk is continuous too).
+        3 (acceleration jumps at the ends), 5 (acceleration is continuous), 7 (jerk is continuous too) or 9 (and the
+        derivative of the jerk).
     """
 
     duration: float
@@ -55,12 +57,8 @@ class Polynomial(ProfileRecord, frozen=True, tag="polynomial"):
 
     def build(self, place: Place) -> Curve:
         """Check and build."""
-        start = place.time("start", self.start)
-        times = np.array([start, start + place.span("duration", self.duration)])
-        values = np.array(
-            [place.quantity("from", self.from_, self.from_deg), place.quantity("to", self.to, self.to_deg)]
-        )
-        return _legs(times, values, place.choice("degree", self.degree, tuple(_REST_TO_REST)))
+        first, last = place.quantity("from", self.from_, self.from_deg), place.quantity("to", self.to, self.to_deg)
+        return rest_to_rest(place, self.start, self.duration, first, last, self.degree)
 
 
 class Waypoints(ProfileRecord, frozen=True, tag="waypoints"):
@@ -73,7 +71,7 @@ class Waypoints(ProfileRecord, frozen=True, tag="waypoints"):
     values, values_deg : list of float
         Coordinates at the stops [rad or m], or in degrees; give one.
     degree : int
-        3, 5 or 7, of each leg, see polynomial.
+        3, 5, 7 or 9, of each leg, see polynomial.
     """
 
     times: tuple[float, ...]
@@ -151,7 +149,7 @@ class SpinUp(ProfileRecord, frozen=True, tag="spin_up"):
     ramp : str
         ``polynomial`` or ``sine``.
     degree : int, optional
-        Of the polynomial: 3 (acceleration has kinks at the ends), 5 or 7; 7 unless given.
+        Of the polynomial: 3 (acceleration has kinks at the ends), 5, 7 or 9; 7 unless given.
     """
 
     duration: float
@@ -229,6 +227,13 @@ class MotionTable(ProfileRecord, frozen=True, tag="table"):
 
 Motion = Polynomial | Waypoints | Sine | SpinUp | MotionTable
 """Shapes of a joint coordinate (rad or m), with two derivatives."""
+
+
+def rest_to_rest(place: Place, start: float, duration: float, first: float, last: float, degree: int) -> Piecewise:
+    """One motion from rest to rest, its fields ``start``, ``duration`` and ``degree`` checked."""
+    begun = place.time("start", start)
+    times = np.array([begun, begun + place.span("duration", duration)])
+    return _legs(times, np.array([first, last]), place.choice("degree", degree, tuple(_REST_TO_REST)))
 
 
 def _legs(times: NDArray[np.float64], values: NDArray[np.float64], degree: int) -> Piecewise:

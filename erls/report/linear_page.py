@@ -15,6 +15,7 @@ from erls.report.html import table as html_table
 from erls.report.tables import table
 
 _SHOWN = 30  # modes
+_NOISE = "~0"  # a real part that rounding makes
 _CURVES = 6  # of a plot
 _NOTHING = 1e-12  # of the largest response of a kind: no curve
 _MODES = ("pole [1/s]", "frequency [Hz]", "damped [Hz]", "damping ratio", "moves farthest")
@@ -23,7 +24,7 @@ _MODES = ("pole [1/s]", "frequency [Hz]", "damped [Hz]", "damping ratio", "moves
 def model_text(model: LinearModel) -> str:
     """What it is, its modes and zeros, for the terminal."""
     parts = [_about(model), *(text for text, _ in _verdicts(model))]
-    parts.append("Modes\n" + table(_MODES, [_mode_row(mode) for mode in model.modes[:_SHOWN]]))
+    parts.append("Modes\n" + table(_MODES, [_mode_row(model, mode) for mode in model.modes[:_SHOWN]]))
     if len(model.modes) > _SHOWN:
         parts[-1] += f"\n... and {len(model.modes) - _SHOWN} more"
     return "\n\n".join(parts)
@@ -34,7 +35,7 @@ def model_page(model: LinearModel) -> str:
     parts = [paragraph(_about(model))]
     parts += [paragraph(text, "good" if fine else "bad") for text, fine in _verdicts(model)]
     parts += [paragraph(text, "note") for text in model.warnings]
-    parts += [heading("Modes"), html_table(_MODES, [_mode_row(mode) for mode in model.modes])]
+    parts += [heading("Modes"), html_table(_MODES, [_mode_row(model, mode) for mode in model.modes])]
     if model.outputs:
         header = ("output", *(_short(mode.pole) for mode in model.modes[:_SHOWN]))
         rows = [
@@ -60,7 +61,7 @@ def _about(model: LinearModel) -> str:
 
 def _verdicts(model: LinearModel) -> list[tuple[str, bool]]:
     if not model.steady:
-        growing = max((mode.pole.real for mode in model.modes), default=0.0)
+        growing = max((mode.pole.real for mode in model.unstable), default=0.0)
         text = "the mechanism moves or is let go in this state: the model is that of the instant"
         return [(text + (f", in which motions grow by up to {growing:.3g} 1/s" if growing > 0 else ""), False)]
     found = [
@@ -69,9 +70,11 @@ def _verdicts(model: LinearModel) -> list[tuple[str, bool]]:
     return found or [("no mode grows", True)]
 
 
-def _mode_row(mode: Mode) -> tuple[str, ...]:
-    hz = f"{mode.frequency_hz:.6g}", f"{mode.damped_frequency_hz:.6g}", f"{mode.damping_ratio:.4g}"
-    return (_pole(mode.pole), *hz, mode.moves)
+def _mode_row(model: LinearModel, mode: Mode) -> tuple[str, ...]:
+    hz, noise = (f"{mode.frequency_hz:.6g}", f"{mode.damped_frequency_hz:.6g}"), model.noise(mode.pole)
+    if noise and mode.pole.imag and mode.pole.real:  # its sign says nothing
+        return (f"{_NOISE}{_pole(1j * mode.pole.imag)[1:]}", *hz, _NOISE, mode.moves)
+    return (_pole(mode.pole), *hz, f"{mode.damping_ratio:.4g}", mode.moves)
 
 
 def _pole(pole: complex) -> str:

@@ -10,6 +10,7 @@ from erls.scene.contacts import Contact
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
 from erls.scene.records import Pose, Record, SceneFile, SceneTables
+from erls.scene.servo import Inverse, Servo
 from erls.scene.settings import Simulation
 from fe_import.description.records import Inertia, Vector
 
@@ -180,6 +181,10 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
         Crossings that are told after the run, or end it, ``[[events]]``.
     sensors : list of AnySensor
         Instruments whose readings are columns of tables, files and reports, ``[[sensors]]``.
+    servo : list of Servo
+        Motions that `erls invert` finds the drives for, ``[[servo]]``.
+    inverse : Inverse
+        Which drives these are.
     """
 
     simulation: Simulation
@@ -194,6 +199,8 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     loops: list[Loop] = []
     events: list[Event] = []
     sensors: list[AnySensor] = []
+    servo: list[Servo] = []
+    inverse: Inverse = Inverse()
 
 
 @dataclass(frozen=True, repr=False)

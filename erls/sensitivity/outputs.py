@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
@@ -25,8 +24,12 @@ from erls.sensitivity.variants import Difference
 Output = Callable[[ChainRun], Any]
 """A number or an array that a run gives, smooth in its motion."""
 
-_ALONG = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))  # steps and weights, of fourth order
-_MOVED = 1e-3  # of the size of the mechanism: steps along the derivative of a motion
+EVALUATIONS = 4
+"""Of an output by a parameter, along the derivative of a motion."""
+ALONG = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
+"""Steps and weights of differences, of fourth order."""
+MOVED = 1e-3
+"""Steps along the derivative of a motion, of the size of the mechanism."""
 
 
 def value_of(output: Output, run: ChainRun, name: str) -> Array:
@@ -49,7 +52,14 @@ def value_of(output: Output, run: ChainRun, name: str) -> Array:
     return found
 
 
-def derivative_of(output: Output, name: str, run: ChainRun, difference: Difference, motion: Array) -> Array:
+def own_derivative(output: Output, name: str, run: ChainRun, difference: Difference, value: Array) -> Array:
+    """What a parameter changes of an output whose ``value`` is known, the motion held; in the shape of the output."""
+    return difference.beside(lambda variant: value_of(output, variant.run(run), name), value)
+
+
+def derivative_of(
+    output: Output, name: str, run: ChainRun, difference: Difference, motion: Array, metres: Array, value: Array
+) -> Array:
     """Of an output by a parameter, in the shape of the output.
 
     Parameters
@@ -62,18 +72,21 @@ def derivative_of(output: Output, name: str, run: ChainRun, difference: Differen
         By the parameter.
     motion : (k, 3, n) array
         Derivatives of coordinates, rates and accelerations at the knots of the run.
+    metres : (n,) array
+        Per unit of each coordinate.
+    value : array
+        Of the output.
     """
-    own = difference.of(lambda variant: value_of(output, variant.run(run), name))
+    own = own_derivative(output, name, run, difference, value)
     formulation: Any = run.formulation
-    metres = metre_scales(formulation)
     largest = float(np.abs(metres * motion[:, 0]).max(initial=0.0))
     if not motion.any():
         return own
-    step = _MOVED * float(formulation.mechanism.reach) / max(largest, 1e-300)
+    step = MOVED * float(formulation.mechanism.reach) / max(largest, 1e-300)
     s = run.solution
 
     def moved(share: float) -> Array:
         y, v, a = (x + share * motion[:, i] for i, x in enumerate((s.y, s.v, s.a)))
         return value_of(output, replace(run, solution=replace(s, y=y, v=v, a=a)), name)
 
-    return np.asarray(own + sum(weight / step * moved(at * step) for at, weight in _ALONG))
+    return np.asarray(own + sum(weight / step * moved(at * step) for at, weight in ALONG))

@@ -20,7 +20,8 @@ from erls.integrate.alpha_rules import Formulas, Rules
 from erls.integrate.lobatto import NODES, tableau
 from erls.maths.so3 import Array
 
-_SAME_STEP = 1e-6  # relative change of a step that leaves α where it is, as in `erls.integrate.alpha_steps`
+SAME_STEP = 1e-6
+"""Relative change of a step that leaves α where it is, as in `erls.integrate.alpha_steps`."""
 
 
 @dataclass(frozen=True)
@@ -53,32 +54,32 @@ class Scheme:
         """Nodes of a step."""
         return len(self.nodes)
 
-    def history(self, h: float) -> tuple[Array, Array]:
-        """(s, 4) what (y, v, a, α) at the start of a step give to y_i, and to v_i."""
-        one = np.ones(self.count)
-        square = h * h
-        to_y = [one, h * self.nodes, square * self.place_before, square * self.place_algorithmic]
+    def history(self, h: Array) -> tuple[Array, Array]:
+        """(j, s, 4) what (y, v, a, α) at the start of j steps h (j,) give to y_i, and to v_i."""
+        one = np.ones((len(h), self.count))
+        h = h[:, None]
+        to_y = [one, h * self.nodes, h * h * self.place_before, h * h * self.place_algorithmic]
         to_v = [0 * one, one, h * self.rate_before, h * self.rate_algorithmic]
-        return np.stack(to_y, axis=1), np.stack(to_v, axis=1)
+        return np.stack(to_y, axis=2), np.stack(to_v, axis=2)
 
     def rescaled(self, h: float, before: float | None) -> Array:
         """(4, 4) what a change of the step does to (y, v, a, α)."""
         result = np.eye(4)
-        if before is not None and abs(h - before) > _SAME_STEP * h and self.algorithmic.any():
+        if before is not None and abs(h - before) > SAME_STEP * h and self.algorithmic.any():
             ratio = h / before
             result[3, 2:] = 1 - ratio, ratio
         return result
 
-    def moved_on(self, h: float) -> tuple[Array, Array]:
-        """(4, 4) what (y, v, a, α) at the start of a step give to those at its end, and (4, s) what its accelerations
-        do.
+    def moved_on(self, h: Array) -> tuple[Array, Array]:
+        """(j, 4, 4) what (y, v, a, α) at the start of j steps h (j,) give to those at their ends, and (j, 4, s) what
+        their accelerations do.
         """
         to_y, to_v = self.history(h)
-        before, nodes = np.zeros((4, 4)), np.zeros((4, self.count))
-        before[0], before[1] = to_y[-1], to_v[-1]
-        nodes[0], nodes[1] = h * h * self.places[-1], h * self.rates[-1]
-        nodes[2, -1] = 1.0
-        before[3, 2:], nodes[3, -1] = self.algorithmic[:2], self.algorithmic[2]
+        before, nodes = np.zeros((len(h), 4, 4)), np.zeros((len(h), 4, self.count))
+        before[:, 0], before[:, 1] = to_y[:, -1], to_v[:, -1]
+        nodes[:, 0], nodes[:, 1] = np.outer(h * h, self.places[-1]), np.outer(h, self.rates[-1])
+        nodes[:, 2, -1] = 1.0
+        before[:, 3, 2:], nodes[:, 3, -1] = self.algorithmic[:2], self.algorithmic[2]
         return before, nodes
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
+
+import numpy as np
 
 from erls.equations.registry import system_of
+from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
+from erls.maths.jit import announcing
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
@@ -17,18 +21,24 @@ from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
 from erls.scene.read import AnyScene, chain_alone, load_chain
-from erls.sensitivity.forward import differentiated
-from erls.sensitivity.outputs import Output, derivative_of, value_of
-from erls.sensitivity.parameters import parameters_of
+from erls.sensitivity import forward
+from erls.sensitivity.adjoint import gradients
+from erls.sensitivity.gradients import Asking
+from erls.sensitivity.outputs import EVALUATIONS, Output, derivative_of, own_derivative, value_of
+from erls.sensitivity.parameters import Parameter, parameters_of
 from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
-from erls.sensitivity.variants import differences
+from erls.sensitivity.variants import Difference, differences
 from erls.simulation.simulate import simulate
 
 _ROOM = 50_000_000
 """Numbers of derivatives of a motion that are held at a time, 400 MB: more parameters go one group after the other."""
 
+Method = Literal["auto", "forward", "adjoint"]
+
+_FEW = 4
+"""Parameters by which the forward method is taken, whatever the outputs."""
+
 _UNKNOWN = {
-    "nodal": "the nodal formulation",
     "pieces": "links in substructures",
     "quasi-static": "modes that follow statically",
     "absolute": "absolute coordinates",
@@ -49,18 +59,22 @@ class Sensitivities:
         By name of the output.
     derivatives : dict of str to dict of str to array
         By name of the output and key of the parameter, in the shape of the output, per unit of the parameter.
+    method : str
+        ``"forward"`` or ``"adjoint"``.
     """
 
     run: ChainRun
     parameters: dict[str, float]
     values: dict[str, Array]
     derivatives: dict[str, dict[str, Array]]
+    method: str = "forward"
 
 
 def sensitivities(
     scene: AnyScene | Run | Path | str,
     outputs: Mapping[str, Output],
     parameters: Sequence[str] | Mapping[str, float],
+    method: Method = "auto",
     *,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Sensitivities:
@@ -79,6 +93,10 @@ def sensitivities(
     parameters : sequence of str, or mapping of str to float
         Keys as ``--set`` takes them; behind ``links.NAME.model`` they go on in the description of that link. With a
         mapping, about how large a change of each would be large: its own size unless given, which zero has not.
+    method : str, optional
+        ``"forward"``: all states of the run by each parameter, for outputs of any size. ``"adjoint"``: backward over
+        the run, for few outputs by many parameters; outputs must ask the run at fixed times. ``"auto"``: the one that
+        asks outputs less often. Both agree to 1e-9.
     tell : callable, optional
         Told about each preparation that takes time.
 
@@ -105,6 +123,9 @@ def sensitivities(
     >>> bool(found.derivatives["height"]["gravity.2"] > 0)
     True
     """
+    if method not in get_args(Method):
+        message, remedy = "no such method", f"take one of {', '.join(get_args(Method))}"
+        raise SceneError(Cause.BAD_FIELD, message, where="method", value=method, remedy=remedy)
     if isinstance(scene, ChainRun):
         run, keys = scene, parameters_of(scene.scene, parameters)
     else:
@@ -113,33 +134,132 @@ def sensitivities(
         refuse(loaded, build_mechanism(loaded, tell).mechanism)
         keys = parameters_of(loaded, parameters)
         run = simulate(loaded, tell=tell, verdict=False)
-    scheme = scheme_of(run)
+    refuse_run(run)
     values = {name: value_of(output, run, name) for name, output in outputs.items()}
+    with announcing(tell):
+        askings = _askings(run, outputs, values, len(keys), method)
+        if askings is None:
+            derivatives = _forward(run, outputs, values, keys)
+        else:
+            derivatives = _adjoint(askings, keys, scheme_of(run))
+    at = {one.key: one.value for one in keys}
+    return Sensitivities(run, at, values, derivatives, "forward" if askings is None else "adjoint")
+
+
+def _askings(
+    run: ChainRun, outputs: Mapping[str, Output], values: Mapping[str, Array], parameters: int, method: Method
+) -> list[tuple[Asking, dict[int, Array]]] | None:
+    """For the adjoint method, outputs with their derivatives by states; None for the forward one.
+
+    Tangents, factors and forces by parameters are the same for both: what differs is how often outputs are asked.
+    """
+    if method == "forward":
+        return None
+    chosen = method == "adjoint"
+    if _of_nodes(run) or _eventful(run):
+        if chosen:
+            what = "nodal runs" if _of_nodes(run) else "runs with contacts, stops or joints that stick"
+            raise _refusal(f"{what} by the adjoint method", "method", "take 'auto' or 'forward'")
+        return None
+    few = sum(value.size for value in values.values()) < parameters and parameters > _FEW
+    if not chosen and not few:
+        return None
+    found = [Asking(output, name, run) for name, output in outputs.items()]
+    if not chosen and sum(asking.evaluations for asking in found) > EVALUATIONS * parameters * len(outputs):
+        return None
+    try:
+        return [(asking, asking.by_knots()) for asking in found]
+    except SceneError:
+        if chosen:
+            raise
+        return None
+
+
+def _forward(
+    run: ChainRun,
+    outputs: Mapping[str, Output],
+    values: Mapping[str, Array],
+    keys: Sequence[Parameter],
+) -> dict[str, dict[str, Array]]:
     derivatives: dict[str, dict[str, Array]] = {name: {} for name in outputs}
     some = max(1, _ROOM // max(1, 3 * run.solution.y.size))
     for first in range(0, len(keys), some):
         found = differences(run, keys[first : first + some])
-        motion = differentiated(run, found, scheme)
+        motion, metres = _motion(run, found)
         for k, one in enumerate(found):
             for name, output in outputs.items():
-                key = one.parameter.key
-                derivatives[name][key] = derivative_of(output, name, run, one, motion[..., k])
-    return Sensitivities(run, {one.key: one.value for one in keys}, values, derivatives)
+                derivative = derivative_of(output, name, run, one, motion[..., k], metres, values[name])
+                derivatives[name][one.parameter.key] = derivative
+    return derivatives
+
+
+def _adjoint(
+    askings: Sequence[tuple[Asking, dict[int, Array]]], keys: Sequence[Parameter], scheme: Scheme
+) -> dict[str, dict[str, Array]]:
+    derivatives: dict[str, dict[str, Array]] = {asking.name: {} for asking, _ in askings}
+    if not askings:
+        return derivatives
+    run = askings[0][0].run
+    ends = np.cumsum([asking.value.size for asking, _ in askings]).tolist()
+    columns = [slice(end - asking.value.size, end) for end, (asking, _) in zip(ends, askings, strict=True)]
+    n = run.solution.y.shape[1]
+    seeds: dict[int, Array] = {}
+    for (_, by_knots), own in zip(askings, columns, strict=True):
+        for knot, seed in by_knots.items():
+            seeds.setdefault(knot, np.zeros((3, n, ends[-1])))[..., own] += seed
+    found = differences(run, keys)
+    through = gradients(run, found, scheme, seeds, ends[-1])
+    for one, row in zip(found, through, strict=True):
+        for (asking, _), own in zip(askings, columns, strict=True):
+            held = own_derivative(asking.output, asking.name, run, one, asking.value)
+            derivatives[asking.name][one.parameter.key] = np.asarray(held + row[own].reshape(asking.value.shape))
+    return derivatives
+
+
+def _of_nodes(run: ChainRun) -> bool:
+    return system_of(run.formulation.mechanism, run.scene.record.simulation) == "nodal"
+
+
+def _motion(run: ChainRun, differences: Sequence[Difference]) -> tuple[Array, Array]:
+    """(k, 3, n, p) derivatives of what a run keeps of its knots, with rates and accelerations, and (n,) metres per unit
+    of it.
+    """
+    formulation: Any = run.formulation
+    if _of_nodes(run):
+        from erls.sensitivity import nodal_forward  # here: most runs need none of it
+
+        return nodal_forward.differentiated(run, differences), nodal_forward.metres_of(formulation)
+    metres = metre_scales(formulation)
+    if _eventful(run):
+        from erls.sensitivity import eventful  # here: most runs need none of it
+
+        return eventful.differentiated(run, differences, scheme_of(run)), metres
+    return forward.differentiated(run, differences, scheme_of(run)), metres
+
+
+def _eventful(run: ChainRun) -> bool:
+    """Whether forces change at times that parameters move."""
+    mechanism = run.formulation.mechanism
+    return mechanism.sticks or mechanism.touches
 
 
 def scheme_of(run: ChainRun) -> Scheme:
-    """What made a run, as maps of small changes.
+    """What made a run of a chain with coordinates of its own, as maps of small changes."""
+    settings = run.scene.record.simulation
+    return generalized_alpha(settings.spectral_radius) if settings.integrator == FIXED_STEP else lobatto()
+
+
+def refuse_run(run: ChainRun) -> None:
+    """Refuse what cannot be differentiated yet.
 
     Raises
     ------
     SceneError
-        BAD_FIELD: this cannot be differentiated yet; names what.
+        BAD_FIELD: names what.
     """
-    settings = run.scene.record.simulation
     refuse(run.scene, run.formulation.mechanism)
     if run.failure is not None:
         raise _refusal("a run that did not come to its end", str(run.scene.path), "shorten it, or mend why it failed")
-    return generalized_alpha(settings.spectral_radius) if settings.integrator == FIXED_STEP else lobatto()
 
 
 def refuse(scene: Scene, mechanism: Mechanism) -> None:
@@ -158,13 +278,18 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
     kind = system_of(mechanism, settings)
     if kind in _UNKNOWN:
         raise _refusal(_UNKNOWN[kind], where, "use erls or ffr with independent coordinates and links in one piece")
-    if settings.gauge == "minimum-norm":
+    if settings.gauge == "minimum-norm" and kind != "nodal":
         raise _refusal("the minimum-norm gauge", f"{where}.gauge", "use the joint-angle gauge")
-    if mechanism.sticks:
+    closing = [loop.freedom.forces.sticks for loop in mechanism.loops if loop.freedom is not None]
+    if (mechanism.sticks or any(closing)) and (kind != "tree" or mechanism.limited):
         remedy = "use friction.law = 'smooth'"
-        raise _refusal("motions of joints that stick", f"{scene.path}: friction.law", remedy)
-    if mechanism.rotation_vectors:
+        what = "loops or nodal runs whose joints stick" if kind != "tree" else "joints that stick beside limited motors"
+        raise _refusal(what, f"{scene.path}: friction.law", remedy)
+    if mechanism.rotation_vectors and kind != "nodal":
         raise _refusal("coordinates that are rotation vectors", f"{scene.path}: joints", "use universal joints")
+    if kind == "nodal" and mechanism.touches:
+        remedy = "use formulation erls or ffr, which differentiate through them"
+        raise _refusal("nodal runs with contacts or stops", f"{where}.formulation", remedy)
     if kind == "loops" and settings.integrator == FIXED_STEP:
         remedy = "use integrator auto or lobatto, whose equations hold the forces of loops"
         raise _refusal("generalized-alpha with loops", f"{where}.integrator", remedy)

@@ -24,7 +24,8 @@ def start_derivatives(run: ChainRun, differences: Sequence[Difference]) -> Array
     """
     base: Any = run.formulation
     if not base.mechanism.static_start:
-        return np.stack([d.of(lambda variant: _initial(variant)) for d in differences], axis=2)
+        here = np.stack(base.initial_state())
+        return np.stack([d.beside(_initial, here) for d in differences], axis=2)
     return _static(run, differences)
 
 
@@ -54,15 +55,15 @@ def _static(run: ChainRun, differences: Sequence[Difference]) -> Array:
         return np.concatenate([force if variant.turn is None else force @ variant.turn, own.conditions(at)[0]])
 
     result = []
+    here = _rates(base)
     for difference in differences:
-        rates = difference.of(lambda variant: _rates(variant))
+        rates = difference.beside(lambda variant: variant.taken_back(_rates(variant.formulation)), here)
         moved = -np.linalg.solve(block, difference.of(balance))[: len(y)]
         result.append(np.stack([moved, rates]))
     return np.stack(result, axis=2)
 
 
-def _rates(variant: Variant) -> Array:
+def _rates(formulation: Any) -> Array:
     """(n,) rates at the start; those of a tree know no equilibrium."""
-    own = variant.formulation
-    found = own.initial_state() if own.mechanism.loops else own.undeformed_start()
-    return variant.taken_back(found[1])
+    found = formulation.initial_state() if formulation.mechanism.loops else formulation.undeformed_start()
+    return np.asarray(found[1])

@@ -1,19 +1,23 @@
 """Exact tangents of the equations of motion along a run: ∂R/∂a, ∂R/∂v and ∂R/∂y of R = M a - f at its knots.
 
 The iteration matrices of implicit methods leave out what only costs iterations (gyroscopic, centrifugal, geometric
-terms); derivatives of a run need all of it. R is evaluated at many states in one call
-(`erls.equations.series.residual_series`) and differenced as in `erls.equations.linearization`, there with its accuracy.
+terms); derivatives of a run need all of it. Where a run is long enough to be worth their compilation, numbers that
+carry their derivatives along seven directions give it to rounding (`erls.equations.side_by_side`); otherwise R is
+evaluated at many states in one call (`erls.equations.series.residual_series`) and differenced as in
+`erls.equations.linearization`, there with its accuracy.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.linearization import difference_steps
 from erls.equations.series import mass_series, residual_series
+from erls.equations.side_by_side import eightfold_forces, eightfold_kernels, eightfold_tangents
 from erls.maths.so3 import Array
 
 _ROUGHER = 5.0
@@ -36,28 +40,45 @@ class Knots(NamedTuple):
     v: Array
     a: Array
 
-    def part(self, first: int, end: int) -> Knots:
-        """Some of them."""
-        return Knots(*(array[first:end] for array in self))
 
+@dataclass(frozen=True)
+class Evaluation:
+    """How forces and tangents of a run are found.
 
-def tangents(system: CompiledSystem, knots: Knots, steps: Array) -> Tangents:
-    """At all knots.
-
-    Parameters
+    Attributes
     ----------
-    system : CompiledSystem
-    knots : Knots
     steps : (n,) array
         Of differences, `steps_of`.
+    kernels : module or None
+        Of eightfold numbers.
     """
-    t, y, v, a = knots
-    n = y.shape[1]
-    damping, stiffness = np.empty((2, len(t), n, n))
-    for j in range(n):
-        damping[:, :, j] = _difference(lambda x: residual_series(system, t, y, x, a), v, j, steps[j])
-        stiffness[:, :, j] = _difference(lambda x: residual_series(system, t, x, v, a), y, j, steps[j])
-    return Tangents(mass_series(system, t, y), damping, stiffness)
+
+    steps: Array
+    kernels: Any = None
+
+    @classmethod
+    def of(cls, system: CompiledSystem, steps: Array, knots: int) -> Evaluation:
+        """For a run with so many knots."""
+        return cls(steps, eightfold_kernels(system, 4 * system.size * knots))
+
+    def forces(self, system: CompiledSystem, knots: Knots) -> Array:
+        """(k, n) forces out of balance, of equations of the same kind."""
+        if self.kernels is None:
+            return residual_series(system, *knots)
+        return eightfold_forces(self.kernels, system, *knots)
+
+    def tangents(self, system: CompiledSystem, knots: Knots) -> Tangents:
+        """At all knots."""
+        t, y, v, a = knots
+        mass = mass_series(system, t, y)
+        if self.kernels is not None:
+            return Tangents(mass, *eightfold_tangents(self.kernels, system, *knots))
+        n = y.shape[1]
+        damping, stiffness = np.empty((2, len(t), n, n))
+        for j in range(n):
+            damping[:, :, j] = _difference(lambda x: residual_series(system, t, y, x, a), v, j, self.steps[j])
+            stiffness[:, :, j] = _difference(lambda x: residual_series(system, t, x, v, a), y, j, self.steps[j])
+        return Tangents(mass, damping, stiffness)
 
 
 def _difference(forces, x: Array, place: int, step: float) -> Array:  # type: ignore[no-untyped-def]

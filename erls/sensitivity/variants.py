@@ -16,21 +16,16 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.registry import formulate
-from erls.equations.series import residual_series
+from erls.equations.registry import formulate, system_of
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism, link_model
 from erls.sensitivity.parameters import Parameter, description_with, scene_with
-from erls.sensitivity.tangents import Knots
 from erls.simulation.chains import models_of
 from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
-
-_LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
-_ROUNDING = 1e-13  # of forces
 
 
 @dataclass(frozen=True)
@@ -41,22 +36,17 @@ class Variant:
     ----------
     weight : float
         In the derivative [1/unit of the parameter].
+    apart : float
+        Of the parameter from its value in the run.
     formulation : Formulation
     turn : (n, n) array or None
         T, of all coordinates; None where they are the same.
     """
 
     weight: float
+    apart: float
     formulation: Any
     turn: Array | None = None
-
-    def forces(self, knots: Knots) -> Array:
-        """(k, n) forces out of balance, in the coordinates of the run."""
-        t, y, v, a = knots
-        if self.turn is None:
-            return residual_series(self.formulation.compiled, t, y, v, a)
-        turned = (x @ self.turn.T for x in (y, v, a))
-        return np.asarray(residual_series(self.formulation.compiled, t, *turned) @ self.turn)
 
     def placed(self, y: Array) -> Array:
         """(..., n) coordinates of the run in those of the variant."""
@@ -73,33 +63,58 @@ class Variant:
         return replace(run, formulation=self.formulation, solution=moved)
 
 
-@dataclass(frozen=True)
 class Difference:
-    """A derivative by a parameter, as a sum over variants."""
+    """A derivative by a parameter, as a sum over variants, which are made when they are asked for.
 
-    parameter: Parameter
-    variants: tuple[Variant, ...]
+    Parameters
+    ----------
+    run : ChainRun
+    parameter : Parameter
+    stencil : Stencil
+        Where, and with which weights.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        The first two that are made will not do; others are refused when they are asked for.
+    """
+
+    def __init__(self, run: ChainRun, parameter: Parameter, stencil: Stencil) -> None:
+        self.parameter = parameter
+        self._run, self._stencil = run, stencil
+        self._made: dict[int, Variant] = {}
+        if parameter.within:  # shapes of all are held together
+            self._get(tuple(range(len(stencil))))
+        self.few = self._get((0, 2) if stencil[0][0] else (1, 3))
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """All of them."""
+        return self._get(tuple(range(len(self._stencil))))
 
     @property
     def acts(self) -> bool:
         """Whether the equations of motion depend on it: a start alone may."""
-        first, *others = (variant.formulation.compiled for variant in self.variants)
-        turned = any(variant.turn is not None for variant in self.variants)
-        return turned or not all(_alike(first, other) for other in others)
+        first, second = (variant.formulation.compiled for variant in self.few)
+        return any(variant.turn is not None for variant in self.few) or not _alike(first, second)
 
-    def thinned(self, sample: Knots) -> Difference:
-        """The same with fewer variants where forces depend linearly on the parameter, as some knots show."""
-        if len(self.variants) != len(STENCILS[0]):
-            return self
-        inner = Difference(self.parameter, tuple(replace(v, weight=0.75 * v.weight) for v in self.variants[1:3]))
-        forces = [np.abs(variant.forces(sample)).max(initial=0.0) for variant in self.variants]
-        rounding = _ROUNDING * max(forces) * inner.variants[1].weight
-        whole, less = (one.of(lambda variant: variant.forces(sample)) for one in (self, inner))
-        return inner if np.abs(whole - less).max() <= _LINEAR * np.abs(whole).max() + rounding else self
+    def _get(self, numbers: tuple[int, ...]) -> tuple[Variant, ...]:
+        missing = [k for k in numbers if k not in self._made]
+        if missing:
+            made = _variants(self._run, self.parameter, [self._stencil[k] for k in missing])
+            self._made |= dict(zip(missing, made, strict=True))
+        return tuple(self._made[k] for k in numbers)
+
+    def beside(self, what: Callable[[Variant], Array], here: Array) -> Array:
+        """The derivative of what an array depends on, ``here`` in the run; nothing where two variants have the same."""
+        if all(np.array_equal(what(variant), here) for variant in self.few):
+            return np.zeros_like(here)
+        return self.of(what)
 
     def of(self, what: Callable[[Variant], Array]) -> Array:
-        """The derivative of what an array depends on."""
-        return np.asarray(sum(variant.weight * what(variant) for variant in self.variants))
+        """The derivative of what an array depends on: exactly zero where it does not."""
+        first = what(self.variants[0])  # weights add up to zero
+        return np.asarray(sum(variant.weight * (what(variant) - first) for variant in self.variants[1:]))
 
 
 def _alike(one: CompiledSystem, other: CompiledSystem) -> bool:
@@ -120,31 +135,35 @@ def differences(run: ChainRun, parameters: Sequence[Parameter]) -> list[Differen
 
 
 def _difference(run: ChainRun, parameter: Parameter) -> Difference:
-    step, problems = STEP * parameter.size, []
+    problems = []
     for stencil in STENCILS:
         try:
-            return Difference(parameter, tuple(_variants(run, parameter, stencil, step)))
+            return Difference(run, parameter, stencil)
         except ReportedError as problem:
             problems.append(problem)
     raise problems[0]
 
 
-def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float) -> list[Variant]:
-    """At the values of a stencil."""
+def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, float]]) -> list[Variant]:
+    """At the values of a stencil, or some of them."""
     base: Any = run.formulation
+    step = STEP * parameter.size
     mechanisms = [_mechanism(run, parameter, parameter.value + at * step) for at, _ in stencil]
     turns: list[Array | None] = [None] * len(stencil)
-    if parameter.within and parameter.link is not None:
+    nodal = system_of(base.mechanism, run.scene.record.simulation) == "nodal"
+    if parameter.within and parameter.link is not None and not nodal:
         number = base.mechanism.bodies[parameter.link]
         models = [mechanism.links[number].model for mechanism in mechanisms]
         found = held(models, base.mechanism.links[number].model, f"parameter {parameter.key}")
         turns = [_of_all(base, number, turn[6:, 6:]) for turn in found]
     result = []
-    for (_, weight), mechanism, turn in zip(stencil, mechanisms, turns, strict=True):
+    for (at, weight), mechanism, turn in zip(stencil, mechanisms, turns, strict=True):
         formulation: Any = formulate(mechanism, run.scene.record.simulation)
-        if mechanism.loops:
+        if nodal:
+            _refuse_others(formulation, base, parameter)
+        elif mechanism.loops:
             formulation.kept = base.kept  # of rows that follow from one another, any others would do as well
-        if formulation.breakpoints != base.breakpoints:
+        if _times(formulation, nodal) != _times(base, nodal):
             raise SceneError(
                 Cause.BAD_FIELD,
                 "times at which forces jump depend on this parameter: derivatives through them are not known yet",
@@ -152,8 +171,26 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Stencil, step: float
                 value=parameter.value,
                 remedy="name another field, or smooth the profile that it belongs to",
             )
-        result.append(Variant(weight / step, formulation, turn))
+        result.append(Variant(weight / step, at * step, formulation, turn))
     return result
+
+
+def _times(formulation: Any, nodal: bool) -> tuple[float, ...]:
+    """At which forces jump."""
+    found: tuple[float, ...] = (formulation.system if nodal else formulation).breakpoints
+    return found
+
+
+def _refuse_others(formulation: Any, base: Any, parameter: Parameter) -> None:
+    """Refuse nodes, elements or conditions of another number or order."""
+    if formulation.chain.left_out != base.chain.left_out:
+        message = "which conditions of a loop follow from the others depends on this parameter"
+    elif not np.array_equal(formulation.system.flat.integers, base.system.flat.integers):
+        message = "elements and joints change with this parameter by jumps"
+    else:
+        return
+    where, remedy = f"parameter {parameter.key}", "name another field, or give it a value off such a place"
+    raise SceneError(Cause.BAD_FIELD, message, where=where, value=parameter.value, remedy=remedy)
 
 
 def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
@@ -167,6 +204,8 @@ def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
         scene = scene_with(scene, parameter, value)
     if k is not None:
         models[k] = link_model(scene, k, lambda text: None, described)
+        if described is not None and descriptions[k] is not None:  # made of beams, as nodes take them
+            descriptions[k] = described.description
     return build_mechanism(scene, lambda text: None, models, descriptions, pieces).mechanism
 
 

@@ -76,7 +76,36 @@ def overlay(run: Run, record: Path) -> Overlay:
     SceneError
         The file is missing or faulty; it has no heads, none that the run knows, or no time within the run.
     """
-    titles, table = read_titled_csv(record, "--overlay")
+    held = matched(run, record, "--overlay")
+    known = run.columns(held.times)
+    found = (_overlaid(name, held.times, values, known[name]) for name, values in held.columns.items())
+    return Overlay(run, record, tuple(found), held.unknown, held.outside, held.every)
+
+
+@dataclass(frozen=True)
+class Matched:
+    """A record as a run sees it: its rows within the run, and its columns by their heads in the table of the run.
+
+    Attributes
+    ----------
+    times : (k,) array
+    columns : dict of (k,) arrays
+    unknown : tuple of str
+        Heads that the run does not have.
+    outside, every : int
+        How many rows the run does not cover, and which of the others were taken.
+    """
+
+    times: Array
+    columns: dict[str, Array]
+    unknown: tuple[str, ...]
+    outside: int
+    every: int
+
+
+def matched(run: Run, record: Path, where: str) -> Matched:
+    """Read a record. Parameters and errors are those of `overlay`; ``where`` is what names it."""
+    titles, table = read_titled_csv(record, where)
     if len(titles) != table.shape[1] or len(titles) < 2:
         remedy = "name its columns in the first line as in erls view RUN.h5 -o RUN.csv"
         message = "a record needs time and values, and a head for each column"
@@ -89,18 +118,14 @@ def overlay(run: Run, record: Path) -> Overlay:
         remedy = "count its time from the start of the run"
         message = "the record has not two rows within the run"
         raise SceneError(Cause.TABLE, message, where=str(record), value=float(table[0, 0]), limit=limit, remedy=remedy)
-    known = run.columns(kept[:, 0])
+    known = run.columns(kept[:1, 0])
     short = {name.rpartition(" [")[0]: name for name in known}
-    found, unknown = [], []
-    for title, values in zip(titles[1:], kept[:, 1:].T, strict=True):
-        name = title if title in known else short.get(title)
-        if name is None:
-            unknown.append(title)
-        else:
-            found.append(_overlaid(name, kept[:, 0], values, known[name]))
+    names = {title: title if title in known else short.get(title) for title in titles[1:]}
+    found = {name: kept[:, k] for k, name in enumerate(names.values(), 1) if name is not None}
+    unknown = tuple(title for title, name in names.items() if name is None)
     if not found:
         choose(unknown[0], [name for name in short if name != run.axis.symbol], f"{record}: first line", SceneError)
-    return Overlay(run, record, tuple(found), tuple(unknown), int((~inside).sum()), every)
+    return Matched(kept[:, 0], found, unknown, int((~inside).sum()), every)
 
 
 def _overlaid(name: str, times: Array, measured: Array, simulated: Array) -> Overlaid:

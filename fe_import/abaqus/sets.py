@@ -174,23 +174,36 @@ def surface_nodes(
     LostSet
         Sets or elements that do not exist, faces of other elements than solids, free surfaces without a face.
     """
+    if not by_nodes:
+        faces = surface_faces(rows, elements, connectivity)
+        return {node for _, nodes in faces for node in nodes}
     found: set[int] = set()
-    table = node_sets if by_nodes else elements
     for row in rows:
-        try:
-            (item,) = set_items(row[:1], generate=False) or [""]
-        except ValueError as problem:
-            raise LostSet(str(problem)) from None
-        labels = {item} if isinstance(item, int) else table.members(str(item))
-        if by_nodes:
-            found |= labels
-            continue
+        item = _first(row)
+        found |= {item} if isinstance(item, int) else node_sets.members(str(item))
+    return found
+
+
+def surface_faces(
+    rows: list[list[str]], elements: SetTable, connectivity: dict[int, tuple[str, list[int]]]
+) -> Iterator[tuple[str, list[int]]]:
+    """Type of the element and nodes, corners first, of each face of a *SURFACE of elements; see `surface_nodes`."""
+    for row in rows:
+        item = _first(row)
         face = row[1].upper() if len(row) > 1 else ""
-        for label in labels:
+        for label in sorted({item} if isinstance(item, int) else elements.members(str(item))):
             if label not in connectivity:
                 raise LostSet(f"it needs element {label}, which the deck does not define")
-            found.update(_face_nodes(*connectivity[label], face))
-    return found
+            kind, nodes = connectivity[label]
+            yield kind, _face_nodes(kind, nodes, face)
+
+
+def _first(row: list[str]) -> Item:
+    try:
+        (item,) = set_items(row[:1], generate=False) or [""]
+    except ValueError as problem:
+        raise LostSet(str(problem)) from None
+    return item
 
 
 def _face_nodes(kind: str, nodes: list[int], face: str) -> list[int]:

@@ -21,10 +21,14 @@ _METHOD = Reduction().method
 
 @dataclass(frozen=True)
 class LinkFile:
-    """A link description with the file that it came from; relative paths start at ``folder``."""
+    """A link description with the file that it came from; relative paths start at ``folder``.
+
+    ``content`` is what it depends on besides, of a link that was made in Python.
+    """
 
     path: Path
     description: LinkDescription
+    content: bytes = b""
 
     @property
     def folder(self) -> Path:
@@ -33,7 +37,7 @@ class LinkFile:
 
     def content_hash(self) -> str:
         """SHA-256 of everything that the reduction depends on: the description and the files it names."""
-        digest = hashlib.sha256(msgspec.json.encode(self.description, order="deterministic"))
+        digest = hashlib.sha256(msgspec.json.encode(self.description, order="deterministic") + self.content)
         for name in self.description.files():
             with contextlib.suppress(OSError, ValueError):  # reported with its name when it is read
                 for file in with_included(self.folder / name):

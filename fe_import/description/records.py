@@ -33,11 +33,15 @@ class Units(_Record, frozen=True):
         ``kg``, ``g``, ``t``, ``lb``, or with pounds of force ``slug`` (feet) or ``lbf*s2/in`` (inches).
     time : str
         ``s`` or ``ms``.
+    unusual : bool
+        The link is as large, heavy, soft or light as its figures say: those that look like a slipped unit are reported,
+        not refused.
     """
 
     length: str = "m"
     mass: str = "kg"
     time: str = "s"
+    unusual: bool = False
 
 
 class Material(_Record, frozen=True):
@@ -205,14 +209,15 @@ class PointMass(_Record, frozen=True):
 
 
 class Interface(_Record, frozen=True):
-    """A node where a joint sits: a node of a frame, or one that moves with a face.
+    """A node where a joint sits: a node of a frame or of beams, or one that moves with a face.
 
     Attributes
     ----------
     name : str
         What scenes call it.
     node : str
-        A named node; give this or ``face``.
+        A named node; of a solid one that turns (of a beam, of a rigid body of its mesh file), or the set that holds it
+        alone. Give this or ``face``.
     face : str
         A node or face set of the mesh.
     coupling : str

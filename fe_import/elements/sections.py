@@ -151,6 +151,25 @@ def _cowper_tube(ratio: float, nu: float) -> float:
     return 6 * (1 + nu) * s / ((7 + 6 * nu) * s + (20 + 12 * nu) * ratio**2)
 
 
+def box_constants(width: float, height: float, wall_y: float, wall_z: float) -> SectionConstants:
+    """Of a thin-walled box of outer size ``width`` along y, ``height`` along z.
+
+    ``wall_y`` is the thickness, along y, of the walls across y; ``wall_z`` that of those across z. Torsion after Bredt,
+    4 A² / ∮ ds/t; shear is carried by the walls along the force.
+    """
+    inner_y, inner_z = width - 2 * wall_y, height - 2 * wall_z
+    area = width * height - inner_y * inner_z
+    mean_y, mean_z = width - wall_y, height - wall_z
+    return SectionConstants(
+        area,
+        (width * height**3 - inner_y * inner_z**3) / 12,
+        (width**3 * height - inner_y**3 * inner_z) / 12,
+        4 * (mean_y * mean_z) ** 2 / (2 * mean_y / wall_z + 2 * mean_z / wall_y),
+        2 * wall_z * mean_y / area,
+        2 * wall_y * mean_z / area,
+    )
+
+
 def _constants(section: Section, poissons_ratio: float) -> SectionConstants:
     match section:
         case Rectangular(width=b, height=h):
@@ -166,17 +185,9 @@ def _constants(section: Section, poissons_ratio: float) -> SectionConstants:
             i = math.pi * (d**4 - inner**4) / 64
             return SectionConstants(math.pi * (d**2 - inner**2) / 4, i, i, 2 * i, k, k)
         case RectangularTube(width=b, height=h, thickness=t):
-            bi, hi = b - 2 * t, h - 2 * t
-            area = b * h - bi * hi
-            bm, hm = b - t, h - t
-            return SectionConstants(
-                area,
-                (b * h**3 - bi * hi**3) / 12,
-                (b**3 * h - bi**3 * hi) / 12,
-                2 * t * (bm * hm) ** 2 / (bm + hm),
-                section.shear_factor_y or 2 * t * bm / area,
-                section.shear_factor_z or 2 * t * hm / area,
-            )
+            c = box_constants(b, h, t, t)
+            factors = section.shear_factor_y or c.shear_factor_y, section.shear_factor_z or c.shear_factor_z
+            return SectionConstants(c.area, c.inertia_y, c.inertia_z, c.torsion_constant, *factors)
         case Constants():
             return SectionConstants(
                 section.area,

@@ -1,8 +1,8 @@
-"""Element matrices of an isotropic solid, many elements at a time, and their sum in compressed rows.
+"""Element matrices of a solid, many elements at a time, and their sum in compressed rows.
 
 With G_ab[i, j] = ∫ ∂_a φ_i ∂_b φ_j the stiffness between component a of node i and b of node j is λ G_ab +
-μ G_ba + μ δ_ab tr G (Lamé's λ, μ). The shape functions interpolate the geometry as well (isoparametric elements),
-hex20's curved sides with its own twenty.
+μ G_ba + μ δ_ab tr G (Lamé's λ, μ) of isotropic materials, Σ C_ac,bd G_cd of others. The shape functions interpolate
+the geometry as well (isoparametric elements), hex20's curved sides with its own twenty.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 import scipy.sparse as sp
 
+from fe_import.elements.elasticity import PAIRS, lame_parameters
 from fe_import.elements.solid_elements import SolidElement
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.model import Array, IntArray
@@ -32,12 +33,13 @@ def element_masses(element: SolidElement, corners: Array, density: float) -> Arr
     return np.asarray((masses + masses.swapaxes(1, 2)) / 2)
 
 
-def element_stiffnesses(element: SolidElement, corners: Array, lam: float, mu: float) -> Array:
+def element_stiffnesses(element: SolidElement, corners: Array, moduli: Array) -> Array:
     """(e, 3 k, 3 k) stiffness of each element, row 3 * node + component, symmetric to the last bit [N/m].
 
-    ``corners`` (e, k, 3): positions of the nodes. Incompatible modes are eliminated.
+    ``corners`` (e, k, 3): positions of the nodes; ``moduli`` (6, 6) or (e, 6, 6), see `fe_import.elements.elasticity`.
+    Incompatible modes are eliminated.
     """
-    full, size = _with_modes(element, corners, lam, mu), 3 * element.size
+    full, size = _with_modes(element, corners, moduli), 3 * element.size
     if not element.incompatible:
         return full
     motion = _motion_of_modes(full, size)
@@ -45,31 +47,51 @@ def element_stiffnesses(element: SolidElement, corners: Array, lam: float, mu: f
     return np.asarray((stiffness + stiffness.swapaxes(1, 2)) / 2)
 
 
-def motion_of_modes(element: SolidElement, corners: Array, lam: Array, mu: Array) -> Array:
-    """(e, 9 or 0, 3 k) incompatible modes that go with the displacements of the nodes; ``lam``, ``mu`` (e,)."""
+def motion_of_modes(element: SolidElement, corners: Array, moduli: Array) -> Array:
+    """(e, 9 or 0, 3 k) incompatible modes that go with the displacements of the nodes; ``moduli`` (e, 6, 6)."""
     size = 3 * element.size
     if not element.incompatible:
         return np.zeros((len(corners), 0, size))
-    return _motion_of_modes(_with_modes(element, corners, lam[:, None, None], mu[:, None, None]), size)
+    return _motion_of_modes(_with_modes(element, corners, moduli), size)
 
 
 def _motion_of_modes(full: Array, size: int) -> Array:
     return np.asarray(-np.linalg.solve(full[:, size:, size:], full[:, size:, :size]))
 
 
-def _with_modes(element: SolidElement, corners: Array, lam: float | Array, mu: float | Array) -> Array:
+def _with_modes(element: SolidElement, corners: Array, moduli: Array) -> Array:
     """(e, 3 k', 3 k') stiffness over nodes and incompatible modes."""
     scaled = _weighted_slopes(element, corners, *element.quadrature(element.stiffness_order))
+    lame = lame_parameters(moduli)
+    stiffness = _anisotropic(scaled, moduli) if lame is None else _isotropic(scaled, *lame)
+    return np.asarray((stiffness + stiffness.swapaxes(1, 2)) / 2)
+
+
+def _isotropic(scaled: Array, lam: Array, mu: Array) -> Array:
+    """(e, 3 k, 3 k) of weighted slopes (e, q, 3, k)."""
     count, q, _, k = scaled.shape
     scaled = scaled.transpose(0, 3, 2, 1).reshape(count, 3 * k, q)
     g = scaled @ scaled.swapaxes(1, 2)
     terms = g.reshape(count, k, 3, k, 3)
+    lam, mu = lam.reshape(-1, 1, 1), mu.reshape(-1, 1, 1)
     stiffness = (lam * g + mu * terms.swapaxes(2, 4).reshape(g.shape)).reshape(terms.shape)
     trace = mu * np.einsum("eiaja->eij", terms)
     for a in range(3):
         stiffness[:, :, a, :, a] += trace
-    stiffness = stiffness.reshape(g.shape)
-    return np.asarray((stiffness + stiffness.swapaxes(1, 2)) / 2)
+    return stiffness.reshape(g.shape)
+
+
+def _anisotropic(scaled: Array, moduli: Array) -> Array:
+    """(e, 3 k, 3 k) of weighted slopes (e, q, 3, k)."""
+    count, q, _, k = scaled.shape
+    strains = np.zeros((count, q, 6, k, 3))
+    for row, (a, b) in enumerate(PAIRS):
+        strains[:, :, row, :, a] += scaled[:, :, b]
+        if a != b:
+            strains[:, :, row, :, b] += scaled[:, :, a]
+    flat, whole = strains.reshape(count, q, 6, 3 * k), (count, 6 * q, 3 * k)
+    stresses = (moduli[:, None] if moduli.ndim == 3 else moduli) @ flat
+    return np.asarray(flat.reshape(whole).swapaxes(1, 2) @ stresses.reshape(whole))
 
 
 def _weighted_slopes(element: SolidElement, corners: Array, points: Array, weights: Array) -> Array:

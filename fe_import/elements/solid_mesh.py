@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,25 +38,71 @@ class ElementBlock:
 
 
 @dataclass(frozen=True)
+class MeshMaterial:
+    """A material that a mesh file brings, in its units.
+
+    Attributes
+    ----------
+    youngs_modulus, poissons_ratio, density : float
+        With moduli of its own, Young's modulus is the largest along their axes and Poisson's ratio 0.
+    moduli : (6, 6) array or None
+        In the axes of its section's orientation, or of the mesh; see `fe_import.elements.elasticity`.
+    """
+
+    youngs_modulus: float
+    poissons_ratio: float
+    density: float
+    moduli: Array | None = None
+
+
+@dataclass(frozen=True)
+class MeshSection:
+    """An element set of a mesh file, its material and the name of its orientation, empty without one."""
+
+    elements: str
+    material: str
+    orientation: str = ""
+
+
+FILLING = "NONSTRUCTURAL MASS"  # keyword of a filling
+
+
+@dataclass(frozen=True)
+class Filling:
+    """Nonstructural mass in the elements of a set: ``density`` per volume, or ``total``, shared as their own mass is
+    (``by_mass``) or as their volume.
+    """
+
+    elements: str
+    density: float = 0.0
+    total: float = 0.0
+    by_mass: bool = True
+
+
+@dataclass(frozen=True)
 class MeshMaterials:
     """Materials that a mesh file brings.
 
     Attributes
     ----------
-    constants : dict
-        Name -> Young's modulus, Poisson's ratio, density, in the units of the file.
-    sections : tuple of pairs
-        Element set and material.
+    constants : dict of MeshMaterial
+    sections : tuple of MeshSection
+    orientations : dict of callable
+        (e, 3, 3) axes (columns) at the centres (e, 3) of elements.
     lack : str
         Why they cannot be used; empty when they can.
     names : tuple of str
         What of the file they are made of.
+    fillings : tuple of Filling
+        Nonstructural masses, whatever the materials are.
     """
 
-    constants: dict[str, tuple[float, float, float]] = field(default_factory=dict)
-    sections: tuple[tuple[str, str], ...] = ()
+    constants: dict[str, MeshMaterial] = field(default_factory=dict)
+    sections: tuple[MeshSection, ...] = ()
+    orientations: dict[str, Callable[[Array], Array]] = field(default_factory=dict)
     lack: str = "it is none that brings materials"
     names: tuple[str, ...] = ()
+    fillings: tuple[Filling, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -81,6 +127,8 @@ class SolidMesh:
         What stands in the file and is not part of the link, and how often.
     further_nodes : (k, 3) array
         Of no element, which attachments need.
+    further_names : dict of int
+        Name -> the one further node of a set.
     attachments : tuple of Attachment
         Further nodes have negative numbers: those of the mesh and these in one array, counted from its end.
     materials : MeshMaterials
@@ -94,6 +142,7 @@ class SolidMesh:
     lost_sets: dict[str, str] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     further_nodes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    further_names: dict[str, int] = field(default_factory=dict)
     attachments: tuple[Attachment, ...] = ()
     materials: MeshMaterials = field(default_factory=MeshMaterials)
 
@@ -128,6 +177,11 @@ class SolidMesh:
         """Nodes of elements, rising."""
         used = [block.elements[rows].ravel() for block, rows, _ in self.parts(chosen)]
         return np.unique(np.concatenate(used))
+
+    def centres(self, chosen: IntArray) -> Array:
+        """(e, 3) means of the corners of elements, which rise."""
+        corners = [block.elements[rows, : block.element.corners] for block, rows, _ in self.parts(chosen)]
+        return np.concatenate([self.nodes[own].mean(axis=1) for own in corners])
 
     def element_nodes(self, number: int) -> IntArray:
         """(k,) nodes of one element."""

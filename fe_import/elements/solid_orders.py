@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fe_import.elements.attachments import RigidBody
+from fe_import.elements.attachments import AverageNode, RigidBody, TiedNodes
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.elements.solid_mesh import ElementBlock, SolidMesh, boundary_faces
 from fe_import.model import IntArray
@@ -25,8 +25,8 @@ def is_linear(mesh: SolidMesh) -> bool:
 def raised(mesh: SolidMesh) -> SolidMesh:
     """The mesh with a node in the middle of each edge, if it has none; a checked mesh stays sound.
 
-    New nodes come last. They belong to the node sets and rigid bodies that hold the corners of a whole face of the
-    surface around them.
+    New nodes come last. They belong to the node sets, rigid bodies, ties and averages by area that hold the corners of
+    a whole face of the surface around them.
     """
     if not is_linear(mesh):
         return mesh
@@ -46,7 +46,9 @@ def raised(mesh: SolidMesh) -> SolidMesh:
     faces = boundary_faces(whole)
     sets = {name: _with_middles(members, faces, len(mesh.nodes)) for name, members in mesh.node_sets.items()}
     attachments = tuple(
-        replace(item, nodes=_with_middles(item.nodes, faces, len(mesh.nodes))) if isinstance(item, RigidBody) else item
+        replace(item, nodes=_with_middles(item.nodes, faces, len(mesh.nodes)))
+        if isinstance(item, (RigidBody, TiedNodes)) or (isinstance(item, AverageNode) and item.weights is None)
+        else item
         for item in mesh.attachments
     )
     return replace(whole, node_sets=sets, attachments=attachments)

@@ -8,12 +8,14 @@ elements), extrapolated to its nodes by the polynomial through these points (of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fe_import.elements.elasticity import average_lame_parameters, stress_of_gradient
 from fe_import.elements.reference_cells import HEXAHEDRON, TETRAHEDRON, WEDGE
+from fe_import.elements.solid import SolidMaterial, element_moduli
 from fe_import.elements.solid_assembly import chunks, motion_of_modes, slopes
 from fe_import.elements.solid_elements import SolidElement
 from fe_import.elements.solid_mesh import SolidMesh
@@ -30,16 +32,28 @@ class SolidStress:
     Attributes
     ----------
     mesh : SolidMesh
-    lame : (elements, 2) array
-        Lamé's λ and μ [Pa] of each element.
+    moduli : (k, 6, 6) array
+        Of all materials [Pa], see `fe_import.elements.elasticity`.
+    material : (elements,) int array
+        Which of them each element has.
     sets : dict
         Nodes of the mesh's node sets and of its element sets.
     """
 
     mesh: SolidMesh
-    lame: Array
+    moduli: Array
+    material: IntArray
     sets: Mapping[str, IntArray]
     quantity: str = "stress"
+
+    @property
+    def lame(self) -> Array:
+        """(elements, 2) λ and μ [Pa] of each element, averaged over all directions where they are not isotropic."""
+        return np.asarray(average_lame_parameters(self.moduli)[self.material])
+
+    def moduli_of(self, numbers: IntArray) -> Array:
+        """(e, 6, 6) of elements."""
+        return np.asarray(self.moduli[self.material[numbers]])
 
     @property
     def site_nodes(self) -> IntArray:
@@ -79,7 +93,7 @@ class SolidStress:
         """(m,) ∫ e : C⁻¹ : e / 2 of the difference e between this stress and the one averaged at the nodes, and the
         energy of this stress [J]."""
         averaged = self.evaluate(fields, dof_map, self.site_nodes)
-        totals = np.zeros((2, fields.shape[1]))
+        totals, compliances = np.zeros((2, fields.shape[1])), np.linalg.inv(self.moduli)
         for element, nodes, numbers in chunks(self.mesh):
             points, weights = element.quadrature(element.stiffness_order)
             moved = fields[dof_map[nodes, :3]].reshape(len(nodes), nodes.shape[1], -1)
@@ -87,29 +101,30 @@ class SolidStress:
             smooth = np.einsum("kq,eksm->eqsm", element.shape_values(points), averaged[nodes])
             volume = slopes(element, self.mesh.nodes[nodes], points)[1] * weights
             for total, part in zip(totals, (smooth - stress, stress), strict=True):
-                total += np.einsum("eqm,eq->m", _energy(part, self.lame[numbers]), volume)
+                strain = compliances[self.material[numbers]][:, None] @ part
+                total += np.einsum("eqsm,eqsm,eq->m", part, strain, volume) / 2
         return totals[0], totals[1]
 
     def _at(self, element: SolidElement, nodes: IntArray, numbers: IntArray, moved: Array, points: Array) -> Array:
         """(e, q, 6, m) stress at points of elements whose nodes move by ``moved`` (e, k, 3 m)."""
-        corners, lame = self.mesh.nodes[nodes], self.lame[numbers]
+        corners, moduli = self.mesh.nodes[nodes], self.moduli_of(numbers)
         gradients, _ = slopes(element, corners, points)
         count, size = nodes.shape
-        modes = motion_of_modes(element, corners, *lame.T)
+        modes = motion_of_modes(element, corners, moduli)
         inner = (modes @ moved.reshape(count, 3 * size, -1)).reshape(count, -1, moved.shape[2])
         moved = np.concatenate([moved, inner], axis=1)
         strained = gradients.reshape(count, -1, moved.shape[1]) @ moved
-        return _stress(strained.reshape(*gradients.shape[:3], 3, -1), lame)
+        return stress_of_gradient(strained.reshape(*gradients.shape[:3], 3, -1), moduli)
 
     def converted(self, length: float, stress: float) -> SolidStress:
         """The same elements in other units; see `fe_import.model.StressSource`."""
-        return replace(self, mesh=replace(self.mesh, nodes=self.mesh.nodes * length), lame=self.lame * stress)
+        return replace(self, mesh=replace(self.mesh, nodes=self.mesh.nodes * length), moduli=self.moduli * stress)
 
 
-def solid_stress(mesh: SolidMesh, lame: Array) -> SolidStress:
-    """Stress of a mesh with Lamé's parameters (elements, 2) of each element."""
+def solid_stress(mesh: SolidMesh, materials: Sequence[SolidMaterial]) -> SolidStress:
+    """Stress of a mesh of materials."""
     sets = {name: mesh.nodes_of(elements) for name, elements in mesh.element_sets.items()}
-    return SolidStress(mesh, lame, {**sets, **mesh.node_sets})
+    return SolidStress(mesh, *element_moduli(mesh, materials), {**sets, **mesh.node_sets})
 
 
 def sampling(element: SolidElement) -> tuple[Array, Array]:
@@ -135,19 +150,3 @@ def sampling(element: SolidElement) -> tuple[Array, Array]:
 
     return points, monomials(element.reference_nodes) @ np.linalg.pinv(monomials(points.T))
 
-
-def _stress(gradient: Array, lame: Array) -> Array:
-    """(e, q, 6, m) stress of displacement gradients (e, q, derivative, component, m)."""
-    lam, mu = (part[:, None, None] for part in lame.T)
-    trace = lam * np.einsum("eqaam->eqm", gradient)
-    parts = [trace + 2 * mu * gradient[:, :, a, a] for a in range(3)]
-    parts += [mu * (gradient[:, :, a, b] + gradient[:, :, b, a]) for a, b in ((0, 1), (1, 2), (2, 0))]
-    return np.stack(parts, axis=2)
-
-
-def _energy(stress: Array, lame: Array) -> Array:
-    """(e, q, m) energy per volume of stress (e, q, 6, m)."""
-    lam, mu = (part[:, None, None] for part in lame.T)
-    normal, shear = stress[:, :, :3], stress[:, :, 3:]
-    squares = (normal**2).sum(axis=2) + 2 * (shear**2).sum(axis=2)
-    return np.asarray((squares - lam / (3 * lam + 2 * mu) * normal.sum(axis=2) ** 2) / (4 * mu))

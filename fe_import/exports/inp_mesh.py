@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fe_import.abaqus.parse import Deck, read_deck
+from fe_import.abaqus.deck import Deck
+from fe_import.abaqus.parse import read_deck
 from fe_import.abaqus.sets import LostSet, indices
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array, IntArray

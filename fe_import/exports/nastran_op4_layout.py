@@ -11,11 +11,14 @@ between two copies of its length.
 from __future__ import annotations
 
 import os
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, NoReturn
+
+import numpy as np
 
 from fe_import.errors import Cause, FEImportError
 
@@ -24,6 +27,7 @@ _CLOSING = (0, 4, 8, 16)  # bytes of the number in the record behind the last co
 _BIG_ROWS = 65536  # from here on sparse columns are BIGMAT whatever the sign of the rows
 _LONGEST_LINE = 1000
 _DIGITS = 9  # of an integer in a header
+_CLOSING_NUMBER = re.compile(r"[+-]?\d\.\d+(?:[ED][+-]?\d{2,3}|[+-]\d{3})", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -192,11 +196,17 @@ class _Text(_Walk):
             self.fail("not a line of an OUTPUT4 file")
         return raw.decode("ascii").rstrip()
 
-    def integers(self, line: str, count: int) -> list[int]:
-        texts = [line[8 * k : 8 * k + 8].strip() for k in range(count)]
+    def integers(self, line: str, widths: tuple[int, ...]) -> list[int]:
+        ends = np.cumsum(widths).tolist()
+        texts = [line[end - width : end].strip() for end, width in zip(ends, widths, strict=True)]
         if not all(t.removeprefix("-").isdigit() and len(t) <= _DIGITS for t in texts):
-            self.fail("whole numbers in columns of eight expected", line[:40])
+            self.fail(f"whole numbers in columns of {' and '.join(map(str, sorted(set(widths))))} expected", line[:40])
         return [int(t) for t in texts]
+
+    def record(self, count: int, wide: bool) -> list[int]:
+        """Whole numbers of a line; behind a header with ``|I16`` their columns may be wide."""
+        line = self.line()
+        return self.integers(line, (16 if wide and len(line) > 8 * count else 8,) * count)
 
     def matrices(self) -> Iterator[Op4Header]:
         while self.file.tell() < self.size:
@@ -205,13 +215,13 @@ class _Text(_Walk):
                 if self.file.read().strip():
                     self.fail("an empty line between matrices")
                 return
-            if line.endswith("|I16"):
-                self.fail("integers of 16 digits are not read", "|I16", "write the matrix in binary form")
-            columns, rows, form, kind = self.integers(line, 4)
+            wide = line.endswith("|I16")
+            columns, rows, form, kind = self.integers(line, (16, 16, 8, 8) if wide else (8, 8, 8, 8))
+            name, text = (line[48:56], line[56:-4]) if wide else (line[32:40], line[40:])
             self.check_header(rows, columns)
-            per_line, width = self.number_format(line[40:])
-            values = self.columns(rows, columns, kind, per_line, width)
-            yield Op4Header(line[32:40].strip().lower(), abs(rows), columns, form, kind, values)
+            per_line, width = self.number_format(text)
+            values = self.columns(rows, columns, kind, per_line, width, wide)
+            yield Op4Header(name.strip().lower(), abs(rows), columns, form, kind, values)
 
     def number_format(self, text: str) -> tuple[int, int]:
         """Numbers per line and their width, from ``1P,3E23.16``; 5E16.9 where the header ends with the name."""
@@ -222,17 +232,18 @@ class _Text(_Walk):
             self.fail("the format of the numbers is not understood", text, "such as 1P,5E16.9")
         return int(count), int(width)
 
-    def columns(self, rows: int, columns: int, kind: int, per_line: int, width: int) -> int:
+    def columns(self, rows: int, columns: int, kind: int, per_line: int, width: int, wide: bool) -> int:
         words = 1 if kind % 2 else 2
         last, total = 0, 0
         layout: str | None = None
         while last <= columns:
-            column, row, count = self.integers(self.line(), 3)
+            column, row, count = self.record(3, wide)
             self.check_column(column, last, columns)
             last = column
             if column > columns:
-                if len(self.line()) != width:  # one number, whatever its count of words says
-                    self.fail("the record behind the last column is not one number")
+                closing = self.line().strip()  # one number, whatever its count of words and its width say
+                if not _CLOSING_NUMBER.fullmatch(closing):
+                    self.fail("the record behind the last column is not one number", closing[:40])
                 return total
             layout = self.column_layout(row, rows, layout)
             if layout == "full":
@@ -242,7 +253,7 @@ class _Text(_Walk):
                 continue
             while count > 0:
                 if layout == "wide":
-                    length, row = self.integers(self.line(), 2)
+                    length, row = self.record(2, wide)
                     head, held = 2, length - 1
                 else:
                     packed = self.packed(self.line())

@@ -44,8 +44,8 @@ def check_mesh_error(
     if len(omega) <= 6:
         return ()
     error, energy = source.energy_of_error(shapes[:, 6 : 6 + _MODES], model.dof_map)
-    share = np.minimum(error / energy, _MOST)
-    worst = float((1 / np.sqrt(1 - share) - 1).max())
+    whole = np.maximum(energy, omega[6 : 6 + _MODES] ** 2 / 2)  # with that of beams and springs
+    worst = float(frequency_errors(error, whole).max())
     locking = [b.type for b in source.mesh.blocks if not b.element.midpoints and not b.element.incompatible]
     if worst > limit and locking:
         raise FEImportError(
@@ -57,3 +57,8 @@ def check_mesh_error(
             remedy="set raise_order = true in [solid], refine the mesh, or accept the error with a larger mesh_error",
         )
     return (HealthCheck("error of the first frequencies by the mesh, as jumps of stress tell", worst, limit),)
+
+
+def frequency_errors(error: Array, energy: Array) -> Array:
+    """(m,) errors of frequencies, as shares, of modes of which ``error`` is the error's part of the energy."""
+    return np.asarray(1 / np.sqrt(1 - np.minimum(error / energy, _MOST)) - 1)

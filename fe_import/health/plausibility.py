@@ -1,19 +1,20 @@
 """Units that slipped: figures of a link held against what links are like.
 
-A figure outside of its range is suspicious and becomes a failed health check that names the likely slip. Far outside,
-where nothing is built (denser than a star's shell, faster than any sound), the link is refused.
+A figure outside of its range is suspicious and a failed check that names the likely slip: the link is refused, unless
+its description says that it is unusual. Far outside, where nothing is built (denser than a star's shell, faster than
+any sound), it is refused in any case.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fe_import.description.records import Material
 from fe_import.errors import Cause, FEImportError
-from fe_import.modal.model import HealthCheck
+from fe_import.modal.model import NO_LIMIT, HealthCheck
 from fe_import.model import Array
 
 _THIN = 0.1  # a model of beams has no thickness: a tenth of its length encloses it
@@ -97,6 +98,11 @@ _EXPANSION = Range(
     below="",
     above="µm/(m K) read as 1/K? give 12e-6 for 12 of them",
 )
+SOUND_IN_MATRICES = Range(
+    *("speed of sound in the matrices", "m/s", 20.0, 5e4, 1e-6, 1e9),
+    below="stiffness in N/mm or MPa read as N/m or Pa, or mass in g read as kg? check units and scale of the matrices",
+    above="mass in t read as kg, or stiffness in other units? check units and scale of the matrices",
+)
 _FREQUENCY = Range(
     *("first elastic frequency", "Hz", 1e-3, 1e7, 1e-9, 1e12),
     below="stiffness in N/mm read as N/m, or mass in g read as kg? check units",
@@ -117,6 +123,27 @@ _DENSE = Range(
     below="",
     above='mass in g read as kg, set units.mass = "g"; m read as mm, set units.length = "m"',
 )
+
+
+def refuse_slips(checks: tuple[HealthCheck, ...], unusual: bool, where: str) -> tuple[HealthCheck, ...]:
+    """The checks, those of units not judged where a link is said to be unusual.
+
+    Raises
+    ------
+    FEImportError
+        ``BAD_FIELD``: a check of units failed, and the link is not said to be unusual.
+    """
+    if unusual:
+        return tuple(replace(c, limit=NO_LIMIT) if c.name.startswith("units: ") else c for c in checks)
+    for check in checks:
+        if check.name.startswith("units: ") and not check.ok:
+            raise FEImportError(
+                Cause.BAD_FIELD,
+                f"a unit seems to have slipped: {check.name.removeprefix('units: ')}",
+                where=f"{where}: units",
+                remedy="mend it, or set unusual = true in [units] if the link is like that",
+            )
+    return checks
 
 
 def plausible_link(

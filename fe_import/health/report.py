@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from fe_import.errors import Cause, FEImportError
 from fe_import.health.rigid_motion import rigid_motion_as_eigenmodes, rigid_motion_by_stiffness
 from fe_import.health.rotation_terms import rotation_departure
+from fe_import.health.rounding import MOST, rounding_share
 from fe_import.modal.inertia import InertiaInvariants, mass_properties
 from fe_import.modal.model import NO_LIMIT, HealthCheck
 from fe_import.model import Array, FEModel
@@ -22,14 +23,23 @@ from fe_import.reduction import Basis
 from fe_import.solver.sparse import modes_below
 
 _ROUNDING = 1e-9  # symmetry, mass properties: sums of many terms of one sign in double precision
-_RIGID = 1e-5  # rounding times the condition of a slender link's stiffness; a loose or grounded part gives 1
+_RIGID = 1e-5  # or what rounding allows; a loose or grounded part gives 1
 _RIGID_PRINTED = 1e-4  # the same with the 14 digits of exported text, which leave 1.2e-5 on the L of 100 hexahedra
+_LOOSE = 0.3  # a part that moves alone departs by 1
+_MARGIN = 10  # of rounding: a motion found by solving departs by 0.3 to 2 times its share
 _EIGEN = 1e-6
+_TOO_SLENDER = (
+    "the link is too slender for its elements: no solver finds its bending in double precision; use beams, or fewer, "
+    "longer elements"
+)
+_EIGEN_PRINTED = 1e-5  # with the ten digits of DMIG entries, which leave 3.5e-6 on an L of 40 beams
+ROUNDING = "rounding in the stiffness"
+RIGID = "rigid-body"  # begin of checks that loose parts and hinges fail
 _CAUSES = {
     "mass matrix": Cause.NOT_DEFINITE,
     "stiffness matrix": Cause.NOT_DEFINITE,
     "grounding": Cause.GROUNDED,
-    "rigid-body": Cause.NOT_DEFINITE,
+    RIGID: Cause.NOT_DEFINITE,
 }
 
 
@@ -83,7 +93,7 @@ def _refuse(checks: Iterable[tuple[HealthCheck, str]], where: str) -> None:
             cause = next((c for start, c in _CAUSES.items() if check.name.startswith(start)), Cause.EIGENSOLVER)
             raise FEImportError(
                 cause,
-                f"{check.name} is not zero",
+                f"{check.name} is not {'small' if check.name.startswith(ROUNDING) else 'zero'}",
                 where=where,
                 value=check.value,
                 limit=check.limit,
@@ -111,18 +121,22 @@ def check_basis(
     FEImportError
         NOT_DEFINITE: a part of the link moves without strain, or something holds it.
     """
+    least = _RIGID_PRINTED if model.kind == "matrices" else _RIGID
+    rounding = rounding_share(model, float(omega[6]), where) if len(omega) > 6 else 0.0
     checks = [
+        HealthCheck(f"{ROUNDING}, share of the first elastic ω²", rounding, MOST),
         HealthCheck(
-            "rigid-body motion by stiffness against geometry",
+            f"{RIGID} motion by stiffness against geometry",
             rigid_motion_by_stiffness(model, basis, stiffness),
-            _RIGID_PRINTED if model.kind == "matrices" else _RIGID,
-        )
+            max(least, min(_MARGIN * rounding, _LOOSE)),
+        ),
     ]
+    spent = _spent(model, rounding)
     if len(omega) > 6:
         frequency, departure = rigid_motion_as_eigenmodes(mass, stiffness, basis.rigid, float(omega[6]))
         checks += [
-            HealthCheck("rigid-body eigenvalues, per first elastic one", frequency, _EIGEN),
-            HealthCheck("rigid-body eigenmodes against geometry", departure, _EIGEN),
+            HealthCheck(f"{RIGID} eigenvalues, per first elastic one", frequency, spent),
+            HealthCheck(f"{RIGID} eigenmodes against geometry", departure, spent),
         ]
     carried = basis.fixed_interface.effective_mass
     if len(carried):
@@ -132,8 +146,13 @@ def check_basis(
         "look for loose parts, hinges, supports, matrices of another model, and for many small elements in a slender "
         "or very stiff part"
     )
-    _refuse(((check, remedy) for check in checks), where)
+    _refuse(((check, _TOO_SLENDER if check.name.startswith(ROUNDING) else remedy) for check in checks), where)
     return (*checks, *_missing_modes(model, omega), HealthCheck("condition of the basis", _condition(mass), NO_LIMIT))
+
+
+def _spent(model: FEModel, rounding: float) -> float:
+    """Limit of what rigid-body motions may cost, per first elastic ω²."""
+    return max(_EIGEN_PRINTED if model.kind == "matrices" else _EIGEN, rounding)
 
 
 def _missing_modes(model: FEModel, omega: Array) -> tuple[HealthCheck, ...]:
@@ -190,9 +209,15 @@ def _independent_diagonal(model: FEModel) -> Array:
 
 
 def check_reduction(
-    model: FEModel, shapes: Array, stiffness: Array, omega: Array, invariants: InertiaInvariants, where: str
+    model: FEModel,
+    shapes: Array,
+    stiffness: Array,
+    omega: Array,
+    invariants: InertiaInvariants,
+    rounding: float,
+    where: str,
 ) -> tuple[HealthCheck, ...]:
-    """Checks of the reduced link against the full model.
+    """Checks of the reduced link against the full model; ``rounding``: the share of ω² that it may make up.
 
     Raises
     ------
@@ -208,7 +233,7 @@ def check_reduction(
     distance = full.centre_of_mass @ full.centre_of_mass  # both inertias were moved here from the mesh origin
     inertia_scale = np.abs(full.inertia).max() + full.mass * distance
     elastic = omega[6:] ** 2
-    identity = np.eye(len(omega))
+    identity, spent = np.eye(len(omega)), _spent(model, rounding)
     checks = [
         HealthCheck("modes: rigid-body motion of geometry reproduced", float(reproduced.max()), _ROUNDING),
         HealthCheck("mass against the full model", abs(reduced.mass / full.mass - 1), _ROUNDING),
@@ -228,8 +253,8 @@ def check_reduction(
         strain = np.abs(np.diag(stiffness)[:6]).max() / elastic[0]
         spread = np.abs(np.diag(stiffness)[6:] / elastic - 1).max()
         checks += [
-            HealthCheck("strain energy of rigid-body modes, per first elastic mode", float(strain), _EIGEN),
-            HealthCheck("Rayleigh quotients against squared frequencies", float(spread), _EIGEN),
+            HealthCheck(f"strain energy of {RIGID} modes, per first elastic mode", float(strain), spent),
+            HealthCheck("Rayleigh quotients against squared frequencies", float(spread), max(_EIGEN, rounding)),
         ]
     if model.kind == "matrices":  # of a superelement only the kept nodes are known
         name = "centrifugal terms against those of a rigid body"

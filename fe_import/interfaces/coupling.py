@@ -31,7 +31,8 @@ class Coupling:
     Attributes
     ----------
     nodes : (n + i + a, 3) array
-        The model's nodes, then one per interface, then auxiliary nodes of large averaged faces [m].
+        The model's nodes, then one per interface that is none of them, then auxiliary nodes of large averaged faces
+        [m].
     dof_map : (n + i + a, 6) int array
         Row of each nodal component, -1 where a node lacks it.
     coupling : (d, f) sparse CSC
@@ -81,24 +82,32 @@ def couple_interfaces(
     ------
     FEImportError
         ``INTERFACE``: nodes that do not exist, too few, collinear or too close ones, a position far from the face,
-        rigid faces that share a node, averaged ones with none left of their own, too many nodes to average, faulty
-        weights, or two interfaces of one name.
+        rigid faces that share a node, averaged ones with none left of their own, a node that does not turn or that
+        follows, too many nodes to average, faulty weights, or two interfaces of one name.
     """
     faces = checked_faces(nodes, faces, source)
-    n, i = len(nodes), len(faces)
+    n = len(nodes)
     if dof_map is None:
         dof_map = np.full((n, 6), -1, dtype=np.int64)
         dof_map[:, :3] = np.arange(3 * n).reshape(n, 3)
     start = int(dof_map.max(initial=-1)) + 1 if rows is None else rows
     patches = [_patches(face, faces, nodes, source) for face in faces]
     auxiliary = [[patch.position for level in levels for patch in level] for levels in patches]
+    new = [k for k, face in enumerate(faces) if face.coupling != "node"]
+    i = len(new)
     added = start + np.arange(6 * (i + sum(map(len, auxiliary)))).reshape(-1, 6)
-    interface_rows, patch_rows = added[:i], np.split(added[i:], np.cumsum([len(a) for a in auxiliary])[:-1])
+    places = [n + new.index(k) if k in new else int(f.nodes[0]) for k, f in enumerate(faces)]
+    own_nodes = np.array(places, dtype=np.int64)
+    interface_rows = np.vstack([dof_map, added[:i]])[own_nodes]
+    patch_rows = np.split(added[i:], np.cumsum([len(a) for a in auxiliary])[:-1])
 
     state = Dependence.free(start + added.size) if state is None else state.extended(added.size)
-    for k in sorted(range(i), key=lambda k: faces[k].coupling != "rigid"):  # what is rigid follows its own node only
+    order = sorted(range(len(faces)), key=lambda k: faces[k].coupling != "rigid")
+    for k in order:  # what is rigid follows its own node only
         face, points = faces[k], nodes[faces[k].nodes]
-        if face.coupling == "rigid":
+        if face.coupling == "node":
+            _check_node(face, interface_rows[k], state, source)
+        elif face.coupling == "rigid":
             offsets = points - face.position
             followers = dof_map[face.nodes]
             if (state.columns(followers[followers >= 0]) < 0).any():
@@ -121,19 +130,31 @@ def couple_interfaces(
                 )
             state = averaged
     return Coupling(
-        nodes=np.vstack([nodes, *(face.position for face in faces), *(a for some in auxiliary for a in some)]),
+        nodes=np.vstack([nodes, *(faces[k].position for k in new), *(a for some in auxiliary for a in some)]),
         dof_map=np.vstack([dof_map, added]),
         coupling=state.matrix.tocsc(),
         independent=state.independent,
         interface_nodes=tuple(
-            InterfaceNode(f.name, n + k, f.position, f.nodes, f.shares, f.coupling) for k, f in enumerate(faces)
+            InterfaceNode(f.name, int(own), f.position, f.nodes, f.shares, f.coupling)
+            for f, own in zip(faces, own_nodes, strict=True)
         ),
     )
 
 
+def _check_node(face: InterfaceFace, rows: IntArray, state: Dependence, source: str) -> None:
+    """An interface that is a node must turn, and follow no others."""
+    if (rows < 0).any():
+        message, remedy = "is a node of a solid, which does not turn", "put it on a face, or on a node of a beam"
+    elif (state.columns(rows) < 0).any():
+        message, remedy = "is a node that follows others, by constraints of the mesh file", "put it on their reference"
+    else:
+        return
+    raise FEImportError(Cause.INTERFACE, f"interface {face.name!r} {message}", where=source, remedy=remedy)
+
+
 def _patches(face: InterfaceFace, faces: Sequence[InterfaceFace], nodes: Array, source: str) -> list[list[Patch]]:
     """Patches of an averaged face that shares no node with another interface."""
-    if face.coupling == "rigid":
+    if face.coupling != "averaged":
         return []
     shared = any(np.intersect1d(face.nodes, other.nodes).size for other in faces if other is not face)
     return divided(nodes[face.nodes], face.shares, shared, face.name, source)

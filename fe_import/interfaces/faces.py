@@ -1,5 +1,6 @@
 """The face of an interface: the nodes that a joint's interface node moves, rigidly (RBE2) or on average (RBE3).
 
+A node that turns (of a beam, of a rigid body) is an interface by itself: coupling ``node``, one node, in its place.
 For solids `interface_face` finds it in the mesh; for other models write
 ``InterfaceFace(name, nodes, position, coupling, weights)``. Either goes to
 `fe_import.interfaces.coupling.couple_interfaces`, which checks it and adds the interface node.
@@ -36,7 +37,7 @@ class InterfaceFace:
     position : (3,) array
         Of the interface node [m].
     coupling : str
-        ``rigid`` or ``averaged``.
+        ``rigid``, ``averaged`` or ``node``.
     weights : (k,) array or None
         Positive weights of the nodes, for the average; equal ones when None.
     """
@@ -155,6 +156,8 @@ def _check_count(name: str, nodes: IntArray, source: str) -> None:
 
 
 def _check_face(face: InterfaceFace, nodes: Array, source: str) -> None:
+    if face.coupling == "node":
+        return
     _check_count(face.name, face.nodes, source)
     if face.nodes[0] < 0 or face.nodes[-1] >= len(nodes):
         raise _faulty(
@@ -205,6 +208,12 @@ def _check_pairs(faces: Sequence[InterfaceFace], source: str) -> None:
             if face.name == other.name:
                 raise _faulty(f"two interfaces are named {face.name!r}", source)
             shared = np.intersect1d(face.nodes, other.nodes)
+            if shared.size and "node" in (face.coupling, other.coupling):
+                raise _faulty(
+                    f"interfaces {other.name!r} and {face.name!r} share node {shared[0]}",
+                    source,
+                    remedy="let each interface have nodes of its own",
+                )
             if shared.size and face.coupling == other.coupling == "rigid":
                 raise _faulty(
                     f"interfaces {other.name!r} and {face.name!r} share {shared.size} nodes, "

@@ -27,25 +27,34 @@ _SHAPES: dict[int, Any] = {  # nodes of a face -> element whose shape functions 
 _CORNERS = {3: ((0, 0), (1, 0), (0, 1)), 4: ((0, 0), (1, 0), (1, 1), (0, 1))}
 
 
+def face_shapes(count: int, points: Array) -> tuple[Array, Array]:
+    """Shape functions (count, q) of a face of ``count`` nodes, and their gradients (count, 2, q), at points (2, q)."""
+    element = _SHAPES[count]
+    values, gradients = np.empty((count, points.shape[1])), np.empty((count, *points.shape))
+    for local, node in enumerate(_local_nodes(count)):
+        values[node], gradients[node] = element.lbasis(points, local)
+    return values, gradients
+
+
 @cache
-def _face_rule(count: int) -> tuple[Array, Array, Array]:
-    """Shape functions (count, q), their gradients (count, 2, q) and weights (q,) at quadrature points of a face."""
+def _local_nodes(count: int) -> tuple[int, ...]:
+    """Our node at each of scikit-fem's, matched by place."""
     corners = np.array(_CORNERS[3 if count in (3, 6) else 4], dtype=float)
     edges = (corners + np.roll(corners, -1, axis=0)) / 2
     ours = np.vstack([corners, edges, corners.mean(axis=0)])[:count]
-    element = _SHAPES[count]
+    return tuple(int(np.abs(ours - place).sum(axis=1).argmin()) for place in _SHAPES[count].doflocs)
+
+
+@cache
+def _face_rule(count: int) -> tuple[Array, Array, Array]:
+    """Shape functions (count, q), their gradients (count, 2, q) and weights (q,) at quadrature points of a face."""
     x, w = np.polynomial.legendre.leggauss(4)
     x, w = (x + 1) / 2, w / 2
     s, t = (g.ravel() for g in np.meshgrid(x, x, indexing="ij"))
     weights = np.outer(w, w).ravel()
-    if len(corners) == 3:  # the square collapsed onto the triangle
+    if count in (3, 6):  # the square collapsed onto the triangle
         t, weights = (1 - s) * t, weights * (1 - s)
-    points = np.stack([s, t])
-    values, gradients = np.empty((count, len(weights))), np.empty((count, 2, len(weights)))
-    for local, place in enumerate(element.doflocs):
-        node = int(np.abs(ours - place).sum(axis=1).argmin())
-        values[node], gradients[node] = element.lbasis(points, local)
-    return values, gradients, weights
+    return *face_shapes(count, np.stack([s, t])), weights
 
 
 def nodal_areas(nodes: Array, faces: IntArray) -> Array:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fe_import.abaqus.attachments import Attached, attachments
+from fe_import.abaqus.deck import Deck
 from fe_import.abaqus.keywords import is_read, loss, loss_of_elements
 from fe_import.abaqus.materials import USED, deck_materials
-from fe_import.abaqus.parse import Deck, read_deck
+from fe_import.abaqus.parse import read_deck
 from fe_import.abaqus.sets import LostSet, indices, surface_nodes
 from fe_import.elements.attachments import renumbered
-from fe_import.elements.solid_mesh import MeshMaterials
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 
@@ -50,18 +51,11 @@ def read_abaqus(path: Path, name: str) -> RawMesh:
     _add_element_sets(deck, numbers, mesh)
     _add_node_sets(deck, place, mesh)
     _add_surfaces(deck, place, mesh)
-    mesh.materials = _materials(deck)
     attached = attachments(deck)
+    mesh.materials = replace(deck_materials(deck), fillings=tuple(attached.fillings))
     mesh.left_out += _left_out(deck, attached)
     mesh.attachments += [renumbered(i, place.__getitem__) for i in attached.items if i.keyword not in attached.reasons]
     return mesh
-
-
-def _materials(deck: Deck) -> MeshMaterials:
-    found = deck_materials(deck)
-    shown = deck.element_sets.names
-    sections = tuple((shown.get(name, name), material) for name, material in found.sections)
-    return MeshMaterials(found.constants, sections, found.lack, USED)
 
 
 def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:
@@ -71,6 +65,7 @@ def _left_out(deck: Deck, attached: Attached) -> list[LeftOut]:
         if name in attached.reasons:
             text += f" ({attached.reasons[name]})"
         used = name in attached.whole and name not in attached.reasons
+        used |= name in USED[:3] and "BEAM SECTION" in attached.whole
         return LeftOut(name, count, deck.places[name], "" if used else text, used)
 
     found = [entry(name, count, loss(name)) for name, count in deck.keywords.items() if not is_read(name)]
@@ -115,9 +110,7 @@ def _add_node_sets(deck: Deck, place: dict[int, int], mesh: RawMesh) -> None:
 
 
 def _add_surfaces(deck: Deck, place: dict[int, int], mesh: RawMesh) -> None:
-    connectivity = {
-        label: (kind, nodes) for kind, cells in deck.elements.items() for label, nodes in cells.items()
-    }
+    connectivity = deck.connectivity
     for shown, (by_nodes, rows) in deck.surfaces.items():
         try:
             members = surface_nodes(rows, deck.element_sets, connectivity, deck.node_sets, by_nodes)

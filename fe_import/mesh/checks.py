@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from fe_import.elements.attachments import AttachedMass, TiedNodes, nodes_of
 from fe_import.elements.reference_cells import Tuples
 from fe_import.elements.solid_elements import SolidElement
 from fe_import.elements.solid_mesh import SolidMesh, element_faces
@@ -78,6 +79,14 @@ def _check_repeated_nodes(mesh: SolidMesh) -> None:
 def _check_coincident_nodes(mesh: SolidMesh) -> None:
     limit = COINCIDENT * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     pairs = cKDTree(mesh.nodes).query_pairs(limit, output_type="ndarray")
+    if len(pairs):  # a tie, an equation, a beam may join such nodes
+        tied, held = (np.zeros(len(mesh.nodes) + len(mesh.further_nodes), dtype=bool) for _ in range(2))
+        for item in mesh.attachments:
+            if isinstance(item, TiedNodes):
+                tied[item.nodes] = True
+            elif not isinstance(item, AttachedMass):
+                held[nodes_of(item)] = True
+        pairs = pairs[~(tied[pairs].any(axis=1) | held[pairs].all(axis=1))]
     if len(pairs):
         a, b = sorted(pairs[np.lexsort(pairs.T[::-1])[0]].tolist())
         raise _faulty(
@@ -189,17 +198,45 @@ def _check_connections(mesh: SolidMesh) -> None:
             f"two elements have the same corners, one is {_element(mesh, int(shared.row[twins.argmax()]))}",
             "remove doubled elements",
         )
-    parts, part = connected_components(shared, directed=False)
+    _check_parts(mesh, connected_components(shared, directed=False)[1])
+
+
+def _check_parts(mesh: SolidMesh, part: IntArray) -> None:
+    """Parts of the mesh (elements,) that no face joins must be joined by attachments, and so must further nodes."""
+    count, further = int(part.max()) + 1, len(mesh.further_nodes)
+    vertex = np.empty(len(mesh.nodes) + further, dtype=np.int64)  # of the graph of parts, then further nodes
+    for block, _, numbers in mesh.parts():
+        vertex[block.elements] = part[numbers][:, None]
+    vertex[len(mesh.nodes) :] = count + np.arange(further)
+    rows = [vertex[np.array(nodes_of(item), dtype=np.int64)] for item in mesh.attachments]
+    pairs = np.array([(own[0], other) for own in rows for other in own[1:]], dtype=np.int64).reshape(-1, 2)
+    graph = sp.coo_array((np.ones(len(pairs)), pairs.T), shape=(count + further,) * 2)
+    together = connected_components(graph, directed=False)[1]
+    apart = np.setdiff1d(together[count:], together[:count])
+    if apart.size:
+        first = int((together[count:] == apart[0]).argmax())
+        names = {item.keyword for item in mesh.attachments if first - further in nodes_of(item)}
+        listed = ", ".join(f'"{name}"' for name in sorted(names))
+        raise _faulty(
+            mesh,
+            f"{', '.join(sorted(names))} on a node that nothing joins to the solid, "
+            f"at {mesh.further_nodes[first].tolist()}",
+            f"join it (*RIGID BODY, RBE2 ...), or ignore = [{listed}] in [solid]",
+            cause=Cause.DISCONNECTED,
+        )
+    part = together[:count][part]
+    parts = len(np.unique(part))
     if parts > 1:
         sizes = np.bincount(part)
-        smallest = _element(mesh, int((part == sizes.argmin()).argmax()))
-        one, others = (mesh.nodes_of(np.flatnonzero(own)) for own in (part == 0, part != 0))
+        rarest = int(np.where(sizes > 0, sizes, sizes.max() + 1).argmin())
+        smallest = _element(mesh, int((part == rarest).argmax()))
+        one, others = (mesh.nodes_of(np.flatnonzero(own)) for own in (part == part[0], part != part[0]))
         touching = np.intersect1d(one, others).size > 0
         raise _faulty(
             mesh,
             f"the mesh has {parts} parts that no element face joins"
             + (" (they touch at nodes or edges only)" if touching else "")
-            + f", the smallest of {sizes.min()} elements, with {smallest}",
+            + f", the smallest of {sizes[rarest]} elements, with {smallest}",
             "fuse the parts before meshing, or mesh each link alone",
             cause=Cause.DISCONNECTED,
             value=parts,

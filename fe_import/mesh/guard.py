@@ -89,6 +89,9 @@ def check_declared(path: Path, name: str) -> None:
             for what, count in _VTU_COUNT.findall(text[:_HEAD]):
                 _check_count(f"NumberOf{what.decode()}", _number(count), 50 * size, name)  # zlib packs 1000 : 1
         elif path.suffix.lower() == ".msh":
+            if text[:4] == b"$NOD":
+                message, remedy = "cannot be read as a mesh: MSH 1 of 2005", "open it with gmsh, save as MSH 4.1"
+                raise FEImportError(Cause.NOT_READABLE, message, where=name, remedy=remedy)
             for section in (b"$Nodes", b"$Elements"):
                 for count in _msh_counts(text, section):
                     _check_count(section.decode(), count, size // 4, name)
@@ -147,7 +150,9 @@ def _check_node_fields(section: bytes, counts: list[float], version: bytes, name
     blank = np.frombuffer(section, dtype=np.uint8) <= ord(" ")
     found = int((blank[:-1] & ~blank[1:]).sum())
     expected = found
-    if version in (b"4", b"4.1"):
+    if version in (b"4", b"4.0"):
+        expected = int(2 + 4 * sum(counts))
+    elif version == b"4.1":
         expected = int(4 * (1 + sum(counts)))
     elif version.startswith(b"2"):
         expected = int(1 + 4 * sum(counts))

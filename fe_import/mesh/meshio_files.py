@@ -21,6 +21,7 @@ from fe_import.mesh.guard import bounded_memory, check_declared, check_found
 from fe_import.mesh.raw import Block, RawMesh
 
 meshio._mesh.topological_dimension.update({"wedge15": 3, "pyramid13": 3})  # which meshio 5 knows but for this
+meshio.gmsh.main._readers["4"] = meshio.gmsh._gmsh40  # as gmsh calls MSH 4.0; meshio takes it for 4.1
 MOST_GROUPS = 1000  # different numbers in an array; more are labels, not groups
 _SHORT_NAMES = {"gmsh:physical": "physical", "medit:ref": "ref"}
 _OTHER_MEANING = {"gmsh:geometrical", "cell_tags", "point_tags", "gmsh:dim_tags"}

@@ -20,7 +20,10 @@ from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.includes import included_name, resolved
 from fe_import.files.text import TextFile
-from fe_import.mesh.nastran_attachments import Unused, attachment
+from fe_import.mesh.nastran_attachments import READERS, attached
+from fe_import.mesh.nastran_bulk import Bulk, Unused
+from fe_import.mesh.nastran_materials import solid_materials
+from fe_import.mesh.orders import HEIGHT_FIRST
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 from fe_import.model import IntArray
 from fe_import.nastran.cards import Card, read_cards
@@ -34,13 +37,16 @@ _SOLIDS = {  # card -> types by number of nodes
     "CPENTA": ("wedge6", "wedge15"),
     "CHEXA": ("hex8", "hex20"),
 }
-_ORDER = {  # where Nastran's order of nodes is another one: edges along the height come before those of the top
-    "wedge15": [*range(9), 12, 13, 14, 9, 10, 11],
-    "hex20": [*range(12), 16, 17, 18, 19, 12, 13, 14, 15],
-}
 _SHAPES = {2: ("line", 1), 3: ("triangle", 2), 4: ("quad", 2), 6: ("triangle6", 2), 8: ("quad8", 2)}
 _PROPERTIES = re.compile(r"(PSHELL|PCOMP|PSHEAR|PBAR|PBEAM|PROD|PTUBE|PBEND)")
 _BEGIN = re.compile(r"\s*BEGIN\b(?:\s+BULK)?\s*(?P<more>.*)", re.IGNORECASE)
+_CASE_MPC = re.compile(r"\s*MPC\s*=\s*(\d{1,9})\s*\Z", re.IGNORECASE)
+_PROPERTIES_OF = {  # cards that are used with others
+    "CBAR": ("PBAR", "PBARL", "MAT1"),
+    "CBEAM": ("PBEAM", "PBEAML", "MAT1"),
+    "CELAS1": ("PELAS",),
+    "CBUSH": ("PBUSH",),
+}
 _CASE_SET = re.compile(r"\s*SET\s+(\d{1,9})\s*=(.*)", re.IGNORECASE)
 MOST_DEEP = 20  # files that include each other
 _MOST_MEMBERS = 10_000_000  # of a set
@@ -64,9 +70,10 @@ def read_nastran(path: Path, name: str) -> RawMesh:
     lines: list[tuple[str, str]] = []
     _read(path, name, Path(name), lines, [])
     try:
-        first, cases = _case_control(lines)
+        first, cases, selected = _case_control(lines)
         bulk = lines[first:]
-        return _mesh(list(read_cards((text for text, _ in bulk), None, lambda k: bulk[k - 1][1])), cases)
+        cards = list(read_cards((text for text, _ in bulk), None, lambda k: bulk[k - 1][1]))
+        return _mesh(Bulk(cards, grid_points(card for card in cards if card.name in CARDS), selected), cases)
     except FEImportError as problem:
         if problem.cause is Cause.EXPORT:
             problem.cause, problem.message = Cause.NOT_READABLE, f"cannot be read as a mesh: {problem.message}"
@@ -91,8 +98,8 @@ def _read(path: Path, name: str, first: Path, lines: list[tuple[str, str]], with
             _read(target, str(target), first, lines, known)
 
 
-def _case_control(lines: list[tuple[str, str]]) -> tuple[int, dict[int, str]]:
-    """Number of lines before the bulk data, and the sets that stand there."""
+def _case_control(lines: list[tuple[str, str]]) -> tuple[int, dict[int, str], set[int] | None]:
+    """Number of lines before the bulk data, sets that stand there, and the sets of MPC that it selects, if it is."""
     begins = [k for k, (line, _) in enumerate(lines) if _BEGIN.match(line)]
     for k in begins:
         match = _BEGIN.match(lines[k][0])
@@ -102,11 +109,14 @@ def _case_control(lines: list[tuple[str, str]]) -> tuple[int, dict[int, str]]:
     if len(begins) > 1:
         raise _fault(lines[begins[1]][1], "bulk data begin twice", "write one bulk data file")
     if not begins:
-        return 0, {}
+        return 0, {}, None
+    selected: set[int] = set()
     sets: dict[int, str] = {}
     number, text = 0, ""
     for line, _ in lines[: begins[0]]:
         stripped = line.partition("$")[0].strip()
+        if chosen := _CASE_MPC.match(stripped):
+            selected.add(int(chosen[1]))
         match = _CASE_SET.match(stripped)
         if match:
             number, text = int(match[1]), match[2]
@@ -115,35 +125,38 @@ def _case_control(lines: list[tuple[str, str]]) -> tuple[int, dict[int, str]]:
         if number:
             sets[number] = text
             number = number if text.rstrip().endswith(",") else 0
-    return begins[0] + 1, sets
+    if len(selected) > 1:
+        message, remedy = "cases select several sets of MPC", "give one case; a link has the same constraints always"
+        raise _fault(lines[begins[0]][1], message, remedy)
+    return begins[0] + 1, sets, selected
 
 
 def _fault(where: str, message: str, remedy: str) -> FEImportError:
     return FEImportError(Cause.NOT_READABLE, message, where=where, remedy=remedy)
 
 
-def _mesh(cards: list[Card], cases: dict[int, str]) -> RawMesh:
-    points = grid_points(card for card in cards if card.name in CARDS)
+def _mesh(bulk: Bulk, cases: dict[int, str]) -> RawMesh:
+    cards, points = bulk.cards, bulk.points
     place = {label: k for k, label in enumerate(points.positions)}
     properties = {card.integer(1) for card in cards if _PROPERTIES.match(card.name)}
     cells: dict[str, list[list[int]]] = {}
     owners: dict[str, list[int]] = {}
     labels: set[int] = set()
     left_out: list[tuple[str, str, str]] = []
-    attached, reasons = _attachments(cards, place)
+    attachments, reasons = _attachments(bulk, properties)
     for card in cards:
         kind_of_card = card.name.rstrip("_")  # as meshio writes those of second order
-        wanted = SURFACES.get(kind_of_card) or LINES.get(kind_of_card)
+        marks = _marks(card, properties)
         if kind_of_card in _SOLIDS:
             kind, nodes = _solid(card, *_SOLIDS[kind_of_card])
             shape = MESH_ELEMENTS[kind].meshio_name
-        elif wanted and card.integer(2, card.integer(1)) not in properties:
-            shape, nodes = _SHAPES[wanted][0], [card.integer(k) for k in range(3, 3 + wanted)]
+        elif marks:
+            shape, nodes = _SHAPES[marks][0], [card.integer(k) for k in range(3, 3 + marks)]
             left_out.append((card.name, card.where, ""))
         else:
             why = f" ({reasons[card.name]})" if card.name in reasons else ""
             left_out.append((card.name, card.where, loss(card.name) + why))
-            if card.name == "GRID":
+            if card.name in ("GRID", "GRDSET"):
                 left_out.pop()
                 left_out += _of_grid(card)
             continue
@@ -159,26 +172,42 @@ def _mesh(cards: list[Card], cases: dict[int, str]) -> RawMesh:
     dimensions = {**dict(_SHAPES.values()), **{e.meshio_name: 3 for e in MESH_ELEMENTS.values()}}
     blocks = [Block(shape, dimensions[shape], np.array(rows, dtype=np.int64)) for shape, rows in cells.items()]
     mesh = RawMesh(np.array(list(points.positions.values()), dtype=float).reshape(-1, 3), blocks)
-    mesh.attachments += [renumbered(item, place.__getitem__) for item in attached if item.keyword not in reasons]
+    mesh.attachments += [renumbered(item, place.__getitem__) for item in attachments if item.keyword not in reasons]
     used = {item.keyword for item in mesh.attachments}
-    mesh.left_out += [replace(i, loss="", used=True) if i.name in used else i for i in _counted(left_out)]
+    used |= {name for keyword in used for name in _PROPERTIES_OF.get(keyword, ())}
+    for entry in _counted(left_out):
+        known = entry.name in used or (entry.name in READERS and entry.name not in reasons)
+        mesh.left_out.append(replace(entry, loss="", used=entry.name in used) if known else entry)
+    mesh.materials = solid_materials(bulk, {n for shape in cells if dimensions[shape] == 3 for n in owners[shape]})
     _add_properties(mesh, [np.array(owners[shape]) for shape in cells])
     _add_sets(mesh, cards, cases, place)
     return mesh
 
 
-def _attachments(cards: list[Card], place: dict[int, int]) -> tuple[list[Attachment], dict[str, str]]:
+def _marks(card: Card, properties: set[int]) -> int:
+    """How many grid points a surface or line element has that only marks them; 0 for other cards.
+
+    Those with pin flags or offsets are meant as beams: without a property they are refused.
+    """
+    name = card.name.rstrip("_")
+    if name in LINES and any(card.fields[8:]):
+        return 0
+    count = SURFACES.get(name) or LINES.get(name) or 0
+    return count if count and card.integer(2, card.integer(1)) not in properties else 0
+
+
+def _attachments(bulk: Bulk, properties: set[int]) -> tuple[list[Attachment], dict[str, str]]:
     """What cards attach, and why cards of a name are not used."""
     found: list[Attachment] = []
     reasons: dict[str, str] = {}
-    for card in cards:
+    for card in bulk.cards:
         try:
-            item = attachment(card)
+            items = None if _marks(card, properties) else attached(card, bulk)
         except Unused as reason:
             reasons.setdefault(card.name, f"{reason}, {card.where.rpartition(': ')[2]}")
             continue
-        if item is not None:
-            missing = next((n for n in nodes_of(item) if n not in place), None)
+        for item in items or []:
+            missing = next((n for n in nodes_of(item) if n not in bulk.points.positions), None)
             if missing is not None:
                 raise card.fault("it needs a grid point that is not there", missing)
             found.append(item)
@@ -192,16 +221,16 @@ def _solid(card: Card, linear: str, quadratic: str) -> tuple[str, list[int]]:
         given.pop()
     for kind in (linear, quadratic):
         if len(given) == MESH_ELEMENTS[kind].size and all(given):
-            return kind, [given[k] for k in _ORDER.get(kind, range(len(given)))]
+            return kind, [given[k] for k in HEIGHT_FIRST.get(kind, range(len(given)))]
     sizes = " or ".join(str(MESH_ELEMENTS[kind].size) for kind in (linear, quadratic))
     raise card.fault("another number of grid points than these elements have", sum(map(bool, given)), sizes)
 
 
 def _of_grid(card: Card) -> Iterable[tuple[str, str, str]]:
     if card.field(7) and card.field(7) != "0":
-        yield "PS of GRID", card.where, "supports (a link is free, and joints hold it)"
+        yield f"PS of {card.name}", card.where, "supports (a link is free, and joints hold it)"
     if card.field(8) and card.field(8) != "0":
-        yield "SEID of GRID", card.where, "superelements"
+        yield f"SEID of {card.name}", card.where, "superelements"
 
 
 def _counted(found: list[tuple[str, str, str]]) -> list[LeftOut]:

@@ -1,20 +1,20 @@
-"""Mesh files: everything that meshio reads -> a checked mesh of solid elements with its named sets.
+"""Mesh files: our own readers and everything that meshio reads -> a checked mesh of solid elements with its named sets.
 
-meshio stays behind `fe_import.mesh.meshio_files`; decks of Abaqus and CalculiX are read by
-`fe_import.mesh.abaqus_files`, bulk data of Nastran by `fe_import.mesh.nastran_files`.
+meshio stays behind `fe_import.mesh.meshio_files`; what it does not read, or not whole, has readers of its own.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fe_import.elements.attachments import AttachedMass, Attachment, nodes_of, renumbered
+from fe_import.elements.attachments import Attachment, nodes_of, renumbered
 from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.elements.solid_mesh import ElementBlock, SolidMesh
 from fe_import.errors import Cause, FEImportError
@@ -24,7 +24,14 @@ from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
 from fe_import.model import IntArray
 
-_NASTRAN = (".bdf", ".fem", ".nas")
+_READERS = {  # by suffix: module and function, imported when asked for
+    ".inp": ("fe_import.mesh.abaqus_files", "read_abaqus"),
+    **dict.fromkeys((".bdf", ".fem", ".nas"), ("fe_import.mesh.nastran_files", "read_nastran")),
+    ".cdb": ("fe_import.mesh.ansys_files", "read_ansys"),
+    **dict.fromkeys((".e", ".ex2", ".exo"), ("fe_import.mesh.exodus_files", "read_exodus")),
+    ".unv": ("fe_import.mesh.universal_files", "read_universal"),
+}
+_OTHERS = ("fe_import.mesh.meshio_files", "read_with_meshio")
 _BY_MESHIO_NAME = {element.meshio_name: name for name, element in MESH_ELEMENTS.items()}
 
 
@@ -72,9 +79,10 @@ def read_mesh(path: Path, ignore: Sequence[str] = ()) -> SolidMesh:
     dense[used] = np.arange(len(used))
     element_sets, node_sets, lost = _sets(raw, solids, dense)
     blocks = _joined(raw, solids, dense)
-    further, attachments = _attachments(raw, left_out, dense, str(path))
+    further, attachments = _attachments(raw, left_out, dense)
+    names = _further_names(raw, further)
     mesh = SolidMesh(
-        points[used], blocks, element_sets, node_sets, str(path), lost, left_out, points[further], attachments,
+        points[used], blocks, element_sets, node_sets, str(path), lost, left_out, points[further], names, attachments,
         raw.materials,
     )  # fmt: skip
     if raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
@@ -90,17 +98,9 @@ def _read(path: Path) -> RawMesh:
             Cause.NOT_READABLE, "cannot be read as a mesh: not a file", where=str(path), remedy="check the path"
         )
     with unpacked(path) as plain:
-        if plain.suffix.lower() == ".inp":
-            from fe_import.mesh.abaqus_files import read_abaqus
-
-            return read_abaqus(plain, str(path))
-        if plain.suffix.lower() in _NASTRAN:
-            from fe_import.mesh.nastran_files import read_nastran
-
-            return read_nastran(plain, str(path))
-        from fe_import.mesh.meshio_files import read_with_meshio  # meshio is heavy
-
-        return read_with_meshio(plain, str(path))
+        module, function = _READERS.get(plain.suffix.lower(), _OTHERS)
+        read: Callable[[Path, str], RawMesh] = getattr(import_module(module), function)
+        return read(plain, str(path))
 
 
 def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]:
@@ -125,23 +125,21 @@ def _left_out(raw: RawMesh, ignore: Sequence[str], where: str) -> dict[str, int]
 
 
 def _attachments(
-    raw: RawMesh, left_out: dict[str, int], dense: IntArray, where: str
+    raw: RawMesh, left_out: dict[str, int], dense: IntArray
 ) -> tuple[IntArray, tuple[Attachment, ...]]:
     """Points of no element that attachments need, and these: elements' nodes, then from -1 backwards the others."""
     chosen = [item for item in raw.attachments if item.keyword not in left_out]
     further = sorted({node for item in chosen for node in nodes_of(item) if dense[node] < 0})
     number = {node: k - len(further) for k, node in enumerate(further)}
-    joined = {node for item in chosen if not isinstance(item, AttachedMass) for node in nodes_of(item)}
-    for item in chosen:
-        if isinstance(item, AttachedMass) and item.node in number and item.node not in joined:
-            raise FEImportError(
-                Cause.DISCONNECTED,
-                f"{item.keyword} on a node that nothing joins to the solid, at {raw.points[item.node].tolist()}",
-                where=where,
-                remedy=f'join it (*RIGID BODY, RBE2 ...), or ignore = ["{item.keyword}"] in [solid]',
-            )
     items = tuple(renumbered(i, lambda node: number[node] if node in number else int(dense[node])) for i in chosen)
     return np.array(further, dtype=np.int64), items
+
+
+def _further_names(raw: RawMesh, further: IntArray) -> dict[str, int]:
+    """Sets of one point that is none of an element."""
+    place = {int(node): k - len(further) for k, node in enumerate(further)}
+    found = {name: np.unique(np.asarray(points)) for name, points in raw.point_sets.items() if np.size(points)}
+    return {name: place[int(own[0])] for name, own in found.items() if len(own) == 1 and int(own[0]) in place}
 
 
 def _joined(raw: RawMesh, solids: list[int], dense: IntArray) -> tuple[ElementBlock, ...]:
@@ -168,7 +166,10 @@ def _solid_blocks(raw: RawMesh, where: str) -> list[int]:
             remedy="mesh with one of the supported types",
         )
     if not counts:
-        found = _listing((block.type, len(block.cells)) for block in raw.blocks) or "no elements at all"
+        others: Counter[str] = Counter()
+        for block in raw.blocks:
+            others[block.type] += len(block.cells)
+        found = _listing(others.items()) or "no elements at all"
         raise FEImportError(
             Cause.MESH,
             f"no solid elements, found {found}",

@@ -9,10 +9,13 @@ import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports import Export
-from fe_import.models.export_rigid import listed
+from fe_import.models.export_rigid import listed, row_name
 from fe_import.models.measures import asymmetry
 
 _ASYMMETRY = 1e-9
+_FEW = 2  # entries, of both triangles
+_ROUNDING = 1e-12  # of the largest diagonal entry
+_RESISTS_NOTHING, _RESISTS = 1e-5, 1e-2  # share of its terms; exported stiffness has 6 digits and more
 _LARGEST = 1e60  # of mass and stiffness in any unit; squares stay finite
 _FARTHEST = 1e12
 
@@ -32,7 +35,6 @@ def check_export(export: Export, where: str) -> None:
             raise _fault(f"the {name} matrix has the wrong size", where, shape, square, "take both of one export")
         if not (np.abs(matrix.data) <= _LARGEST).all():
             raise _fault(f"the {name} matrix holds a number that is not finite or absurd", where, limit=_LARGEST)
-        _check_symmetry(matrix, name, where)
     if export.nodes.shape != (count, 3) or export.labels.shape != (count,):
         raise _fault("some nodes have no position or no number", where)
     if not (np.abs(export.nodes) <= _FARTHEST).all():
@@ -42,18 +44,82 @@ def check_export(export: Export, where: str) -> None:
         raise _fault("two nodes of one number", where, int(values[times.argmax()]))
     _check_rows(export, size, where)
     _check_nodes(export, where)
+    for name, matrix in (("stiffness", export.stiffness), ("mass", export.mass)):
+        _check_symmetry(matrix, name, where, export)
+    _check_signs(export, where)
+    _check_exchanged(export, where)
     if export.orientations is not None:
         product = export.orientations.transpose(0, 2, 1) @ export.orientations
         if not np.abs(product - np.eye(3)).max(initial=0.0) < 1e-6:
             raise _fault("the axes of a node's frame are not orthonormal", where)
 
 
-def _check_symmetry(matrix: sp.csc_array, name: str, where: str) -> None:
+def _check_signs(export: Export, where: str) -> None:
+    """Diagonals are not negative: of one row, of a matrix, of both."""
+    flipped = []
+    for name, matrix in (("stiffness", export.stiffness), ("mass", export.mass)):
+        diagonal = matrix.diagonal()
+        negative = np.flatnonzero(diagonal < -_ROUNDING * np.abs(diagonal).max(initial=0.0))
+        if not len(negative):
+            continue
+        if (diagonal <= 0).all():
+            flipped.append(name)
+            continue
+        row = int(negative[0])
+        raise FEImportError(
+            Cause.NOT_DEFINITE,
+            f"the {name} matrix is negative on its diagonal in {len(negative)} of {len(diagonal)} rows, the first is "
+            f"{row_name(export.dof_map, export.labels, row)}: a sign is wrong there",
+            where=where,
+            value=float(diagonal[row]),
+            limit="zero or more",
+            remedy="mend the signs of these rows, or look for a negative mass or spring",
+        )
+    if flipped:
+        what = " and ".join(flipped)
+        raise FEImportError(
+            Cause.NOT_DEFINITE,
+            f"negative throughout, all signs are flipped: {what}",
+            where=where,
+            remedy="export K of K u = f and M of kinetic energy, not their negatives",
+        )
+
+
+def _check_exchanged(export: Export, where: str) -> None:
+    """A mass that resists no translation, beside a stiffness that does, is the stiffness."""
+    rows = export.dof_map[:, :3]
+    rows = rows[(rows >= 0).all(axis=1)]
+    moved = np.zeros((export.mass.shape[0], 3))
+    moved[rows.ravel(), np.tile(np.arange(3), len(rows))] = 1.0
+    shares = []
+    for matrix in (export.stiffness, export.mass):
+        forces, terms = np.abs(matrix @ moved).max(initial=0.0), (abs(matrix) @ moved).max(initial=0.0)
+        shares.append(forces / terms if terms else 0.0)
+    if export.mass.nnz and shares[1] < _RESISTS_NOTHING and shares[0] > _RESISTS:
+        raise FEImportError(
+            Cause.EXPORT,
+            "mass and stiffness are exchanged: the mass matrix resists no translation of the link, the stiffness does",
+            where=where,
+            value=f"{shares[1]:.1e} and {shares[0]:.1e} of their terms",
+            remedy="exchange the two files, or the names of the two matrices",
+        )
+
+
+def _check_symmetry(matrix: sp.csc_array, name: str, where: str, export: Export) -> None:
     if (found := asymmetry(matrix)) <= _ASYMMETRY:
         return
     if min(sp.triu(matrix, 1).nnz, sp.tril(matrix, -1).nnz) == 0:
         message = f"the {name} matrix holds one triangle, where its file declares all entries"
         raise _fault(message, where, remedy="declare it symmetric, or export both triangles")
+    off = abs(matrix - matrix.T)
+    if off.count_nonzero() <= _FEW:
+        place = sp.coo_array(off)
+        row, column = (int(c[place.data.argmax()]) for c in place.coords)
+        places = f"{row_name(export.dof_map, export.labels, row)} and {row_name(export.dof_map, export.labels, column)}"
+        message = f"the {name} matrix is not symmetric at one place: {places}"
+        values = f"{matrix[row, column]:.6g} and {matrix[column, row]:.6g}"
+        remedy = "mend the entry, one of the two has a wrong value or sign"
+        raise FEImportError(Cause.NOT_DEFINITE, message, where=where, value=values, limit="equal", remedy=remedy)
     raise FEImportError(
         Cause.NOT_DEFINITE,
         f"the {name} matrix is not symmetric",

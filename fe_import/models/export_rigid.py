@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
+from fe_import.exports.dofs import COMPONENTS
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.measures import GROUNDING, grounding
 
@@ -97,7 +98,7 @@ def _odd(message: str, where: str, value: Array, expected: str) -> FEImportError
         where=f"{where}: matrices",
         value=value.tolist(),
         limit=f"{expected} to {_DIRECTED:g}",
-        remedy="check the order of the dofs, and that the file is whole",
+        remedy="check the order of the dofs, the signs of the entries, and that the file is whole",
     )
 
 
@@ -115,6 +116,9 @@ def _reason(model: FEModel, rigid: Array, labels: IntArray) -> tuple[str, str]:
             message += f" (positions have {model.notes['positions']})"
             return message, "name the deck as 'mesh', which has all digits"
         return message, "check the unit of length, the mesh, the order of the dofs and the frames of the nodes"
+    if pair := _flipped_pair(model, force):
+        names = " and ".join(row_name(model.dof_map, labels, row) for row in pair)
+        return f"the stiffness entry between {names} has the wrong sign", "mend it, and its twin in the other triangle"
     size = force[rows, :3].max(axis=(1, 2))
     held = size > _NOTICED * size.max()
     if held.mean() <= _LOCAL:
@@ -128,6 +132,27 @@ def _reason(model: FEModel, rigid: Array, labels: IntArray) -> tuple[str, str]:
         "export the full matrices, in CalculiX by *FREQUENCY, SOLVER=MATRIXSTORAGE, or check supports and the order of "
         "the dofs",
     )
+
+
+def _flipped_pair(model: FEModel, force: Array) -> tuple[int, int] | None:
+    """Two rows that alone resist translations, each with twice the entry between them."""
+    resisting = force[:, :3].max(axis=1)
+    rows = np.flatnonzero(resisting > _NOTICED * resisting.max())
+    if len(rows) != 2:
+        return None
+    i, j = int(rows[0]), int(rows[1])
+    twice = 2 * abs(float(model.stiffness[i, j]))
+    return (i, j) if np.abs(resisting[rows] - twice).max() <= _NOTICED * twice else None
+
+
+def row_name(dof_map: IntArray, labels: IntArray, row: int) -> str:
+    """Row, component and node, by its number; modal coordinates have none."""
+    found = np.argwhere(dof_map == row)
+    if not len(found):
+        return f"row {row + 1}, a modal coordinate"
+    node, component = found[0]
+    number = labels[node] if node < len(labels) else "of an interface"
+    return f"row {row + 1}, {COMPONENTS[component]} of node {number}"
 
 
 def listed(labels: IntArray) -> str:

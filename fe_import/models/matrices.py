@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.description.link import LinkFile
-from fe_import.description.records import Matrices
+from fe_import.description.records import LinkDescription, Matrices
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports import EXPORTS, Export, ExportFormat
 from fe_import.files.toml import choose, convert
@@ -33,7 +33,12 @@ def matrices_model(link: LinkFile) -> FEModel:
     description, where = link.description, str(link.path)
     if description.matrices is None:
         raise FEImportError(Cause.BAD_FIELD, "not a link of matrices", where=where)
-    export = read_export(link, description.matrices)
+    return export_model(read_export(link, description.matrices), description, where)
+
+
+def export_model(export: Export, description: LinkDescription, where: str) -> FEModel:
+    """The model of matrices that are read; see `matrices_model`."""
+    assert description.matrices is not None
     check_export(export, f"{where}: matrices")
     export = along_mesh_axes(export)
     if "positions" in export.notes:

@@ -8,10 +8,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.description.link import LinkFile
-from fe_import.description.records import LinkDescription, Solid
-from fe_import.elements.attachments import AttachedSpring, needs_rotations
-from fe_import.elements.solid import SolidMaterial, assemble_solid
-from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
+from fe_import.description.records import Interface, LinkDescription, Solid
+from fe_import.elements.attachments import AttachedBeam, AttachedSpring, needs_rotations
+from fe_import.elements.elasticity import turned_moduli
+from fe_import.elements.solid import SolidMaterial, assemble_solid, volume
+from fe_import.elements.solid_mesh import FILLING, SolidMesh, surface_triangles
 from fe_import.elements.solid_orders import raised, with_incompatible_modes
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
@@ -19,8 +20,9 @@ from fe_import.files.toml import choose
 from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.mesh.read import read_mesh
-from fe_import.model import FEModel
+from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.attached import attached_constraints, attached_matrices, attached_nodes
+from fe_import.models.hinges import check_hinges
 
 
 def solid_model(link: LinkFile) -> FEModel:
@@ -44,31 +46,37 @@ def solid_model(link: LinkFile) -> FEModel:
             value=solid.mesh,
             remedy="give a path that starts at the folder of the link description",
         )
-    mesh = read_mesh(path, solid.ignore)
+    return mesh_model(read_mesh(path, solid.ignore), description, where)
+
+
+def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEModel:
+    """The model of a checked mesh; see `solid_model`."""
+    solid = description.solid
+    assert solid is not None
     if solid.raise_order:
         mesh = raised(mesh)
     if solid.hex8 == "incompatible-modes":
         mesh = with_incompatible_modes(mesh)
     materials, own = _materials(description, solid, mesh, where), not (solid.material or solid.regions)
-    mass, stiffness = assemble_solid(mesh, materials)
-    lame = np.empty((mesh.count, 2))
-    for material in materials:
-        lame[slice(None) if material.elements is None else material.elements] = material.lame
-    faces = _faces(description, mesh, where)
+    mass, stiffness = assemble_solid(mesh, materials, _fillings(mesh, materials, where))
+    faces, untied = _faces(description, solid, mesh, where), dict[str, int]()
     if mesh.attachments:
         places = attached_nodes(mesh)
         added, springs = attached_matrices(mesh, places)
         mass, stiffness = _sum(mass, added), _sum(stiffness, springs)
-        constraints = attached_constraints(mesh, places)
+        constraints, untied = attached_constraints(mesh, places)
         coupled = couple_interfaces(places.nodes, faces, where, places.dof_map, places.rows, constraints)
     else:
         coupled = couple_interfaces(mesh.nodes, faces, where)
+    stiffness = coupled.extended(stiffness)
+    if mesh.attachments:
+        check_hinges(mesh, places, coupled, stiffness)
     return FEModel(
         name=description.name,
         nodes=coupled.nodes,
         dof_map=coupled.dof_map,
         mass=coupled.extended(mass),
-        stiffness=coupled.extended(stiffness),
+        stiffness=stiffness,
         interface_nodes=coupled.interface_nodes,
         independent=coupled.independent,
         coupling=coupled.coupling,
@@ -76,10 +84,10 @@ def solid_model(link: LinkFile) -> FEModel:
         triangles=surface_triangles(mesh),
         kind="solid",
         source=where,
-        stress=solid_stress(mesh, lame),
+        stress=solid_stress(mesh, materials),
         left_out={name: n for name, n in mesh.left_out.items() if not own or name not in mesh.materials.names},
-        materials=mesh.materials.constants if own else {},
-        notes=_attached_notes(mesh),
+        materials=_constants(mesh, own),
+        notes=_attached_notes(mesh, untied),
         second_order_lack=_second_order_lack(mesh),
     )
 
@@ -90,9 +98,12 @@ def _sum(matrix: sp.csc_array, added: sp.csc_array) -> sp.csc_array:
     return (sp.csc_array((coo.data, coo.coords), shape=added.shape) + added).tocsc()
 
 
-def _attached_notes(mesh: SolidMesh) -> dict[str, str]:
+def _attached_notes(mesh: SolidMesh, untied: dict[str, int]) -> dict[str, str]:
     counts = Counter(item.keyword for item in mesh.attachments)
-    return {"attached": ", ".join(f"{count} {name}" for name, count in counts.items())} if counts else {}
+    if not counts:
+        return {}
+    free = {name: f" ({count} nodes beyond its tolerance stay free)" for name, count in untied.items()}
+    return {"attached": ", ".join(f"{count} {name}{free.get(name, '')}" for name, count in counts.items())}
 
 
 def _second_order_lack(mesh: SolidMesh) -> str:
@@ -134,7 +145,7 @@ def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str)
 
 def _materials_of_mesh(mesh: SolidMesh, where: str) -> list[SolidMaterial]:
     found = mesh.materials
-    lost = next((name for name, _ in found.sections if name not in mesh.element_sets), None)
+    lost = next((s.elements for s in found.sections if s.elements not in mesh.element_sets), None)
     if found.lack or lost is not None:
         reason = found.lack or f"its set {lost!r} holds no solid elements that could be followed"
         raise FEImportError(
@@ -143,21 +154,66 @@ def _materials_of_mesh(mesh: SolidMesh, where: str) -> list[SolidMaterial]:
             where=f"{where}: solid",
             remedy="give material = NAME for the whole mesh, or [[solid.regions]] for its element sets",
         )
-    return [SolidMaterial(*found.constants[name], mesh.element_sets[key]) for key, name in found.sections]
-
-
-def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[InterfaceFace]:
     result = []
+    for section in found.sections:
+        m, elements = found.constants[section.material], mesh.element_sets[section.elements]
+        moduli = m.moduli
+        if moduli is not None and section.orientation:
+            moduli = turned_moduli(moduli, found.orientations[section.orientation](mesh.centres(elements)))
+        result.append(SolidMaterial(m.youngs_modulus, m.poissons_ratio, m.density, elements, moduli))
+    return result
+
+
+def _fillings(mesh: SolidMesh, materials: list[SolidMaterial], where: str) -> list[tuple[IntArray, float]]:
+    """Elements with nonstructural mass and its density."""
+    result: list[tuple[IntArray, float]] = []
+    for filling in () if FILLING in mesh.left_out else mesh.materials.fillings:
+        if filling.elements not in mesh.element_sets:
+            raise FEImportError(
+                Cause.NOT_USED,
+                f"{FILLING}: its set {filling.elements!r} holds no solid elements that could be followed",
+                where=where,
+                remedy=f'mend the set, or ignore = ["{FILLING}"] in [solid]',
+            )
+        elements = mesh.element_sets[filling.elements]
+        if not filling.total:
+            result.append((elements, filling.density))
+            continue
+        parts = [elements if m.elements is None else np.intersect1d(elements, m.elements) for m in materials]
+        shares = [m.density if filling.by_mass else 1.0 for m in materials]
+        whole = sum(share * volume(mesh, part) for share, part in zip(shares, parts, strict=True))
+        result += [(part, share * filling.total / whole) for share, part in zip(shares, parts, strict=True)]
+    return result
+
+
+def _constants(mesh: SolidMesh, own: bool) -> dict[str, tuple[float, float, float]]:
+    """Young's modulus, Poisson's ratio and density of the materials of the file that are used: solids', beams'."""
+    found = mesh.materials.constants if own else {}
+    result = {name: (m.youngs_modulus, m.poissons_ratio, m.density) for name, m in found.items()}
+    for item in mesh.attachments:
+        if isinstance(item, AttachedBeam) and (item.element.density or not item.line_mass):
+            e = item.element
+            ratio = e.youngs_modulus / (2 * e.shear_modulus) - 1
+            result.setdefault(item.material, (e.youngs_modulus, ratio, e.density))
+    return result
+
+
+def _faces(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[InterfaceFace]:
+    result = []
+    names = _named_nodes(solid, mesh, where)
     for k, interface in enumerate(link.interfaces):
         place = f"{where}: interfaces[{k}]"
-        if interface.node or not interface.face:
+        if bool(interface.node) == bool(interface.face):
             raise FEImportError(
                 Cause.INTERFACE,
-                "an interface of a solid link sits on a face",
+                "an interface of a solid link sits on a face, or on a node that turns",
                 where=place,
                 value=interface.node or None,
-                remedy="give face = SET",
+                remedy="give face = SET, or node = NAME for a node of a beam or of a rigid body",
             )
+        if interface.node:
+            result.append(_node(interface, mesh, names, place))
+            continue
         position = None if interface.position is None else np.asarray(interface.position, dtype=float)
         try:
             weights = interface.weights or ("area" if interface.coupling == "averaged" else "uniform")
@@ -170,12 +226,42 @@ def _faces(link: LinkDescription, mesh: SolidMesh, where: str) -> list[Interface
     return result
 
 
+def _node(interface: Interface, mesh: SolidMesh, names: dict[str, int], place: str) -> InterfaceFace:
+    """An interface on a node: of ``solid.nodes``, or the only one of a set of the mesh."""
+    count = len(mesh.nodes) + len(mesh.further_nodes)
+    alone = {name: int(own[0]) for name, own in mesh.node_sets.items() if len(own) == 1}
+    known = {**alone, **{name: count + k for name, k in mesh.further_names.items()}, **names}
+    if interface.node not in known:
+        raise FEImportError(
+            Cause.INTERFACE,
+            "no node of this name, neither of [solid.nodes] nor alone in a set of the mesh",
+            where=f"{place}.node",
+            value=interface.node,
+            limit=", ".join(sorted(known)) or "none is named",
+            remedy="give face = SET, or a node of a beam or of a rigid body by the set that holds it alone",
+        )
+    for field in ("position", "weights"):
+        if getattr(interface, field):
+            message, remedy = f"an interface on a node has no {field}", "remove the field, or couple a face"
+            raise FEImportError(Cause.INTERFACE, message, where=f"{place}.{field}", remedy=remedy)
+    if interface.coupling != "rigid":
+        message, remedy = "an interface on a node couples no others", "remove the field, or couple a face"
+        raise FEImportError(Cause.INTERFACE, message, where=f"{place}.coupling", remedy=remedy)
+    node = known[interface.node]
+    return InterfaceFace(interface.name, np.array([node]), _positions(mesh)[node], "node")
+
+
+def _positions(mesh: SolidMesh) -> Array:
+    return np.vstack([mesh.nodes, mesh.further_nodes])
+
+
 def _named_nodes(solid: Solid, mesh: SolidMesh, where: str) -> dict[str, int]:
-    """Mesh nodes nearest to the named positions."""
+    """Nodes of the mesh, and of what is attached to it, nearest to the named positions."""
     result = {}
-    limit = 0.05 * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    nodes = _positions(mesh)
+    limit = 0.05 * float(np.linalg.norm(np.ptp(nodes, axis=0)))
     for name, position in solid.nodes.items():
-        distance = np.linalg.norm(mesh.nodes - np.asarray(position), axis=1)
+        distance = np.linalg.norm(nodes - np.asarray(position), axis=1)
         nearest = int(distance.argmin())
         if not distance[nearest] <= limit:
             raise FEImportError(

@@ -84,7 +84,9 @@ def read_cards(
         line = raw.partition("$")[0].rstrip().expandtabs(8)
         if not line:
             continue
-        head, data = _split(line)
+        head, data, more = _split(line)
+        if more and (name or head[:1].isalpha()) and (names is None or name or head.rstrip("* ").upper() in names):
+            raise _damaged(place(number), "more fields than a line holds", raw)
         if name and _COMMENT_IN_WORD.search(raw):
             raise _damaged(place(number), "a comment begins within a field", raw)
         if not head or head[0] in "+*":
@@ -93,7 +95,10 @@ def read_cards(
             continue
         if name:
             if not head[0].isalpha():
-                raise _damaged(place(number), "neither a card nor the continuation of one", raw)
+                message = "neither a card nor the continuation of one"
+                if head.startswith("="):
+                    message = "cards repeated with = and * are not followed"
+                raise _damaged(place(number), message, raw)
             yield Card(name, tuple(fields), place(start))
         name = ""
         keyword = head.rstrip("* ").upper()
@@ -116,12 +121,17 @@ def _damaged(where: str, message: str, line: str) -> FEImportError:
     return FEImportError(Cause.EXPORT, message, where=where, value=line.strip()[:60], remedy="export again")
 
 
-def _split(line: str) -> tuple[str, list[str]]:
-    """First field, and the fields behind it: always eight, or four wide ones."""
+def _split(line: str) -> tuple[str, list[str], bool]:
+    """First field, the fields behind it (always eight, or four wide ones), and whether numbers are left over.
+
+    Between commas one more field may name the continuation.
+    """
     if "," in line[:_FREE_FORMAT]:
         head, *data = (part.strip() for part in line.split(","))
         count = 4 if "*" in head else 8
-        return head, (data + [""] * count)[:count]
+        left = [text for text in data[count:] if text]
+        more = len(left) > 1 or any(_INTEGER.fullmatch(text) or _REAL.fullmatch(text) for text in left)
+        return head, (data + [""] * count)[:count], more
     head = line[:8].strip()
     width = 16 if "*" in head else 8
-    return head, [line[at : at + width].strip() for at in range(8, _DATA_COLUMNS, width)]
+    return head, [line[at : at + width].strip() for at in range(8, _DATA_COLUMNS, width)], False

@@ -1,4 +1,4 @@
-"""Nastran grid points: positions and displacement frames from GRID and CORD2R, CORD2C, CORD2S cards."""
+"""Nastran grid points: positions and displacement frames from GRID and CORD1R ... CORD2S cards."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array
 from fe_import.nastran.cards import Card
 
-_FRAMES = ("CORD2R", "CORD2C", "CORD2S")
-_OTHER_FRAMES = ("CORD1R", "CORD1C", "CORD1S")
+_BY_POINTS = ("CORD2R", "CORD2C", "CORD2S")
+_BY_GRIDS = ("CORD1R", "CORD1C", "CORD1S")
 _DEEPEST = 100  # coordinate systems defined in each other
-CARDS = frozenset({"GRID", "GRDSET", "SPOINT", "PLOTEL", *_FRAMES, *_OTHER_FRAMES})
+CARDS = frozenset({"GRID", "GRDSET", "SPOINT", "PLOTEL", *_BY_POINTS, *_BY_GRIDS})
 
 
 @dataclass(frozen=True)
@@ -30,16 +30,19 @@ class GridPoints:
     scalar_points : set of int
     lines : list of pairs
         Points that PLOTEL cards join.
+    frames : Frames
+        All coordinate systems.
     """
 
     positions: dict[int, Array]
     axes: dict[int, Array]
     scalar_points: set[int]
     lines: list[tuple[int, int]]
+    frames: Frames
 
 
 @dataclass(frozen=True)
-class _Frame:
+class Frame:
     """Origin and axes (columns) in the basic frame; ``kind``: rectangular R, cylindrical C, spherical S."""
 
     origin: Array
@@ -73,7 +76,7 @@ class _Frame:
         return np.asarray(self.axes @ local)
 
 
-_BASIC = _Frame(np.zeros(3), np.eye(3))
+_BASIC = Frame(np.zeros(3), np.eye(3))
 
 
 def grid_points(cards: Iterable[Card]) -> GridPoints:
@@ -82,17 +85,15 @@ def grid_points(cards: Iterable[Card]) -> GridPoints:
     Raises
     ------
     FEImportError
-        ``EXPORT``: a faulty field, a number that stands twice, GRDSET; ``BAD_REFERENCE``: a coordinate system that is
-        not there, or not a CORD2R, CORD2C or CORD2S.
+        ``EXPORT``: a faulty field, a number that stands twice; ``BAD_REFERENCE``: a coordinate system that is
+        not there.
     """
     found = list(cards)
-    frames = _Frames(found)
-    result = GridPoints({}, {}, set(), [])
+    frames = Frames(found)
+    result = GridPoints({}, {}, set(), [], frames)
     for card in found:
         if card.name == "GRID":
             _add_grid(card, frames, result)
-        elif card.name == "GRDSET":
-            raise card.fault("defaults for GRID are not followed", remedy="write CP and CD on each GRID")
         elif card.name == "SPOINT":
             result.scalar_points.update(_numbers(card))
         elif card.name == "PLOTEL":
@@ -100,14 +101,20 @@ def grid_points(cards: Iterable[Card]) -> GridPoints:
     return result
 
 
-def _add_grid(card: Card, frames: _Frames, points: GridPoints) -> None:
+def _defaults(cards: list[Card]) -> tuple[int, int]:
+    """Coordinate systems of grid points that name none: of GRDSET, else the basic one."""
+    found = [card for card in cards if card.name == "GRDSET"]
+    if len(found) > 1:
+        raise found[1].fault("this card stands twice")
+    return (found[0].integer(2, 0), found[0].integer(6, 0)) if found else (0, 0)
+
+
+def _add_grid(card: Card, frames: Frames, points: GridPoints) -> None:
     number = card.integer(1)
     if number in points.positions:
         raise card.fault("this grid point stands twice", number)
-    placed = frames.get(card.integer(2, 0), card)
-    local = np.array([card.real(k, 0.0) for k in (3, 4, 5)])
-    points.positions[number] = placed.position(local)
-    frame = card.integer(6, 0)
+    points.positions[number] = frames.of_grid(card)
+    frame = card.integer(6, frames.moved)
     if frame:
         points.axes[number] = frames.get(frame, card).axes_at(points.positions[number])
 
@@ -121,51 +128,67 @@ def _numbers(card: Card) -> Iterable[int]:
     return [card.integer(k) for k in range(1, len(card.fields) + 1) if card.field(k)]
 
 
-class _Frames:
+class Frames:
     """Coordinate systems by number, each worked out when it is asked for."""
 
     def __init__(self, cards: list[Card]) -> None:
-        self._known: dict[int, _Frame] = {0: _BASIC}
-        self._cards: dict[int, Card] = {}
+        self._known: dict[int, Frame] = {0: _BASIC}
+        self._cards: dict[int, tuple[Card, int]] = {}  # with the field of its number: a CORD1 may define two
+        self._grids = {card.integer(1): card for card in cards if card.name == "GRID"}
         self._open: set[int] = set()
+        self._placed, self.moved = _defaults(cards)
         for card in cards:
-            if card.name.startswith("CORD"):
-                number = card.integer(1)
-                if number in self._cards:
-                    raise card.fault("this coordinate system stands twice", number)
-                self._cards[number] = card
+            for at in (1, 5) if card.name in _BY_GRIDS and card.field(5) else (1,):
+                if card.name.startswith("CORD"):
+                    number = card.integer(at)
+                    if number in self._cards:
+                        raise card.fault("this coordinate system stands twice", number)
+                    self._cards[number] = card, at
 
-    def get(self, number: int, user: Card) -> _Frame:
+    def of_grid(self, card: Card) -> Array:
+        """(3,) position that a GRID states."""
+        return self.get(card.integer(2, self._placed), card).position(np.array([card.real(k, 0.0) for k in (3, 4, 5)]))
+
+    def get(self, number: int, user: Card) -> Frame:
         """The coordinate system that a card refers to."""
         if number in self._known:
             return self._known[number]
-        card = self._cards.get(number)
-        if card is None or card.name not in _FRAMES:
+        if number not in self._cards:
             raise FEImportError(
                 Cause.BAD_REFERENCE,
-                f"{user.name}: coordinate system {number} is " + ("not there" if card is None else f"a {card.name}"),
+                f"{user.name}: coordinate system {number} is not there",
                 where=user.where,
                 value=number,
-                limit="0, a CORD2R, CORD2C or CORD2S",
-                remedy="export grid points in the basic frame, or with coordinate systems by three points (CORD2R ...)",
+                limit="0, or that of a CORD1R, CORD1C, CORD1S, CORD2R, CORD2C or CORD2S",
+                remedy="export the coordinate systems too, or grid points in the basic frame",
             )
+        card, at = self._cards[number]
         if number in self._open or len(self._open) > _DEEPEST:
             deep = number not in self._open
             message = "is nested too deeply" if deep else "is defined by itself"
             raise card.fault(f"this coordinate system {message}", number)
         self._open.add(number)
-        frame = self._known[number] = _by_points(card, self.get(card.integer(2, 0), card))
+        if card.name in _BY_GRIDS:
+            points = [self._grid(card.integer(at + k), card) for k in (1, 2, 3)]
+        else:
+            reference = self.get(card.integer(2, 0), card)
+            points = [reference.position(np.array([card.real(k + j, 0.0) for j in range(3)])) for k in (3, 6, 9)]
+        frame = self._known[number] = _by_points(card, *points)
         self._open.discard(number)
         return frame
 
+    def _grid(self, number: int, user: Card) -> Array:
+        if number not in self._grids:
+            raise user.fault("it needs a grid point that is not there", number)
+        return self.of_grid(self._grids[number])
 
-def _by_points(card: Card, reference: _Frame) -> _Frame:
-    """CORD2x: origin A, z axis towards B, xz plane through C, all in the frame of reference."""
-    a, b, c = (reference.position(np.array([card.real(k + j, 0.0) for j in range(3)])) for k in (3, 6, 9))
+
+def _by_points(card: Card, a: Array, b: Array, c: Array) -> Frame:
+    """Origin A, z axis towards B, xz plane through C."""
     z, side = b - a, c - a
     y = np.cross(z, side)
     if not np.linalg.norm(y) > 1e-9 * np.linalg.norm(z) * np.linalg.norm(side):
         raise card.fault("the three points lie on one line")
     axes = np.stack([np.cross(y, z), y, z], axis=1)
     axes /= np.linalg.norm(axes, axis=0)
-    return _Frame(a, axes, card.name[-1])
+    return Frame(a, axes, card.name[-1])

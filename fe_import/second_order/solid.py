@@ -16,6 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fe_import.elements.elasticity import stress_of_gradient
 from fe_import.elements.solid_assembly import chunks, motion_of_modes, slopes
 from fe_import.elements.solid_stress import SolidStress
 from fe_import.modal.second_order import SecondOrder
@@ -129,18 +130,15 @@ def _membrane_forces(solid: SolidStress, fields: Array, dof_map: IntArray, first
         corners, k = mesh.nodes[nodes], element.size
         derivatives, volume = slopes(element, corners, points)  # ∂_a of shape k
         volume *= weights
-        modes = motion_of_modes(element, corners, *solid.lame[some].T)
+        moduli = solid.moduli_of(some)
+        modes = motion_of_modes(element, corners, moduli)
         moved = fields[dof_map[nodes, :3]]  # (e, k, 3, n)
         gradient = np.einsum("eqak,ekcn->eqacn", derivatives[..., :k], moved)  # ∂_a u_c
         for begin in range(0, len(first), 64):
             pairs = slice(begin, begin + 64)
             product = np.einsum("eqacp,eqbcp->eqabp", gradient[..., first[pairs]], gradient[..., second[pairs]])
-            strain = (product + product.swapaxes(2, 3)) / 2
-            lam, mu = (part[:, None, None] for part in solid.lame[some].T)
-            stress = 2 * mu[..., None, None] * strain
-            trace = lam * np.einsum("eqaap->eqp", strain)
-            for a in range(3):
-                stress[:, :, a, a] += trace
+            parts = stress_of_gradient(product, moduli)
+            stress = parts[:, :, ((0, 3, 5), (3, 1, 4), (5, 4, 2))]
             forces = np.einsum("eqak,eqacp,eq->ekcp", derivatives, stress, volume, optimize=True)
             inner = forces[:, k:].reshape(len(nodes), -1, forces.shape[3])
             forces = forces[:, :k] + (modes.swapaxes(1, 2) @ inner).reshape(len(nodes), k, 3, -1)

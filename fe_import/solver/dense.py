@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import Array
 
+MECHANISM = "some part can move without strain"  # in errors that `fe_import.reduce` completes with the place
 Matrix: TypeAlias = Array | sp.csc_array
 
 
@@ -18,7 +19,7 @@ def singular_matrix(what: str) -> FEImportError:
     """The error for a stiffness matrix that is not positive definite."""
     return FEImportError(
         Cause.NOT_DEFINITE,
-        f"the {what} is singular or unstable: some part can move without strain",
+        f"the {what} is singular or unstable: {MECHANISM}",
         remedy="connect all parts, remove hinges inside the link, or give the free part stiffness",
     )
 

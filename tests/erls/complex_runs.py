@@ -7,6 +7,7 @@ are those that the run left: what its own iterations stop at is a matter of the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +24,7 @@ from erls.simulation.chains import models_of
 
 STEP = 1e-30
 ENOUGH = 12  # iterations: each leaves a tenth or less
-_RICHARDSON = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
+RICHARDSON = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Given:
 def given(run: ChainRun, parameter: Parameter, step: float) -> Given:
     """By differences of what is packed, of fourth order; the modal models stay as they are."""
     parts = []
-    for at, weight in _RICHARDSON:
+    for at, _ in RICHARDSON:
         scene = scene_with(run.scene, parameter, parameter.value + at * step)
         chain: Any = formulate(
             build_mechanism(scene, lambda text: None, *models_of(run)).mechanism, run.scene.record.simulation
@@ -46,8 +47,14 @@ def given(run: ChainRun, parameter: Parameter, step: float) -> Given:
         system = chain.compiled
         np.testing.assert_array_equal(system.integers, run.formulation.compiled.integers)  # type: ignore[attr-defined]
         limitless = np.where(np.isfinite(system.reals), system.reals, 0.0)  # a torque without limit, say
-        parts.append([weight / step * part for part in (limitless, *chain.initial_state())])
-    return Given(*(np.asarray(sum(part)) for part in zip(*parts, strict=True)))
+        parts.append((limitless, *chain.initial_state()))
+    return Given(*(summed(part, step) for part in zip(*parts, strict=True)))
+
+
+def summed(values: Sequence[np.ndarray], step: float) -> np.ndarray:
+    """Derivative from values at steps of `RICHARDSON`: none of what does not change, as its weights add up to zero."""
+    weights = [weight / step for _, weight in RICHARDSON]
+    return np.asarray(sum(w * (value - values[0]) for w, value in zip(weights, values, strict=True)))
 
 
 def differentiated(run: ChainRun, by: Given, spectral_radius: float | None) -> np.ndarray:

@@ -14,6 +14,7 @@ from erls.cli.main import main
 
 OPTIONS = {
     "reduce": ["--output", "-o", "--method", "--modes", "--force", "--json"],
+    "export": ["--output", "-o", "--format", "--force", "--json"],
     "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict",
                  "--resume", "--until", "--force", "--json"],
     "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--force", "--json"],
@@ -25,6 +26,7 @@ OPTIONS = {
     "effects": ["--set", "--json"],
     "linearize": ["--output", "-o", "--at", "--equilibrium", "--inputs", "--outputs", "--campbell", "--locus", "--mode",
                   "--set", "--force", "--json"],
+    "invert": ["--output", "-o", "--method", "--confirm", "--correct", "--set", "--force", "--json"],
     "info": ["--json"],
     "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--overlay", "--force", "--json"],
 }

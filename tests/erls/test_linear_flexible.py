@@ -15,6 +15,7 @@ from erls.errors import SceneError, SimulationError
 from erls.linear.diagrams import campbell, root_locus
 from erls.linear.model import LinearModel
 from erls.linear.response import frequency_response, step_response, telling_frequencies, telling_times
+from erls.report.linear_page import model_text
 from erls.run.chain.run import ChainRun
 
 TORQUE = scenes.ROOT / "data/l_shape/torque.toml"
@@ -35,19 +36,22 @@ def test_frequencies_of_the_third_test_of_the_paper(formulation: str) -> None:
     np.testing.assert_allclose(across[:4], [12.28, 31.0, 120.3, 151.9], rtol=2e-3)
 
 
-def test_campbell_diagram_of_a_spinning_beam() -> None:
+@pytest.mark.parametrize("formulation", ["erls", "nodal"])
+def test_campbell_diagram_of_a_spinning_beam(formulation: str) -> None:
     """The slow mode of a cantilever that turns in its plane: J. R. Wright et al., J. Appl. Mech. 49 (1982) 197-202.
 
     Their first frequency across the plane of rotation at η = 0, 1, 2, 3 in units of √(EI / ρA L⁴), less η² within it.
     Beam of data/spin_up: EI = 1.4e4 N m², ρA = 1.2 kg/m, L = 10 m; shear and rotary inertia take less than 1e-3 of it.
     """
     unit = np.sqrt(1.4e4 / 1.2) / 100
-    speeds = [0.0, unit, 2 * unit, 3 * unit]
-    found = campbell(scenes.ROOT / "data/spin_up/beam.toml", "hub", speeds)
-    wright = np.array([3.5160, 3.6817, 4.1373, 4.7973])
-    expected = np.sqrt(wright**2 - np.arange(4) ** 2)
+    turns = np.arange(4) if formulation == "erls" else np.array([0, 3])
+    beam = erls.load_scene(scenes.ROOT / "data/spin_up/beam.toml", [f"simulation.formulation={formulation}"])
+    found = campbell(beam, "hub", turns * unit)
+    wright = np.array([3.5160, 3.6817, 4.1373, 4.7973])[turns]
+    expected = np.sqrt(wright**2 - turns**2)
     np.testing.assert_allclose(found.poles.imag[:, 0] / unit, expected, rtol=1e-3)
     assert not found.warnings
+    assert all(model.steady for model in found.models)
 
 
 def _blade(folder: Path, axis_deg: float) -> Path:
@@ -67,11 +71,13 @@ def _blade(folder: Path, axis_deg: float) -> Path:
     return scenes.write_toml(folder / "blade.toml", data)
 
 
+@pytest.mark.parametrize("formulation", ["erls", "nodal"])
 @pytest.mark.parametrize(("axis_deg", "flaps"), [(0.0, 0.0), (90.0, 1.0)])
-def test_campbell_diagram_of_a_hinged_blade(tmp_path: Path, axis_deg: float, flaps: float) -> None:
+def test_campbell_diagram_of_a_hinged_blade(tmp_path: Path, axis_deg: float, flaps: float, formulation: str) -> None:
     """ω² = Ω² (m e c / I + 1) as it flaps, without the 1 as it lags: exact, e = 0.2 m, c = 0.5 m, I = m l² / 3."""
     speeds = [2.0, 30.0]
-    found = campbell(_blade(tmp_path, axis_deg), "mast", speeds)
+    blade = erls.load_scene(_blade(tmp_path, axis_deg), [f"simulation.formulation={formulation}"])
+    found = campbell(blade, "mast", speeds)
     expected = np.array(speeds) * np.sqrt(0.2 * 0.5 * 3 + flaps)
     np.testing.assert_allclose(found.poles[:, 0], 1j * expected, rtol=1e-9)
 
@@ -82,11 +88,24 @@ def test_speed_beyond_all_numbers_has_no_equilibrium(tmp_path: Path) -> None:
         campbell(_blade(tmp_path, 0.0), "mast", [1e300])
 
 
-def test_nodes_of_a_spinning_joint_are_never_at_rest(tmp_path: Path) -> None:
-    """Refused by name."""
+def test_nodes_go_along_with_joints_on_the_ground_alone(tmp_path: Path) -> None:
+    """Others are refused by name; so is rest, without a speed."""
     scene = erls.load_scene(_blade(tmp_path, 0.0), ["simulation.formulation=nodal"])
-    with pytest.raises(SceneError, match="never at rest"):
-        campbell(scene, "mast", [1.0])
+    with pytest.raises(SceneError, match="joint on the ground alone"):
+        campbell(scene, "hinge", [1.0])
+
+
+def test_real_parts_of_an_instant_are_marked() -> None:
+    """Quick vibrations of an undamped L that swings: 1e-5 of the frequency is no growth and no decay."""
+    model = erls.linearize(TORQUE, at=0.1)
+    quick = {mode.pole for mode in model.modes if mode.frequency_hz > 160}
+    assert not model.steady
+    assert any(pole.real > 0 for pole in quick)
+    assert all(model.noise(pole) for pole in quick)
+    assert not {mode.pole for mode in model.unstable} & quick
+    assert "~0 ± " in model_text(model)
+    damped = erls.linearize(erls.load_scene(TORQUE, ["links.l.damping={ratio=0.001}"]), at=0.1)
+    assert not any(damped.noise(mode.pole) for mode in damped.modes if mode.frequency_hz > 160)
 
 
 def test_places_seen_from_a_turning_hub(tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from body_scenes_data import PENDULUM, STRIP, body_scene
 import erls
 from erls.errors import Cause, SceneError, SimulationError
 from erls.linear.diagrams import campbell
-from erls.linear.model import transmission_zeros
 from erls.linear.response import frequency_response
+from erls.linear.zeros import transmission_zeros
 
 G = 9.81
 LENGTHS, MASSES = (0.6, 0.4), (2.0, 1.5)
@@ -266,6 +266,21 @@ def test_zeros_of_a_known_system() -> None:
     system = tf2ss(np.poly([-2, 3j, -3j]), np.poly([-1, 2j, -2j, -5]))
     np.testing.assert_allclose(np.sort_complex(transmission_zeros(*system)), [-2, -3j, 3j], atol=1e-12)
     assert len(transmission_zeros(*tf2ss([1.0], [1.0, 0.0, 0.0]))) == 0
+
+
+def test_zeros_of_more_outputs_than_inputs() -> None:
+    """[(s + 2)(s + 3), (s + 2)(s² + 9)] over one denominator have the common zero alone, and so has its transpose; two
+    transfer functions without a common one have none.
+    """
+    from scipy.signal import tf2ss
+
+    poles = np.poly([-1, 2j, -2j, -5]).real
+    numerators = np.array([[0.0, *np.poly([-2, -3])], np.poly([-2, 3j, -3j]).real])
+    a, b, c, d = tf2ss(numerators, poles)
+    np.testing.assert_allclose(transmission_zeros(a, b, c, d), [-2], atol=1e-9)
+    np.testing.assert_allclose(transmission_zeros(a.T, c.T, b.T, d.T), [-2], atol=1e-9)
+    numerators[0] = [0.0, *np.poly([-4, -3])]
+    assert len(transmission_zeros(*tf2ss(numerators, poles))) == 0
 
 
 @pytest.mark.parametrize(

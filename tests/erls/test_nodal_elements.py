@@ -82,7 +82,7 @@ def _somewhere(case: str) -> tuple[NodalSystem, Nodes, list[Array]]:
 @pytest.mark.parametrize("case", CASES)
 def test_complex_steps_through_the_residual(case: str) -> None:
     """By state, velocity, acceleration, multipliers and each real constant: against central differences, and against
-    mass matrix and gradients of the conditions. Compiled for complex numbers on demand.
+    mass matrix, gradients of the conditions and exact tangents. Compiled for complex numbers on demand.
     """
     system, q, motion = _somewhere(case)
     complex_one, n = Complex(system, q, any_scalar), system.size
@@ -106,6 +106,10 @@ def test_complex_steps_through_the_residual(case: str) -> None:
             columns.append(check(moved, 1.0))
         jacobians.append(np.array(columns).reshape(len(values), n + system.constraints).T)
     gradient, mass = dense(system.constraint_matrix(TIME, q)), dense(system.mass_matrix(TIME, q))
+    if system.local and case != "springs SE(3)":  # whose dampers iterations alone know
+        for found, jacobian in zip(system.exact_stiffness_and_damping(TIME, q, *motion[1:]), jacobians, strict=False):
+            largest = np.abs(jacobian).max()
+            np.testing.assert_allclose(dense(found), jacobian[:n], rtol=0, atol=1e-14 * largest)
     np.testing.assert_allclose(jacobians[0][n:], gradient, rtol=0, atol=1e-12 * np.abs(gradient).max(initial=1.0))
     np.testing.assert_allclose(jacobians[2][:n], mass, rtol=0, atol=1e-12 * np.abs(mass).max())
     np.testing.assert_allclose(jacobians[3][:n], gradient.T, rtol=0, atol=1e-12 * np.abs(gradient).max(initial=1.0))

@@ -34,6 +34,7 @@ def _column(folder: Path, times: float, tilt_deg: float = 0.0, **initial: Any) -
     data = scenes.merged(
         scenes.ARM_LINK,
         {
+            "units": {"unusual": True},
             "materials": {"m": {"youngs_modulus": 1e6, "density": density}},
             "frame": {"nodes": {"root": [0.0, 0.0, 0.0], "tip": [1.0, 0.0, 0.0]}, "theory": "euler-bernoulli"},
         },

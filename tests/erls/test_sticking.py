@@ -279,12 +279,14 @@ def test_what_sticking_does_not_go_with(settings: dict[str, Any], tmp_path: Path
 
 
 def test_what_makes_steps_of_its_own_refuses_it(tmp_path: Path) -> None:
-    """Steppers and derivatives take the compiled equations, which leave this friction out."""
+    """Steppers take the compiled equations, which leave this friction out, and so do derivatives of nodal runs."""
     scene = erls.load_scene(arm(tmp_path, (20.0, 5.0)))
     with pytest.raises(SceneError, match="where a joint sticks") as caught:
         erls.stepper(scene)
     assert caught.value.where.endswith("friction.law")
-    with pytest.raises(SceneError, match="joints that stick are not known yet"):
+    settings = {"formulation": "nodal", "integrator": "generalized_alpha", "step": 1e-3, "duration": 0.1}
+    scene = erls.load_scene(arm(tmp_path, (20.0, 5.0), simulation=settings))
+    with pytest.raises(SceneError, match="joints stick are not known yet"):
         erls.sensitivities(scene, {"end": lambda run: run.position("end", 0.1)}, ["joints.second.friction.force"])
 
 

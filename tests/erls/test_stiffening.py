@@ -85,6 +85,7 @@ def _spinning(name: str, rate: float, folder: Path) -> Mechanism:
     data = scenes.merged(
         scenes.ARM_LINK,
         {
+            "units": {"unusual": True},
             "materials": {"m": {"youngs_modulus": 1e6, "density": 1.0}},
             "sections": {"s": section},
             "frame": {"nodes": {"root": [0.0, 0.0, 0.0], "tip": [1.0, 0.0, 0.0]}, "theory": "euler-bernoulli"},

@@ -18,8 +18,9 @@ from fuzzing import Facts, Reader
 from fuzzing_facts import content, taken
 from fuzzing_hdf5 import edited
 from link_files import toml
+from mesh_writers import archive, exodus, universal
 from modal_models import synthetic_model
-from solid_meshes import box
+from solid_meshes import box, bulk
 from superelements import Reduced, condensed, deck, frame_model, matrix_input, punch, substructure
 
 from fe_import.description.link import load_link
@@ -197,6 +198,10 @@ def _meshes() -> Iterator[Reader]:
             path = Path(folder) / f"box{suffix}"
             meshio.write(path, hexes, form, binary=binary)
             sound[suffix] = path.read_bytes()
+    sound[".unv"], sound[".cdb"] = universal(mesh).encode(), archive(mesh).encode()
+    with tempfile.TemporaryDirectory() as folder:
+        exodus(Path(folder) / "box.e", mesh)
+        sound[".e"] = (Path(folder) / "box.e").read_bytes()
     sound[".inp.gz"] = gzip.compress(sound[".inp"], mtime=0)
     options: dict[str, Any] = {
         ".inp": {"counts": False, "ends": False},
@@ -204,12 +209,115 @@ def _meshes() -> Iterator[Reader]:
         ".vtu": {"counts": False},
         ".vtk": {"binary": True},
         "-binary.msh": {"binary": True},
+        ".unv": {"counts": False, "ends": False},
+        ".cdb": {"counts": False, "ends": False},
+        ".e": {"binary": True},
         ".inp.gz": {"binary": True, "exact": True},
     }
     for suffix, data in sound.items():
         name = f"box{suffix}"
         more = {"told": _lost, **options.get(suffix, {})}
         yield Reader(f"mesh {suffix}", {name: data}, (name,), _mesh_of(name), mesh_facts, **more)
+
+
+ASSEMBLED = """*PART, NAME=Bar
+*NODE
+{nodes}
+20, 3., .5, .5
+21, 4., .5, 1.
+*ELEMENT, TYPE=C3D8, ELSET=All
+{elements}
+*ELEMENT, TYPE=B31, ELSET=Beam
+20, 20, 21
+*NSET, NSET=End
+{end}
+*NSET, NSET=Root
+{root}
+*SURFACE, NAME=Up
+1, S2
+2, S2
+*SURFACE, NAME=Low
+1, S1
+2, S1
+*SOLID SECTION, ELSET=All, MATERIAL=Wood, ORIENTATION=Along
+*BEAM SECTION, ELSET=Beam, MATERIAL=Alu, SECTION=RECT, OFFSET1=0.1
+.01, .02
+0., 1., .2
+*ORIENTATION, NAME=Along
+1., 2., 0., 0., 1., 0.
+3, 20.
+*RIGID BODY, NSET=End, REF NODE=20
+*NONSTRUCTURAL MASS, ELSET=All, UNITS=TOTAL MASS
+2.5
+*END PART
+*ASSEMBLY, NAME=All
+*INSTANCE, NAME=One, PART=Bar
+*END INSTANCE
+*INSTANCE, NAME=Two, PART=Bar
+0., 0., 1.
+*END INSTANCE
+*NSET, NSET=Corners
+One.1, Two.2
+*TIE, NAME=T
+Two.Low, One.Up
+*MPC
+BEAM, Two.21, One.21
+*EQUATION
+4
+One.5, 1, 1., One.6, 1, -1., Two.5, 1, -1., Two.6, 1, 1.
+*END ASSEMBLY
+*MATERIAL, NAME=Wood
+*ELASTIC, TYPE=ENGINEERING CONSTANTS
+1.4e11, 1e10, 8e9, .3, .25, .4, 5e9, 4e9
+3e9,
+*DENSITY
+1600.,
+*MATERIAL, NAME=Alu
+*ELASTIC
+7e10, .33
+*DENSITY
+2700.,
+"""
+CARDS = """CORD1R,4,7,17,27
+GRID,900,,3.,.5,.5,4
+GRID,901,4,1.,.3,.2
+RBE2,910,900,123456,{end}
+CBAR,911,3,900,901,0.,1.,.2,GGG
+,,5,.1,.2,.3
+PBARL,3,1,,BOX
+,.02,.03,.002,.001,.1
+CBEAM,912,5,900,901,7
+PBEAM,5,1,2.-4,6.-9,1.-9,,4.-9
+,YES,1.,2.-4
+,
+,.8,.8
+CBUSH,913,6,900,901,7,,,4
+,.25
+PBUSH,6,K,10.,20.,30.,40.,50.,60.
+CELAS1,914,7,900,1,901,1
+PELAS,7,100.
+RBAR,915,901,7,123456
+MPC,3,17,1,1.,27,1,-1.
+,,37,1,-1.,47,1,1.
+MAT11,8,1.4+11,1.+10,8.+9,.3,.25,.4,5.+9
+,4.+9,3.+9,1600.
+CONM2,916,901,4,1.5,.1,.2,.3
+,.01,,.02,,,.025"""
+
+
+def _decks() -> Iterator[Reader]:
+    """Parts, beams, constraints, materials; bars, springs, systems."""
+    mesh = box("hex8", (2, 1, 1), (2.0, 1.0, 1.0))
+    end = (mesh.node_sets["x1"] + 1).tolist()
+    nodes = "\n".join(f"{k}, " + ", ".join(map(repr, p)) for k, p in enumerate(mesh.nodes.tolist(), start=1))
+    rows = (", ".join(map(str, [k, *(e + 1)])) for k, e in enumerate(mesh.only.elements, start=1))
+    sides = {name: ", ".join(str(n + 1) for n in mesh.node_sets[own]) for name, own in (("root", "x0"), ("end", "x1"))}
+    text = ASSEMBLED.format(nodes=nodes, elements="\n".join(rows), **sides)
+    options: dict[str, Any] = {"counts": False, "ends": False, "told": _lost}
+    yield Reader("assembly", {"all.inp": text.encode()}, ("all.inp",), _mesh_of("all.inp"), mesh_facts, **options)
+    cards = CARDS.format(end=",".join(str(10 * n - 3) for n in end))
+    text = bulk(mesh, *cards.splitlines())
+    yield Reader("bars", {"all.bdf": text.encode()}, ("all.bdf",), _mesh_of("all.bdf"), mesh_facts, **options)
 
 
 def _lost(mesh: SolidMesh) -> Facts:
@@ -307,6 +415,7 @@ GROUPS: dict[str, Callable[[], Iterator[Reader]]] = {
     "full matrices": _solid_exports,
     "reduced matrices": _reduced_exports,
     "meshes": _meshes,
+    "decks": _decks,
     "descriptions": _descriptions,
     "modal files": _modal_files,
 }

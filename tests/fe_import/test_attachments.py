@@ -138,9 +138,12 @@ FAULTS = {
         "a spring to the ground",
     ),
     "distributing": (
-        ["*SURFACE, NAME=E, TYPE=NODE", "x1,", "*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=E", "*DISTRIBUTING"],
+        [
+            *("*SURFACE, NAME=E, TYPE=NODE", "x1,", "*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=E"),
+            "*DISTRIBUTING, WEIGHTING METHOD=LINEAR",
+        ],
         Cause.NOT_USED,
-        "couplings are used that are *KINEMATIC",
+        "weights of *DISTRIBUTING that fall with the distance",
     ),
     "mass without value": (["*ELEMENT, TYPE=MASS, ELSET=M", "9000, 1"], Cause.NOT_USED, "without a value"),
     "nonlinear": (
@@ -222,10 +225,10 @@ def test_materials_of_a_deck(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("*ELASTIC", "*ELASTIC, TYPE=ORTHO"), "elastic of type ORTHO"),
+        (("*ELASTIC", "*ELASTIC, TYPE=TRACTION"), "elastic of type TRACTION"),
         (("7e10, .33", "7e10, .33\n6e10, .33, 100."), "changes with temperature"),
         (("*DENSITY\n2700.,", ""), "lacks *ELASTIC or *DENSITY"),
-        (("MATERIAL=alu", "MATERIAL=alu, ORIENTATION=O"), "orientation"),
+        (("MATERIAL=alu", "MATERIAL=alu, COMPOSITE"), "layers"),
         (("ELSET=all", "ELSET=none"), "'none' holds no solid elements".replace("'none'", "'NONE'")),
         (("*SOLID SECTION, ELSET=all, MATERIAL=alu", ""), "no *SOLID SECTION"),
     ],
@@ -235,4 +238,67 @@ def test_materials_that_cannot_be_used(tmp_path, change, words):
     with pytest.raises(FEImportError) as caught:
         build_model(with_cards(tmp_path, lines, solid={"material": ""}))
     assert caught.value.cause is Cause.BAD_FIELD
+    assert words in str(caught.value)
+
+
+FILLINGS = {  # lines, mass that they add to each half of a box of two densities, 8000 and 2000, of 9e-5 m³ each
+    "per volume": (["*NONSTRUCTURAL MASS, ELSET=LEFT, UNITS=MASS PER VOLUME", "400."], (0.036, 0.0)),
+    "by mass": (["*NONSTRUCTURAL MASS, ELSET=ALL, UNITS=TOTAL MASS", "0.5"], (0.4, 0.1)),
+    "by volume": (
+        ["*NONSTRUCTURAL MASS, ELSET=all, UNITS=TOTAL MASS, DISTRIBUTION=VOLUME PROPORTIONAL", "0.5"],
+        (0.25, 0.25),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FILLINGS)
+def test_nonstructural_mass(tmp_path, name):
+    """Of sets of elements, in each half of the box; to be left out on purpose."""
+    lines, added = FILLINGS[name]
+    materials = {"m": {"density": 8000.0}, "n": {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2000.0}}
+    regions = [{"set": "LEFT", "material": "m"}, {"set": "RIGHT", "material": "n"}]
+    solid = {"material": "", "regions": regions}
+    halves = ["*ELSET, ELSET=LEFT", "1,", "*ELSET, ELSET=RIGHT", "2,"]
+    write = {"solid": solid, "materials": materials}
+    found = []
+    for more in (lines, []):
+        link = with_cards(tmp_path, **write)
+        write_box(tmp_path / "box.inp", along=2)
+        mesh = tmp_path / "box.inp"
+        mesh.write_text(mesh.read_text() + "\n".join([*halves, *more]) + "\n")
+        model = build_model(link)
+        rigid = model.rigid_body_modes()
+        found.append(mass_properties(rigid.T @ model.mass @ rigid))
+    assert found[0].mass - found[1].mass == pytest.approx(sum(added), rel=1e-9)
+    moment = found[0].mass * found[0].centre_of_mass[0] - found[1].mass * found[1].centre_of_mass[0]
+    assert moment == pytest.approx(added[0] * 0.075 + added[1] * 0.225, rel=1e-9)
+    mesh.write_text(mesh.read_text() + "\n".join(lines) + "\n")
+    left = build_model(with_ignored(tmp_path, write))
+    assert left.left_out["NONSTRUCTURAL MASS"] == 1
+    rigid = left.rigid_body_modes()[:, 0]
+    assert rigid @ left.mass @ rigid == pytest.approx(found[1].mass, rel=1e-12)
+
+
+def with_ignored(folder: Path, write: dict[str, Any]) -> LinkFile:
+    """The link in a folder, without its nonstructural masses."""
+    table = merged(merged(SOLID, write), {"solid": {"ignore": ["NONSTRUCTURAL MASS"]}})
+    return load_link(write_toml(folder / "link.toml", table))
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (["*NONSTRUCTURAL MASS, ELSET=all, UNITS=MASS PER AREA", "1."], "per volume or in total"),
+        (["*NONSTRUCTURAL MASS, ELSET=all, UNITS=TOTAL MASS", "-1."], "must be positive"),
+        (["*NONSTRUCTURAL MASS, ELSET=none, UNITS=TOTAL MASS", "1."], "does not define"),
+        (
+            ["*ELEMENT, TYPE=S4, ELSET=S", "900, 1, 2, 3, 4", "*NONSTRUCTURAL MASS, ELSET=S, UNITS=TOTAL MASS", "1."],
+            "of other elements than solids",
+        ),
+    ],
+)
+def test_nonstructural_mass_that_cannot_be_used(tmp_path, lines, words):
+    with pytest.raises(FEImportError) as caught:
+        build_model(with_cards(tmp_path, *lines))
+    assert caught.value.cause is Cause.NOT_USED
     assert words in str(caught.value)

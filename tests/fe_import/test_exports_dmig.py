@@ -161,9 +161,9 @@ DMIG_FAULTS: dict[str, tuple[str, str]] = {
     ),
     "no grids": (without("GRID"), "2 nodes of the matrices have no"),
     "grid twice": ("GRID,21\n" + PCH, "stands twice"),
-    "GRDSET": ("GRDSET,,,,,,3\n" + PCH, "defaults for GRID"),
+    "GRDSET": ("GRDSET,,,,,,3\n" + PCH, "coordinate system 3 is not there"),
     "unknown coordinate system": (PCH.replace("GRID,21,,", "GRID,21,5,"), "coordinate system 5 is not there"),
-    "CORD1R": (PCH.replace("GRID,21,,", "GRID,21,5,") + "CORD1R,5,11,21,11\n", "5 is a CORD1R"),
+    "CORD1R": (PCH.replace("GRID,21,,", "GRID,21,5,") + "CORD1R,5,11,21,11\n", "defined by itself"),
     "circular": (
         PCH.replace("GRID,21,,", "GRID,21,5,") + "CORD2R,5,6,,,,,,1.\n,1.\nCORD2R,6,5,,,,,,1.\n,1.\n",
         "defined by itself",

@@ -24,6 +24,7 @@ from superelements import condensed, description, frame_model, punch
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.nastran_op4 import Op4Options, read_op4
+from fe_import.exports.nastran_op4_layout import op4_layout
 from fe_import.reduce import reduce_link
 
 
@@ -96,6 +97,37 @@ def test_rows_of_op4_from_a_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[6:], expected[6:], rtol=1e-9)
 
 
+def wide(text: str) -> str:
+    """The headers of a text file with integers of sixteen columns, as Nastran writes large ones."""
+    lines = []
+    for line in text.splitlines():
+        if "1P,3E23.16" in line:
+            line = f"{line[:8]:>16s}{line[8:16]:>16s}{line[16:]}|I16"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("closing", [" 1.000000000000000E+00", " 1.0000000000000000D+00", " 1.00000000000000000-001"])
+def test_other_text_files(tmp_path: Path, closing: str) -> None:
+    """Wide integers in headers, and closing numbers of another width than the values."""
+    parts = small()
+    text = wide(TEXT_OP4).replace(f"{14:8d}{1:8d}{1:8d}\n {1:.16E}", f"{14:8d}{1:8d}{1:8d}\n{closing}")
+    (tmp_path / "m.op4").write_text(text, encoding="utf-8")
+    positions = {str(label): tuple(p) for label, p in zip(parts.labels, parts.positions.tolist(), strict=True)}
+    options = Op4Options(boundary=parts.labels, positions=positions)
+    export = read_op4({"stiffness": tmp_path / "m.op4"}, options, "link.toml")
+    np.testing.assert_allclose(export.stiffness.toarray(), parts.stiffness, rtol=1e-15)
+
+
+def test_a_file_of_nastran_with_wide_integers(tmp_path: Path) -> None:
+    """Of pyyeti's tests: headers of a matrix of ten million rows, columns of 19 and 7 values."""
+    path = tmp_path / "large.op4"
+    path.write_bytes(gzip.decompress((DATA / "large_dim_bigmat.op4.gz").read_bytes()))
+    found = {header.name: header for header in op4_layout(path, "large.op4")}
+    assert (found["matdt"].columns, found["matdt"].rows) == (19, 10_000_001)
+    assert (found["matd22a"].columns, found["matd22a"].rows) == (10_000_001, 10_000_001)
+
+
 # ---- faults ----------------------------------------------------------------------------------------------------------
 
 
@@ -164,11 +196,13 @@ OP4_FAULTS: dict[str, tuple[bytes, str]] = {
     "not a number": (spoiled_op4(_not_a_number), "not finite"),
     "grounded": (spoiled_op4(_grounded), "resists rigid-body motion"),
     "another file": (b"\x00" + bytes(range(1, 100)), "not an OUTPUT4 file"),
-    "text, another file": (b"not an OUTPUT4 file at all\n" * 9, "whole numbers in columns of eight"),
+    "text, another file": (b"not an OUTPUT4 file at all\n" * 9, "whole numbers in columns of 8"),
     "text, cut": (TEXT_OP4[: TEXT_OP4.rindex("       9")].encode(), "ends within"),
     "text, short line": (TEXT_OP4.replace("000E+00", "E+00", 1).encode(), "another length"),
     "text, columns do not rise": (TEXT_OP4.replace(f"{2:8d}{1:8d}", f"{1:8d}{1:8d}").encode(), "must rise"),
     "text, no format": (TEXT_OP4.replace("1P,3E23.16", "1P,XE23.16").encode(), "format of the numbers"),
+    "text, closing record": (TEXT_OP4.replace(f"{14:8d}{1:8d}{1:8d}\n 1.00", f"{14:8d}{1:8d}{1:8d}\n hello").encode(),
+                             "not one number"),
     "text, no number": (TEXT_OP4.replace("0000E+04", "x000E+04", 1).encode(), "cannot be read"),
     "gzip, cut": (gzip.compress(GOOD)[:-30], "cannot be read"),
 }  # fmt: skip

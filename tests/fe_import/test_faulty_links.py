@@ -200,7 +200,7 @@ FAULTS = [
           "x0, x1"),
     solid("face of elements", {"interfaces": [{"name": "x", "face": "all"}]}, Cause.INTERFACE, "interfaces[0].face",
           "set of solid elements"),
-    solid("node of a solid", {"interfaces": [{"name": "x", "node": "n"}]}, Cause.INTERFACE, "interfaces[0]",
+    solid("node of a solid", {"interfaces": [{"name": "x", "node": "n"}]}, Cause.INTERFACE, "interfaces[0].node",
           "face = SET"),
     solid("one face twice", {"interfaces": [{"name": "a", "face": "x0"}, {"name": "b", "face": "x0"}]},
           Cause.INTERFACE, "", "share 8 nodes"),

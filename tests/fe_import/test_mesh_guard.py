@@ -25,7 +25,9 @@ VTU = (
     '<VTKFile type="UnstructuredGrid" version="0.1"><UnstructuredGrid>'
     '<Piece NumberOfPoints="{}" NumberOfCells="{}"/></UnstructuredGrid></VTKFile>'
 )
+MSH40 = "$MeshFormat\n4 0 8\n$EndMeshFormat\n"
 HEADERS = {
+    "nodes of MSH 4.0": ("a.msh", f"{MSH40}$Nodes\n1 1000000000000\n", "$Nodes"),
     "nodes of MSH 4": ("a.msh", f"{MSH4}$Nodes\n1 1000000000000 1 8\n", "$Nodes"),
     "blocks of MSH 4": ("a.msh", f"{MSH4}$Nodes\n1000000000000 8 1 8\n", "$Nodes"),
     "elements of MSH 4": ("a.msh", f"{MSH4}$Elements\n99999999999 8 1 8\n", "$Elements"),
@@ -145,3 +147,25 @@ def test_memory_of_readers_is_bounded(tmp_path, monkeypatch):
         read_mesh(path)
     assert caught.value.cause is Cause.NOT_READABLE
     assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_msh_4_0_as_gmsh_names_it(tmp_path, binary):
+    """gmsh writes "4", which meshio took for 4.1; a number too many or too few is still found."""
+    path = tmp_path / "cube.msh"
+    cube = meshio.Mesh(CUBE.nodes, [("hexahedron", CUBE.only.elements)])
+    meshio.gmsh._gmsh40.write(path, cube, ".16e", binary)
+    data = path.read_bytes().replace(b"\n4.0 ", b"\n4 ", 1)
+    path.write_bytes(data)
+    np.testing.assert_array_equal(read_mesh(path).only.elements, CUBE.only.elements)
+    if not binary:
+        path.write_bytes(data.replace(b"$EndNodes", b"1.0\n$EndNodes"))
+        with pytest.raises(FEImportError, match=r"\$Nodes has 39 numbers, 38 are declared"):
+            read_mesh(path)
+
+
+def test_msh_1(tmp_path):
+    path = tmp_path / "old.msh"
+    path.write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n0\n$ENDELM\n")
+    with pytest.raises(FEImportError, match="MSH 1"):
+        read_mesh(path)

@@ -74,18 +74,28 @@ def test_coordinate_systems(tmp_path, frame, given):
             line = ",".join([*words[:2], "4", *(repr(float(v)) for v in local)])
         lines.append(line)
     np.testing.assert_allclose(read(tmp_path, "\n".join(lines)).nodes, BAR.nodes, atol=1e-14)
+    unnamed = [line.replace(",4,", ",,", 1) if line.startswith("GRID,") else line for line in lines]
+    default = "\n".join(unnamed).replace("ENDDATA", "GRDSET,,4\nENDDATA")
+    np.testing.assert_allclose(read(tmp_path, default).nodes, BAR.nodes, atol=1e-14)
 
 
 LOSSES = {  # cards, what the message says, names to ignore
     "masses": (["CMASS2,90,1.5,7,1"], "point masses: 1 CMASS2 from line 26", ["CMASS2"]),
-    "turned mass": (["CONM2,90,7,3,1.5"], "point masses (a CONM2 in a coordinate system of its own", ["CONM2"]),
+    "turned mass": (
+        ["CONM2,90,7,3,1.5", "CORD2C,3,,0.,0.,0.,0.,0.,1.", ",1.,0.,0."],
+        "point masses (a CONM2 in a coordinate system that is not rectangular",
+        ["CONM2"],
+    ),
+    "long mass": (["CONM2,90,7,,1.5", ",.1,,.1,,,.1,1."], "a CONM2 with more fields than it has", ["CONM2"]),
     "rigid in part": (["RBE2,90,7,13,17,27"], "(an RBE2 that leaves displacements free, line 26)", ["RBE2"]),
     "two averaged": (["RBE3,90,,7,123,1.,123,17,27"], "fewer than three grid points", ["RBE3"]),
-    "bar": (["RBAR,90,7,17,123456"], "constraints between nodes: 1 RBAR", ["RBAR"]),
-    "springs": (["CELAS2,90,1.+5,7,1", "CBUSH,91,5,7,17"], "1 CELAS2", ["CELAS2", "CBUSH"]),
+    "bar": (["RBAR,90,7,17,123,456"], "constraints between nodes (an RBAR whose independent", ["RBAR"]),
+    "spline": (["RSPLINE,90,.1,7,17,123,27,"], "constraints between nodes: 1 RSPLINE", ["RSPLINE"]),
+    "springs": (["CELAS2,90,1.+5,7,1", "CBUSH,91,5,7,17"], "(a spring to the ground", ["CELAS2", "CBUSH"]),
     "supports": (["SPC1,1,123,7"], "supports (a link is free", ["SPC1"]),
-    "beams": (["CBAR,90,3,7,17,0.,0.,1.", "PBAR,3,1,.1,.1,.1,.1"], "beams or bars: 1 CBAR", ["CBAR"]),
+    "beams": (["CBAR,90,3,7,17,0.,0.,1.", "PBAR,3,1,.1,.1,.1,.1"], "beams or bars (a beam without length", ["CBAR"]),
     "shells": (["CTRIA3,90,3,7,17,27", "PSHELL,3,1,.1"], "shells: 1 CTRIA3", ["CTRIA3"]),
+    "supports of all points": (["GRDSET,,,,,,,123"], "1 PS of GRDSET", ["PS of GRDSET"]),
     "supports of a point": (["GRID,901,,0.,0.,0.,,123"], "1 PS of GRID", ["PS of GRID"]),
     "matrices": (["DMIG,K2GG,0,6,2,0"], "given as matrices: 1 DMIG", ["DMIG"]),
     "unknown": (["ODDONE,1,2"], "not known here: 1 ODDONE", ["ODDONE"]),
@@ -114,8 +124,10 @@ FAULTS = {
     "unknown grid point": (bulk(BAR, "CTETRA,90,2,7,17,27,8"), "needs a grid point that is not there"),
     "element twice": (bulk(BAR, "CTETRA,1,2,7,17,27,37"), "stands twice"),
     "grid twice": (bulk(BAR, "GRID,7"), "stands twice"),
+    "ten fields": (bulk(BAR, "GRID,901,,1.,2.,3.,,,,5.,6."), "more fields than a line holds"),
     "word": (bulk(BAR, "GRID,901,,a"), "finite real number"),
-    "defaults": (bulk(BAR, "GRDSET,,,,,,,123"), "defaults for GRID"),
+    "defaults twice": (bulk(BAR, "GRDSET,,4", "GRDSET,,4"), "this card stands twice"),
+    "repeated": (bulk(BAR, "GRID,901,,0.,0.,0.", "=,*(1),=,*(.1)"), "repeated with = and * are not followed"),
 }
 
 

@@ -26,6 +26,8 @@ from solid_meshes import box
 
 from fe_import.description.link import LinkFile
 from fe_import.description.records import Recovery
+from fe_import.elements.elasticity import isotropic_moduli
+from fe_import.elements.solid import SolidMaterial
 from fe_import.elements.solid_elements import SOLID_ELEMENTS
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
@@ -173,7 +175,7 @@ def nodal_stress(mesh: Any, lam: float, mu: float, field: Array) -> Array:
     n = len(mesh.nodes)
     dof_map = np.full((n, 6), -1)
     dof_map[:, :3] = np.arange(3 * n).reshape(n, 3)
-    source = solid_stress(mesh, np.tile([lam, mu], (len(mesh.only.elements), 1)))
+    source = solid_stress(mesh, [SolidMaterial(1.0, 0.0, 1.0, own_moduli=isotropic_moduli(lam, mu))])
     return source.evaluate(field.reshape(-1, 1), dof_map, source.site_nodes)[:, :, 0]
 
 

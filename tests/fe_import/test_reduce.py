@@ -38,7 +38,7 @@ def test_link_by_path_or_loaded(tmp_path: Path) -> None:
     link = frame_link(tmp_path)
     assert same(reduce_link(link), reduce_link(link.path))
     assert same(reduce_link(link), fe_import.reduce_link(str(link.path)))
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+    with pytest.raises(AttributeError, match=r"attribute.*nothing"):
         _ = fe_import.nothing
 
 

@@ -54,7 +54,7 @@ _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @part
-def _posed(model: Model, poses: Array, k: int) -> tuple[Vector, Rotation, Vector, Rotation]:
+def posed(model: Model, poses: Array, k: int) -> tuple[Vector, Rotation, Vector, Rotation]:
     """Pose of the outer frame in the inner one, and in the inner node."""
     inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
     frames = model.actuator_frames
@@ -66,7 +66,7 @@ def _posed(model: Model, poses: Array, k: int) -> tuple[Vector, Rotation, Vector
 
 
 @part
-def _coordinate(model: Model, k: int, place: Vector, turn: Rotation, near: float) -> float:
+def coordinate_of(model: Model, k: int, place: Vector, turn: Rotation, near: float) -> float:
     """Joint coordinate on the turn next to ``near``."""
     if model.actuator_along[k] == 2:
         return place[2]
@@ -116,7 +116,7 @@ def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> f
         torque = law[k, 9]
     elif torque.real < law[k, 8].real:
         torque = law[k, 8]
-    torque += law[k, 10] - law[k, 1] * (angle - law[k, 2]) - law[k, 3] * rate
+    torque -= law[k, 1] * (angle - law[k, 2]) + law[k, 3] * rate - law[k, 10]
     if law[k, 4] != 0.0:
         torque -= law[k, 4] * np.tanh(rate / law[k, 5])
     if law[k, _STOPS + 2] != 0.0:
@@ -125,13 +125,32 @@ def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> f
 
 
 @part
-def _turning(model: Model, work: Work, k: int, reach: Vector, axes: Rotation) -> tuple[Twist, Twist, float, float]:
+def _turning(
+    model: Model, twist: Array, change: Array, k: int, reach: Vector, axes: Rotation
+) -> tuple[Twist, Twist, float, float]:
     """Rows of the coordinate's rate over the twists of both nodes, the rate and its own rate."""
     inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
     first, second = _rows(model, k, reach, axes)
-    rate = rate_along(first, work.twist, inner) + rate_along(second, work.twist, outer)
-    gain = rate_along(first, work.rate, inner) + rate_along(second, work.rate, outer)
-    return first, second, rate, gain + _swing(model, k, reach, axes, work.twist)
+    rate = rate_along(first, twist, inner) + rate_along(second, twist, outer)
+    gain = rate_along(first, change, inner) + rate_along(second, change, outer)
+    return first, second, rate, gain + _swing(model, k, reach, axes, twist)
+
+
+@part
+def actuate(
+    model: Model, poses: Array, twist: Array, change: Array, sample: Array, k: int, near: float, force: Array
+) -> float:
+    """Add inertia of the rotor less the effort of actuator k, at twists and their rates, to ``force``; its coordinate,
+    which lies next to ``near``.
+    """
+    place, turn, reach, axes = posed(model, poses, k)
+    angle = coordinate_of(model, k, place, turn, near)
+    if model.actuator_active[k]:
+        first, second, rate, gain = _turning(model, twist, change, k, reach, axes)
+        balance = model.actuators[k, 0] * gain - _effort(model, k, sample, angle, rate)
+        push(force, model.actuator_nodes[k, 0], balance, first)
+        push(force, model.actuator_nodes[k, 1], balance, second)
+    return angle
 
 
 @kernel(FORCES, counted=False)
@@ -141,15 +160,7 @@ def actuator_forces(reals: Array, integers: IntArray, scratch: Array, last: Arra
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     before, sample = read_state(last, integers, known.state).turned, vector_at(scratch, 0, known.samples)
     for k in range(len(model.actuator_nodes)):
-        place, turn, reach, axes = _posed(model, work.poses, k)
-        work.turned[k] = _coordinate(model, k, place, turn, before[k])
-        if not model.actuator_active[k]:
-            continue
-        inner, outer = model.actuator_nodes[k, 0], model.actuator_nodes[k, 1]
-        first, second, rate, gain = _turning(model, work, k, reach, axes)
-        balance = model.actuators[k, 0] * gain - _effort(model, k, sample, work.turned[k], rate)
-        push(work.force, inner, balance, first)
-        push(work.force, outer, balance, second)
+        work.turned[k] = actuate(model, work.poses, work.twist, work.rate, sample, k, before[k], work.force)
 
 
 @part
@@ -157,8 +168,8 @@ def _derivatives(model: Model, work: Work, k: int, block: Array) -> None:
     """Mass of the rotor; damping of dampers, friction and gains; stiffness of springs and gains into a block."""
     if not model.actuator_active[k]:
         return
-    _, _, reach, axes = _posed(model, work.poses, k)
-    first, second, rate, _ = _turning(model, work, k, reach, axes)
+    _, _, reach, axes = posed(model, work.poses, k)
+    first, second, rate, _ = _turning(model, work.twist, work.rate, k, reach, axes)
     law = model.actuators
     stiffness, damping = law[k, 1], law[k, 3]
     if law[k, 8].real < law[k, 9].real:  # else it gives its limit
@@ -184,8 +195,8 @@ def actuator_derivatives(reals: Array, integers: IntArray, scratch: Array, mater
 @part
 def _energy(model: Model, work: Work, k: int) -> tuple[float, float]:
     """Of the rotor, and of spring and stops."""
-    _, _, reach, axes = _posed(model, work.poses, k)
-    _, _, rate, _ = _turning(model, work, k, reach, axes)
+    _, _, reach, axes = posed(model, work.poses, k)
+    _, _, rate, _ = _turning(model, work.twist, work.rate, k, reach, axes)
     law = model.actuators
     stored = 0.5 * law[k, 1] * (work.turned[k] - law[k, 2]) ** 2
     if law[k, _STOPS + 2] != 0.0:
@@ -207,8 +218,8 @@ def actuator_energies(reals: Array, integers: IntArray, scratch: Array, out: Arr
 @part
 def _acting(model: Model, work: Work, sample: Array, k: int, out: Array) -> None:
     """Of actuator k (10,): coordinate, rate, acceleration, effort, and the wrench on the outer node in its axes."""
-    _, _, reach, axes = _posed(model, work.poses, k)
-    _, second, rate, gain = _turning(model, work, k, reach, axes)
+    _, _, reach, axes = posed(model, work.poses, k)
+    _, second, rate, gain = _turning(model, work.twist, work.rate, k, reach, axes)
     effort = 0.0 * rate
     if model.actuator_active[k]:
         effort = _effort(model, k, sample, work.turned[k], rate)
@@ -236,8 +247,8 @@ def turn_actuators(reals: Array, integers: IntArray, scratch: Array, last: Array
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     before = read_state(last, integers, known.state).turned
     for k in range(len(model.actuator_nodes)):
-        place, turn, _, _ = _posed(model, work.poses, k)
-        work.turned[k] = _coordinate(model, k, place, turn, before[k])
+        place, turn, _, _ = posed(model, work.poses, k)
+        work.turned[k] = coordinate_of(model, k, place, turn, before[k])
 
 
 @kernel(KNOT, counted=False)
@@ -247,7 +258,7 @@ def store_actuators(reals: Array, integers: IntArray, scratch: Array, out: Array
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     first_entry = out.shape[1] - len(model.actuator_nodes)
     for k in range(len(model.actuator_nodes)):
-        _, _, reach, axes = _posed(model, work.poses, k)
-        _, _, rate, gain = _turning(model, work, k, reach, axes)
+        _, _, reach, axes = posed(model, work.poses, k)
+        _, _, rate, gain = _turning(model, work.twist, work.rate, k, reach, axes)
         column = first_entry + k
         out[0, column], out[1, column], out[2, column] = work.turned[k], rate, gain

@@ -39,8 +39,8 @@ _STEPPED = (
 @cache
 def functions(*kinds: str) -> Functions:
     """Loaded with the first system, together with modules of these kinds of elements: not every run is one of nodes."""
-    own = "erls.equations.nodal"
-    with compiling_beside(*(f"{own}.{name}" for name in (*kinds, "outputs", "blocks", "matrix", "step"))):
+    own, more = "erls.equations.nodal", ("beam_derivatives",) if "beam_forces" in kinds else ()
+    with compiling_beside(*(f"{own}.{name}" for name in (*kinds, *more, "outputs", "blocks", "matrix", "step"))):
         from erls.equations.nodal.sums import forces, move, remember
     from erls.equations.nodal.blocks import blocks, conditions, weighted
     from erls.equations.nodal.outputs import energies, knot
@@ -179,6 +179,19 @@ class NodalSystem:
             stiffness = stiffness + self._nodes.matrix([turning])
         damping = self._mass.matrix([self._weighted(work, 1, (0.0, 1.0, 0.0))[: len(self.kinds.pairs)]])
         return stiffness, damping
+
+    def exact_stiffness_and_damping(
+        self, t: float, q: Nodes, v: Array, a: Array, multipliers: Array
+    ) -> tuple[Matrix, Matrix]:
+        """(n, n) twice, with all that iterations leave out (`erls.equations.nodal.tangents`); on SE(3)."""
+        from erls.equations.nodal.tangents import addresses, exact_blocks, room  # here: it is compiled
+
+        model = self.model
+        self._evaluated(t, q, v, a, multipliers)
+        known = addresses(len(model.beam_nodes), len(model.actuator_nodes))
+        exact_blocks(known, *self._memory, *room(self.count))
+        blocks = self._work.blocks
+        return self._stiffness.matrix([blocks[:, 2]]), self._mass.matrix([blocks[: len(self.kinds.pairs), 1]])
 
     def constraint(self, t: float, q: Nodes) -> Array:
         """(m,) Φ."""

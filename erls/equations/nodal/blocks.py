@@ -8,6 +8,7 @@ from __future__ import annotations
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.body_forces import body_derivatives, load_derivatives
 from erls.equations.nodal.contract import (
+    BEAMS_APART,
     BLOCKS,
     CONDITIONS,
     SUMMED,
@@ -59,7 +60,7 @@ def blocks(reals: Array, integers: IntArray, scratch: Array, material: int) -> N
     conditions; `Work` holds the state with `erls.equations.nodal.sums.forces` evaluated.
 
     With ``material``, internal forces count as if they did not turn with deformation. Inertia that changes with
-    deformation is left out.
+    deformation is left out; with `BEAMS_APART` all of beams is.
     """
     known = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
@@ -69,7 +70,7 @@ def blocks(reals: Array, integers: IntArray, scratch: Array, material: int) -> N
             for i in range(12):
                 for j in range(12):
                     table[e, kind, i, j] = 0.0
-    if known.beam_derivatives >= 0:
+    if known.beam_derivatives >= 0 and material != BEAMS_APART:
         call_beam_derivatives(known.beam_derivatives, reals, integers, scratch, material)
     at = len(model.beam_nodes)
     for k in range(len(model.body_nodes)):

@@ -19,10 +19,11 @@ from erls.equations.nodal.contacts import Contacts, NodalContact
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import GROUND, Joint, Motion
 from erls.equations.nodal.loads import NodalLoad, NodalLoads
-from erls.equations.nodal.nodes import Nodes
+from erls.equations.nodal.nodes import Nodes, twists_of
 from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies
+from erls.equations.nodal.seat import Seat
 from erls.maths import motion_maps as motions
 from erls.maths.rotation_maps import exp
 from erls.maths.se3 import inverse, pose
@@ -30,27 +31,11 @@ from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.chain import poses as link_poses
 from erls.mechanism.contacts import PointContact
-from erls.mechanism.joint_types import Freedom, Z, single
+from erls.mechanism.joint_types import Freedom, single
 from erls.mechanism.joints import Joint as MechanismJoint
 from erls.mechanism.loads import CENTRE, PointLoad
 from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
 from erls.mechanism.rigid_dynamics import inverse_dynamics
-
-
-@dataclass(frozen=True)
-class Seat:
-    """Where a joint sits: nodes (`GROUND` for the ground) and the pose of its frames there, about or along whose z axis
-    it moves, unless by a rotation vector.
-    """
-
-    inner: int
-    outer: int
-    inner_frame: Array
-    outer_frame: Array
-
-    def screw(self, freedom: Freedom) -> Array:
-        """(6,) twist of unit joint velocity in the axes of the outer node."""
-        return np.asarray(motions.adjoint(self.outer_frame) @ replace(freedom, axis=Z).screw)
 
 
 class ChainSystem(NodalSystem):
@@ -82,13 +67,8 @@ class ChainSystem(NodalSystem):
         place, rate = (x[: 12 * self.count].reshape(-1, 12) for x in (y, v))
         left, _, right = np.linalg.svd(place[:, 3:].reshape(-1, 3, 3))
         turn = left @ right
-        back = np.swapaxes(turn, 1, 2)
-        spin = back @ rate[:, 3:].reshape(-1, 3, 3)
-        twist = np.empty((self.count, 6))
-        twist[:, :3] = (back @ rate[:, :3, None])[:, :, 0]
-        twist[:, 3:] = (spin - np.swapaxes(spin, 1, 2))[:, [2, 0, 1], [1, 2, 0]] / 2
         near = replace(self.start, turned=y[12 * self.count :].copy())
-        return self.at(motions.poses(turn, place[:, :3]), near), twist.ravel()
+        return self.at(motions.poses(turn, place[:, :3]), near), twists_of(turn, rate).ravel()
 
 
 @dataclass(frozen=True)

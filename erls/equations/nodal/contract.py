@@ -122,7 +122,7 @@ class Work(NamedTuple):
         Mass, damping and stiffness of each element.
     whole : (E, 12, 12) array
         Their weighted sum, in the coordinates of the system.
-    rows, shape : (6, 12) arrays
+    rows, shape, bends : (6, 12) arrays
         Of one beam.
     gradient, drift, bias : arrays
         Of each condition: (m, 12) by the twists of both nodes, (m,) by time, (m,) Φ̈ − B a.
@@ -151,6 +151,7 @@ class Work(NamedTuple):
     whole: Stack
     rows: Matrix
     shape: Matrix
+    bends: Matrix
     gradient: Matrix
     drift: Vector
     bias: Vector
@@ -191,8 +192,8 @@ class Layout(NamedTuple):
     forces, remember, knot, blocks, weighted : int
         Addresses of the functions of `erls.equations.nodal.sums`, `outputs` and `blocks`.
     beam_forces, bend_beams, beam_derivatives, beam_energies : int
-        Those of `beam_forces`; of this and of the next three kinds -1, and nothing of them is compiled, where there are
-        none.
+        Those of `beam_forces` and `beam_derivatives`; of this and of the next three kinds -1, and nothing of them is
+        compiled, where there are none.
     actuator_forces, turn_actuators, actuator_derivatives, actuator_energies, store_actuators : int
         Those of `actuator_forces`.
     contact_forces, contact_derivatives, contact_energies : int
@@ -244,6 +245,9 @@ class Before(NamedTuple):
     behind: Vector
 
 
+BEAMS_APART = 2
+"""What blocks are asked for where those of beams come from elsewhere; 0 and 1 are with and without ``material``."""
+
 FORCES: Any = None
 REMEMBER: Any = None
 CONDITIONS: Any = None
@@ -252,6 +256,8 @@ SUMMED: Any = None
 ENERGIES: Any = None
 KNOT: Any = None
 ACTING: Any = None
+COMPLEX_MATRIX: Any = None
+TANGENTS: Any = None
 if ENABLED:
     from numba import types as _t
 
@@ -261,6 +267,8 @@ if ENABLED:
     BLOCKS = _t.void(*_memory, _t.int64)
     SUMMED = _t.void(*_memory, _t.float64, _t.float64, _t.float64)
     KNOT = ACTING = _t.void(*_memory, MATRIX)
+    COMPLEX_MATRIX = _t.complex128[:, ::1]
+    TANGENTS = _t.void(*_memory, COMPLEX_MATRIX, COMPLEX_MATRIX)
 
 read_model, read_work, read_state = reader(Model), reader(Work), reader(State)
 read_layout, read_before, read_factors = reader(Layout), reader(Before), reader(Factors)
@@ -268,7 +276,7 @@ call_forces, call_remember, call_knot = caller(FORCES), caller(REMEMBER), caller
 call_blocks, call_weighted = caller(BLOCKS), caller(SUMMED)
 call_beam_forces = caller(FORCES, "erls.equations.nodal.beam_forces:beam_forces")
 call_bend_beams = caller(REMEMBER, "erls.equations.nodal.beam_forces:bend_beams")
-call_beam_derivatives = caller(BLOCKS, "erls.equations.nodal.beam_forces:beam_derivatives")
+call_beam_derivatives = caller(BLOCKS, "erls.equations.nodal.beam_derivatives:beam_derivatives")
 call_beam_energies = caller(ENERGIES, "erls.equations.nodal.beam_forces:beam_energies")
 call_actuator_forces = caller(FORCES, "erls.equations.nodal.actuator_forces:actuator_forces")
 call_turn_actuators = caller(REMEMBER, "erls.equations.nodal.actuator_forces:turn_actuators")
@@ -282,3 +290,5 @@ call_spring_energies = caller(ENERGIES, "erls.equations.nodal.spring_forces:spri
 call_contact_forces = caller(FORCES, "erls.equations.nodal.contact_forces:contact_forces")
 call_contact_derivatives = caller(BLOCKS, "erls.equations.nodal.contact_forces:contact_derivatives")
 call_contact_energies = caller(ENERGIES, "erls.equations.nodal.contact_forces:contact_energies")
+call_beam_tangents = caller(TANGENTS, "erls.equations.nodal.beam_tangents:beam_tangents")
+call_actuator_tangents = caller(TANGENTS, "erls.equations.nodal.actuator_tangents:actuator_tangents")

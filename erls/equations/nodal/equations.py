@@ -8,7 +8,7 @@ integrator found with them: the rates of the nodes' twists and the multipliers.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,8 +20,7 @@ from erls.equations.loops.closed_start import ClosedStart
 from erls.equations.loops.failures import warnings_of
 from erls.equations.neighbours import small_motions
 from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.chain import Chain, Seat, build_chain
-from erls.equations.nodal.joints import GROUND
+from erls.equations.nodal.chain import Chain, build_chain
 from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.locks import LockedSystem, dry_joints
 from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
@@ -30,15 +29,16 @@ from erls.equations.nodal.parts import link_parts
 from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
+from erls.equations.nodal.seat import Seat
+from erls.equations.nodal.spinning import SpinningNeighbours, spinning_neighbours
+from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
 from erls.equations.stability import LARGEST, Stability, stability_of
 from erls.equations.switches.law import DryFriction
-from erls.maths import motion_maps as motions
 from erls.maths import rotation_maps as rotations
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array, cross
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.joint_types import Z
 
 
 class Nodal:
@@ -149,28 +149,17 @@ class Nodal:
             NO_EQUILIBRIUM, UNSTABLE_START, when the start is to be static.
         """
         q = self.system.at(self._resting.q.poses) if self.mechanism.static_start else self.system.start
-        rates = [joint.rate for joint in self.mechanism.joints] if self._start is None else self._start.rates
-        v = np.zeros((self.system.count, 6))
-        moving: list[Array] = []  # links, in the world's axes, about its origin
-        vectors = self.mechanism.rotation_vectors
-        for k, (joint, seat, nodes) in enumerate(
-            zip(self.mechanism.joints, self.chain.seats, self.chain.nodes, strict=True)
-        ):
-            below = np.zeros(6) if joint.parent < 0 else moving[joint.parent]
-            inner, outer = self._frames_of(q, seat)
-            if k in vectors:
-                spin = rotations.tangent(self._vector(q, k)) @ np.array(rates[k : k + 3])
-                below = below + motions.adjoint(outer) @ np.concatenate([np.zeros(3), spin])
-            elif not joint.freedom.vector:
-                below = below + motions.adjoint(inner) @ replace(joint.freedom, axis=Z).screw * rates[k]
-            moving.append(below)
-            v[nodes] = motions.adjoint_inverse(q.poses[nodes]) @ moving[-1]
-        velocity = v.ravel()
+        velocity = self.carried_along(q)
         if self.chain.closing:  # links that bend at the start do not move as rigid ones do
             velocity = consistent_velocity(self.system, 0.0, q, velocity)
         a, multipliers = consistent_acceleration(self.system, 0.0, q, velocity)
         multipliers = np.append(multipliers, np.zeros(len(self.dry.places)))
         return _stored(self.system, 0.0, q, velocity, a, lambda: multipliers)[:2]
+
+    def carried_along(self, q: Nodes) -> Array:
+        """(n,) twists of the nodes where links move with the rates at which joints start, bent as they are."""
+        rates = [joint.rate for joint in self.mechanism.joints] if self._start is None else self._start.rates
+        return carried_along(self.mechanism, self.chain, q, rates)
 
     def neighbours(self, t: float, y: Array, v: Array) -> NodalNeighbours:
         """States beside one, with accelerations and multipliers that go with it."""
@@ -198,6 +187,16 @@ class Nodal:
 
         return nodal_neighbours(frozen(self), t, q, velocity, stored, self._names, frozen)
 
+    def spinning(self, joint: str, speed: float) -> SpinningNeighbours:
+        """States beside a steady motion about or along a joint [rad/s or m/s]: see `spinning_neighbours`."""
+
+        def stored(
+            system: NodalSystem, t: float, q: Nodes, v: Array, a: Array, multipliers: Callable[[], Array]
+        ) -> tuple[Array, Array, Array]:
+            return _stored(system, t, q, v, a, lambda: np.append(multipliers(), np.zeros(len(self.dry.places))))
+
+        return spinning_neighbours(self.mechanism, self.chain, joint, speed, stored, self._names)
+
     @property
     def _names(self) -> tuple[str, ...]:
         """(n,) of the motions of the nodes."""
@@ -209,13 +208,18 @@ class Nodal:
         return names_of_nodes(owners)
 
     @cached_property
-    def _resting(self) -> Resting:
-        """At rest under gravity, and what acts in joints, with joints held; those that follow loops are not."""
+    def held(self) -> NodalSystem:
+        """The same with joints held, of which a static start is an equilibrium; those that follow loops are not."""
         positions, held = [joint.position for joint in self.mechanism.joints], range(len(self.mechanism.joints))
         if self._start is not None:
             positions = self._start.positions.tolist()
         chosen = held if self._start is None else self._start.held
-        return resting(self.chain, self.mechanism, {k: positions[k] for k in chosen})
+        return self.chain.resting({k: positions[k] for k in chosen})
+
+    @cached_property
+    def _resting(self) -> Resting:
+        """At rest under gravity, and what acts in joints."""
+        return resting(self.held, self.chain, self.mechanism)
 
     @cached_property
     def stability(self) -> Stability:
@@ -235,29 +239,11 @@ class Nodal:
         rates[self.dry.places - self._frames] = v[self.dry.places]  # exactly zero at rest
         angles, rates = y[self._joints].copy(), rates[: len(self.mechanism.joints)].copy()
         for k in self.mechanism.rotation_vectors:
-            psi = self._vector(q, k)
+            psi = self.chain.seats[k].vector(q)
             angles[k : k + 3] = psi
-            rates[k : k + 3] = rotations.tangent_inverse(psi) @ self._spin(q, velocity, k)
+            rates[k : k + 3] = rotations.tangent_inverse(psi) @ self.chain.seats[k].spin(q, velocity)
         frames, modal = [x.frame for x in found], [x.modal for x in found]
         return State(t, frames, modal, angles, angles, rates, [x.nodes for x in found], [x.turns for x in found])
-
-    def _frames_of(self, q: Nodes, seat: Seat) -> tuple[Array, Array]:
-        """(4, 4) frames of a joint in the world: the inner and the outer one."""
-        carrier = np.eye(4) if seat.inner == GROUND else q.poses[seat.inner]
-        return carrier @ seat.inner_frame, q.poses[seat.outer] @ seat.outer_frame
-
-    def _vector(self, q: Nodes, number: int) -> Array:
-        """(3,) rotation vector of a joint, the number being that of its first component."""
-        inner, outer = self._frames_of(q, self.chain.seats[number])
-        return np.asarray(rotations.log(inner[:3, :3].T @ outer[:3, :3]))
-
-    def _spin(self, q: Nodes, velocity: Array, number: int) -> Array:
-        """(3,) angular velocity of the outer frame of a joint against the inner one, in the axes of the former."""
-        seat, spins = self.chain.seats[number], velocity.reshape(-1, 6)[:, 3:]
-        across = q.poses[seat.outer, :3, :3] @ spins[seat.outer]
-        if seat.inner != GROUND:
-            across = across - q.poses[seat.inner, :3, :3] @ spins[seat.inner]
-        return np.asarray(self._frames_of(q, seat)[1][:3, :3].T @ across)
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""

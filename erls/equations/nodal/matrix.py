@@ -109,19 +109,9 @@ def _add_joints(model: Model, work: Work, beta: float, table: Array, left: Array
             left[n + row] = 1.0 / size if size > 0.0 else 1.0
 
 
-@kernel(contract.FACTOR, counted=False)
-def factor(
-    reals: Array,
-    integers: IntArray,
-    scratch: Array,
-    t: float,
-    q: Array,
-    v: Array,
-    alpha: float,
-    beta: float,
-    factors: Array,
-) -> int:
-    """Factor [[M + α C + β K T, Bᵀ], [B T, 0]] at the state whose residual was found last; see `stepped`."""
+@part
+def factored(reals: Array, integers: IntArray, scratch: Array, alpha: float, beta: float, factors: Array) -> int:
+    """Factors of [[M + α C + β K T, Bᵀ], [B T, 0]] from the blocks of a state; 0, or 1 + the number of an unknown."""
     own = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, own.model), read_work(scratch, integers, own.work)
     room = read_factors(factors, integers, own.factors)
@@ -131,7 +121,6 @@ def factor(
             table[i, j] = 0.0
     for i in range(n):
         work.inertia[i] = 0.0
-    call_blocks(own.blocks, reals, integers, scratch, 0)
     call_weighted(own.weighted, reals, integers, scratch, 1.0, alpha, beta)
     for e in range(len(model.pairs)):
         _add_element(table, model.place, model.pairs, e, work.whole[e])
@@ -156,6 +145,24 @@ def factor(
         if model.place[i] == found - 1:
             return i + 1
     return int(found)
+
+
+@kernel(contract.FACTOR, counted=False)
+def factor(
+    reals: Array,
+    integers: IntArray,
+    scratch: Array,
+    t: float,
+    q: Array,
+    v: Array,
+    alpha: float,
+    beta: float,
+    factors: Array,
+) -> int:
+    """Factor [[M + α C + β K T, Bᵀ], [B T, 0]] at the state whose residual was found last; see `stepped`."""
+    own = read_layout(reals, integers, integers[len(integers) - 1])
+    call_blocks(own.blocks, reals, integers, scratch, 0)
+    return factored(reals, integers, scratch, alpha, beta, factors)
 
 
 @kernel(contract.SOLVE, counted=False)

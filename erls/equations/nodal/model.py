@@ -119,7 +119,7 @@ def room(model: Model) -> Work:
         **dict.fromkeys(("multipliers", "violation", "drift", "bias"), (m,)),
         "blocks": (e, 3, 12, 12),
         "whole": (e, 12, 12),
-        **dict.fromkeys(("rows", "shape"), (6, 12)),
+        **dict.fromkeys(("rows", "shape", "bends"), (6, 12)),
         "gradient": (m, 12),
         "factors": (k, 3, 6, 6),
         "turning": (k, 3, 3),

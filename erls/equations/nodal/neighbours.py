@@ -7,7 +7,7 @@ order in x: a turned node sees its own velocity from other axes.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -55,7 +55,7 @@ class NodalNeighbours:
     multipliers: Array
     stored: Stored
     names: tuple[str, ...]
-    system_of: SystemOf = system_in
+    system_of: SystemOf = field(default=system_in, kw_only=True)
 
     @cached_property
     def metres(self) -> Array:
@@ -163,7 +163,8 @@ def nodal_neighbours(
     system_of: SystemOf = system_in,
 ) -> NodalNeighbours:  # fmt: skip
     """Of a state with the acceleration and the multipliers of the equations of motion."""
-    return NodalNeighbours(system, t, q, v, *consistent_acceleration(system, t, q, v), stored, names, system_of)
+    known = consistent_acceleration(system, t, q, v)
+    return NodalNeighbours(system, t, q, v, *known, stored, names, system_of=system_of)
 
 
 def names_of_nodes(owners: Sequence[str]) -> tuple[str, ...]:

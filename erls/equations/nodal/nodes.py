@@ -56,3 +56,13 @@ def of_numbers(numbers: Array, like: Nodes) -> Nodes:
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
     parts = [x.reshape(shape).copy() for x, shape in zip(np.split(numbers, ends[:-1]), shapes, strict=True)]
     return Nodes(poses_of(parts[0]), *parts[1:])
+
+
+def twists_of(turn: Array, rate: Array) -> Array:
+    """(..., 6) twists in the axes of nodes with rotations (..., 3, 3) from what is stored of their rates (..., 12)."""
+    back = np.swapaxes(turn, -1, -2)
+    spin = back @ rate[..., 3:].reshape(turn.shape)
+    twist = np.empty((*rate.shape[:-1], 6))
+    twist[..., :3] = (back @ rate[..., :3, None])[..., 0]
+    twist[..., 3:] = (spin - np.swapaxes(spin, -1, -2))[..., [2, 0, 1], [1, 2, 0]] / 2
+    return twist

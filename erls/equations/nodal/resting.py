@@ -11,7 +11,6 @@ with a positive stiffness (`erls.equations.serial.equilibrium` does the same of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -87,15 +86,15 @@ class Resting(NamedTuple):
     bearing: Bearing
 
 
-def resting(chain: Chain, mechanism: Mechanism, held: Mapping[int, float]) -> Resting:
-    """At rest under all loads with joints held.
+def resting(whole: NodalSystem, chain: Chain, mechanism: Mechanism) -> Resting:
+    """At rest under all loads.
 
     Parameters
     ----------
+    whole : NodalSystem
+        With joints held.
     chain : Chain
     mechanism : Mechanism
-    held : mapping of int to float
-        Coordinates by the numbers of the joints.
 
     Raises
     ------
@@ -103,7 +102,6 @@ def resting(chain: Chain, mechanism: Mechanism, held: Mapping[int, float]) -> Re
         UNSTABLE_START: links buckle under their loads, and the mechanism does not allow it; names the link.
         NO_EQUILIBRIUM, where none is found.
     """
-    whole = chain.resting(held)
     found = _directly(whole)
     if chain.beams is None:
         return Resting(_reached(found), Bearing(1.0, ""))

@@ -12,6 +12,8 @@ import numpy as np
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.contract import (
+    State,
+    Work,
     call_forces,
     call_knot,
     call_remember,
@@ -23,7 +25,7 @@ from erls.equations.nodal.contract import (
 )
 from erls.equations.nodal.motion import compose as composed
 from erls.equations.stepped import COMPOSE, SETTLE
-from erls.maths.jit import kernel
+from erls.maths.jit import kernel, part
 
 
 @kernel(COMPOSE, counted=False)
@@ -74,6 +76,19 @@ def residual(
     out[n + m], out[n + m + 1] = np.sqrt(force), np.sqrt(reaction)
 
 
+@part
+def keep(work: Work, there: State) -> None:
+    """Into a configuration, what its poses do not tell."""
+    for e in range(len(work.bent)):
+        for i in range(6):
+            there.bent[e, i] = work.bent[e, i]
+    for k in range(len(work.turned)):
+        there.turned[k] = work.turned[k]
+    for k in range(len(work.wound)):
+        for i in range(3):
+            there.wound[k, i] = work.wound[k, i]
+
+
 @kernel(SETTLE, counted=False)
 def settle(
     reals: Array, integers: IntArray, scratch: Array, t: float, q: Array, v: Array, a: Array, knot: Array
@@ -89,13 +104,6 @@ def settle(
         work.v[i], work.a[i] = v[i], a[i]
     if before.behind[0] != 0.0:
         call_remember(known.remember, reals, integers, scratch, before.numbers)
-    for e in range(len(work.bent)):
-        for i in range(6):
-            there.bent[e, i] = work.bent[e, i]
-    for k in range(len(work.turned)):
-        there.turned[k] = work.turned[k]
-    for k in range(len(work.wound)):
-        for i in range(3):
-            there.wound[k, i] = work.wound[k, i]
+    keep(work, there)
     call_knot(known.knot, reals, integers, scratch, knot)
     return 0

@@ -1,0 +1,78 @@
+"""Figures of inverse dynamics: what forward runs miss, order of the step, and cost over steps and modes.
+
+``python benchmarks/inverse.py [figures] [cost]``; processor time, so that other work on the machine counts less.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import erls
+from erls.inverse.confirm import confirmed
+
+DATA = Path(__file__).parents[1] / "data"
+ARM, PLANAR = (DATA / "inverse" / f"{name}.toml" for name in ("arm", "two_link_planar"))
+ROBOT = DATA / "robot" / "two_link.toml"
+FFR = "simulation.formulation=ffr"
+CIRCLE = 'servo.0.path={shape="circle", centre=[0.5, 0.4, 0.0], from=[0.5, 0.5, 0.0], start=0.6, duration=0.8}'
+SPATIAL = (
+    'servo=[{point="end2", coordinates=["y", "z"], '
+    'path={shape="line", from=[1.0, 0.0, 0.0], to=[0.8, 0.4, 0.2], start=0.3, duration=0.8}}]'
+)
+CASES: dict[str, tuple[Path, tuple[str, ...], tuple[str, ...]]] = {
+    **{f"arm, erls, {h:g} ms": (ARM, (f"simulation.step={h / 1e3}",), ("erls",)) for h in (4, 2, 1)},
+    **{f"arm, ffr, {h:g} ms": (ARM, (f"simulation.step={h / 1e3}", FFR), ("ffr",)) for h in (4, 2)},
+    "arm on nodes": (ARM, ("simulation.step=0.004", "simulation.elements_per_member=16"), ("nodal",)),
+    "planar robot, line": (PLANAR, (), ("erls", "nodal")),
+    "planar robot, circle": (PLANAR, (CIRCLE,), ("erls", "nodal")),
+    "spatial robot under weight": (ROBOT, (SPATIAL, "simulation.step=0.002"), ("erls",)),
+}
+
+
+def figures() -> None:
+    """Print what forward runs miss."""
+    print("case, forward run: tip error, of rigid feed-forward [mm]; peak efforts, of rigid links; ahead [s]; work [s]")
+    for name, (path, changes, runs) in CASES.items():
+        begun = time.process_time()
+        found = erls.invert(erls.load_scene(path, changes))
+        spent = time.process_time() - begun
+        for formulation in runs:
+            elastic = confirmed(found, found.efforts, found.start, formulation)
+            rigid = confirmed(found, found.rigid_efforts, found.rigid_start, formulation)
+            both = (found.efforts, found.rigid_efforts)
+            peaks = "; ".join(", ".join(f"{np.abs(x).max():.4g}" for x in each.values()) for each in both)
+            errors = f"{1e3 * elastic.error:.5f}, {1e3 * rigid.error:.4f}"
+            print(f"{name}, {formulation}: {errors}; {peaks}; {found.pre_actuation():.3f}; {spent:.1f}", flush=True)
+
+
+def spent(*changes: str) -> tuple[float, int]:
+    """Processor time of an iteration [s], and coordinates; the second of two inversions."""
+    for _ in range(2):
+        begun = time.process_time()
+        found: Any = erls.invert(erls.load_scene(PLANAR, ["inverse.bandwidth=20.0", *changes]))
+        whole = time.process_time() - begun
+    return whole / found.iterations, int(found.problem.flexible.tree.size)
+
+
+def cost() -> None:
+    """Print work over steps and over modes, and the powers by which it grows."""
+    base = spent("simulation.step=0.004")[0]
+    for step in (0.002, 0.001):
+        ratio = spent(f"simulation.step={step}")[0] / base
+        print(f"{0.004 / step:g} times the steps: {ratio:.2f} times the work of an iteration", flush=True)
+    counts = [spent(f"links.0.elastic_modes={m}", f"links.1.elastic_modes={m}") for m in (3, 6, 12)]
+    for (first, few), (second, more) in pairwise(counts):
+        power = np.log(second / first) / np.log(more / few)
+        print(f"{few} to {more} coordinates: {second / first:.2f} times the work, power {power:.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    chosen = sys.argv[1:] or ["figures", "cost"]
+    for part in chosen:
+        {"figures": figures, "cost": cost}[part]()

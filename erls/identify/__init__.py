@@ -1,0 +1,1 @@
+"""Numbers of a scene from measured records, with what the records leave open."""

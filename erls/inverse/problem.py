@@ -1,0 +1,210 @@
+"""From a scene to what an inversion works on: the tree with its conditions, and the same of rigid links."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from erls.equations.registry import TREES, system_of
+from erls.equations.serial.formulation import SerialFormulation
+from erls.errors import Cause, SceneError
+from erls.inverse.conditions import Conditions, conditions_of
+from erls.inverse.frames import with_ends
+from erls.inverse.servoed import Servoed
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.curves import piecewise
+from erls.mechanism.drives import Drive
+from erls.mechanism.without_effects import with_rigid
+from erls.scene.build import Message, build_mechanism
+from erls.scene.chain import Scene
+from fe_import.model import IntArray
+
+STEP = 1e-3
+"""Of scenes that give none [s]."""
+
+_MOST = 50_000_000
+"""Numbers of one matrix at all knots, 400 MB; there are some ten."""
+
+_SYSTEMS = {
+    "nodal": ("formulation", "use erls or ffr; erls invert --confirm nodal runs the drives on nodal elements"),
+    "pieces": ("formulation", "leave links in one piece (substructures = 1)"),
+    "loops": ("", "remove [[loops]]"),
+    "quasi-static": ("bandwidth", "remove it: fast internal motions follow by inverse.bandwidth"),
+    "absolute": ("coordinates", "use coordinates = 'independent'"),
+}
+"""Kinds of systems that are not inverted yet, with the field of the settings that says so."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An inversion.
+
+    Attributes
+    ----------
+    scene : Scene
+    mechanism : Mechanism
+        Of the scene.
+    conditions : Conditions
+    drives : tuple of str
+        Joints whose efforts are unknown.
+    flexible : Servoed
+    rigid : Servoed
+        Of rigid links, joints that nothing drives held where they start.
+    t : (k,) array
+        Knots [s].
+    warnings : tuple of str
+    """
+
+    scene: Scene
+    mechanism: Mechanism
+    conditions: Conditions
+    drives: tuple[str, ...]
+    flexible: Servoed
+    rigid: Servoed
+    t: Array
+    warnings: tuple[str, ...]
+
+    @property
+    def step(self) -> float:
+        """Between knots [s]."""
+        return float(self.t[1] - self.t[0])
+
+
+def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
+    """Read a scene for its inversion.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        Bad input, or a scene that cannot be inverted; TOO_FEW_DRIVES.
+    """
+    built = build_mechanism(scene, tell)
+    mechanism = built.mechanism
+    _refuse(scene, mechanism)
+    drives = unknown_drives(scene, mechanism)
+    conditions = conditions_of(scene, mechanism)
+    _refuse_number(scene, conditions, [mechanism.joints[k].name for k in drives.tolist()])
+    free = _with_drives(mechanism, {k: Drive() for k in drives.tolist()})
+    held = {
+        k: Drive("motion", motion=joint.drive.motion or piecewise([], [joint.position]))
+        for k, joint in enumerate(free.joints)
+        if not joint.drive.prescribed and k not in drives.tolist()
+    }
+    rigid = with_rigid(_with_drives(free, held), {link.name for link in mechanism.links})
+    flexible, stiff = (Servoed(_tree(scene, each, conditions), conditions, drives) for each in (free, rigid))
+    settings = scene.record.simulation
+    count = max(2, round(settings.duration / (settings.step or STEP)))
+    if count * flexible.tree.size**2 > _MOST:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            f"too many steps for {flexible.tree.size} coordinates",
+            where=f"{scene.path}: simulation.step",
+            value=count,
+            limit=_MOST // flexible.tree.size**2,
+            remedy="give a larger step, a shorter duration, or links with fewer modes (elastic_modes)",
+        )
+    t = np.linspace(0.0, settings.duration, count + 1)
+    names = tuple(mechanism.joints[k].name for k in drives.tolist())
+    return Problem(scene, mechanism, conditions, names, flexible, stiff, t, built.warnings)
+
+
+def unknown_drives(scene: Scene, mechanism: Mechanism) -> IntArray:
+    """(r,) joints whose efforts are unknown, by their numbers."""
+    names = scene.record.inverse.drives
+    found = [
+        k
+        for k, joint in enumerate(mechanism.joints)
+        if not joint.fixed and (joint.name in names if names else joint.drive.kind != "free")
+    ]
+    return np.array(found, dtype=np.int64)
+
+
+def _with_drives(mechanism: Mechanism, drives: dict[int, Drive]) -> Mechanism:
+    joints = (replace(joint, drive=drives[k]) if k in drives else joint for k, joint in enumerate(mechanism.joints))
+    return replace(mechanism, joints=tuple(joints), static_start=False)
+
+
+def _tree(scene: Scene, mechanism: Mechanism, conditions: Conditions) -> SerialFormulation:
+    settings = scene.record.simulation
+    tree = TREES[settings.formulation](with_ends(mechanism, conditions.points), settings)
+    assert isinstance(tree, SerialFormulation)
+    return tree
+
+
+def _refuse_number(scene: Scene, conditions: Conditions, drives: list[str]) -> None:
+    wanted, given = len(conditions.every), len(drives)
+    if wanted == given:
+        return
+    where, names = f"{scene.path}: servo", ", ".join(each.name for each in conditions.every)
+    if wanted > given:
+        raise SceneError(
+            Cause.TOO_FEW_DRIVES,
+            f"fewer drives ({', '.join(drives) or 'none'}) than conditions ({names})",
+            where=where,
+            value=given,
+            limit=wanted,
+            remedy="demand less, or name more drives (inverse.drives)",
+        )
+    raise SceneError(
+        Cause.BAD_FIELD,
+        f"more drives ({', '.join(drives)}) than conditions ({names})",
+        where=where,
+        value=given,
+        limit=wanted,
+        remedy="demand the motion of a joint, too, or name as many drives as conditions (inverse.drives)",
+    )
+
+
+def _refuse(scene: Scene, mechanism: Mechanism) -> None:
+    """Refuse what cannot be inverted yet.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: names what.
+    """
+    settings = scene.record.simulation
+
+    def refused(field: str, what: str, remedy: str) -> SceneError:
+        where = f"{scene.path}: simulation.{field}" if field else str(scene.path)
+        return SceneError(Cause.BAD_FIELD, f"{what} cannot be inverted", where=where, remedy=remedy)
+
+    kind = system_of(mechanism, settings)
+    if kind in _SYSTEMS:
+        field, remedy = _SYSTEMS[kind]
+        raise refused(field, f"a scene with {getattr(settings, field)!r}" if field else "a scene with loops", remedy)
+    if settings.gauge == "minimum-norm":
+        raise refused("gauge", "the minimum-norm gauge", "use gauge = 'joint-angle'")
+    if settings.effects == "auto":
+        raise refused("effects", "a scene that chooses its effects", "use 'all', or the names of effects")
+    if mechanism.rotation_vectors:
+        raise refused("", "a joint that turns by a rotation vector", "use universal and revolute joints")
+    for joint in mechanism.joints:
+        if joint.forces.sticks or joint.forces.stops:
+            raise refused("", f"joint {joint.name!r} with stops or with friction that sticks", "remove them")
+    if mechanism.contacts:
+        raise refused("", "a scene with contacts", "remove [[contacts]]")
+
+
+def followed(servoed: Servoed, conditions: Conditions, t: Array) -> Array:
+    """(k, n) places at which the conditions hold at times (k,), each next to the one before; the first one next to the
+    start of the scene.
+
+    Raises
+    ------
+    SimulationError
+        OUT_OF_REACH, SINGULAR_SERVO: says when.
+    """
+    demand = conditions.demand(t)
+    y = servoed.tree.undeformed_start()[0][None]
+    result = np.empty((len(t), y.shape[1]))
+    for k in range(len(t)):
+        one = demand.part(slice(k, k + 1))
+        y = servoed.settled(one, y)
+        result[k] = y[0]
+        if k + 1 < len(t):
+            rates = servoed.at(one, y, np.zeros((1, servoed.count)), np.zeros_like(y), np.zeros((1, 0))).v
+            y = y + (t[k + 1] - t[k]) * rates
+    return result

@@ -1,0 +1,167 @@
+"""Derivatives of the forces of a run by a parameter, at its knots.
+
+∂R/∂p is a sum of forces R of equations at other values of p, or with constants c + Δp dc/dp, of which R is a simpler
+function: linear in inertia, in loads, in gains. Fewer terms than fourth order takes are enough then, as a look at some
+knots shows: two on either side, or one beside the run itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from erls.equations.compiled_system import CompiledSystem
+from erls.maths.so3 import Array
+from erls.sensitivity.tangents import Evaluation, Knots
+from erls.sensitivity.variants import Difference, Variant
+from fe_import.derivatives import STENCILS, STEP
+
+_LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
+_ROUNDING = 4e-15  # of forces out of balance, and of constants
+_SEEN = 1e3  # times rounding: less is nothing
+
+
+class Term(NamedTuple):
+    """Forces at another value.
+
+    Attributes
+    ----------
+    weight : float
+        In the derivative [1/unit of the parameter].
+    apart : float
+        Of the parameter from its value in the run; 0 of the run itself.
+    system : CompiledSystem
+    turn : (n, n) array or None
+        As of `erls.sensitivity.variants.Variant`.
+    """
+
+    weight: float
+    apart: float
+    system: CompiledSystem
+    turn: Array | None = None
+
+    def forces(self, knots: Knots, evaluation: Evaluation) -> Array:
+        """(k, n) forces out of balance, in the coordinates of the run."""
+        t, y, v, a = knots
+        if self.turn is None:
+            return evaluation.forces(self.system, knots)
+        turned = Knots(t, *(x @ self.turn.T for x in (y, v, a)))
+        return np.asarray(evaluation.forces(self.system, turned) @ self.turn)
+
+
+@dataclass(frozen=True)
+class ForceDerivative:
+    """∂R/∂p as a sum of terms."""
+
+    terms: tuple[Term, ...]
+
+    def at(self, knots: Knots, evaluation: Evaluation, known: dict[int, Array]) -> Array:
+        """(k, n) at knots; ``known`` keeps forces of the run itself, for all who ask at the same knots."""
+        found: dict[int, Array] = {}
+        order = [0, len(self.terms) - 1, *range(1, len(self.terms) - 1)]
+        for k in order:
+            if len(found) == 2 and np.array_equal(found[order[0]], found[order[1]]):
+                return np.zeros_like(knots.y)  # it does not act here
+            found[k] = self._forces(self.terms[k], knots, evaluation, known)
+        return np.asarray(sum(term.weight * found[k] for k, term in enumerate(self.terms)))
+
+    @staticmethod
+    def _forces(term: Term, knots: Knots, evaluation: Evaluation, known: dict[int, Array]) -> Array:
+        if term.apart:
+            return term.forces(knots, evaluation)
+        if 0 not in known:
+            known[0] = term.forces(knots, evaluation)
+        return known[0]
+
+
+def force_derivative(
+    base: CompiledSystem, difference: Difference, sample: Knots, evaluation: Evaluation
+) -> ForceDerivative | None:
+    """By a parameter, with as few terms as some knots let it have; None where forces do not depend on it.
+
+    Parameters
+    ----------
+    base : CompiledSystem
+        Of the run.
+    difference : Difference
+    sample : Knots
+    evaluation : Evaluation
+    """
+    if not difference.acts:
+        return None
+    terms = _along_constants(base, difference)
+    if terms is None:
+        terms = [Term(one.weight, one.apart, one.formulation.compiled, one.turn) for one in difference.variants]
+    here = Term(0.0, 0.0, base)
+    found = [term.forces(sample, evaluation) for term in terms]
+    rounding = _ROUNDING * max(map(_largest, found)) / min(abs(term.apart) for term in terms if term.apart)
+    linear = _linear([here, *terms], [here.forces(sample, evaluation), *found], rounding)
+    return ForceDerivative(linear or _inner(terms, found, rounding))
+
+
+def _along_constants(base: CompiledSystem, difference: Difference) -> list[Term] | None:
+    """Terms of fourth order with constants c + Δp dc/dp: forces are simpler functions of constants than of parameters.
+
+    None where equations of another kind, or in other coordinates, stand at other values. One that comes into play with
+    the parameter, a damper say, may be of a kind of its own, whose constants are those of the run without it.
+    """
+    first, second = difference.few
+    found = first.formulation.compiled, second.formulation.compiled
+    if first.turn is not None or not _of_one_kind(*found) or len(found[0].reals) != len(base.reals):
+        return None
+    slope = _linear_slope(base.reals, first, second)
+    if slope is None:
+        every = [variant.formulation.compiled for variant in difference.variants]
+        if not _of_one_kind(base, *every):
+            return None
+        same = np.all([x.reals == base.reals for x in every], axis=0)  # infinite ones, too
+        weights = [variant.weight for variant in difference.variants]
+        slope = np.sum([w * np.where(same, 0.0, x.reals) for w, x in zip(weights, every, strict=True)], axis=0)
+    step = STEP * difference.parameter.size
+    moved = [(weight / step, at * step) for at, weight in STENCILS[0]]
+    return [Term(weight, apart, replace(found[0], reals=base.reals + apart * slope)) for weight, apart in moved]
+
+
+def _linear_slope(here: Array, first: Variant, second: Variant) -> Array | None:
+    """dc/dp where constants are linear in the parameter, as two variants show."""
+    one, other = first.formulation.compiled.reals, second.formulation.compiled.reals
+    same = (one == here) & (other == here)  # infinite ones, too
+    with np.errstate(invalid="ignore"):
+        slope = np.where(same, 0.0, (other - one) / (second.apart - first.apart))
+        off = np.where(same, 0.0, one - first.apart * slope - here)
+    return slope if (np.abs(off) <= _ROUNDING * np.abs(here)).all() else None
+
+
+def _of_one_kind(first: CompiledSystem, *others: CompiledSystem) -> bool:
+    return all(np.array_equal(first.integers, other.integers) for other in others)
+
+
+def _linear(terms: list[Term], found: list[Array], rounding: float) -> tuple[Term, ...] | None:
+    """Two terms where they are enough, of which one is the run itself, the first one here.
+
+    Where nothing of the parameter shows at these knots, nothing is known of the others.
+    """
+    first, second = [k for k in range(1, len(terms), 2) if terms[k].apart][:2]
+    one, other = ((found[k] - found[0]) / terms[k].apart for k in (first, second))
+    if _largest(one) <= _SEEN * rounding or _largest(one - other) > _LINEAR * _largest(one) + rounding:
+        return None
+    far = max(terms[first], terms[second], key=lambda term: abs(term.apart))
+    return far._replace(weight=1 / far.apart), terms[0]._replace(weight=-1 / far.apart)
+
+
+def _inner(terms: list[Term], found: list[Array], rounding: float) -> tuple[Term, ...]:
+    """The two terms on either side of the run, if they are enough and something shows."""
+    if terms[0].apart >= 0 or terms[-1].apart <= 0:
+        return tuple(terms)
+    inner = tuple(term._replace(weight=0.75 * term.weight) for term in terms[1:3])
+    weights = np.array([term.weight for term in terms])
+    whole = np.tensordot(weights, np.array(found), 1)
+    less = 0.75 * np.tensordot(weights[1:3], np.array(found[1:3]), 1)
+    shows = _largest(whole) > _SEEN * rounding
+    return inner if shows and _largest(whole - less) <= _LINEAR * _largest(whole) + rounding else tuple(terms)
+
+
+def _largest(x: Array) -> float:
+    return float(np.abs(x).max(initial=0.0))

@@ -1,0 +1,70 @@
+"""The command ``erls export``: files, summary, what it refuses."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from erls.cli.main import main
+
+ROOT = Path(__file__).parents[2]
+LINK = ROOT / "data" / "l_shape" / "links" / "steel_tall.toml"
+
+
+@pytest.fixture(scope="module")
+def modal(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("modal") / "l.modal.h5"
+    assert main(["reduce", str(LINK), "-o", str(path)]) == 0
+    return path
+
+
+def exported(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> str:
+    capsys.readouterr()
+    assert main(["export", *words]) == code
+    found = capsys.readouterr()
+    return found.err if code else found.out
+
+
+def test_a_superelement_and_the_full_model(
+    modal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = json.loads(exported(capsys, str(modal), "-o", str(tmp_path / "l.mtx"), "--json"))
+    assert (told["dofs"], told["nodes"], told["modal_coordinates"]) == (24, 2, 12)
+    assert told["interfaces"] == {"root": 1, "tip": 2}
+    assert [Path(f).name for f in told["files"]] == ["l.mtx", "l.mass.mtx", "l.rows.txt", "l.nodes.txt", "l.toml"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(Path(f).name for f in told["files"])
+    assert main(["reduce", str(tmp_path / "l.toml"), "-o", str(tmp_path / "again.modal.h5")]) == 0
+    assert "246 dofs, 41 nodes, 0 modal" in exported(capsys, str(LINK), "-o", str(tmp_path / "full.pch"))
+
+
+def test_what_is_replaced(modal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Earlier exports are, but for OUTPUT4, which has no place for a mark; never what is read, or another's file."""
+    target = tmp_path / "l.mtx"
+    for _ in range(2):
+        exported(capsys, str(modal), "-o", str(target))
+    target.write_text("%%MatrixMarket matrix coordinate real general\n", encoding="ascii")
+    assert "no .mtx file that erls wrote" in exported(capsys, str(modal), "-o", str(target), code=2)
+    exported(capsys, str(modal), "-o", str(target), "--force")
+    exported(capsys, str(modal), "-o", str(tmp_path / "l.op4"))
+    assert "--force" in exported(capsys, str(modal), "-o", str(tmp_path / "l.op4"), code=2)
+    own = tmp_path / "own.toml"
+    shutil.copy(LINK, own)
+    text = own.read_bytes()
+    assert "a file that is read" in exported(capsys, str(own), "-o", str(tmp_path / "own.mtx"), "--force", code=2)
+    assert own.read_bytes() == text
+    assert not (tmp_path / "own.mtx").exists()
+
+
+def test_faults(modal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words, message in (
+        ([str(modal), "-o", str(tmp_path / "l.xyz")], "names no format"),
+        ([str(modal), "-o", str(tmp_path / "l.op4"), "--format", "op4"], "unknown name 'op4'"),
+        ([str(modal), "-o", str(tmp_path / "nowhere" / "l.op4")], "no folder"),
+        ([str(tmp_path / "nix.h5"), "-o", str(tmp_path / "l.op4")], "no such file"),
+        ([str(modal)], "output"),
+    ):
+        assert message in exported(capsys, *words, code=2)
+    assert not list(tmp_path.iterdir())

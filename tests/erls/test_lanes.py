@@ -1,0 +1,140 @@
+"""Eightfold numbers: their arithmetic against closed forms, and equations of motion in them against single numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import erls
+from erls.equations import side_by_side
+from erls.equations.compiled_system import CompiledSystem
+from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
+from erls.equations.series import residual_series
+from erls.equations.side_by_side import WORTH, eightfold_forces, eightfold_kernels, eightfold_tangents
+from erls.equations.system import metre_scales
+from erls.maths.jit import ENABLED
+from erls.sensitivity.tangents import Evaluation, Knots, steps_of
+
+DATA = Path(__file__).parents[2] / "data"
+ROBOT = DATA / "robot" / "two_link.toml"
+LINEAR = 'simulation.effects=["flexibility", "gravity", "coriolis", "inertia_first_order", "joint_friction"]'
+FORMS = {
+    "linear": [LINEAR],
+    "second order": [],
+    "floating frames": ['simulation.formulation="ffr"'],
+}
+ACTING = [
+    "simulation.duration=0.02",
+    'joints.0.drive={type="free"}',
+    "joints.0.friction={force=0.3, transition_rate=0.3}",
+    'loads=[{point="end1", force=[0.0, 1.0, 2.0], factor=[{shape="step", start=0.01, value=1.0}]}]',
+]
+
+compiled_only = pytest.mark.skipif(not ENABLED, reason="eightfold numbers are for compiled code")
+
+
+def _functions() -> tuple[Any, Any]:
+    """A function of three numbers with every operation, in duals and in lanes, of memory (3, 8) into (1, 8)."""
+    from numba import njit
+
+    from erls.maths.lanes import as_duals, as_lanes
+
+    def formula(z, r):  # type: ignore[no-untyped-def]
+        x, y, c = z[0], z[1], z[2]
+        q = 0.0
+        q += x * y / c + np.cos(x) * np.sqrt(y) - 2 * c**2 + 3 / y - np.tanh(x) / 4
+        q -= np.exp(-x) * np.log(y) + np.sin(c) * np.tan(x) - np.cosh(x) / np.sinh(y) + np.arctan(r * c)
+        if q.real < 100.0 and abs(q) >= 0 and q != 7.0 and not q == 3.0 and x <= y and c > x:  # noqa: SIM201
+            q = abs(-q) + y.imag
+        return 1.5 - q
+
+    compiled = njit(formula, error_model="numpy")
+
+    @njit(error_model="numpy")
+    def in_duals(x, r, out):  # type: ignore[no-untyped-def]
+        as_duals(out)[0] = compiled(as_duals(x), r)
+
+    @njit(error_model="numpy")
+    def in_lanes(x, r, out):  # type: ignore[no-untyped-def]
+        as_lanes(out)[0] = compiled(as_lanes(x), r)
+
+    def single(z: np.ndarray, r: float) -> complex:
+        x, y, c = z
+        q = x * y / c + np.cos(x) * np.sqrt(y) - 2 * c**2 + 3 / y - np.tanh(x) / 4
+        q -= np.exp(-x) * np.log(y) + np.sin(c) * np.tan(x) - np.cosh(x) / np.sinh(y) + np.arctan(r * c)
+        return 1.5 - (q if q.real > 0 else -q)
+
+    return (in_duals, in_lanes), single
+
+
+@compiled_only
+def test_arithmetic() -> None:
+    """Derivatives against complex steps, states against single ones; states that go different ways are told."""
+    from erls.maths.lanes import WAYS, WIDTH, Apart, eightfold
+
+    (in_duals, in_lanes), single = _functions()
+    rng, out = np.random.default_rng(2), eightfold(1)
+    x = eightfold(3)
+    x[:, 0], x[:, 1:] = [0.3, 0.8, 1.7], rng.normal(size=(3, WAYS))
+    in_duals(x, 0.7, out)
+    expected = [single(x[:, 0] + 1e-30j * way, 0.7).imag / 1e-30 for way in x[:, 1:].T]
+    np.testing.assert_allclose(out[0], [single(x[:, 0], 0.7).real, *expected], rtol=1e-14, atol=1e-14)  # terms up to 8
+    x[:] = x[:, :1] + 0.1 * rng.uniform(size=(3, WIDTH))
+    in_lanes(x, 0.7, out)
+    np.testing.assert_allclose(out[0], [single(one, 0.7) for one in x.T], rtol=1e-14, atol=1e-14)
+    x[1, 3] = x[0, 3] / 2
+    with pytest.raises(Apart):
+        in_lanes(x, 0.7, out)
+
+
+def _case(form: str) -> tuple[Any, CompiledSystem, Knots]:
+    scene: Any = erls.load_scene(ROBOT, [*ACTING, *FORMS[form]])
+    chain = erls.simulate(scene, verdict=False).formulation
+    rng, steps = np.random.default_rng(5), _steps(chain)
+    y, v, a = (scale * steps * rng.uniform(-1, 1, (21, len(steps))) for scale in (3e2, 3e4, 1e6))
+    y[:, 0] += rng.uniform(-1, 1, 21)
+    t = np.linspace(0.0, 0.02, 21)  # a load begins within one of the eights
+    return chain, chain.compiled, Knots(t, y, v, a)  # type: ignore[attr-defined]
+
+
+def _steps(chain: Any) -> np.ndarray:
+    return steps_of(metre_scales(chain), size_of(chain.mechanism), elastic_on_diagonal(chain)[0])
+
+
+@compiled_only
+@pytest.mark.parametrize("form", FORMS)
+def test_equations(form: str) -> None:
+    """Forces to rounding, tangents to what differences leave: 1e-10 of the largest, and of forces over their steps."""
+    chain, system, knots = _case(form)
+    kernels = eightfold_kernels(system, WORTH)
+    expected = residual_series(system, *knots)
+    forces = eightfold_forces(kernels, system, *knots)
+    assert np.abs(forces - expected).max() <= 1e-13 * np.abs(expected).max()
+    steps = _steps(chain)
+    differences = Evaluation(steps).tangents(system, knots)
+    rounding = 1e-15 * np.abs(expected).max() / steps
+    for found, of in zip(eightfold_tangents(kernels, system, *knots), differences[1:], strict=True):
+        assert (np.abs(found - of) <= 1e-10 * np.abs(of).max() + rounding).all()
+
+
+@compiled_only
+def test_states_that_go_different_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The load begins between states of one eight: these are taken one by one, and no others."""
+    _, system, knots = _case("second order")
+    taken = []
+
+    def noted(system: CompiledSystem, t: np.ndarray, *state: np.ndarray) -> np.ndarray:
+        taken.extend(t.tolist())
+        return residual_series(system, t, *state)
+
+    monkeypatch.setattr(side_by_side, "residual_series", noted)
+    eightfold_forces(eightfold_kernels(system, WORTH), system, *knots)
+    assert taken == knots.t[8:16].tolist()
+
+
+def test_what_is_not_worth_it() -> None:
+    _, system, _ = _case("second order")
+    assert eightfold_kernels(system, WORTH - 1) is None
