@@ -12,14 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from erls.equations.switches.tree import SwitchedTree
 from erls.errors import Cause, SceneError
-from erls.integrate.base import Leg, legs
+from erls.integrate.base import Leg, walked
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.outputs import ALONG
@@ -119,15 +118,8 @@ class Modes:
             BAD_FIELD: the run was made in parts.
         """
         t, v = run.solution.t, run.solution.v
-        ends = [0, *(np.flatnonzero(np.diff(t) == 0) + 1).tolist(), len(t)]
-        whole = legs(self.system, (float(t[0]), float(t[-1])))
         found = []
-        for first, end in pairwise(ends):
-            leg = next((leg for leg in whole if leg.start <= t[first] < leg.end), whole[-1] if whole else None)
-            if leg is None:
-                continue
-            begun = float(t[first])
-            own = leg if begun == leg.start else Leg(begun, leg.end, begun, leg.last)
+        for first, end, leg in walked(self.system, t):
             modes, switched = np.zeros(0), end < len(t) and bool(t[end - 1] < leg.end)
             if self.sticking is not None:
                 rates = v[first:end, self.sticking.rubbing.places]
@@ -135,7 +127,7 @@ class Modes:
             elif switched:
                 message = "derivatives of a run in parts are not known yet"
                 raise SceneError(Cause.BAD_FIELD, message, where=str(run.scene.path), remedy="run it in one piece")
-            found.append(Piece(first, end, own, modes, switched))
+            found.append(Piece(first, end, leg, modes, switched))
         return found
 
     def through(

@@ -15,8 +15,10 @@ from scipy.optimize import brentq
 from test_sticking import TIGHT, switches
 from test_sticking_loops import INERTIA, LEVEL, parallelogram, pin, run_scene
 
+import erls
 from erls.accuracy.energy_balance import energy_balance
 from erls.accuracy.looked_at import LookedAt
+from erls.errors import SceneError
 from erls.maths.so3 import Array
 
 GAIN, RATE_GAIN, LIMIT, GOAL, END = 40.0, 0.8, 0.5, 0.3, 1.5
@@ -155,3 +157,24 @@ def test_flexible_arm_under_its_limit(tmp_path: Path) -> None:
     assert run.accuracy is not None
     assert run.accuracy.integration is not None
     assert off["equal"] <= run.accuracy.integration
+
+
+@pytest.mark.parametrize("settings", [{"integrator": "lobatto"}, {"formulation": "nodal", "step": 5e-3}])
+def test_derivatives_of_motors_at_their_limits_are_refused(settings: dict[str, Any], tmp_path: Path) -> None:
+    """By name where limits are reached; a larger one is differentiated."""
+    link = {"name": "arm", "rigid": {**ROD, "points": {"root": [0.0] * 3, "tip": [0.5, 0.0, 0.0]}}}
+    data: dict[str, Any] = {
+        "gravity": [0.0] * 3,
+        "simulation": {"duration": 0.6, **settings},
+        "joints": [{"name": "hub", "dh": {"convention": "modified"}, "drive": DRIVE}],
+        "links": [{**link, "mesh_pose": {"frame": "joint"}}],
+        "points": [{"name": "end", "link": "arm", "node": "tip"}],
+    }
+    asked = {"end": lambda run: run.position("end", 0.5)}, ["joints.hub.drive.proportional_gain"]
+    path = scenes.write_toml(tmp_path / "scene.toml", data)
+    with pytest.raises(SceneError, match="motors come to their limits") as caught:
+        erls.sensitivities(erls.load_scene(path), *asked)
+    assert caught.value.where.endswith("torque_limit")
+    data["joints"][0]["drive"] = {**DRIVE, "torque_limit": 100.0}
+    found = erls.sensitivities(erls.load_scene(scenes.write_toml(path, data)), *asked)
+    assert np.abs(found.derivatives["end"]["joints.hub.drive.proportional_gain"]).max() > 1e-4

@@ -13,7 +13,7 @@ from erls.equations.compiled_system import call_mass_matrix, call_residual, call
 from erls.equations.switches.still import still_forces, still_matrix
 from erls.maths.dense import backward, cholesky, forward
 from erls.maths.jit import kernel
-from erls.maths.records import Matrix, Vector, reader
+from erls.maths.records import Indices, Matrix, Vector, reader
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -29,12 +29,18 @@ class Frictions(NamedTuple):
         Addresses of the functions of the system without this friction.
     room : int
         Place of the `Room`.
+    places : (m,) int array
+        Coordinates of the joints.
+    sliding : (m,) array
+        Friction of each while it slides [N m or N].
     """
 
     residual: int
     mass_matrix: int
     stiffness_and_damping: int
     room: int
+    places: Indices
+    sliding: Vector
 
 
 class Room(NamedTuple):
@@ -44,10 +50,13 @@ class Room(NamedTuple):
     ----------
     held : (n,) array
         1 of coordinates that do not move, 0 of others: set from outside.
+    modes : (m,) array
+        1 of a joint that slides on, -1 of one that slides back, 0 of one that sticks: set from outside.
     mass : (n, n) array
     """
 
     held: Vector
+    modes: Vector
     mass: Matrix
 
 
@@ -61,7 +70,10 @@ def residual(
     """M a - f, see `erls.equations.compiled_system`; of a joint that sticks, a_k."""
     own = read_frictions(reals, integers, integers[len(integers) - 1])
     call_residual(own.residual, reals, integers, scratch, t, y, v, a, out)
-    still_forces(read_room(scratch, integers, own.room).held, a, out)
+    room = read_room(scratch, integers, own.room)
+    for k in range(len(room.modes)):
+        out[own.places[k]] += room.modes[k] * own.sliding[k]
+    still_forces(room.held, a, out)
 
 
 @kernel(contract.MASS_MATRIX, counted=False)

@@ -14,6 +14,7 @@ from erls.maths.so3 import Array
 if TYPE_CHECKING:
     from erls.equations.compiled_system import CompiledSystem
     from erls.equations.serial.formulation import SerialFormulation
+    from erls.equations.switches.kernels import Room
 
 
 class SwitchedTree(Switches):
@@ -33,7 +34,6 @@ class SwitchedTree(Switches):
         joints = system.mechanism.joints
         motors = motors_among([joint.drive for joint in joints], [joint.name for joint in joints], acting)
         super().__init__(system.dry or NO_FRICTION, motors, system.size)
-        self._joints = acting.joints[system.free_joints[self.rubbing.places]]
         self._asked = Asked(motors, self._bare, self._bare.residual)
 
     @cached_property
@@ -48,13 +48,16 @@ class SwitchedTree(Switches):
 
         bare, integers = self._bare, [int(i) for i in self._bare.integers]
         constants, scratch = Memory(integers, bare.reals.copy()), Memory(integers, bare.scratch)
-        if not len(self.rubbing.places):  # all functions of the tree are as they were
+        rubs = len(self.rubbing.places)
+        if not rubs:  # all functions of the tree are as they were
             return replace(bare, reals=constants.numbers, scratch=scratch.numbers)
         whole = own.Frictions(
             residual=address_of(bare.residual, contract.RESIDUAL),
             mass_matrix=address_of(bare.mass_matrix, contract.MASS_MATRIX),
             stiffness_and_damping=address_of(bare.stiffness_and_damping, contract.STIFFNESS_AND_DAMPING),
-            room=scratch.put(own.Room(np.zeros(self.size), np.zeros((self.size, self.size)))),
+            room=scratch.put(own.Room(np.zeros(self.size), self.modes[:rubs], np.zeros((self.size, self.size)))),
+            places=self.rubbing.places,
+            sliding=self.rubbing.sliding,
         )
         integers.append(constants.put(whole))
         return contract.CompiledSystem(
@@ -69,25 +72,23 @@ class SwitchedTree(Switches):
         )
 
     @cached_property
-    def _held(self) -> Array:
-        """(n,) flags of coordinates that do not move, as the equations read them."""
+    def _room(self) -> Room:
+        """Which coordinates do not move, and modes, as the equations read them."""
         from erls.equations.switches import kernels as own  # here: it imports the compiler
         from erls.maths.records import python_reader
 
         system = self.compiled
         frictions = python_reader(own.Frictions)(system.reals, system.integers, int(system.integers[-1]))
-        return python_reader(own.Room)(system.scratch, system.integers, frictions.room).held
+        return python_reader(own.Room)(system.scratch, system.integers, frictions.room)
 
     def put(self, y: Array) -> None:
         """Into constants and memory of the equations."""
-        from erls.equations.switches.motors import put_friction  # here: it imports the compiler
-
         system, rubs = self.compiled, len(self.rubbing.places)
         self.motors.put(self.modes[rubs:], system.reals, system.integers)
         if rubs:
-            put_friction(-self.modes[:rubs] * self.rubbing.sliding, self._joints, system.reals, system.integers)
-            self._held[:] = 0.0
-            self._held[self.fixed] = 1.0
+            self._room.held[:] = 0.0
+            self._room.held[self.fixed] = 1.0
+            self._room.modes[:] = self.modes[:rubs]
 
     def freely(self, t: float, y: Array, v: Array) -> Freely:
         """See `Switches`."""
