@@ -1,6 +1,7 @@
 from .identify.identify import identify as identify
 from .inverse.invert import invert as invert
 from .linear.linearize import linearize as linearize
+from .optimization.optimize import optimize as optimize
 from .run.chain.run import ChainRun as ChainRun
 from .run.file import load_run as load_run
 from .run.file import save_run as save_run

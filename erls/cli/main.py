@@ -1,4 +1,4 @@
-"""The command ``erls``: reduce, export, simulate, linearize, invert, identify, compare, study, info, view.
+"""The command ``erls``: reduce, export, simulate, linearize, optimize, invert, identify, study, info, view ...
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 2 bad input, 3 numerical failure, 4 did not
 converge where convergence was asked for, 130 interrupted. Heavy packages are imported inside the commands, so that
@@ -24,6 +24,7 @@ from erls.cli.identify import identify
 from erls.cli.importing import import_
 from erls.cli.invert import invert
 from erls.cli.linearize import linearize
+from erls.cli.optimize import optimize
 from erls.cli.reduce import reduce
 from erls.cli.simulate import simulate
 from erls.cli.starting import examples, new, schema
@@ -47,7 +48,9 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-for command in (reduce, export, simulate, info, view, compare, effects, linearize, invert, identify, new, schema):
+for command in (reduce, export, simulate, info, view, compare, effects, linearize, optimize, invert, identify):
+    app.command(command)
+for command in (new, schema):
     app.command(command)
 app.command(import_, name="import")
 for group in (study, examples):
@@ -66,7 +69,7 @@ def _report(error: ReportedError, as_json: bool) -> None:
 def _usage_error(problem: CycloptsError) -> ReportedError:
     from erls.errors import Cause, SceneError
 
-    text = " ".join(str(problem).split()).rstrip(".")
+    text = " ".join(str(problem).split()).partition(" Available commands")[0].rstrip(".")  # help lists them whole
     return SceneError(Cause.BAD_FIELD, text, where="command line", remedy="see erls --help")
 
 

@@ -85,9 +85,14 @@ def copy(name: str, folder: Path | None = None, /, *, json: Json = False) -> Non
 
 
 def schema(
-    kind: Literal["scene", "link", "bodies"], /, *, output: Output = None, force: Force = False, json: Json = False
+    kind: Literal["scene", "link", "bodies", "problem"],
+    /,
+    *,
+    output: Output = None,
+    force: Force = False,
+    json: Json = False,
 ) -> None:
-    """JSON schema of scenes, links or scenes of bodies, for editors that complete and check TOML.
+    """JSON schema of scenes, links, scenes of bodies or problems, for editors that complete and check TOML.
 
     A first line "#:schema ./scene.schema.json" in a TOML file names it to them.
 

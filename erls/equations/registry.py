@@ -38,11 +38,14 @@ def _ffr(mechanism: Mechanism, settings: Simulation) -> TreeFormulation:
 
 def _nodal(mechanism: Mechanism, settings: Simulation) -> Formulation:
     from erls.equations.nodal.equations import Nodal
+    from erls.equations.nodal.parts import BeamRules
 
-    return Nodal(mechanism, settings.elements_per_member, _closed_start(mechanism) if mechanism.loops else None)
+    rules = BeamRules(settings.residual_bending_flexibility, settings.inertia_interpolation == "linear")
+    start = closed_start_of(mechanism) if mechanism.loops else None
+    return Nodal(mechanism, settings.elements_per_member, start, rules=rules)
 
 
-def _closed_start(mechanism: Mechanism) -> ClosedStart:
+def closed_start_of(mechanism: Mechanism) -> ClosedStart:
     """Of the same mechanism with rigid links."""
     from erls.equations.erls.formulation import Erls
 

@@ -27,7 +27,7 @@ from erls.errors import Cause, SimulationError
 from erls.inverse.conditions import Conditions, Demand, Held, Joints
 from erls.inverse.frames import point_motions
 from erls.maths.so3 import Array
-from erls.sensitivity.tangents import Knots, steps_of, tangents
+from erls.sensitivity.tangents import Evaluation, Knots, steps_of
 from fe_import.model import IntArray
 
 _ITERATIONS = 40
@@ -232,7 +232,7 @@ class Servoed:
 
     def tangents(self, demand: Demand, states: States) -> Derivatives:
         """Of `missing`, conditions held up to rates."""
-        own = tangents(self.system, Knots(demand.t, states.y, states.v, states.a), self.steps)
+        own = Evaluation(self.steps).tangents(self.system, Knots(demand.t, states.y, states.v, states.a))
         rows = self.held(demand, states.y, states.v).rows
         by_place, last_by_place, last_by_rate = self._kinematics(demand, states)
         s, z, m, p = self.dependent, self.internal, self.count, len(self.dependent)

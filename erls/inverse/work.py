@@ -19,7 +19,7 @@ from erls.inverse.problem import Problem
 from erls.inverse.servoed import States
 from erls.inverse.two_point import Ends, Solved, collocate, ends_of
 from erls.maths.so3 import Array
-from erls.sensitivity.tangents import Knots, tangents
+from erls.sensitivity.tangents import Evaluation, Knots
 
 _TOLERANCE = 1e-11  # m: change that ends iterations
 _ROUGH = 1e-4  # m: the same of those that give others a start
@@ -64,7 +64,9 @@ class Work:
         units = 1 / np.maximum(metres, _STEEP * metres.max(initial=0.0))
         both = np.concatenate([units, units / problem.step])
         zeros = np.linalg.eigvals(first * both / both[:, None]).astype(complex) if m else np.zeros(0, dtype=complex)
-        own = tangents(servoed.system, Knots(self.demand.t[:1], *(x for x in start.states[:3])), servoed.steps)
+        own = Evaluation(servoed.steps).tangents(
+            servoed.system, Knots(self.demand.t[:1], *(x for x in start.states[:3]))
+        )
         motions = Linearization(own.mass[0], own.damping[0], own.stiffness[0], np.eye(servoed.tree.size))
         self._units = units
         self.nature = nature_of(zeros, motions, self._limit(), _EXCITED * self._slowest(), float(problem.t[-1]))

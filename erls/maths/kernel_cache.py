@@ -40,7 +40,7 @@ class _SealedFiles(IndexDataCacheFile):  # type: ignore[misc]  # Numba has no an
     def _load_index(self) -> Any:
         try:
             version, stamp, overloads = self._read(self._index_path)
-        except FileNotFoundError:
+        except (FileNotFoundError, ImportError, AttributeError):  # or of a version that knows more kinds of numbers
             return {}
         return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
 

@@ -170,6 +170,21 @@ class JointType(NamedTuple):
         return self.freedoms[0] if self.freedoms is not None and len(self.freedoms) == 1 else None
 
     @property
+    def driven(self) -> Freedom | None:
+        """The motion that may be prescribed where such a joint closes a loop or joins nodes: that of one coordinate, or
+        the turn of a planar one.
+        """
+        if self.name == "planar" and self.freedoms is not None:
+            return self.freedoms[2]
+        return self.one
+
+    @property
+    def driven_conditions(self) -> tuple[Condition, ...]:
+        """What is forbidden beside `conditions` included, once that motion is prescribed."""
+        kept = tuple(condition for condition in self.conditions if condition.line.any())
+        return kept + _STRAIGHT if self.name == "planar" else _PINNED + _STRAIGHT
+
+    @property
     def slides(self) -> bool:
         """Whether the outer origin moves in the inner frame."""
         holding = sum(condition.line.any() and not condition.pitch for condition in self.conditions)
@@ -231,7 +246,8 @@ JOINT_TYPES = {kind.name: kind for kind in _TYPES}
 CHAIN_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.freedoms is not None)
 HOLDING_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.conditions)
 SINGLE_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.one is not None)
-"""Those of chains, those of loops and of nodes, and those of one coordinate."""
+DRIVEN_TYPES = tuple(name for name, kind in JOINT_TYPES.items() if kind.driven is not None)
+"""Those of chains, those of loops and of nodes, those of one coordinate, and those with one that may be prescribed."""
 
 OWN_FIELDS = {"pitch": "how far it advances along its axis per radian [m/rad], other than 0"}
 """Fields of joints in scenes that only some kinds have, and what they say."""

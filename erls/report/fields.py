@@ -18,6 +18,7 @@ from msgspec import inspect as schema
 from erls.equations.registry import FORMULATIONS
 from erls.mechanism.dh import CONVENTIONS
 from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES
+from erls.optimization import records as optimization
 from erls.scene import chain, check, check_settings, joints, links
 from erls.scene.bodies import analyses
 from erls.scene.bodies.schema import BodySceneRecord, Connection
@@ -34,6 +35,7 @@ PAGES: dict[str, tuple[str, Record]] = {
     "link description": ("links.md", records.LinkDescription),
     "scene": ("scenes.md", chain.SceneRecord),
     "scene of bodies": ("bodies.md", BodySceneRecord),
+    "problem": ("optimize.md", optimization.ProblemRecord),
 }
 """Kinds of files, each with the page that holds its tables and its outermost record."""
 
@@ -43,6 +45,14 @@ OPTIONS: dict[tuple[Record, str], Collection[str]] = {
     (Simulation, "body_frame"): check_settings.BODY_FRAMES,
     (Simulation, "coordinates"): check_settings.COORDINATES,
     (Simulation, "integrator"): INTEGRATORS,
+    (Simulation, "inertia_interpolation"): check_settings.INERTIA,
+    (optimization.Term, "frame"): optimization.FRAMES,
+    (optimization.Goal, "quantity"): optimization.QUANTITIES,
+    (optimization.Goal, "over_time"): optimization.OVER_TIME,
+    (optimization.DeflectionLimit, "times"): optimization.TIMES,
+    (optimization.StressLimit, "times"): optimization.TIMES,
+    (optimization.EffortLimit, "times"): optimization.TIMES,
+    (optimization.Settings, "optimizer"): optimization.OPTIMIZERS,
     (joints.DH, "convention"): CONVENTIONS,
     (joints.Joint, "type"): CHAIN_TYPES,
     (joints.Loop, "type"): HOLDING_TYPES,

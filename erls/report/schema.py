@@ -15,7 +15,7 @@ from msgspec import inspect
 from erls.report.fields import OPTIONS, PAGES, Record, documentation
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-KINDS = {"scene": "scene", "link": "link description", "bodies": "scene of bodies"}
+KINDS = {"scene": "scene", "link": "link description", "bodies": "scene of bodies", "problem": "problem"}
 """What ``erls schema`` calls a kind of file, and what the documentation does."""
 
 

@@ -137,7 +137,7 @@ def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
             link.flexible,
             link.elastic_modes,
             link.temperature_change,
-            json.dumps(link.reduction, sort_keys=True, default=str),
+            json.dumps([link.reduction, link.changes], sort_keys=True, default=str),
             link.name if link.rigid else "",
         )
         if key not in made:
@@ -163,14 +163,18 @@ def _pieces(scene: Scene, models: Sequence[ModalModel], tell: Message) -> list[t
 
 def _beam_descriptions(scene: Scene) -> list[LinkDescription | None]:
     """Descriptions of the links that are made of beams."""
-    found = [load_link(scene.folder / link.model).description if link.model else None for link in scene.record.links]
+    found = [
+        load_link(scene.folder / link.model, changes=link.changes).description if link.model else None
+        for link in scene.record.links
+    ]
     return [d if d is not None and d.frame is not None else None for d in found]
 
 
 def link_description(scene: Scene, link: LinkRecord) -> LinkFile:
-    """Description of a link with a ``model``, its reduction as the scene asks for it."""
+    """Description of a link with a ``model``, with its changes, its reduction as the scene asks for it."""
     options = {**link.reduction, "form": "orthonormal"}
-    return load_link(scene.folder / link.model, options, expands=link.temperature_change is not None)
+    expands = link.temperature_change is not None
+    return load_link(scene.folder / link.model, options, expands=expands, changes=link.changes)
 
 
 def link_model(scene: Scene, k: int, tell: Message, description: LinkFile | None = None) -> ModalModel:

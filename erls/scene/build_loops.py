@@ -11,7 +11,7 @@ from erls.errors import Cause, SceneError
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism, poses
-from erls.mechanism.drives import build_drive
+from erls.mechanism.drives import MotionDrive, build_drive
 from erls.mechanism.joint_types import JOINT_TYPES, Freedom
 from erls.mechanism.loop_turns import turning_signs
 from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
@@ -70,12 +70,13 @@ def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Pla
         base = frames[inner.link] @ pose(position=mechanism.links[inner.link].model.nodes[inner.node]) @ inner.frame
     kind = JOINT_TYPES[record.type].given(record)
     loop = Loop(record.name, kind, inner, outer)
-    if kind.one is None:
+    freedom = kind.driven if isinstance(record.drive, MotionDrive) else kind.one
+    if freedom is None:
         return loop
     slide = float((inverse(base) @ start)[2, 3])
-    if kind.one.pitch:  # frames of a thread coincide where its coordinate is zero
+    if freedom.pitch:  # frames of a thread coincide where its coordinate is zero
         loop = replace(loop, inner=replace(inner, frame=inner.frame @ pose(position=np.array([0.0, 0.0, slide]))))
-    return replace(loop, freedom=_freedom(record, kind.one, mechanism, loop, slide, at))
+    return replace(loop, freedom=_freedom(record, freedom, mechanism, loop, slide, at))
 
 
 def _freedom(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from erls.errors import SceneError
 from erls.mechanism.dh import CONVENTIONS
+from erls.mechanism.drives import MotionDrive
 from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, Load, SceneRecord
@@ -243,6 +244,12 @@ def _check_link(link: Link, place: str) -> None:
     if link.reduction and not link.model:
         message = "'reduction' changes how a model is reduced, and this link names none"
         raise bad(f"{place}.reduction", message, None, "remove it, or give 'model'")
+    if link.changes and not link.model:
+        message = "'changes' replace values of a description, and this link names none"
+        raise bad(f"{place}.changes", message, None, "remove it, or give 'model'")
+    if "reduction" in link.changes:
+        message = "how a model is reduced is said by 'reduction'"
+        raise bad(f"{place}.changes.reduction", message, None, f"give it as links.{link.name}.reduction")
     if bool(link.model) + bool(link.modal_file) + (link.rigid is not None) != 1:
         message = "give exactly one of 'model', 'modal_file' and 'rigid'"
         raise bad(place, message, link.name, "a link has one source")
@@ -343,7 +350,8 @@ def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
     directed(f"{place}.second_axis", loop.second_axis)
     if kind.one is None:
         plain = type(loop)(name=loop.name, link=loop.link, node=loop.node)
-        for field in _ACTING:
+        driven = kind.driven is not None and isinstance(loop.drive, MotionDrive)  # and only that
+        for field in _ACTING[3 * driven :]:
             if getattr(loop, field) != getattr(plain, field):
                 message = f"a {loop.type} joint has no single coordinate that this could act along"
                 raise bad(f"{place}.{field}", message, loop.type, f"remove it, or use one of {', '.join(SINGLE_TYPES)}")

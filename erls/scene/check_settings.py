@@ -12,6 +12,7 @@ from fe_import.files.toml import choose
 GAUGES = ("joint-angle", "minimum-norm")
 BODY_FRAMES = ("tangent", "mean-axis")
 COORDINATES = ("independent", "absolute")
+INERTIA = ("helicoidal", "linear")
 TIED = (FIXED_STEP, "auto")  # integrators for coordinates that conditions tie
 SMALLEST_RTOL = 3e-14  # rounding
 
@@ -23,6 +24,11 @@ def check_settings(s: Simulation, place: str) -> None:
     choose(s.gauge, GAUGES, f"{place}.gauge", SceneError)
     choose(s.body_frame, BODY_FRAMES, f"{place}.body_frame", SceneError)
     choose(s.coordinates, COORDINATES, f"{place}.coordinates", SceneError)
+    choose(s.inertia_interpolation, INERTIA, f"{place}.inertia_interpolation", SceneError)
+    for name in ("residual_bending_flexibility", "inertia_interpolation"):
+        if s.formulation != "nodal" and getattr(s, name) != getattr(Simulation(duration=1.0), name):
+            message = f"'{s.formulation}' has no elements of its own"
+            raise bad(f"{place}.{name}", message, getattr(s, name), "use formulation = 'nodal', or remove it")
     if s.coordinates == "absolute":
         for name, value, right in (("formulation", s.formulation, ("ffr",)), ("integrator", s.integrator, TIED)):
             if value not in right:

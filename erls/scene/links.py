@@ -64,6 +64,9 @@ class Link(Record, frozen=True):
         deformation; mode counts then hold for every piece. ``nodal`` needs none.
     reduction : dict
         With ``model``: fields that replace those of its table ``[reduction]``.
+    changes : dict
+        With ``model``: values that replace those of its other tables, in tables of the same names:
+        ``changes = { sections.tube.outer_diameter = 0.04 }``; ``--set links.NAME.model.sections...`` writes them here.
     inboard : str
         Interface of the link's own joint; the first unless given.
     outboard : str
@@ -84,6 +87,7 @@ class Link(Record, frozen=True):
     elastic_modes: int | None = None
     substructures: int = 1
     reduction: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     inboard: str = ""
     outboard: str = ""
     mesh_pose: MeshPose = MeshPose()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from typing import Any
 
@@ -9,6 +10,14 @@ from erls.errors import Cause, SceneError
 from fe_import.files.toml import place_of
 
 _SHORT = {"effects": "simulation.effects"}
+_DESCRIBED = re.compile(r"(links\.[^.]+)\.model\.(?=.)")
+
+
+def in_scene(key: str) -> str:
+    """Where a scene holds what a key says: behind ``links.NAME.model`` keys go on in that link description, whose
+    ``changes`` the scene holds.
+    """
+    return _DESCRIBED.sub(r"\1.changes.", key, count=1)
 
 
 def apply_override(data: dict[str, Any], text: str) -> None:
@@ -27,5 +36,5 @@ def apply_override(data: dict[str, Any], text: str) -> None:
         found = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
         found = {}
-    at, place = place_of(data, _SHORT.get(key.strip(), key.strip()), where, SceneError)
+    at, place = place_of(data, in_scene(_SHORT.get(key.strip(), key.strip())), where, SceneError)
     at[place] = found["value"] if len(found) == 1 else value.strip()  # a bare word is a string

@@ -24,6 +24,12 @@ class Simulation(Stepping, frozen=True):
         multipliers, index 3.
     elements_per_member : int, optional
         Of ``nodal``: elements of each member of a link, instead of the number in its description.
+    residual_bending_flexibility : bool
+        Of ``nodal``: elements of length l take l²/(12 E I) on top of their flexibility in shear 1/(κ G A), which a
+        curvature that is constant along them leaves out of bending: single ones then deflect as exact beams do.
+    inertia_interpolation : str
+        Of ``nodal``: the motion of an element's mass is interpolated as its strains are, ``helicoidal``, or places and
+        turns each by itself, ``linear``, as in classical two-node elements. Both converge to the same.
     integrator : str
         ``generalized_alpha``, ``lobatto``, one of SciPy's (``rk45``, ``dop853``, ``radau``, ``bdf``, ``lsoda``), or
         ``auto``: the one that fits; of ``nodal`` and absolute coordinates, generalized-α with steps that follow
@@ -56,6 +62,8 @@ class Simulation(Stepping, frozen=True):
     body_frame: str = "tangent"
     coordinates: str = "independent"
     elements_per_member: int | None = None
+    residual_bending_flexibility: bool = False
+    inertia_interpolation: str = "helicoidal"
     integrator: str = ""
     output_step: float | None = None
     rtol: float = 1e-8

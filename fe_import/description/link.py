@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from fe_import.description.check import check_link
 from fe_import.description.records import LinkDescription
 from fe_import.description.reduction import Reduction
 from fe_import.files.includes import with_included
-from fe_import.files.toml import convert, read_toml
+from fe_import.files.toml import convert, place_of, read_toml
 
 _METHOD = Reduction().method
 
@@ -45,7 +46,21 @@ class LinkFile:
         return digest.hexdigest()
 
 
-def load_link(path: Path | str, overrides: dict[str, Any] | None = None, expands: bool = False) -> LinkFile:
+def leaves(tables: dict[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Values in nested tables, by dotted keys."""
+    for name, value in tables.items():
+        if isinstance(value, dict) and value:
+            yield from leaves(value, f"{before}{name}.")
+        else:
+            yield f"{before}{name}", value
+
+
+def load_link(
+    path: Path | str,
+    overrides: dict[str, Any] | None = None,
+    expands: bool = False,
+    changes: dict[str, Any] | None = None,
+) -> LinkFile:
     """Read and check a link description.
 
     Parameters
@@ -55,6 +70,8 @@ def load_link(path: Path | str, overrides: dict[str, Any] | None = None, expands
         Fields of the ``reduction`` table that replace those of the file (``method``, ``elastic_modes`` ...).
     expands : bool
         Prepare its reduction for a temperature change, also where the file gives none.
+    changes : dict, optional
+        Tables with values that replace those of the file; members of lists go by name or number.
 
     Raises
     ------
@@ -63,6 +80,9 @@ def load_link(path: Path | str, overrides: dict[str, Any] | None = None, expands
     """
     path = Path(path)
     data = read_toml(path)
+    for key, value in leaves(changes or {}):
+        table, place = place_of(data, key, f"{path}: changes.{key}")
+        table[place] = value
     if overrides:
         table = data.setdefault("reduction", {})
         if isinstance(table, dict):

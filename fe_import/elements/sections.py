@@ -69,8 +69,10 @@ class Tubular(msgspec.Struct, tag="tubular", tag_field="shape", forbid_unknown_f
     ----------
     outer_diameter : float
         [m]
-    thickness : float
-        Of the wall [m].
+    thickness : float, optional
+        Of the wall [m]; give this or ``diameter_ratio``.
+    diameter_ratio : float, optional
+        Inner over outer diameter.
     shear_factor : float, optional
         Effective area in shear over the area; after Cowper (1966) unless given.
     torsion_constant : float, optional
@@ -78,9 +80,17 @@ class Tubular(msgspec.Struct, tag="tubular", tag_field="shape", forbid_unknown_f
     """
 
     outer_diameter: float
-    thickness: float
+    thickness: float | None = None
+    diameter_ratio: float | None = None
     shear_factor: float | None = None
     torsion_constant: float | None = None
+
+    @property
+    def inner_diameter(self) -> float:
+        """[m]"""
+        if self.diameter_ratio is not None:
+            return self.outer_diameter * self.diameter_ratio
+        return self.outer_diameter - 2 * (self.thickness or 0.0)
 
 
 class RectangularTube(
@@ -179,8 +189,8 @@ def _constants(section: Section, poissons_ratio: float) -> SectionConstants:
             k = section.shear_factor or _cowper_tube(0.0, poissons_ratio)
             i = math.pi * d**4 / 64
             return SectionConstants(math.pi * d**2 / 4, i, i, 2 * i, k, k)
-        case Tubular(outer_diameter=d, thickness=t):
-            inner = d - 2 * t
+        case Tubular(outer_diameter=d):
+            inner = section.inner_diameter
             k = section.shear_factor or _cowper_tube(inner / d, poissons_ratio)
             i = math.pi * (d**4 - inner**4) / 64
             return SectionConstants(math.pi * (d**2 - inner**2) / 4, i, i, 2 * i, k, k)
@@ -223,9 +233,11 @@ def check_section(section: Section, where: str) -> None:
                 value=value,
                 remedy="give a length, area or factor above 0",
             )
+    if isinstance(section, Tubular):
+        _check_wall(section, where)
     if isinstance(section, (Tubular, RectangularTube)):
         outer = section.outer_diameter if isinstance(section, Tubular) else min(section.width, section.height)
-        if 2 * section.thickness > outer:
+        if section.thickness is not None and 2 * section.thickness > outer:
             raise FEImportError(
                 Cause.BAD_FIELD,
                 "the wall is thicker than half the section",
@@ -234,6 +246,26 @@ def check_section(section: Section, where: str) -> None:
                 limit=outer / 2,
                 remedy="give a wall below half the outer size",
             )
+
+
+def _check_wall(section: Tubular, where: str) -> None:
+    """One way to say how thick it is."""
+    if (section.thickness is None) == (section.diameter_ratio is None):
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            "a tube needs exactly one of 'thickness' and 'diameter_ratio'",
+            where=where,
+            remedy="say how thick its wall is",
+        )
+    if section.diameter_ratio is not None and not section.diameter_ratio < 1:
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            "the bore is as wide as the tube",
+            where=f"{where}.diameter_ratio",
+            value=section.diameter_ratio,
+            limit=1,
+            remedy="give inner over outer diameter, below 1",
+        )
 
 
 def section_constants(section: Section, poissons_ratio: float, torsion: str, where: str) -> SectionConstants:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from erls.maths import jit
+from erls.maths import jit, kernel_cache
 
 pytestmark = pytest.mark.skipif(not jit.ENABLED, reason="nothing is compiled with ERLS_JIT=0")
 
@@ -107,6 +107,19 @@ def test_code_is_found_wherever_the_source_lies(tmp_path: Path, monkeypatch: pyt
         source.write_text("def thrice(x):\n    return 3.0 * x\n", encoding="utf-8")
     hits = [_hits_of(tmp_path / place / "package" / "numbers.py", tmp_path, monkeypatch) for place in ("one", "two")]
     assert hits == [0, 1]
+
+
+def test_code_of_a_version_that_knows_more_is_no_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: list[str]
+) -> None:
+    """An index that names a module which is not here: compiled anew, kept, nothing told."""
+    _compiled(monkeypatch, tmp_path)
+    (file,) = tmp_path.rglob("*.nbi")
+    content = b"cerls.maths.of_a_later_version\nKind\n."  # a pickle: a name to import
+    file.write_bytes(content + kernel_cache._sum(content))
+    assert _compiled(monkeypatch, tmp_path)(3.0) == 6.0
+    assert told == []
+    assert sum(_compiled(monkeypatch, tmp_path).stats.cache_hits.values()) == 1
 
 
 def _hits_of(source: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> int:

@@ -25,6 +25,8 @@ STARTS = sorted(path.name for path in (DATA / "start").iterdir())
 
 
 def _kind(tables: dict[str, Any]) -> str:
+    if "variables" in tables:
+        return "problem"
     if "simulation" not in tables:
         return "link"
     return "scene" if "joints" in tables else "bodies"
@@ -59,7 +61,8 @@ def test_examples_are_listed_and_copied(
     monkeypatch.chdir(tmp_path)
     assert main(["examples", "list", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["examples"]
-    own = {str(p.relative_to(DATA).with_suffix("")) for p in DATA.rglob("*.toml") if _kind(_read(p)) != "link"}
+    scenes = [p for p in DATA.rglob("*.toml") if _kind(_read(p)) not in ("link", "problem")]
+    own = {str(p.relative_to(DATA).with_suffix("")) for p in scenes}
     assert set(found) == own
     assert all(len(text) > 10 for text in found.values()), found
     assert main(["examples", "copy", "robot/two_link"]) == 0
@@ -86,7 +89,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 @pytest.mark.parametrize("path", sorted(DATA.rglob("*.toml")), ids=lambda p: str(p.relative_to(DATA)))
 def test_schemas_accept_what_is_shipped(path: Path, validators: dict[str, Any]) -> None:
-    """Scenes of both kinds, and links."""
+    """Scenes of both kinds, links, problems."""
     tables = _read(path)
     assert [error.message for error in validators[_kind(tables)].iter_errors(tables)] == []
 

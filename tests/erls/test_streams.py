@@ -31,8 +31,7 @@ def _shell(folder: Path, line: str, **variables: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout.decode("utf-8"), done.stderr.decode("utf-8")
 
 
-COMMANDS = "reduce, simulate, info, view, compare, effects, linearize, invert, "
-UNKNOWN = f'error: command line: Unknown command "--nix". Available commands: {COMMANDS}; see erls --help\n'
+UNKNOWN = 'error: command line: Unknown command "--nix"; see erls --help\n'
 FULL = "error: stdout: cannot be written: No space left on device; free disk space, or send it elsewhere\n"
 LINES = [
     ("erls --version >&-", 0, ""),  # nobody wants it

@@ -83,8 +83,11 @@ class LoopRows:
 
     def __init__(self, loops: Sequence[Loop]) -> None:
         self.loops = tuple(loops)
-        self._kinds = [JOINT_TYPES["fixed"] if loop.prescribed else loop.type for loop in loops]  # nothing else moves
-        self.conditions: list[tuple[Condition, ...]] = [kind.conditions for kind in self._kinds]
+        self.conditions: list[tuple[Condition, ...]] = [
+            loop.type.driven_conditions if loop.prescribed else loop.type.conditions for loop in loops
+        ]
+        kinds = [JOINT_TYPES["fixed"] if loop.prescribed else loop.type for loop in loops]  # no turn is left
+        self._aligned = [kind.aligned for kind in kinds]
         pairs = [(k, row) for k, found in enumerate(self.conditions) for row in found]
         self.names = tuple(f"loop {loops[k].name!r}, {row.name}" for k, row in pairs)
         self.turns = np.array([not row.line.any() for _, row in pairs], dtype=bool)
@@ -99,8 +102,8 @@ class LoopRows:
     def upside_down(self, found: Closure) -> list[str]:
         """Loops whose frames meet back to front, which their rows cannot tell from right."""
         result: list[str] = []
-        for loop, kind, left in zip(self.loops, self._kinds, found.left, strict=True):
-            if any(left[axis, axis] < 0 for axis in kind.aligned):
+        for loop, aligned, left in zip(self.loops, self._aligned, found.left, strict=True):
+            if any(left[axis, axis] < 0 for axis in aligned):
                 result.append(loop.name)
         return result
 

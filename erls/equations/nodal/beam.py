@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from erls.equations.nodal.contract import HELICOIDAL, LINEAR
 from erls.equations.nodal.rigid_body import RigidBody
 from erls.equations.nodal.scatter import IntArray
 from erls.equations.nodal.section import BeamSection
@@ -33,12 +34,16 @@ class Beam:
     section : BeamSection
     expansion : float
         Axial strain without force, of temperature.
+    linear : bool
+        Its kinetic energy is that of places and turns that are linear between its ends, `beam_linear`; otherwise that
+        of the interpolation of its strains.
     """
 
     nodes: tuple[int, int]
     frames: Array
     section: BeamSection
     expansion: float = 0.0
+    linear: bool = False
 
 
 def straight(nodes: tuple[int, int], start: Array, end: Array, section: BeamSection, up: Array) -> Beam:
@@ -88,6 +93,8 @@ class Beams:
         self.built = self.without_force(built)
         self.stiffness = np.array([b.section.stiffness for b in beams]).reshape(-1, 6, 6) / self.length[:, None, None]
         self.inertia = np.array([b.section.inertia for b in beams]).reshape(-1, 6, 6) * self.length[:, None, None]
+        ways = np.array([LINEAR if b.linear else HELICOIDAL for b in beams], dtype=np.int64)
+        self.moving: IntArray = ways * self.inertia.any(axis=(1, 2))
         self.gravity = np.asarray(gravity, dtype=float)
 
     def strains(self, bent: Array) -> Array:

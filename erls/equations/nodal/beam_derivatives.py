@@ -6,18 +6,12 @@ Iterations do without what inertia changes as an element bends: blocks of mass, 
 from __future__ import annotations
 
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.nodal.beam_forces import (
-    HALF,
-    NONE,
-    POINTS,
-    WEIGHTS,
-    inward,
-    outward,
-    section,
-    section_force,
-)
+from erls.equations.nodal.beam_ends import inward, outward, section, unit_twist
+from erls.equations.nodal.beam_forces import HALF, POINTS, WEIGHTS, section_force
+from erls.equations.nodal.beam_linear import linear_derivatives
 from erls.equations.nodal.contract import (
     BLOCKS,
+    LINEAR,
     Model,
     Work,
     read_layout,
@@ -43,11 +37,9 @@ from erls.maths.vectors import (
     Vector,
     cross,
     dot,
-    nine,
     of_matrix,
     scaled,
     turned,
-    unit,
     vector,
 )
 
@@ -73,22 +65,14 @@ def _add_power(out: Array, table: Array, j: int, scale: float, force: Twist) -> 
 
 
 @part
-def unit_twist(model: Model, e: int, j: int) -> tuple[Twist, Twist]:
-    """Twists of both sections when coordinate j of the nodes moves alone."""
-    side = j // 6
-    frames = model.beam_frames
-    moved = transformed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), unit(j % 6), unit(j % 6 - 3))
-    if side == 0:
-        return moved, NONE
-    return NONE, moved
-
-
-@part
 def inertia_derivatives(
     model: Model, work: Work, e: int, block: Array, u: Vector, psi: Vector, exact: int
 ) -> None:
     """Those by accelerations and velocities, and what turns of sections do to the weight; those by velocities in
     full if ``exact``, and then at fixed bending those of the weight."""
+    if model.beam_moving[e] == LINEAR:
+        linear_derivatives(model, work, e, block, psi, exact)
+        return
     rows, shape, bends = work.rows, work.shape, work.bends
     c0, c1 = outward(model, e, 0, work.twist), outward(model, e, 1, work.twist)
     apart = pair_minus(c1, c0)

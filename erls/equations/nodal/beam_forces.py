@@ -15,9 +15,13 @@ from __future__ import annotations
 import math
 
 from erls.equations.compiled_system import Array, IntArray
+from erls.equations.nodal.beam_ends import NONE, inward, outward, section
+from erls.equations.nodal.beam_linear import linear_energies, linear_inertia
 from erls.equations.nodal.contract import (
     ENERGIES,
     FORCES,
+    HELICOIDAL,
+    LINEAR,
     REMEMBER,
     Model,
     Work,
@@ -42,17 +46,14 @@ from erls.maths.motions import (
 )
 from erls.maths.rotations import exponential, logarithm_near, value
 from erls.maths.vectors import (
-    Rotation,
     Twist,
     Vector,
     add,
     back_product,
     dot,
     minus,
-    nine,
     of_matrix,
     plus,
-    product,
     scaled,
     times,
     turned,
@@ -62,16 +63,6 @@ from erls.maths.vectors import (
 POINTS = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))  # of Gauss's rule on a length of one
 WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 HALF = (0.5, 0.0, 0.0)
-NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-
-@part
-def section(model: Model, poses: Array, e: int, side: int) -> tuple[Vector, Rotation]:
-    """Frame of the section at an end in the world."""
-    node = model.beam_nodes[e, side]
-    turn = nine(poses, node, 3)
-    place = plus(vector(poses, node, 0), times(turn, vector(model.beam_frames, e, 12 * side)))
-    return place, product(turn, nine(model.beam_frames, e, 12 * side + 3))
 
 
 @part
@@ -84,21 +75,6 @@ def _bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tupl
     out[e, 0], out[e, 1], out[e, 2] = u
     out[e, 3], out[e, 4], out[e, 5] = psi
     return u, psi
-
-
-@part
-def inward(model: Model, e: int, side: int, force: Twist) -> Twist:
-    """Wrench on a section as one on its node."""
-    frames = model.beam_frames
-    return transposed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), force[0], force[1])
-
-
-@part
-def outward(model: Model, e: int, side: int, table: Array) -> Twist:
-    """Twist of a section from those of the nodes."""
-    at, frames = 6 * model.beam_nodes[e, side], model.beam_frames
-    v, w = (table[at], table[at + 1], table[at + 2]), (table[at + 3], table[at + 4], table[at + 5])
-    return transformed(vector(frames, e, 12 * side), nine(frames, e, 12 * side + 3), v, w)
 
 
 @part
@@ -149,12 +125,15 @@ def between(model: Model, work: Work, e: int, u: Vector, psi: Vector) -> tuple[T
     """Inertia and internal forces less weight of element e, bent by [u; ψ], on its first and its second section."""
     b = inverse_coefficient(dot(psi, psi))
     push = section_force(model, e, u, psi)
-    direct = NONE
-    if model.beam_moving[e]:
+    direct = further = NONE
+    if model.beam_moving[e] == HELICOIDAL:
         direct, along = _inertia(model, work, e, u, psi, b)
         push = pair_plus(push, along)
+    elif model.beam_moving[e] == LINEAR:
+        direct, further = linear_inertia(model, work, e, psi)
     outer = series_transposed(HALF, b, u, psi, push[0], push[1])
-    return pair_plus(direct, pair_minus(cobracket(u, psi, push[0], push[1]), outer)), outer
+    inner = pair_plus(direct, pair_minus(cobracket(u, psi, push[0], push[1]), outer))
+    return inner, pair_plus(outer, further)
 
 
 @kernel(FORCES, counted=False)
@@ -191,6 +170,9 @@ def _energy(model: Model, work: Work, e: int) -> tuple[float, float, float]:
     push = section_force(model, e, u, psi)
     strain = minus(u, vector(built, e, 0)), minus(psi, vector(built, e, 3))
     elastic = 0.5 * (dot(push[0], strain[0]) + dot(push[1], strain[1]))
+    if model.beam_moving[e] == LINEAR:
+        kinetic, gravity = linear_energies(model, work, e)
+        return kinetic, elastic, gravity
     kinetic = height = 0.0 * elastic
     b = inverse_coefficient(dot(psi, psi))
     c0, c1 = outward(model, e, 0, work.twist), outward(model, e, 1, work.twist)

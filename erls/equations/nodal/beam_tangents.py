@@ -12,7 +12,8 @@ from typing import Any
 
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.beam_derivatives import elastic_derivatives, inertia_derivatives, set_rows
-from erls.equations.nodal.beam_forces import between, inward
+from erls.equations.nodal.beam_ends import inward
+from erls.equations.nodal.beam_forces import between
 from erls.equations.nodal.contract import TANGENTS, Model, Work, read_layout, read_model, read_work
 from erls.maths.jit import kernel, part
 from erls.maths.vectors import Twist, vector

@@ -19,6 +19,9 @@ from erls.maths.calls import caller
 from erls.maths.jit import ENABLED
 from erls.maths.records import Indices, Matrix, Pairs, Pile, Stack, Vector, reader
 
+HELICOIDAL, LINEAR = 1, 2
+"""How beams interpolate motion: as they do strains, or places and turns of their ends each by itself."""
+
 
 class Model(NamedTuple):
     """What does not change during a run.
@@ -32,7 +35,8 @@ class Model(NamedTuple):
     pairs : (E, 2) array
         Nodes of all elements, kind by kind in the order below, and of the joints, which come last.
     beam_nodes, beam_frames, beam_built, beam_stiffness, beam_inertia, beam_moving : arrays
-        (e, 2), (e, 24), (e, 6), (e, 6, 6) per length, (e, 6, 6) times length, (e,) whether it has inertia.
+        (e, 2), (e, 24), (e, 6), (e, 6, 6) per length, (e, 6, 6) times length, (e,) how it interpolates the motion of
+        its mass: 0 where it has none, `HELICOIDAL`, `LINEAR`.
     body_nodes, bodies : arrays
         (b,), (b, 6, 6).
     load_nodes, load_positions, loads, load_dead : arrays

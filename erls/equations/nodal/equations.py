@@ -25,7 +25,7 @@ from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.locks import LockedSystem, dry_joints
 from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
 from erls.equations.nodal.nodes import Nodes
-from erls.equations.nodal.parts import link_parts
+from erls.equations.nodal.parts import BeamRules, link_parts
 from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
@@ -53,6 +53,8 @@ class Nodal:
         Of a mechanism with loops.
     times : int
         So many elements in place of each.
+    rules : BeamRules
+        How beams become elements.
 
     Raises
     ------
@@ -66,9 +68,10 @@ class Nodal:
         elements_per_member: int | None = None,
         start: ClosedStart | None = None,
         times: int = 1,
+        rules: BeamRules = BeamRules(),  # noqa: B008  (frozen)
     ) -> None:
-        self.mechanism, self._elements, self._start = mechanism, elements_per_member, start
-        parts = [link_parts(link, elements_per_member, times) for link in mechanism.links]
+        self.mechanism, self._elements, self._start, self._rules = mechanism, elements_per_member, start, rules
+        parts = [link_parts(link, elements_per_member, times, rules) for link in mechanism.links]
         self._built = [part.nodes for part in parts]  # in the mesh frames
         self.chain: Chain = build_chain(mechanism, parts, start)
         self.system = self.chain.system
@@ -87,7 +90,7 @@ class Nodal:
 
     def refined(self, times: int) -> Nodal:
         """The same with so many elements in place of each."""
-        return Nodal(self.mechanism, self._elements, self._start, times)
+        return Nodal(self.mechanism, self._elements, self._start, times, self._rules)
 
     @cached_property
     def _arms(self) -> list[tuple[int, int, Array]]:

@@ -15,7 +15,7 @@ import numpy as np
 from erls.equations.nodal.scatter import IntArray
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
-from erls.mechanism.joint_types import JOINT_TYPES, SINGLE_TYPES, Condition, JointType, Z
+from erls.mechanism.joint_types import DRIVEN_TYPES, JOINT_TYPES, Condition, JointType, Z
 
 GROUND = -1
 Motion = Callable[[float], tuple[float, float, float]]  # coordinate, rate, acceleration at a time
@@ -34,7 +34,7 @@ class Joint:
     inner_frame, outer_frame : (4, 4) array
         Pose of the joint in the frame of each node, in the world for the ground.
     motion : callable or None
-        Prescribed coordinate of a joint that has one.
+        Prescribed coordinate of a joint that has one, turn of a planar one.
     breakpoints : tuple
         Times at which its acceleration jumps.
     left_out : frozenset of str
@@ -65,8 +65,8 @@ class Joint:
             remedy = f"must be one of {', '.join(JOINT_TYPES)}"
             message = "there is no such joint"
             raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: type", value=self.type, remedy=remedy)
-        if self.motion is not None and JOINT_TYPES[self.type].one is None:
-            message, remedy = "its motion cannot be prescribed", f"let the joint be one of {', '.join(SINGLE_TYPES)}"
+        if self.motion is not None and JOINT_TYPES[self.type].driven is None:
+            message, remedy = "its motion cannot be prescribed", f"let the joint be one of {', '.join(DRIVEN_TYPES)}"
             raise SceneError(Cause.BAD_FIELD, message, where=f"{where}: motion", value=self.type, remedy=remedy)
         if self.inner == self.outer:
             message, remedy = "both frames belong to one node", "name two nodes, or the ground as one of them"
@@ -79,8 +79,8 @@ class Joint:
 
     @property
     def conditions(self) -> list[Condition]:
-        """Conditions of the type; all of them when the last freedom is prescribed; those left out aside."""
-        every = JOINT_TYPES["fixed"].conditions if self.motion else self.kind.conditions
+        """Conditions of the type; of the driven one where a motion is prescribed; those left out aside."""
+        every = self.kind.driven_conditions if self.motion else self.kind.conditions
         return [c for c in every if c.name not in self.left_out]
 
 
@@ -125,7 +125,7 @@ class JointRows:
         return -1 if joint.inner == GROUND and joint.kind.mutual else 1
 
     def _drive(self, joint: Joint) -> Array:
-        freedom = joint.kind.one
+        freedom = joint.kind.driven
         if joint.motion is None or freedom is None:
             return np.zeros(2)
         return np.asarray(self.sign(joint) * freedom.screw[[Z, 3 + Z]])

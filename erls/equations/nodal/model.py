@@ -74,7 +74,7 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
         beam_built=beams.built,
         beam_stiffness=beams.stiffness,
         beam_inertia=beams.inertia,
-        beam_moving=beams.inertia.any(axis=(1, 2)).astype(np.int64),
+        beam_moving=beams.moving,
         body_nodes=bodies.nodes[:, 0].copy(),
         bodies=bodies.matrices,
         load_nodes=loads.nodes,

@@ -7,6 +7,7 @@ their nodes. Euler-Bernoulli members get `STIFF_SHEAR` times their shear stiffne
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,7 +52,23 @@ class LinkParts:
     fractions: Array
 
 
-def link_parts(link: Link, elements: int | None, times: int) -> LinkParts:
+class BeamRules(NamedTuple):
+    """How beams become elements.
+
+    Attributes
+    ----------
+    residual_bending_flexibility : bool
+        Shear takes what constant curvature leaves out of bending (R. H. MacNeal, Comput. Struct. 8 (1978) 175–183):
+        1/(κ G A) + l²/(12 E I).
+    linear_inertia : bool
+        See `erls.equations.nodal.beam_linear`.
+    """
+
+    residual_bending_flexibility: bool = False
+    linear_inertia: bool = False
+
+
+def link_parts(link: Link, elements: int | None, times: int, rules: BeamRules = BeamRules()) -> LinkParts:  # noqa: B008
     """Parts of a link, with ``elements`` in each member unless it is left to the description; ``times`` as many.
 
     Raises
@@ -84,7 +101,7 @@ def link_parts(link: Link, elements: int | None, times: int) -> LinkParts:
     parts = frame_parts(link.description, frame, where, elements, times)
     own = frame_parts(link.description, frame, where).mesh
     places = _places(own, parts.mesh)
-    return LinkParts(parts.mesh.nodes, *_beams_and_bodies(link, parts, places), *places)
+    return LinkParts(parts.mesh.nodes, *_beams_and_bodies(link, parts, places, rules), *places)
 
 
 def _places(own: FrameMesh, mesh: FrameMesh) -> tuple[IntArray, Array]:
@@ -121,11 +138,11 @@ def node_at(parts: LinkParts, number: int, where: str) -> int:
 
 
 def _beams_and_bodies(
-    link: Link, parts: FrameParts, places: tuple[IntArray, Array]
+    link: Link, parts: FrameParts, places: tuple[IntArray, Array], rules: BeamRules
 ) -> tuple[list[Beam], list[RigidBody]]:
     warmer = temperature_change(link)
     beams = [
-        replace(_beam(e, parts.frame, parts.mesh.nodes), expansion=warmer * e.thermal_expansion)
+        replace(_beam(e, parts.frame, parts.mesh.nodes, rules), expansion=warmer * e.thermal_expansion)
         for e in parts.mesh.elements
     ]
     bodies = [RigidBody(m.node, m.mass, _symmetric(m.inertia)) for m in parts.masses]
@@ -140,13 +157,17 @@ def _beams_and_bodies(
     return beams, [b for b in bodies if b.mass or b.inertia.any()]
 
 
-def _beam(e: FrameElement, frame: Frame, nodes: Array) -> Beam:
+def _beam(e: FrameElement, frame: Frame, nodes: Array, rules: BeamRules) -> Beam:
     s, density = e.section, e.density
-    shear = e.shear_modulus * s.area * (1.0 if frame.theory == "timoshenko" else STIFF_SHEAR)
+    rigidity = e.shear_modulus * s.area * (1.0 if frame.theory == "timoshenko" else STIFF_SHEAR)
+    shear = s.shear_factor_y * rigidity, s.shear_factor_z * rigidity
+    if rules.residual_bending_flexibility:
+        bending = 12 * e.youngs_modulus / e.length**2
+        shear = 1 / (1 / shear[0] + 1 / (bending * s.inertia_z)), 1 / (1 / shear[1] + 1 / (bending * s.inertia_y))
     rotary = (density * s.inertia_y, density * s.inertia_z)
     section = beam_section(
         e.youngs_modulus * s.area,
-        (s.shear_factor_y * shear, s.shear_factor_z * shear),
+        shear,
         e.shear_modulus * s.torsion_constant,
         (e.youngs_modulus * s.inertia_y, e.youngs_modulus * s.inertia_z),
         density * s.area,
@@ -160,7 +181,7 @@ def _beam(e: FrameElement, frame: Frame, nodes: Array) -> Beam:
         section = BeamSection(section.stiffness, inertia)
     axes = e.axes.T
     ends = nodes[list(e.nodes)]
-    return Beam(e.nodes, motions.poses(np.array([axes, axes]), ends), section)
+    return Beam(e.nodes, motions.poses(np.array([axes, axes]), ends), section, linear=rules.linear_inertia)
 
 
 def _symmetric(matrix: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.errors import SceneError
-from erls.mechanism.joint_types import HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
+from erls.mechanism.joint_types import DRIVEN_TYPES, HOLDING_TYPES, JOINT_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
 from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
 from erls.scene.check_sensors import check_sensors
@@ -153,9 +153,9 @@ def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:
         if axis is not None and k >= wanted:
             raise bad(f"{place}.{name}", f"a {joint.type} joint has none", axis, "remove it")
         directed(f"{place}.{name}", axis)
-    if joint.motion is not None and JOINT_TYPES[joint.type].one is None:
+    if joint.motion is not None and JOINT_TYPES[joint.type].driven is None:
         message = "its motion cannot be prescribed"
-        raise bad(f"{place}.motion", message, joint.type, f"let the joint be one of {', '.join(SINGLE_TYPES)}")
+        raise bad(f"{place}.motion", message, joint.type, f"let the joint be one of {', '.join(DRIVEN_TYPES)}")
 
 
 def _check_spring(spring: Spring, nodes: list[str], place: str) -> None:

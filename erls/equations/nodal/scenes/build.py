@@ -197,8 +197,8 @@ def _joint_axes(record: Connection, place: str) -> Array:
 def _motion(record: Connection, folder: Path, place: str) -> tuple[Motion | None, tuple[float, ...]]:
     if record.motion is None:
         return None, ()
-    one = JOINT_TYPES[record.type].one
-    curve = record.motion.build(Place(folder, f"{place}.motion", revolute=one is not None and one.turns))
+    driven = JOINT_TYPES[record.type].driven
+    curve = record.motion.build(Place(folder, f"{place}.motion", revolute=driven is not None and driven.turns))
     start = curve.value(0.0)
     if abs(start) > 1e-12:
         raise SceneError(

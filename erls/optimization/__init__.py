@@ -1,0 +1,1 @@
+"""Optimization of mechanisms: links that are as light as the motion allows."""

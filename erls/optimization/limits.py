@@ -1,0 +1,212 @@
+"""Constraints of a problem on motions: their components in a run, and what small displacements change of them.
+
+Rules for a new constraint: one record in `erls.optimization.records`, one class here, one line in `limit_of`. ``exact``
+tells components (n, q) of a motion, ``increments`` what small displacements of its nodes add to them, of many
+directions at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, it asks
+the run, and equivalent static loads cannot treat it; with ``of_sections`` components depend on sections at the same
+motion, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from erls.equations.nodal.equations import Nodal
+from erls.errors import SceneError
+from erls.maths import motion_maps as motions
+from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.optimization.beams import outlines_of, sections_of
+from erls.optimization.frozen import Frozen
+from erls.optimization.link_numbers import LinkNumbers
+from erls.optimization.measures import EdgedSection, Length, Measure, RoundSection
+from erls.optimization.problem import Problem, stressed, terms_of
+from erls.optimization.records import AnyConstraint, DeflectionLimit, EffortLimit, StressLimit, Term
+from erls.run.chain.run import ChainRun
+from fe_import.files.toml import choose
+from fe_import.model import IntArray
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion at the times of a problem.
+
+    Attributes
+    ----------
+    frozen : Frozen
+        Of the same mechanism.
+    poses : (k, N, 4, 4) array
+        Of the nodes in the world.
+    run : ChainRun or None
+    """
+
+    frozen: Frozen
+    poses: Array
+    run: ChainRun | None = None
+
+    @cached_property
+    def twists(self) -> Array:
+        """(k, e, 6) of elements."""
+        return self.frozen.twists(self.poses)
+
+
+class Limit(Protocol):
+    """A constraint of a design."""
+
+    name: str
+    limit: float | None
+    measure: Measure
+    at: IntArray
+    of_shape: bool
+    of_sections: bool
+
+    def exact(self, motion: Motion) -> Array:
+        """(n, q) components in a motion."""
+
+    def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
+        """(n, q) what displacements r (k, 6 L), w (k, 6 N) of all times add."""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A term of a deflection: node, place of the point from it, axes and components."""
+
+    node: int
+    offset: Array
+    on_link: bool
+    components: list[int]
+
+
+class Deflection:
+    """Of named points."""
+
+    measure: Measure = Length()
+    of_shape, of_sections = True, False
+
+    def __init__(self, record: DeflectionLimit, at: IntArray, mechanism: Mechanism, nodal: Nodal) -> None:
+        self.name, self.limit, self.at = record.name, record.limit, at
+        self._parts = [_part(term, mechanism, nodal) for term in terms_of(record)]
+
+    def exact(self, motion: Motion) -> Array:
+        """(k, q)"""
+        frozen, found = motion.frozen, []
+        for part in self._parts:
+            link = frozen.links[part.node]
+            rigid = frozen.frames[self.at, link]
+            own, root = motion.poses[self.at, part.node], motion.poses[self.at, frozen.roots[link]]
+            place = own[:, :3, 3] + own[:, :3, :3] @ part.offset
+            undeformed = frozen.local[part.node, :3, 3] + frozen.local[part.node, :3, :3] @ part.offset
+            if part.on_link:
+                moved = np.einsum("kji,kj->ki", root[:, :3, :3], place - root[:, :3, 3]) - undeformed
+            else:
+                moved = place - rigid[:, :3, 3] - rigid[:, :3, :3] @ undeformed
+            found.append(moved[:, part.components])
+        return np.concatenate(found, axis=1)
+
+    def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
+        """(k, q)"""
+        found = []
+        for part in self._parts:
+            own = slice(6 * part.node, 6 * part.node + 6)
+            link = frozen.links[part.node]
+            u = w[self.at, own]
+            if not part.on_link:
+                u = u + r[self.at] @ frozen.carried[own].T
+            moved = u[:, :3] + np.cross(u[:, 3:], part.offset)
+            axes = frozen.local[part.node, :3, :3]
+            if part.on_link:
+                moved = moved @ axes.T
+            else:
+                moved = np.einsum("kij,kj->ki", frozen.frames[self.at, link, :3, :3] @ axes, moved)
+            found.append(moved[:, part.components])
+        return np.concatenate(found, axis=1)
+
+
+def _part(term: Term, mechanism: Mechanism, nodal: Nodal) -> _Part:
+    names = [point.name for point in mechanism.points]
+    choose(term.point, names, "point", SceneError)
+    point = mechanism.points[names.index(term.point)]
+    link = mechanism.links[point.link]
+    root = nodal.place_of(point.link, link.inboard.node)
+    node = root if not link.elastic_modes else nodal.place_of(point.link, point.node)
+    start = nodal.chain.system.start.poses
+    place = link.inboard.position + (motions.inverse(start[root]) @ start[node])[:3, 3]
+    offset = link.model.nodes[point.node] - place
+    return _Part(node, offset, term.frame == "link", ["xyz".index(c) for c in term.components])
+
+
+class Stress:
+    """Largest normal stress at both ends of elements, one row for each time and end."""
+
+    of_shape, of_sections = True, True
+
+    def __init__(
+        self, record: StressLimit, at: IntArray, mechanism: Mechanism, problem: Problem, numbers: LinkNumbers, x: Array
+    ) -> None:
+        self.name, self.limit, self.at = record.name, record.limit, at
+        settings, links = problem.scene.record.simulation, stressed(record, problem.scene)
+        outlines = outlines_of(mechanism, settings, numbers, x)
+        wanted = np.isin(outlines.links, [mechanism.bodies[k] for k in links])
+        self._elements = np.flatnonzero(wanted)
+        self._factors = outlines.factors[wanted]
+        self._stiffness = sections_of(mechanism, settings, numbers, x)[wanted]
+        rounds = outlines.rounds[wanted]
+        self.measure: Measure = RoundSection() if rounds.all() else EdgedSection()  # which is never below it
+
+    def exact(self, motion: Motion) -> Array:
+        """(k e 2, 3)"""
+        return self._stresses(motion.frozen, motion.twists[self.at][:, self._elements])
+
+    def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
+        """(k e 2, 3)"""
+        places, strains = frozen.places[self._elements], frozen.strains[self._elements]
+        return self._stresses(frozen, np.einsum("ejl,kel->kej", strains, w[self.at][:, places]))
+
+    def _stresses(self, frozen: Frozen, twists: Array) -> Array:
+        force = np.einsum("eij,kej->kei", self._stiffness, twists)
+        half = frozen.lengths[self._elements] / 2
+        ends = []
+        for side in (-1.0, 1.0):  # m' = -x × n
+            bending = force[..., 4] + side * half * force[..., 2], force[..., 5] - side * half * force[..., 1]
+            ends.append(np.stack([force[..., 0], *bending], axis=-1) * self._factors)
+        return np.stack(ends, axis=2).reshape(-1, 3)
+
+
+class Effort:
+    """Of a joint's drive."""
+
+    measure: Measure = Length()
+    of_shape, of_sections = False, False
+
+    def __init__(self, record: EffortLimit, at: IntArray) -> None:
+        self.name, self.limit, self.at, self._joint = record.name, record.limit, at, record.joint
+
+    def exact(self, motion: Motion) -> Array:
+        """(k, 1)"""
+        assert motion.run is not None
+        return motion.run.joint_effort(self._joint, motion.frozen.times[self.at])[:, None]
+
+    def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
+        """(k, 1) loads that are held change nothing."""
+        return np.zeros((len(self.at), 1))
+
+
+def limit_of(
+    record: AnyConstraint,
+    at: IntArray,
+    problem: Problem,
+    mechanism: Mechanism,
+    nodal: Nodal,
+    numbers: LinkNumbers,
+    x: Array,
+) -> Limit:
+    """A constraint of a design (v,), whose samples are those times of all that are looked at."""
+    if isinstance(record, DeflectionLimit):
+        return Deflection(record, at, mechanism, nodal)
+    if isinstance(record, StressLimit):
+        return Stress(record, at, mechanism, problem, numbers, x)
+    return Effort(record, at)

@@ -1,0 +1,234 @@
+"""The tables of a problem file: what may change, what is wanted, what must hold, how it is found."""
+
+from __future__ import annotations
+
+from erls.scene.records import Record
+
+METHODS = ("integrated", "esl-system", "esl-component")
+OPTIMIZERS = ("scp", "slsqp", "trust-constr")
+QUANTITIES, OVER_TIME = ("mass", "deflection", "effort", "stress"), ("peak", "rms")
+TIMES = ("all", "active", "aggregate")
+FRAMES = ("world", "link")
+"""Names that fields take."""
+
+
+class Variable(Record, frozen=True):
+    """A number of the design.
+
+    Attributes
+    ----------
+    name : str
+        What reports call it.
+    keys : list of str, or dict of str to float
+        Fields of the scene that follow it, as ``--set`` takes them; a table gives the factor of each, so that
+        ``{ "links.arm.model.sections.tube.outer_diameter" = 1.0, "links.arm.model.sections.tube.thickness" = 0.1 }``
+        keeps the proportions of a tube.
+    lower, upper : float
+        Its bounds.
+    start : float, optional
+        Where to start; what the scene has in the first key unless given.
+    power : int, optional
+        What depends nearly linearly on it is the variable to this power, in which approximations are made; unless given
+        -4 for diameters, -3 for heights and widths, otherwise 1.
+    """
+
+    name: str
+    keys: list[str] | dict[str, float]
+    lower: float
+    upper: float
+    start: float | None = None
+    power: int | None = None
+
+
+class Goal(Record, frozen=True):
+    """A part of what is minimized.
+
+    Attributes
+    ----------
+    quantity : str
+        ``mass`` of links [kg], without payloads; ``deflection`` [m], ``effort`` [N m or N] or ``stress`` [Pa] of the
+        constraint of this name, which then needs no limit.
+    of : str
+        With deflection, effort and stress: the name of that constraint.
+    over_time : str
+        Of these: ``peak``, its largest value, or ``rms``.
+    links : list of str
+        Of ``mass``: those that count; all unless given.
+    weight : float
+        Factor: parts are added. Mass with 9.81 is weight in newtons.
+    """
+
+    quantity: str = "mass"
+    of: str = ""
+    over_time: str = "peak"
+    links: list[str] = []
+    weight: float = 1.0
+
+
+class Term(Record, frozen=True):
+    """A part of a deflection.
+
+    Attributes
+    ----------
+    point : str
+        A name from ``[[points]]`` of the scene.
+    frame : str
+        ``world``: from where rigid links would have it, in the axes of the world; ``link``: from where it would be on
+        its link undeformed, in the mesh axes of that link, which go with its inboard interface.
+    components : str
+        Which of x, y and z count.
+    """
+
+    point: str
+    frame: str = "world"
+    components: str = "xyz"
+
+
+class Constraint(Record, frozen=True, kw_only=True, tag_field="type"):
+    """What must hold during the whole motion.
+
+    Attributes
+    ----------
+    name : str
+        What reports call it.
+    limit : float, optional
+        The largest value; a constraint without one holds nothing, and lends its value to an objective.
+    samples : int
+        Times, evenly spaced over the run with both ends, each rounded to a step of a run with fixed steps.
+    times : str
+        ``all`` samples are constraints of their own; of the ``active`` ones those near their limit alone; or one
+        smooth ``aggregate`` of all (G. Kreisselmeier, R. Steinhauser, 1979), which lies on the safe side.
+    """
+
+    name: str
+    limit: float | None = None
+    samples: int = 51
+    times: str = "active"
+
+
+class DeflectionLimit(Constraint, frozen=True, kw_only=True, tag="deflection"):
+    """Distance of named points from where they should be [m]: the root of the squares of all terms.
+
+    Attributes
+    ----------
+    point : str
+        Short for one term, all components in the world.
+    terms : list of Term
+        Instead of ``point``.
+    """
+
+    point: str = ""
+    terms: list[Term] = []
+
+
+class StressLimit(Constraint, frozen=True, kw_only=True, tag="stress"):
+    """Largest normal stress in sections of beams [Pa], at both ends of every element: axial force and bending together.
+
+    Attributes
+    ----------
+    links : list of str
+        Links that are looked at; all flexible ones unless given.
+    """
+
+    links: list[str] = []
+
+
+class EffortLimit(Constraint, frozen=True, kw_only=True, tag="effort"):
+    """Torque or force of a joint's drive, either way [N m or N].
+
+    Attributes
+    ----------
+    joint : str
+        Its name.
+    """
+
+    joint: str
+
+
+AnyConstraint = DeflectionLimit | StressLimit | EffortLimit
+
+
+class Published(Record, frozen=True):
+    """What is published of a method, to be shown beside.
+
+    Attributes
+    ----------
+    objective : float
+        In the unit of the objective.
+    variables : dict of str to float
+        By the names of the variables, in their units.
+    analyses, inner_iterations : int, optional
+        Of the motion, and under loads that are held.
+    """
+
+    objective: float
+    variables: dict[str, float] = {}
+    analyses: int | None = None
+    inner_iterations: int | None = None
+
+
+class Settings(Record, frozen=True):
+    """How the optimum is found.
+
+    Attributes
+    ----------
+    methods : list of str
+        ``integrated``: derivatives of the motion; ``esl-system``, ``esl-component``: equivalent static loads of the
+        whole mechanism, or of each link alone.
+    optimizer : str
+        ``scp`` (sequential convex programming), or SciPy's ``slsqp`` or ``trust-constr``.
+    design_tolerance : float
+        Largest relative change of a variable from one design to the next.
+    violation_tolerance : float
+        By how much constraints may be passed, relative to their limits.
+    most_analyses : int
+        Runs of the motion that a method may take.
+    move_limit : float
+        Largest relative change of a variable in one step of ``scp``, adapted as it goes on.
+    starts : int
+        How many starts: further ones are drawn evenly between the bounds.
+    seed : int
+        Of the further starts.
+    """
+
+    methods: tuple[str, ...] = ("esl-system", "integrated")
+    optimizer: str = "scp"
+    design_tolerance: float = 5e-4
+    violation_tolerance: float = 5e-4
+    most_analyses: int = 40
+    move_limit: float = 0.5
+    starts: int = 1
+    seed: int = 0
+
+
+class ProblemRecord(Record, frozen=True):
+    """A problem: a scene, what may change, what is wanted, what must hold.
+
+    Attributes
+    ----------
+    scene : str
+        Scene of joints and links; the path starts at the problem.
+    variables : list of Variable
+        ``[[variables]]``.
+    name : str
+        Of the problem; that of the file unless given.
+    set : list of str
+        Changes of the scene, KEY=VALUE as of ``--set``.
+    objective : list of Goal
+        ``[[objective]]``, added up; the mass unless given.
+    constraints : list of constraints
+        ``[[constraints]]``.
+    settings : Settings
+        ``[settings]``.
+    published : dict of Published
+        ``[published.METHOD]``.
+    """
+
+    scene: str
+    variables: list[Variable]
+    name: str = ""
+    set: list[str] = []
+    objective: list[Goal] = []
+    constraints: list[AnyConstraint] = []
+    settings: Settings = Settings()
+    published: dict[str, Published] = {}
