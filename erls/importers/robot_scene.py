@@ -324,9 +324,7 @@ def _tube(body: Body, seats: Mapping[str, Array], model: str) -> tuple[str, str]
     area = body.mass / (_DENSITY * length) if length else math.inf
     outer, wall = _diameters(model, area, where)
     if not outer * _SLENDER < length:
-        message = (
-            f"no beam: {length:.4g} m long, and {outer:.4g} m thick as an aluminium tube of its {body.mass:.4g} kg"
-        )
+        message = f"no beam: {length:.4g} m long, {outer:.4g} m thick as an aluminium tube of its {body.mass:.4g} kg"
         raise SceneError(Cause.BAD_FIELD, message, where=where, remedy="give a description of it")
     said = (
         f"{body.name!r} is guessed: an aluminium tube of its mass and length, {outer * 1e3:.4g} mm wide, walls "

@@ -204,8 +204,8 @@ _DISTURBANCES = 12  # where rows of a loop depend on others, few of them show ho
 
 
 def disturbed(system: Any, at: State) -> Values:
-    """Ten times what disturbances of a state by 1e-14 of its largest entry do to `outputs`: what closing a loop makes of
-    rounding, which sums of terms leave to entries that are zero, too.
+    """Ten times what disturbances of a state by 1e-14 of its largest entry do to `outputs`: what closing a loop makes
+    of rounding, which sums of terms leave to entries that are zero, too.
     """
     rng, reference = np.random.default_rng(1), outputs(system, at)
     result = dict.fromkeys(reference, 0.0)
