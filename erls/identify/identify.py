@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +56,7 @@ class Fitted:
     start, value : float
         In the unit of its field.
     half_width : float or None
-        Of its interval at 95 %, for white noise; None where the record does not tell it.
+        Of its interval at 95 %, for white noise; None where the record does not tell it, or where it stopped at a bound.
     """
 
     start: float
@@ -167,7 +167,9 @@ def identify(
     problem = _Problem(Path(scene), tuple(overrides), loaded, keys, held, first, progress)
     limits = _limits(problem, bounds or {})
     shares, noise = problem.fitted(limits)
+    stopped = problem.at_bound(shares, limits)
     parameters, covariance, not_told = _intervals(problem, shares, noise)
+    parameters |= {key: replace(parameters[key], half_width=None) for key in stopped}
     after, before = problem.columns(shares), problem.of(first)
     columns = {
         name: Column(values, after[name], before[name], noise[name], _likeness(values - after[name]))
@@ -183,7 +185,7 @@ def identify(
         times=held.times,
         covariance=covariance,
         not_told=not_told,
-        warnings=tuple(_warnings(held, columns, problem.at_bound(shares, limits))),
+        warnings=tuple(_warnings(held, columns, stopped)),
         runs=problem.runs,
         wall_s=time.perf_counter() - begun,
         run=run,
@@ -352,7 +354,7 @@ def _warnings(held: Matched, columns: Mapping[str, Column], bound: Sequence[str]
     found = [f"column {name!r} is not one of the run: left out" for name in held.unknown]
     if held.outside:
         found.append(f"{held.outside} rows lie outside the run: left out")
-    found += [f"{key} stopped at a bound: it has no meaningful interval" for key in bound]
+    found += [f"{key} stopped at a bound: it has no interval, and those of the others hold it there" for key in bound]
     limit = max(_ALIKE, 3.3 / math.sqrt(len(held.times)))
     alike = [name for name, column in columns.items() if abs(column.likeness) > limit]
     if alike:

@@ -37,7 +37,7 @@ def identify_page(found: Identification) -> str:
 
 def _parameters(found: Identification) -> list[tuple[str, ...]]:
     return [
-        (key, f"{one.start:.6g}", f"{one.value:.6g}", "not told" if one.half_width is None else f"{one.half_width:.2g}")
+        (key, f"{one.start:.6g}", f"{one.value:.6g}", "none" if one.half_width is None else f"{one.half_width:.2g}")
         for key, one in found.parameters.items()
     ]
 
