@@ -56,7 +56,7 @@ class Fitted:
     start, value : float
         In the unit of its field.
     half_width : float or None
-        Of its interval at 95 %, for white noise; None where the record does not tell it, or where it stopped at a bound.
+        Of its interval at 95 %, for white noise; None where the record does not tell it, or a bound stopped it.
     """
 
     start: float
