@@ -83,7 +83,7 @@ def test_samples_fill_their_ranges(method: str) -> None:
         ([], "", "nothing is varied"),
         (["a"], "", "KEY=A:B:N"),
         (["a=1:2:x"], "", "KEY=A:B:N"),
-        (["a=1:2:0"], "", "KEY=A:B:N"),
+        (["a=1:2:0"], "", "1 to 10000000 values"),
         (["a=nan:2:3"], "", "KEY=A:B:N"),
         (["a=1:2:20000000"], "", "1 to 10000000 values"),
         (["a=1:2"], "sobol", "METHOD:COUNT"),
