@@ -9,13 +9,14 @@ The rules 2 to 7 of `erls.integrate.base` hold here too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array
 
-if TYPE_CHECKING:  # it imports the compiler
+if TYPE_CHECKING:  # they import the compiler
     from erls.equations.stepped import Stepped
+    from erls.equations.switches.base import Switches
 
 Configuration: TypeAlias = Any  # never changed in place
 
@@ -89,6 +90,25 @@ class ConstrainedSystem(Protocol):
 
     def places(self, stored: Array) -> Array:
         """(k, p, 3) points [m] of what is stored of k knots (k, s): the error of a run is told at these."""
+
+
+@runtime_checkable
+class SwitchedSystem(ConstrainedSystem, Protocol):
+    """A system what acts in whose joints has modes."""
+
+    @property
+    def switches(self) -> Switches | None:
+        """Modes (`erls.equations.switches.base`), at what is stored of knots; None where there are none after all."""
+
+    @property
+    def unlocked(self) -> ConstrainedSystem:
+        """The same without conditions that come and go with modes."""
+
+    def from_stored(self, y: Array, v: Array) -> tuple[Configuration, Array]:
+        """Configuration and velocity from what `stored` gives, interpolated or not."""
+
+    def driven(self, t: float, q: Configuration, v: Array) -> tuple[Array, Array]:
+        """Accelerations (n,) and multipliers (m,) with the present modes."""
 
 
 class ConstrainedState(NamedTuple):

@@ -15,12 +15,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 from erls.equations.system import SecondOrderSystem
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from fe_import.model import IntArray
+
+if TYPE_CHECKING:
+    from erls.equations.switches.law import DryFriction
 
 
 @dataclass(frozen=True)
@@ -225,11 +228,19 @@ class TreeFormulation(Formulation, SecondOrderSystem, Protocol):
         Places of the independent coordinates within (θ, elastic).
     free_joints : int array
         Joints without prescribed motion; their coordinates come first in y.
+    along_coordinates : bool
+        Whether drives and friction act along these coordinates, so that it can be said when what they do ends.
     """
 
+    along_coordinates: ClassVar[bool] = False
     joints: int
     free: IntArray
     free_joints: IntArray
+
+    @property
+    def dry(self) -> DryFriction | None:
+        """Friction that sticks, which the compiled equations leave out; None without any."""
+        return None
 
     def frames(self, t: float, y: Array, v: Array) -> list[FrameMotion]:
         """Frames on displaced nodes that the loops of the mechanism hold, as `erls.mechanism.loops.loop_ends`."""

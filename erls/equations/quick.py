@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from erls.equations.serial.formulation import SerialFormulation
 from erls.maths.so3 import Array
 
 
@@ -49,5 +48,5 @@ class Quick:
 
 def quick(system: Any) -> Any:
     """The system itself, or its compiled form where that is all of it."""
-    whole = system.compiled is None or (isinstance(system, SerialFormulation) and system.dry is not None)
+    whole = system.compiled is None or (getattr(system, "dry", None) is not None)
     return system if whole else Quick(system)

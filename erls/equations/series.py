@@ -24,9 +24,10 @@ if ENABLED:
     from erls.equations.compiled_system import INTEGERS, MATRIX, REALS
 
     _RESIDUALS = _t.void(_t.int64, REALS, INTEGERS, REALS, REALS, MATRIX, MATRIX, MATRIX, MATRIX)
+    _LEAVING = _t.void(_t.int64, REALS, INTEGERS, REALS, REALS, MATRIX, MATRIX, INTEGERS, REALS, MATRIX)
     _MASSES = _t.void(_t.int64, REALS, INTEGERS, REALS, REALS, MATRIX, _t.float64[:, :, ::1])
 else:
-    _RESIDUALS = _MASSES = None
+    _RESIDUALS = _MASSES = _LEAVING = None
 
 
 @kernel(_RESIDUALS, counted=False)
@@ -44,6 +45,26 @@ def residuals(
     """Rows of ``out``, by the function at an address."""
     for k in range(len(t)):
         call_residual(function, reals, integers, scratch, t[k], y[k], v[k], a[k], out[k])
+
+
+@kernel(_LEAVING, counted=False)
+def leavings(
+    function: Any,
+    reals: Array,
+    integers: IntArray,
+    scratch: Array,
+    t: Array,
+    y: Array,
+    v: Array,
+    places: IntArray,
+    spare: Array,
+    out: Array,
+) -> None:
+    """Rows of ``out``: what residuals at accelerations of zero, which go into ``spare`` (n,), leave in some places."""
+    for k in range(len(t)):
+        call_residual(function, reals, integers, scratch, t[k], y[k], v[k], y[k, :0], spare)
+        for i in range(len(places)):
+            out[k, i] = scratch[places[i]]
 
 
 @kernel(_MASSES, counted=False)
@@ -72,6 +93,21 @@ def residual_series(system: CompiledSystem, t: Array, y: Array, v: Array, a: Arr
     address = handed(function or system.residual, RESIDUAL)
     t, y, v, a = (np.ascontiguousarray(x, dtype=float) for x in (t, y, v, a))
     residuals(address, system.reals, system.integers, system.scratch, t, y, v, a, out)
+    return out
+
+
+def residuals_leaving(
+    residual: Any, reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array,
+    places: IntArray,
+) -> Array:  # fmt: skip
+    """(k, p) what a residual at states (k, n) and accelerations of zero leaves in p places of its working memory.
+
+    ``residual`` is a function, or its address.
+    """
+    out = np.empty((len(t), len(places)))
+    t, y, v = (np.ascontiguousarray(x, dtype=float) for x in (t, y, v))
+    address = handed(residual, RESIDUAL)
+    leavings(address, reals, integers, scratch, t, y, v, places, np.empty(y.shape[1]), out)
     return out
 
 

@@ -32,6 +32,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -238,6 +239,22 @@ def legs(system: MovingSystem, times: tuple[float, float]) -> list[Leg]:
     hair = _hair(times)
     pairs = zip([start, *ends[:-1]], ends, strict=True)
     return [Leg(s, e, min(s + hair, (s + e) / 2), max(e - hair, (s + e) / 2)) for s, e in pairs]
+
+
+def walked(system: MovingSystem, t: Array) -> list[tuple[int, int, Leg]]:
+    """Stretches without jumps of a run with knots (k,): numbers of their first knot and of the one after their last,
+    and the legs, of which those that a switch begins or ends are parts.
+    """
+    found: list[tuple[int, int, Leg]] = []
+    ends = [0, *(np.flatnonzero(np.diff(t) == 0) + 1).tolist(), len(t)]
+    whole = legs(system, (float(t[0]), float(t[-1])))
+    for first, end in pairwise(ends):
+        begun = float(t[first])
+        leg = next((leg for leg in whole if leg.start <= begun < leg.end), whole[-1] if whole else None)
+        if leg is not None:
+            own = leg if begun == leg.start else Leg(begun, leg.end, begun, leg.last)
+            found.append((first, end, own))
+    return found
 
 
 def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, Array]:

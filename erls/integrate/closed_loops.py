@@ -17,6 +17,7 @@ from erls.equations.loops.branching import AT, Kind, singular_at
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.loops.failures import ends_singular
 from erls.equations.loops.tied import OPEN
+from erls.equations.switches.base import Switches
 from erls.equations.system import SecondOrderSystem
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Integrator, Observer, Options, Solution, StopRun, Work
@@ -46,6 +47,7 @@ class TiedCoordinates:
         self.constraint_names = tuple(chain.rows.names[k] for k in chain.kept)
         self.length_scales, self.breakpoints = chain.metres, chain.breakpoints
         self._still = np.zeros(chain.size)
+        self.switches = chain if isinstance(chain, Switches) else None
 
     def compose(self, q: Array, increment: Array) -> Array:
         """q + increment."""
@@ -82,6 +84,20 @@ class TiedCoordinates:
     def constraint_bias(self, t: float, q: Array, v: Array) -> Array:
         """(m,) Φ̈ at zero accelerations."""
         return np.asarray(self.chain.closure(t, q, v).bias[self.kept])
+
+    @property
+    def unlocked(self) -> TiedCoordinates:
+        """The same, whose rows take nothing of what friction holds."""
+        return self
+
+    def from_stored(self, y: Array, v: Array) -> tuple[Array, Array]:
+        """The coordinates themselves."""
+        return y, v
+
+    def driven(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        """Accelerations and multipliers with the present modes, see `erls.equations.switches.base`."""
+        a = self.chain.acceleration(t, q, v)
+        return a, self.chain.loops.room.multipliers.copy()
 
     def stored(self, t: float, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """The coordinates themselves.
@@ -143,7 +159,7 @@ def loop_integrator(name: str) -> Integrator:
         failure = solution.failure
         if failure is None or failure.cause in _ITS_OWN:
             return solution
-        return replace(solution, failure=_singular(system, solution) or failure)
+        return replace(solution, failure=_singular(system.unheld, solution) or failure)
 
     return integrate
 
@@ -164,7 +180,7 @@ def _in_stretches(
     parts: list[Solution] = []
     t, near = times[0], False
     while True:
-        watch = Watch(chain, observer, time_of(options.keeper), near, tuple(parts))
+        watch = Watch(chain.unheld, observer, time_of(options.keeper), near, tuple(parts))
         if near:
             speed = float(np.linalg.norm(chain.metres * v))
             largest = CLOSE * chain.reach / (_STEPS * speed) if speed > 0 else None

@@ -11,6 +11,7 @@ from erls.errors import SimulationError
 from erls.integrate.base import Observer
 from erls.integrate.constrained import ConstrainedSolution
 from erls.integrate.driver import Recorder
+from erls.integrate.switching import switching_of
 
 
 class ConstrainedRecorder(Recorder):
@@ -37,7 +38,8 @@ class ConstrainedRecorder(Recorder):
         apart: float | None = None,
     ) -> None:
         stored = len(system.stored(t, start.q, start.v, start.a)[0])
-        super().__init__(stored, observer, 256, apart, len(start.a) + len(start.multipliers))
+        beside = len(start.a) + len(start.multipliers)
+        super().__init__(stored, observer, 256, apart, beside, switching_of(system))
         self._system, self._velocities = system, len(start.a)
 
     @property
@@ -67,6 +69,7 @@ _TOLD = 64  # knots of a run that is told again, between looks of the observer
 
 def tell_again(found: ConstrainedSolution, recorder: Recorder) -> None:
     """Record a run that was made before anybody looked on."""
+    recorder.switching = None  # its switches are known
     recorder.work = replace(found.work, steps=0)
     recorder.warnings += found.warnings
     beside = np.concatenate([found.accelerations, found.multipliers], axis=1)

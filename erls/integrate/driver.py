@@ -73,6 +73,8 @@ class Recorder:
     def begin(self, t: float, *parts: Array) -> None:
         """Add a copy of the knot y, v, a (and what is kept beside it) at which a leg begins; the last leg ends."""
         row = np.concatenate(parts)[None]
+        if self.switching is not None:
+            self.switching.rest(row[:, : 3 * self._size].reshape(1, 3, self._size))
         if not self._kept[0]:
             self._begun = t
         times, rows = self._waiting()
@@ -105,10 +107,13 @@ class Recorder:
         if self.switching is None:
             self._keep(t, rows, steps)
             return
-        count, knot, switch = self.switching.first(t, rows[:, : 3 * self._size].reshape(len(t), 3, self._size))
+        knots = rows[:, : 3 * self._size].reshape(len(t), 3, self._size)
+        self.switching.rest(knots)
+        rows[:, : 3 * self._size] = knots.reshape(len(t), 3 * self._size)
+        count, knot, switch = self.switching.first(t, knots, rows[:, 3 * self._size :])
         t, rows = t[:count], rows[:count]
         if switch is not None and knot is not None:
-            t, rows = np.append(t, switch.t), np.concatenate([rows, knot.reshape(1, -1)])
+            t, rows = np.append(t, switch.t), np.concatenate([rows, knot[None, : rows.shape[1]]])
         self._keep(t, rows, steps if switch is None else 1)
         if switch is not None:
             self._look(switch.t)  # nothing is offered: the steps stand beyond it
@@ -315,7 +320,10 @@ def integrate_legs(
 
     def stand(leg: Leg, y: Array, v: Array) -> None:
         recorder.work.rhs_calls += 1
-        a = system.acceleration(leg.first, y, v) if switching is None else switching.stand(leg, y, v)
+        if switching is None:
+            a = system.acceleration(leg.first, y, v)
+        else:
+            v, a = switching.stand(leg, y, v)
         if not np.isfinite(a).all():
             raise not_finite(leg.start, a)
         recorder.begin(leg.start, y, v, a)

@@ -77,7 +77,9 @@ class _Equal:
 
     def begin(self, leg: Leg, y: Array, v: Array, a: Array) -> None:
         """Stand at the start of a leg."""
-        self._steps.begin(y, v, a if self._recorder.switching is None else self._seen(leg, y, v, a))
+        switching = self._recorder.switching
+        jumps = switching is not None and len(switching.system.rubbing.places) > 0
+        self._steps.begin(y, v, self._seen(leg, y, v, a) if jumps else a)
 
     def _seen(self, leg: Leg, y: Array, v: Array, a: Array) -> Array:
         """(n,) accelerations as steps see them, (M + β h² K)⁻¹ M a: the same to second order in the step; those of

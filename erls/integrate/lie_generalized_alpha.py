@@ -22,11 +22,16 @@ from functools import partial
 import numpy as np
 
 from erls.equations.consistency import consistent_acceleration, consistent_start, refuse_redundant
-from erls.equations.constrained_system import Configuration, ConstrainedState, ConstrainedSystem
+from erls.equations.constrained_system import (
+    Configuration,
+    ConstrainedState,
+    ConstrainedSystem,
+    SwitchedSystem,
+)
 from erls.equations.dead_points import dead_point
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SimulationError
-from erls.integrate.alpha_rules import Rules, Words
+from erls.integrate.alpha_rules import Formulas, Rules, Words
 from erls.integrate.alpha_steps import Steps, adaptive_steps, equal_steps, rough_steps
 from erls.integrate.alpha_to_tolerance import to_tolerance
 from erls.integrate.base import Leg, Observer
@@ -35,6 +40,7 @@ from erls.integrate.constrained_run import ConstrainedRecorder, tell_again
 from erls.integrate.driver import Recorder, not_finite, run_to_end
 from erls.integrate.memory import Keeping
 from erls.integrate.step_plans import Plan, planned
+from erls.integrate.switching import Switch
 from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
 
@@ -88,28 +94,50 @@ def _run(
             equal_steps(steps, part, width, options.iteration_matrix != "frozen", recorder, given=plan is None)
             steps.part += 1
 
+    moving = system if recorder.switching is not None and isinstance(system, SwitchedSystem) else None
+
+    def begin(
+        steps: Steps, leg: Leg, place: Configuration, rate: Array, stored: tuple[Array, Array] | None = None
+    ) -> None:
+        if recorder.switching is not None and len(recorder.switching.system.rubbing.places):  # accelerations jump
+            beta = Formulas.of(Rules(options.spectral_radius, 0.0), step).beta
+            recorder.switching.system.seen_by = beta * (steps.h or step) ** 2
+        start = _start_of_leg(system, leg, place, rate, recorder, stored)
+        steps.begin(place, start.v, np.concatenate([start.a, start.multipliers]))
+
     def go(walk: list[Leg]) -> None:
         if known is not None:
             tell_again(known, recorder)
             return
-        refuse_redundant(system, walk[0].first, q)
-        place, rate = consistent_start(system, walk[0].first, q, given.v, recorder.warnings)
+        free = system if moving is None else moving.unlocked
+        refuse_redundant(free, walk[0].first, q)
+        place, rate = consistent_start(free, walk[0].first, q, given.v, recorder.warnings)
+        if recorder.switching is not None:
+            recorder.switching.coarse = True
+            rate = np.where(given.v == 0.0, 0.0, rate)  # who rests does
         steps = steps_of(system, options, recorder, recorder.kept)
         keeping = Keeping(options.keeper, recorder, steps)
         for number, leg in enumerate(walk):
             if keeping.passed(number):
                 continue
             if not keeping.resumes(number):
-                start = _start_of_leg(system, leg, place, rate, recorder)
-                steps.begin(place, rate, np.concatenate([start.a, start.multipliers]))
-            if leg.end > leg.start:
+                begin(steps, leg, place, rate)
+            elif recorder.switching is not None:
+                leg = recorder.switching.leg
+            while leg.end > leg.start:
                 before = recorder.steps
                 try:
                     advance(steps, leg)
+                    break
+                except Switch as switch:
+                    assert moving is not None
+                    leg = Leg(switch.t, leg.end, switch.t, leg.last)
+                    begin(steps, leg, *moving.from_stored(switch.y, switch.v), (switch.y, switch.v))
                 except SimulationError as problem:
                     raise _why(problem, system, recorder.time or leg.start, steps) from None
-                if options.project_velocity:
-                    recorder.work.factorizations += recorder.steps - before
+                finally:
+                    if options.project_velocity:
+                        recorder.work.factorizations += recorder.steps - before
             place, rate = steps.end()
 
     found = run_to_end(system, times, recorder, go, lambda: recorder.add(times[0], given))
@@ -150,12 +178,25 @@ def steps_of(system: ConstrainedSystem, options: ConstrainedOptions, recorder: R
 
 
 def _start_of_leg(
-    system: ConstrainedSystem, leg: Leg, q: Configuration, v: Array, recorder: ConstrainedRecorder
+    system: ConstrainedSystem,
+    leg: Leg,
+    q: Configuration,
+    v: Array,
+    recorder: ConstrainedRecorder,
+    stored: tuple[Array, Array] | None,
 ) -> ConstrainedState:
-    """Acceleration and multipliers at the start of a leg, which becomes a knot."""
+    """Acceleration and multipliers at the start of a leg, which becomes a knot; places and rates that are ``stored`` of
+    one are those of a switch.
+    """
     recorder.work.rhs_calls += 1
     recorder.work.factorizations += 1
-    a, multipliers = consistent_acceleration(system, leg.first, q, v)
+    switching = recorder.switching
+    if switching is None:
+        a, multipliers = consistent_acceleration(system, leg.first, q, v)
+    else:
+        switching.stand(leg, *(stored or system.stored(leg.first, q, v, np.zeros(system.size))[:2]))
+        assert isinstance(system, SwitchedSystem)
+        a, multipliers = system.driven(leg.first, q, v)
     if not np.isfinite(a).all():
         raise not_finite(leg.start, a)
     state = ConstrainedState(q, v, a, multipliers)

@@ -20,8 +20,8 @@ accepted when e in metres is below ``options.tolerance``, which is an aim for th
 is fitted to runs of 1.5 to 2 s of an L with 18 and 30 modes and of robots with two and three links, at 1e-3 to 1e-7 m:
 there the largest error of the tip came out at 0.3 to 4 times the tolerance. Errors of phase add up, so it grows with
 the length of a run: after 6000 rad of a vibration whose amplitude is near the tolerance it was ten times the tolerance.
-Joints that stick and slide cost up to five times the tolerance; motors that switch between their limits, where small
-vibrations decide when, up to a hundred times (`erls.run.watches.motor_limits` warns of these).
+Joints that stick and slide cost up to five times the tolerance; motors that come to their limits on flexible links,
+where small vibrations decide when, up to thirty times, which `erls.integrate.choice` makes up for.
 """
 
 from __future__ import annotations

@@ -48,6 +48,7 @@ def nodal_generalized_alpha(
         follows_tolerance=adaptive and plan is None,
         output_step=options.output_step,
         keeper=options.keeper,
+        compiled=None if system.locked is None else True,  # only what is compiled knows conditions out of use
     )
 
     def complete(found: ConstrainedSolution) -> Solution:
@@ -61,8 +62,8 @@ def nodal_generalized_alpha(
     def watch(t: float, knots: Callable[[], ConstrainedSolution]) -> Sequence[float] | None:
         return None if observer is None else observer(t, lambda: complete(knots()))
 
-    start = system.configuration(y, v)
-    return closed(system, complete(lie_generalized_alpha(system.system, times, *start, settings, watch, plan)))  # type: ignore[arg-type]
+    start, moving = system.configuration(y, v), system.system if system.locked is None else system.locked
+    return closed(system, complete(lie_generalized_alpha(moving, times, *start, settings, watch, plan)))  # type: ignore[arg-type]
 
 
 def closed(system: Nodal, found: Solution) -> Solution:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -58,6 +59,11 @@ def finer(plan: Plan, factor: float) -> Plan:
 
 
 def planned(plan: Plan, leg: Leg) -> list[tuple[Leg, float]]:
-    """The parts of a leg in which a plan takes equal steps, with their size [s]."""
-    own = [s for s in plan if leg.start <= s.start < leg.end]
-    return [(leg._replace(start=s.start, end=s.end), (s.end - s.start) / s.steps) for s in own]
+    """The parts of a leg in which a plan takes equal steps, with their size [s].
+
+    Legs that a switch ends, or begins at one, are no legs of the plan: of a stretch over such an end each has its part.
+    """
+    own = [s for s in plan if s.start < leg.end and s.end > leg.start]
+    edges = [leg.start, *(s.start for s in own[1:]), leg.end]
+    sizes = [(s.end - s.start) / s.steps for s in own]
+    return [(leg._replace(start=a, end=b), h) for (a, b), h in zip(pairwise(edges), sizes, strict=True)]

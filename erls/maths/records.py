@@ -132,6 +132,17 @@ def python_reader(record: type[R]) -> Callable[[Any, IntArray, int], R]:
     return read
 
 
+def place_of(record: type[Any], field: str, integers: IntArray, at: int) -> int:
+    """Where in the numbers a field lies, or its first entry, of the record whose table stands at ``at``."""
+    fields: tuple[tuple[str, int | None, bool], ...] = _fields(record)  # type: ignore[arg-type]  # classes can be hashed
+    place = at
+    for name, axes, _ in fields:
+        if name == field:
+            return int(integers[place])
+        place += 1 if axes is None else 1 + axes
+    raise ValueError(f"{record.__name__} has no field {field}")
+
+
 def overwrite(record: NamedTuple, numbers: Array, integers: IntArray, at: int) -> None:
     """Put a record of single numbers in the place of the one at ``at``."""
     for place, (value, (_, axes, _)) in enumerate(zip(record, _fields(type(record)), strict=True), at):

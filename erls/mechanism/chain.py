@@ -132,6 +132,18 @@ class Mechanism:
         return any(joint.forces.sticks for joint in self.joints)
 
     @property
+    def limited(self) -> bool:
+        """Whether any motor has a limit, in the tree or where it closes."""
+        drives = [joint.drive for joint in self.joints]
+        drives += [loop.freedom.drive for loop in self.loops if loop.freedom is not None]
+        return any(drive.torque_limit < np.inf for drive in drives)
+
+    @property
+    def switches(self) -> bool:
+        """Whether what acts in joints has modes (`erls.equations.switches`)."""
+        return self.sticks or self.limited
+
+    @property
     def reach(self) -> float:
         """Size of the largest link [m]."""
         return max(1e-3, *(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in self.links))

@@ -15,6 +15,7 @@ from erls.mechanism.joint_types import Freedom
 from fe_import.model import InterfaceNode
 
 FRICTION_LAWS = ("smooth", "stick")
+_SUDDEN = 1e-12  # rate that counts as rest, of friction on a motion that is prescribed
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,14 @@ class JointForces:
     def sticks(self) -> bool:
         """Whether friction holds the joint where it rests."""
         return self.law == "stick" and self.static > 0.0
+
+    def smooth_friction(self, prescribed: bool) -> tuple[float, float]:
+        """Force and transition rate of friction that follows from the rate: sudden along a prescribed motion; none
+        where the joint may rest, which its equations see to.
+        """
+        if self.law == "smooth":
+            return self.friction, self.transition_rate
+        return self.friction if prescribed else 0.0, _SUDDEN
 
     def force(self, angle: float, rate: float) -> float:
         """Force on the joint coordinate."""

@@ -11,6 +11,7 @@ from erls.scene.chain import Event, Load, SceneRecord
 from erls.scene.check_sensors import check_sensors
 from erls.scene.check_servo import check_servo
 from erls.scene.check_settings import check_settings
+from erls.scene.check_sticking import check_sticking
 from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
 from erls.scene.contacts import WORLD, Contact
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
@@ -87,7 +88,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     if scene.simulation.bandwidth is not None:
         _check_bandwidth(scene, f"{file}: simulation.bandwidth")
     _check_compound(scene, f"{file}: simulation")
-    _check_sticking(scene, file)
+    check_sticking(scene, file)
     if scene.loops:
         if scene.simulation.coordinates != "independent":
             message, right = "loops tie independent coordinates", "remove it, or the loops"
@@ -316,28 +317,6 @@ def _check_compound(scene: SceneRecord, place: str) -> None:
         if joint is not None and found:
             message = f"does not go with the {joint.type} joint {joint.name!r}"
             raise bad(f"{place}.{field}", message, getattr(s, field), remedy)
-
-
-def _check_sticking(scene: SceneRecord, file: str) -> None:
-    """What friction that sticks does not go with: more than the equations of a tree in independent coordinates."""
-    given: list[tuple[str, Acting]] = []
-    for kind, joints in (("joints", scene.joints), ("loops", scene.loops)):
-        for k, joint in enumerate(joints):
-            given.append((f"{kind}[{k}]", joint))
-            given += [(f"{kind}[{k}].coordinates.{name}", c) for name, c in getattr(joint, "coordinates", {}).items()]
-    places = [place for place, acting in given if acting.friction is not None and acting.friction.law == "stick"]
-    s = scene.simulation
-    for found, what in (
-        (bool(scene.loops), "[[loops]]"),
-        (s.formulation == "nodal", "simulation.formulation = 'nodal'"),
-        (s.coordinates == "absolute", "simulation.coordinates = 'absolute'"),
-        (s.gauge == "minimum-norm", "simulation.gauge = 'minimum-norm'"),
-        (s.bandwidth is not None, "simulation.bandwidth"),
-        (any(link.substructures > 1 and link.flexible for link in scene.links), "substructures"),
-    ):
-        if found and places:
-            message, remedy = f"exact sticking does not go with {what}", "use law = 'smooth'"
-            raise bad(f"{file}: {places[0]}.friction.law", message, "stick", remedy)
 
 
 def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:

@@ -21,7 +21,7 @@ from scipy.linalg import lapack
 from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Leg, legs
+from erls.integrate.base import Leg, walked
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.forces import force_derivative
@@ -154,10 +154,7 @@ class Equations:
     @cached_property
     def walks(self) -> list[Walk]:
         """Legs that were walked over."""
-        t = self.solution.t
-        ends = [0, *(np.flatnonzero(np.diff(t) == 0) + 1).tolist(), len(t)]
-        whole = legs(self.system, (float(t[0]), float(t[-1])))
-        return [Walk(first, end, leg) for first, end, leg in zip(ends[:-1], ends[1:], whole, strict=False)]
+        return [Walk(*part) for part in walked(self.system, self.solution.t)]
 
     def stretches(self, walk: Walk, between: tuple[int, int] | None = None) -> list[tuple[int, int]]:
         """First knot of each stretch of whole steps of a leg, or of a part of it, and the one after its last."""

@@ -34,7 +34,7 @@ def differentiated(run: ChainRun, differences: Sequence[Difference], scheme: Sch
         return result
     modes = Modes(run)
     own = modes.differences(differences)
-    modes.set(np.ones(0 if modes.sticking is None else len(modes.sticking.dry.places)))
+    modes.set(np.ones(0 if modes.sticking is None else len(modes.sticking.rubbing.places)))
     equations = Equations(run, own, scheme, modes.system)
     passage = Passage(equations, formulation.compiled, modes.held, float(formulation.mechanism.reach))
     pressed = _pressed(run, _APART * float((equations.evaluation.steps * metre_scales(formulation)).max(initial=0.0)))

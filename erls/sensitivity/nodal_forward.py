@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from erls.equations.nodal.nodes import numbers_of, poses_of, twists_of
-from erls.errors import Cause, SceneError, SimulationError
+from erls.errors import Cause, SimulationError
 from erls.integrate.alpha_rules import SINGULAR, Formulas, Rules
-from erls.integrate.base import Leg, legs
+from erls.integrate.base import Leg, walked
 from erls.integrate.nodal_chain import slopes_in_time
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
@@ -79,14 +79,8 @@ class _Motion:
 def _walks(run: ChainRun) -> Iterator[_Walk]:
     """Legs that were walked over."""
     base: Any = run.formulation
-    t = run.solution.t
-    ends = [0, *(np.flatnonzero(np.diff(t) == 0) + 1).tolist(), len(t)]
-    whole = legs(base.system, (float(t[0]), float(t[-1])))
-    if len(whole) != len(ends) - 1 and len(t) > 1:
-        message = "derivatives of a run in parts are not known yet"
-        raise SceneError(Cause.BAD_FIELD, message, where=str(run.scene.path), remedy="run it in one piece")
-    for first, end, leg in zip(ends[:-1], ends[1:], whole, strict=False):
-        yield _Walk(first, end, leg)
+    for part in walked(base.system, run.solution.t):
+        yield _Walk(*part)
 
 
 def differentiated(run: ChainRun, differences: Sequence[Difference]) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from erls.equations.registry import system_of
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
+from erls.integrate.base import legs, walked
 from erls.maths.jit import announcing
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -260,6 +261,13 @@ def refuse_run(run: ChainRun) -> None:
     refuse(run.scene, run.formulation.mechanism)
     if run.failure is not None:
         raise _refusal("a run that did not come to its end", str(run.scene.path), "shorten it, or mend why it failed")
+    if run.formulation.mechanism.limited:
+        system: Any = getattr(run.formulation, "system", run.formulation)  # of nodes
+        t = run.solution.t
+        begun = {leg.start for leg in legs(system, (float(t[0]), float(t[-1])))}
+        if any(leg.start not in begun for _, _, leg in walked(system, t)):
+            remedy = "end the run before, or give the motors a larger torque_limit"
+            raise _refusal("a run whose motors come to their limits", f"{run.scene.path}: torque_limit", remedy)
 
 
 def refuse(scene: Scene, mechanism: Mechanism) -> None:
@@ -280,6 +288,11 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
         raise _refusal(_UNKNOWN[kind], where, "use erls or ffr with independent coordinates and links in one piece")
     if settings.gauge == "minimum-norm" and kind != "nodal":
         raise _refusal("the minimum-norm gauge", f"{where}.gauge", "use the joint-angle gauge")
+    closing = [loop.freedom.forces.sticks for loop in mechanism.loops if loop.freedom is not None]
+    if (mechanism.sticks or any(closing)) and (kind != "tree" or mechanism.limited):
+        remedy = "use friction.law = 'smooth'"
+        what = "loops or nodal runs whose joints stick" if kind != "tree" else "joints that stick beside limited motors"
+        raise _refusal(what, f"{scene.path}: friction.law", remedy)
     if mechanism.rotation_vectors and kind != "nodal":
         raise _refusal("coordinates that are rotation vectors", f"{scene.path}: joints", "use universal joints")
     if kind == "nodal" and mechanism.touches:

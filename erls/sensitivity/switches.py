@@ -12,14 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from erls.equations.sticking import Sticking
+from erls.equations.switches.tree import SwitchedTree
 from erls.errors import Cause, SceneError
-from erls.integrate.base import Leg, legs
+from erls.integrate.base import Leg, walked
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.outputs import ALONG
@@ -41,7 +40,7 @@ class Piece(NamedTuple):
     leg : Leg
         From where it begins.
     modes : (m,) array
-        As of `Sticking`; empty where nothing sticks.
+        As of `SwitchedTree`; empty where nothing sticks.
     switched : bool
         Whether it ends where modes switch, rather than with the leg.
     """
@@ -56,7 +55,7 @@ class Piece(NamedTuple):
 class StuckDifference(Difference):
     """The same derivative of equations with modes."""
 
-    def __init__(self, own: Difference, wrap: Callable[[Any], Sticking]) -> None:
+    def __init__(self, own: Difference, wrap: Callable[[Any], SwitchedTree]) -> None:
         self.parameter, self._own, self._wrap = own.parameter, own, wrap
         self.few = self._wrapped(own.few)
 
@@ -69,24 +68,28 @@ class StuckDifference(Difference):
         return tuple(replace(variant, formulation=self._wrap(variant.formulation)) for variant in variants)
 
 
+def _put(system: SwitchedTree, modes: Array) -> None:
+    system.set(modes, system.rubbing.places[modes == 0.0], system.still)  # whatever the place
+
+
 class Modes:
     """Equations with modes, of a run and of variants beside it, which all have the same ones."""
 
     def __init__(self, run: ChainRun) -> None:
         formulation: Any = run.formulation
-        self._made: dict[int, tuple[Any, Sticking]] = {}
+        self._made: dict[int, tuple[Any, SwitchedTree]] = {}
         self._now = np.zeros(0)
         sticks = formulation.mechanism.sticks and formulation.dry is not None
         self.system: Any = self.of(formulation) if sticks else formulation
-        self.sticking: Sticking | None = self.system if sticks else None
+        self.sticking: SwitchedTree | None = self.system if sticks else None
 
-    def of(self, formulation: Any) -> Sticking:
+    def of(self, formulation: Any) -> SwitchedTree:
         """Equations with modes over those of a formulation."""
         key = id(formulation)
         if key not in self._made:
-            made = Sticking(formulation)
+            made = SwitchedTree(formulation)
             if len(self._now):
-                made.modes[:] = self._now
+                _put(made, self._now)
             self._made[key] = formulation, made
         return self._made[key][1]
 
@@ -98,13 +101,13 @@ class Modes:
         """In all equations, those to come included."""
         self._now = modes
         for _, one in self._made.values():
-            one.modes[:] = modes
+            _put(one, modes)
 
     def held(self) -> IntArray:
         """(h,) coordinates of joints that stick now."""
         if self.sticking is None:
             return np.zeros(0, dtype=np.int64)
-        return np.asarray(self.sticking.dry.places[self.sticking.modes == 0.0])
+        return np.asarray(self.sticking.rubbing.places[self.sticking.modes == 0.0])
 
     def pieces(self, run: ChainRun) -> list[Piece]:
         """Of a run, in their order.
@@ -115,23 +118,16 @@ class Modes:
             BAD_FIELD: the run was made in parts.
         """
         t, v = run.solution.t, run.solution.v
-        ends = [0, *(np.flatnonzero(np.diff(t) == 0) + 1).tolist(), len(t)]
-        whole = legs(self.system, (float(t[0]), float(t[-1])))
         found = []
-        for first, end in pairwise(ends):
-            leg = next((leg for leg in whole if leg.start <= t[first] < leg.end), whole[-1] if whole else None)
-            if leg is None:
-                continue
-            begun = float(t[first])
-            own = leg if begun == leg.start else Leg(begun, leg.end, begun, leg.last)
+        for first, end, leg in walked(self.system, t):
             modes, switched = np.zeros(0), end < len(t) and bool(t[end - 1] < leg.end)
             if self.sticking is not None:
-                rates = v[first:end, self.sticking.dry.places]
+                rates = v[first:end, self.sticking.rubbing.places]
                 modes = np.sign(rates[np.abs(rates).argmax(axis=0), np.arange(rates.shape[1])])
             elif switched:
                 message = "derivatives of a run in parts are not known yet"
                 raise SceneError(Cause.BAD_FIELD, message, where=str(run.scene.path), remedy="run it in one piece")
-            found.append(Piece(first, end, own, modes, switched))
+            found.append(Piece(first, end, leg, modes, switched))
         return found
 
     def through(
@@ -158,7 +154,7 @@ class Modes:
         length = max(t - piece.leg.start, 1e-300)
         tau = 1e-4 * length
 
-        def left(system: Sticking, time: float, y: Array, v: Array) -> float:
+        def left(system: SwitchedTree, time: float, y: Array, v: Array) -> float:
             a = system.acceleration(time, y, v)
             return float(system.left(np.array([time]), y[None], v[None], a[None])[0, joint])
 
@@ -169,7 +165,7 @@ class Modes:
         rows = slice(piece.first, piece.end)
         highest = float(np.abs(self.sticking.left(s.t[rows], s.y[rows], s.v[rows], s.a[rows])[:, joint]).max())
         if not abs(falling) * length > _GRAZES * highest:
-            name, does = self.sticking.dry.names[joint], "comes to rest" if piece.modes[joint] else "breaks away"
+            name, does = self.sticking.rubbing.names[joint], "comes to rest" if piece.modes[joint] else "breaks away"
             raise SceneError(
                 Cause.BAD_FIELD,
                 f"joint {name!r} only just {does} at t = {t:.9g} s: when it does so has no derivative",
@@ -186,13 +182,13 @@ class Modes:
                 moved = [left(self.sticking, t, y + x * place, v + x * rate) for x in (share, -share)]
                 change = change + (moved[0] - moved[1]) / (2 * share)
             result[1, :, k] -= (before - later) * (float(change) / falling)
-        result[1, self.sticking.dry.places[after.modes == 0.0]] = 0.0
+        result[1, self.sticking.rubbing.places[after.modes == 0.0]] = 0.0
         return result
 
     def _joint(self, t: float, y: Array, v: Array, a: Array, piece: Piece, after: Piece) -> int:
         """Number of the joint that switches."""
         assert self.sticking is not None
-        dry = self.sticking.dry
+        dry = self.sticking.rubbing
         left = self.sticking.left(np.array([t]), y[None], v[None], a[None])[0]
         ended = np.where(piece.modes == 0.0, left <= _HELD * dry.static, v[dry.places] == 0.0)
         found = np.flatnonzero(ended & (piece.modes != after.modes))

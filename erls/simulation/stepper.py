@@ -26,6 +26,7 @@ from erls.integrate.memory import Memory
 from erls.integrate.single_steps import SingleSteps
 from erls.maths.jit import announcing
 from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
 from erls.mechanism.place import LARGEST, LATEST
 from erls.run.chain.instants import Instants
 from erls.run.chain.sensors import sensors_of, with_compliances
@@ -113,6 +114,7 @@ class Stepper:
         _refuse_auto(loaded)
         built = build_mechanism(loaded, tell)
         _refuse_system(loaded, system_of(built.mechanism, settings))
+        _refuse_sticking(loaded, built.mechanism)
         loaded = with_compliances(loaded, built.mechanism) if loaded.record.sensors else loaded
         self.scene = self_contained(loaded)
         mechanism, inputs = with_inputs(built.mechanism)
@@ -277,6 +279,13 @@ def _refuse_system(scene: Scene, kind: str) -> None:
     where, value = f"{scene.path}: simulation.{field}", getattr(scene.record.simulation, field)
     message = "a stepper moves chains in independent coordinates, with all modes"
     raise SceneError(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)
+
+
+def _refuse_sticking(scene: Scene, mechanism: Mechanism) -> None:
+    if mechanism.sticks:
+        where, remedy = f"{scene.path}: friction.law", "use law = 'smooth'"
+        message = "a stepper makes the steps that it is asked for, and none to where a joint sticks"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value="stick", remedy=remedy)
 
 
 def stepper(scene: AnyScene | Path | str, *, tell: Message = lambda text: None) -> Stepper:

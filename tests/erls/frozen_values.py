@@ -204,11 +204,13 @@ _DISTURBANCES = 12  # where rows of a loop depend on others, few of them show ho
 
 
 def disturbed(system: Any, at: State) -> Values:
-    """Ten times what disturbances of a state by 1e-14 do to `outputs`: what closing a loop makes of rounding."""
+    """Ten times what disturbances of a state by 1e-14 of its largest entry do to `outputs`: what closing a loop makes of
+    rounding, which sums of terms leave to entries that are zero, too.
+    """
     rng, reference = np.random.default_rng(1), outputs(system, at)
     result = dict.fromkeys(reference, 0.0)
     for _ in range(_DISTURBANCES):
-        y, v = (x * (1 + 1e-14 * rng.uniform(-1, 1, len(x))) for x in (at.y, at.v))
+        y, v = (x + 1e-14 * np.abs(x).max(initial=0.0) * rng.uniform(-1, 1, len(x)) for x in (at.y, at.v))
         for name, values in outputs(system, replace(at, y=y, v=v)).items():
             result[name] = max(result[name], 10 * float(np.abs(values - reference[name]).max(initial=0.0)))
     return {name: np.array(size) for name, size in result.items()}

@@ -18,7 +18,9 @@ from erls.maths.so3 import Array, skew
 from erls.run.chain.run import ChainRun
 
 DATA = scenes.ROOT / "data"
-SHIPPED = [str(p.relative_to(DATA)) for p in scenes.shipped()]
+SHIPPED = [
+    str(p.relative_to(DATA)) for p in scenes.shipped() if "residual_bending" not in p.read_text(encoding="utf-8")
+]  # those of nodal elements alone are no scenes of floating frames
 HELD = '{ type = "motion", motion = { shape = "polynomial", from = 0.3, to = 0.3, duration = 1.0 } }'
 EULER = {"theory": "euler-bernoulli", "torsion": "polar"}
 

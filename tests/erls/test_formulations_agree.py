@@ -22,7 +22,8 @@ def robot(folder: Path, formulation: str, stiffer: float) -> erls.Run:
     (folder / "links").mkdir(exist_ok=True)
     arm = (ROBOT / "links" / "arm.toml").read_text(encoding="utf-8")
     arm = re.sub(r"youngs_modulus = \S+", f"youngs_modulus = {7e10 * stiffer!r}", arm)
-    (folder / "links" / "arm.toml").write_text(arm.replace("elements = 20", "elements = 4"), encoding="utf-8")
+    arm = arm.replace("elements = 20", "elements = 4") + "\n[units]\nunusual = true\n"
+    (folder / "links" / "arm.toml").write_text(arm, encoding="utf-8")
     (folder / "robot.toml").write_text((ROBOT / "two_link.toml").read_text(encoding="utf-8"), encoding="utf-8")
     changes = [f"simulation.formulation={formulation}", "simulation.duration=0.6", "initial.deformation=static"]
     changes += [f"links.{name}.elastic_modes=6" for name in ("upper_arm", "forearm")]

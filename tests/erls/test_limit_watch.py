@@ -23,12 +23,11 @@ def _told(folder: Path, drive: dict[str, Any], *changes: str) -> list[str]:
 
 
 @pytest.mark.parametrize("lead", [False, True])
-@pytest.mark.parametrize("formulation", ["erls", "ffr"])
-def test_a_motor_that_switches_between_its_limits_is_told_of(formulation: str, lead: bool, tmp_path: Path) -> None:
-    """With its joint, its limit and what to do."""
+def test_a_motor_that_switches_between_its_limits_is_told_of(lead: bool, tmp_path: Path) -> None:
+    """With its joint, its limit and what to do, where nobody locates when."""
     drive = {"proportional_gain": 200.0, "derivative_gain": 4.0, "torque_limit": 3.0, "feed_forward": lead}
     lobatto = ("simulation.integrator=lobatto", "simulation.tolerance=1e-2")
-    (text,) = _told(tmp_path, drive, f"simulation.formulation={formulation}", *lobatto)
+    (text,) = _told(tmp_path, drive, "simulation.gauge=minimum-norm", *lobatto)
     assert "its limit of 3" in text
     assert "tolerance of 0.001 m" in text
 
@@ -36,14 +35,15 @@ def test_a_motor_that_switches_between_its_limits_is_told_of(formulation: str, l
 @pytest.mark.parametrize(
     ("drive", "changes"),
     [
-        ({"proportional_gain": 200.0, "derivative_gain": 4.0}, ("simulation.integrator=lobatto",)),
-        ({"proportional_gain": 1.0, "derivative_gain": 0.1, "torque_limit": 1e4}, ("simulation.integrator=lobatto",)),
-        (
-            {"proportional_gain": 200.0, "derivative_gain": 4.0, "torque_limit": 3.0},
-            ("simulation.integrator=generalized_alpha", "simulation.step=1e-3"),  # its error is that of its step
-        ),
+        ({}, ("simulation.integrator=lobatto",)),
+        ({"torque_limit": 1e4}, ("simulation.integrator=lobatto", "simulation.gauge=minimum-norm")),
+        ({"torque_limit": 3.0}, ("simulation.integrator=lobatto",)),  # located
+        ({"torque_limit": 3.0}, ("simulation.integrator=generalized_alpha", "simulation.step=1e-3")),
     ],
 )
 def test_others_are_not(drive: dict[str, Any], changes: tuple[str, ...], tmp_path: Path) -> None:
-    """No limit, a distant one, and fixed steps."""
-    assert _told(tmp_path, drive, *changes) == []
+    """No limit, a distant one, one that is located, and fixed steps, whose error is that of the step."""
+    gains = {"proportional_gain": 200.0, "derivative_gain": 4.0}
+    if drive.get("torque_limit") == 1e4:
+        gains = {"proportional_gain": 1.0, "derivative_gain": 0.1}
+    assert _told(tmp_path, {**gains, **drive}, *changes) == []

@@ -109,6 +109,7 @@ def _soft(folder: Path, data: dict[str, Any], softness: float, names: tuple[str,
         length = record["rigid"]["points"]["tip"][0]
         material = {"youngs_modulus": 7e10 / softness, "poissons_ratio": 0.33, "density": 2700.0}
         link = {
+            "units": {"unusual": True},
             "materials": {"m": material},
             "sections": {"s": {"shape": "rectangular", "width": 0.008, "height": 0.02}},
             "frame": {

@@ -18,6 +18,9 @@ from body_scenes_data import PENDULUM, body_scene
 from checkpoint_times import at_every_look
 from loop_scenes import parallelogram
 from resumed_runs import chunks_of, equal, l_scene, refused
+from test_limited_motors import DRIVE
+from test_sticking_loops import LEVEL
+from test_sticking_loops import parallelogram as four_bar
 
 import erls
 from erls.cli.main import main
@@ -57,6 +60,12 @@ STICKS: dict[str, Any] = {  # five times, and for good
     "joints": [{**PIN, "stiffness": 20.0, "friction": {"force": 0.5, "static_force": 0.7, "law": "stick"}}],
     "links": TOP["links"],
 }
+RUBS = {"friction": {"force": 0.12, "law": "stick"}}
+LINKAGE: dict[str, Any] = {  # three joints that come to rest together, and for good
+    **four_bar({"stiffness": 40.0, "rest": LEVEL, **RUBS}, RUBS, {}, LEVEL + 0.07),
+    "simulation": {"duration": 1.0},
+}
+LIMITED: dict[str, Any] = {**STICKS, "joints": [{**PIN, "drive": DRIVE}]}
 CASES: dict[str, tuple[Path | dict[str, Any], list[str]]] = {
     "lobatto": (L, ["duration=0.3"]),
     "stored output": (L, ["duration=0.3", "output_step=0.004"]),
@@ -70,6 +79,11 @@ CASES: dict[str, tuple[Path | dict[str, Any], list[str]]] = {
     "rk45": (TOP, ["integrator=rk45", "rtol=1e-9", "atol=1e-10"]),
     "sticking": (STICKS, []),
     "sticking, equal steps": (STICKS, ["integrator=generalized_alpha", "step=5e-3"]),
+    "sticking, nodal": (STICKS, ["formulation=nodal", "integrator=generalized_alpha", "step=5e-3"]),
+    "sticking, loop": (LINKAGE, ["integrator=lobatto"]),
+    "sticking, loop, equal steps": (LINKAGE, ["integrator=generalized_alpha", "step=5e-3"]),
+    "limits": (LIMITED, ["integrator=lobatto"]),
+    "limits, nodal": (LIMITED, ["formulation=nodal", "integrator=generalized_alpha", "step=5e-3"]),
     "sticking, dop853": (STICKS, ["integrator=dop853", "output_step=0.01"]),
     "dop853": (TOP, ["integrator=dop853", "rtol=1e-9", "atol=1e-10"]),
     "nodal": (L, ["duration=0.02", "step=1e-3", "formulation=nodal"]),

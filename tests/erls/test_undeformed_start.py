@@ -29,6 +29,7 @@ def _apart(folder: Path, stiffer: float, effects: str = "linear") -> float:
         text = (source / name).read_text(encoding="utf-8")
         assert ("youngs_modulus = 7e10" in text) == ("links" in name)
         text = text.replace("youngs_modulus = 7e10", f"youngs_modulus = {7e10 * stiffer}")
+        text += "\n[units]\nunusual = true\n" if "links" in name else ""
         (folder / name).write_text(text, encoding="utf-8")
     times = np.linspace(0, 0.4, 101)
     changes = ["simulation.duration=0.4", "simulation.step=1e-3", f"simulation.effects={effects}"]

@@ -12,6 +12,7 @@ from erls.equations.loops.records import (
     PUSH,
     RATE,
     TURNING,
+    Loops,
     call_closure,
     call_mass_matrix,
     call_masses,
@@ -24,21 +25,15 @@ from erls.equations.loops.records import (
 )
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import read_joint
+from erls.equations.switches.still import still_forces, still_matrix
 from erls.maths.dense import dot
 from erls.maths.jit import kernel, part
 
 
-@kernel(contract.RESIDUAL, counted=False)
-def forces(
-    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
-) -> None:
-    """`closure`, and M a - f of the tree with what acts along closing joints; an empty ``a`` stands for zeros."""
-    loops = read_loops(reals, integers, integers[len(integers) - 1])
-    call_closure(loops.closure, reals, integers, scratch, t, y, v)
-    call_residual(loops.residual, reals, integers, scratch, t, y, v, a, out)
-    if not loops.active:
-        return
-    n = len(v)
+@part
+def _push_closing(loops: Loops, reals: Array, integers: IntArray, scratch: Array, a: Array, out: Array) -> None:
+    """Add what acts along closing joints."""
+    n = len(out)
     for number in range(loops.loops):
         joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
         if joint.joint >= 0:
@@ -51,6 +46,19 @@ def forces(
                 out[i] += row[i] * push
 
 
+@kernel(contract.RESIDUAL, counted=False)
+def forces(
+    reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
+) -> None:
+    """`closure`, and M a - f of the tree with what acts along closing joints; an empty ``a`` stands for zeros."""
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    call_closure(loops.closure, reals, integers, scratch, t, y, v)
+    call_residual(loops.residual, reals, integers, scratch, t, y, v, a, out)
+    if loops.active:
+        _push_closing(loops, reals, integers, scratch, a, out)
+    still_forces(read_loop_room(scratch, integers, loops.room).held, a, out)
+
+
 @part
 def add_outer(row: Array, factor: float, out: Array) -> None:
     """Add the factor times the row's product with itself."""
@@ -60,18 +68,39 @@ def add_outer(row: Array, factor: float, out: Array) -> None:
             line[j] += weight * row[j]
 
 
-@kernel(contract.MASS_MATRIX, counted=False)
-def masses(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
-    """Mass matrix with the rotors in closing joints; `closure` at this place comes first."""
-    loops = read_loops(reals, integers, integers[len(integers) - 1])
-    call_mass_matrix(loops.mass_matrix, reals, integers, scratch, t, y, out)
-    if not loops.rotors:
-        return
+@part
+def _add_rotors(loops: Loops, reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
     for number in range(loops.loops):
         joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
         if joint.joint >= 0:
             moves = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE).moves
             add_outer(moves[joint.along, : len(out)], read_joint(reals, integers, joint.joint).rotor, out)
+
+
+@kernel(contract.MASS_MATRIX, counted=False)
+def masses(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
+    """Mass matrix with the rotors in closing joints; `closure` at this place comes first."""
+    loops = read_loops(reals, integers, integers[len(integers) - 1])
+    call_mass_matrix(loops.mass_matrix, reals, integers, scratch, t, y, out)
+    if loops.rotors:
+        _add_rotors(loops, reals, integers, scratch, out)
+    still_matrix(read_loop_room(scratch, integers, loops.room).held, 1.0, out)
+
+
+@part
+def _add_gains(
+    loops: Loops, reals: Array, integers: IntArray, scratch: Array, t: float, n: int, k: Array, c: Array
+) -> None:
+    for number in range(loops.loops):
+        joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
+        if joint.joint >= 0:
+            state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
+            row, found = state.moves[joint.along, :n], state.effort
+            acting = read_joint(reals, integers, joint.joint)
+            feed = fed(scratch, integers, joint, found[RATE])
+            stiffness, damping = gains(acting, reals, integers, t, found[COORDINATE], found[RATE], feed)
+            add_outer(row, stiffness, k)
+            add_outer(row, damping, c)
 
 
 @kernel(contract.STIFFNESS_AND_DAMPING, counted=False)
@@ -80,17 +109,10 @@ def matrices(
 ) -> None:
     """M into the room, stiffness and damping of the tree, with what acts along closing joints."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
-    call_masses(loops.masses, reals, integers, scratch, t, y, read_loop_room(scratch, integers, loops.room).mass)
+    room = read_loop_room(scratch, integers, loops.room)
+    call_masses(loops.masses, reals, integers, scratch, t, y, room.mass)
     call_stiffness_and_damping(loops.stiffness_and_damping, reals, integers, scratch, t, y, v, k, c)
-    if not loops.active:
-        return
-    for number in range(loops.loops):
-        joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
-        if joint.joint >= 0:
-            state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
-            row, found = state.moves[joint.along, : len(v)], state.effort
-            acting = read_joint(reals, integers, joint.joint)
-            feed = fed(scratch, integers, joint, found[RATE])
-            stiffness, damping = gains(acting, reals, integers, t, found[COORDINATE], found[RATE], feed)
-            add_outer(row, stiffness, k)
-            add_outer(row, damping, c)
+    if loops.active:
+        _add_gains(loops, reals, integers, scratch, t, len(v), k, c)
+    still_matrix(room.held, 0.0, k)
+    still_matrix(room.held, 0.0, c)

@@ -19,6 +19,7 @@ import scipy.linalg as la
 from erls.equations.formulation import ContactSeries, Energy, LoopForce, Reaction, State
 from erls.equations.linearization import Linearization
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
+from erls.equations.loops.friction import forced, freely
 from erls.equations.loops.neighbours import LoopNeighbours
 from erls.equations.loops.rows import Closure, applied
 from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity, stays_open
@@ -38,6 +39,7 @@ from erls.equations.serial.state_series import (
     state_series,
 )
 from erls.equations.stability import Bearing, Stability, stability_of, tumbling
+from erls.equations.switches.law import DryFriction, Freely, settled
 from erls.errors import SimulationError
 from erls.maths.so3 import Array, cross_all
 from fe_import.model import IntArray
@@ -127,8 +129,28 @@ class ClosedChain(Tied):
         limit = OPEN * self.reach
         raise comes_apart(t, self.rows.names[worst], float(gaps[worst]), limit, worst not in self.kept)
 
-    def _accelerate(self, system: CompiledLoops, t: float, y: Array, v: Array) -> Array:
-        """(n,) accelerations; NaN where the loops lock.
+    @property
+    def dry(self) -> DryFriction | None:
+        """Friction that sticks, in joints of the tree; what is compiled leaves it out."""
+        return self.bare.dry
+
+    @property
+    def unheld(self) -> ClosedChain:
+        """The chain with all its joints free, whatever friction holds."""
+        return self
+
+    def freely(self, t: float, y: Array, v: Array) -> Freely:
+        """A closed state without friction that sticks; see `erls.equations.switches.law`.
+
+        Raises
+        ------
+        SimulationError
+            As `accelerations`.
+        """
+        return freely(self, t, y, v)
+
+    def accelerate(self, system: CompiledLoops, t: float, y: Array, v: Array) -> Array:
+        """(n,) accelerations of one of the compiled forms, without friction that sticks; NaN where the loops lock.
 
         Raises
         ------
@@ -150,14 +172,14 @@ class ClosedChain(Tied):
             SINGULAR_MASS, or LOOP_OPEN where the conditions lock.
         """
         found = self.closure(t, y, v)
-        a = self._accelerate(self.exact, t, y, v)
+        a, own, gradient = forced(self, t, y, v)
         if not np.isfinite(a).all():
             raise self.locked(t, self.stiffest(found))
-        room, every = self.exact.room, np.zeros(len(self.rows.names))
-        every[self.kept] = room.multipliers
+        every = np.zeros(len(self.rows.names))
+        every[self.kept] = own
         if len(self.kept) < len(every):
             along = self.row_metres[:, None] * found.rows[:, self.bare.free]
-            force = room.gradient.T @ room.multipliers
+            force = gradient.T @ own
             every = self.row_metres * np.linalg.lstsq(along.T, force, rcond=DEPENDENT)[0]
         return a, every, found
 
@@ -179,7 +201,7 @@ class ClosedChain(Tied):
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """(n,) accelerations, with decay of what loops are open by; NaN where they lock: integrators step around it."""
-        return self._accelerate(self.loops, t, y, v)
+        return self.accelerate(self.loops, t, y, v)
 
     def acceleration_series(self, t: Array, y: Array, v: Array) -> Array:
         """(k, n) of the nearest closed states at times (k,), without such decay: what runs report."""
@@ -247,9 +269,9 @@ class ClosedChain(Tied):
 
     def neighbours(self, t: float, y: Array, v: Array) -> LoopNeighbours:
         """States beside a closed one, with the forces of the loops as they are there."""
-        a = self._accelerate(self.exact, t, y, v)
-        multipliers = self.exact.room.multipliers.copy()
-        return LoopNeighbours(self, TreeNeighbours(self.bare, t, y, v, a), multipliers, self.kept)
+        a, multipliers, _ = forced(self, t, y, v)
+        stuck = () if self.dry is None else self.dry.places[settled(self, t, y, v).held].tolist()
+        return LoopNeighbours(self, TreeNeighbours(self.bare, t, y, v, a, tuple(stuck)), multipliers.copy(), self.kept)
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
         """Small motions about a closed state on the ways that the loops leave."""
@@ -259,7 +281,7 @@ class ClosedChain(Tied):
     def stability(self) -> Stability:
         """Of the static start."""
         y, v = self.initial_state()
-        a = self._accelerate(self.exact, 0.0, y, v)
+        a = forced(self, 0.0, y, v)[0]
         motions = None if tumbling(self.mechanism, v) else self.linearized(0.0, y, v)
         return stability_of(self._static[1], motions, a, self.metres, self.reach)
 
@@ -268,8 +290,14 @@ class ClosedChain(Tied):
         return self.closed(0.0, y, start_velocity(self, y, self.start.following))[1]
 
     def closed(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
-        """The nearest state, in metres, that closes the loops; the same one where there is none nearby."""
-        return self.loops.closed(t, y, v)
+        """The nearest state, in metres, that closes the loops; the same one where there is none nearby. Joints with dry
+        friction that are at rest stay so.
+        """
+        place, rate = self.loops.closed(t, y, v)
+        if self.dry is not None and (at_rest := self.dry.places[v[self.dry.places] == 0.0]).size:
+            rate = np.array(rate)
+            rate[at_rest] = 0.0
+        return place, rate
 
     def state(self, t: float, y: Array, v: Array) -> State:
         """Poses, modal coordinates and joint angles."""
@@ -376,6 +404,9 @@ class ClosedChain(Tied):
         for k, joint in enumerate(self.mechanism.joints):
             if joint.drive.prescribed:
                 result.effort[:, k] += loads[:, k]
+        if self.dry is not None:  # those that stick bear loads, too
+            joints = self.bare.free_joints[self.dry.places]
+            result.effort[:, joints] += np.where(v[:, self.dry.places] == 0.0, loads[:, joints], 0.0)
         return result
 
     def describe(self) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from erls.equations.loops.records import (
 from erls.equations.serial.joints import effort
 from erls.equations.serial.records import read_joint, read_joint_state
 from erls.equations.serial.time_curves import curve
+from erls.equations.switches.still import still_frames
 from erls.maths.coefficients import angle_of
 from erls.maths.jit import kernel, part
 from erls.maths.products import clear, copy
@@ -242,5 +243,6 @@ def closure(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     room = read_loop_room(scratch, integers, loops.room)
     call_frames(loops.frames, reals, integers, scratch, t, y, v, room.frames)
+    still_frames(room.held, room.frames)
     for number in range(loops.loops):
         _close(loops, room, reals, integers, scratch, number, t, y)

@@ -16,8 +16,9 @@ from erls.equations.loops.closure import closure
 from erls.equations.loops.rows import Closure, Effort, LoopRows
 from erls.equations.serial.pack import force_record, pose_numbers, put_all
 from erls.equations.serial.time_curves import put_curve
+from erls.equations.switches.motors import Acting
 from erls.maths.calls import address_of
-from erls.maths.records import Memory, python_reader
+from erls.maths.records import Memory, place_of, python_reader
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.mechanism.curves import Curve
@@ -25,6 +26,7 @@ from erls.mechanism.loops import Loop, loop_ends
 from fe_import.model import IntArray
 
 _see_room, _see_state = python_reader(own.LoopRoom), python_reader(own.LoopState)
+_see_closing = python_reader(own.ClosingJoint)
 
 
 class Carrier(Protocol):
@@ -165,6 +167,19 @@ class CompiledLoops(CompiledSystem):
     def room(self) -> own.LoopRoom:
         """What the last evaluation left."""
         return _see_room(self.scratch, self.integers, self._places.room)
+
+    @property
+    def acting(self) -> Acting:
+        """Along closing joints."""
+        joints: list[int] = []
+        efforts: list[int] = []
+        for k in range(len(self.given.rows.loops)):
+            joint = _see_closing(self.reals, self.integers, self._places.first + k * own.CLOSING_JOINT).joint
+            if joint >= 0:
+                joints.append(int(joint))
+                state = self._places.states + k * own.LOOP_STATE
+                efforts.append(place_of(own.LoopState, "effort", self.integers, state) + own.PUSH)
+        return Acting(np.array(joints, dtype=np.int64), np.array(efforts, dtype=np.int64))
 
     def closure(self, t: float, y: Array, v: Array) -> Closure:
         """Conditions of the loops, and what acts along them, at a state."""

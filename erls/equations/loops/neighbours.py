@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LoopNeighbours:
-    """Of a closed state of a chain, with the multipliers (m,) of the conditions ``kept``.
+    """Of a closed state of a chain, with the forces (r,) of the conditions ``kept``.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class LoopNeighbours:
 
     chain: Tied
     tree: TreeNeighbours
-    multipliers: Array
+    reactions: Array
     kept: IntArray
 
     @cached_property
@@ -87,9 +87,14 @@ class LoopNeighbours:
         fast, faster = map(max, own, self.tree.driven)
         return fast, faster
 
+    @property
+    def multipliers(self) -> Array:
+        """Those of the conditions, and none of joints that stick."""
+        return np.concatenate([self.reactions, self.tree.multipliers])
+
     def forces(self, x: Array, w: Array, b: Array) -> Array:
         """See `Neighbours`."""
-        return self.loops.held(*self.states(x, w, b), np.tile(self.multipliers, (len(x), 1)))
+        return self.loops.held(*self.states(x, w, b), np.tile(self.reactions, (len(x), 1)))
 
     def mass(self) -> Array:
         """See `Neighbours`."""
@@ -98,11 +103,12 @@ class LoopNeighbours:
     def rows(self) -> Array:
         """See `Neighbours`."""
         found = self.chain.closure(self.tree.time, self.tree.y, self.tree.v)
-        return np.asarray(found.rows[self.kept][:, self.chain.bare.free])
+        return np.concatenate([found.rows[self.kept][:, self.chain.bare.free], self.tree.rows()])
 
     def violation(self) -> Array:
         """See `Neighbours`."""
-        return np.asarray(self.chain.closure(self.tree.time, self.tree.y, self.tree.v).violation[self.kept])
+        found = self.chain.closure(self.tree.time, self.tree.y, self.tree.v).violation[self.kept]
+        return np.concatenate([found, self.tree.violation()])
 
     def states(self, x: Array, w: Array, b: Array) -> States:
         """See `Neighbours`."""
@@ -114,7 +120,7 @@ class LoopNeighbours:
 
     def at_rest(self, x: Array, multipliers: Array) -> LoopNeighbours:
         """See `Neighbours`."""
-        return replace(self, tree=self.tree.at_rest(x, multipliers), multipliers=multipliers)
+        return replace(self, tree=self.tree.at_rest(x, multipliers), reactions=multipliers[: len(self.kept)])
 
     def of(self, formulation: Formulation) -> LoopNeighbours:
         """See `Neighbours`."""

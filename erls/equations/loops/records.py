@@ -187,7 +187,9 @@ class LoopRoom(NamedTuple):
     reduced, multipliers : (n,), (r,) arrays
         z = U⁻ᵀ f, and λ.
     wrong : (r,) array
-        LoopRoom.
+        Room.
+    held : (n,) array
+        1 of coordinates that do not move (`erls.equations.switches`), 0 of others: set from outside.
     """
 
     frames: Matrix
@@ -205,6 +207,7 @@ class LoopRoom(NamedTuple):
     reduced: Vector
     multipliers: Vector
     wrong: Vector
+    held: Vector
 
 
 def loop_state(columns: int, conditions: int) -> LoopState:
@@ -240,6 +243,7 @@ def room(ends: int, columns: int, n: int, m: int, r: int) -> LoopRoom:
         reduced=np.zeros(n),
         multipliers=np.zeros(r),
         wrong=np.zeros(r),
+        held=np.zeros(n),
     )
 
 

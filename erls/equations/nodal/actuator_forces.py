@@ -49,7 +49,7 @@ from erls.maths.vectors import (
 )
 from erls.maths.views import vector_at
 
-_STOPS = 9  # first of six columns of `Model.actuators`; their stiffness is 0 where there are none
+_STOPS = 11  # first of six columns of `Model.actuators`; their stiffness is 0 where there are none
 _NONE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -112,12 +112,11 @@ def _effort(model: Model, k: int, sample: Array, angle: float, rate: float) -> f
     at = 3 * len(model.joint_nodes) + len(model.load_nodes) + 3 * k
     law = model.actuators
     torque: float = sample[at + 2] + law[k, 6] * (sample[at] - angle) + law[k, 7] * (sample[at + 1] - rate)
-    limit = law[k, 8]
-    if torque.real > limit.real:
-        torque = limit
-    elif torque.real < -limit.real:
-        torque = -limit
-    torque -= law[k, 1] * (angle - law[k, 2]) + law[k, 3] * rate
+    if torque.real > law[k, 9].real:
+        torque = law[k, 9]
+    elif torque.real < law[k, 8].real:
+        torque = law[k, 8]
+    torque -= law[k, 1] * (angle - law[k, 2]) + law[k, 3] * rate - law[k, 10]
     if law[k, 4] != 0.0:
         torque -= law[k, 4] * np.tanh(rate / law[k, 5])
     if law[k, _STOPS + 2] != 0.0:
@@ -172,7 +171,9 @@ def _derivatives(model: Model, work: Work, k: int, block: Array) -> None:
     _, _, reach, axes = posed(model, work.poses, k)
     first, second, rate, _ = _turning(model, work.twist, work.rate, k, reach, axes)
     law = model.actuators
-    stiffness, damping = law[k, 1] + law[k, 6], law[k, 3] + law[k, 7]
+    stiffness, damping = law[k, 1], law[k, 3]
+    if law[k, 8].real < law[k, 9].real:  # else it gives its limit
+        stiffness, damping = stiffness + law[k, 6], damping + law[k, 7]
     if law[k, 4] != 0.0:
         damping += law[k, 4] / law[k, 5] / np.cosh(min(abs(rate / law[k, 5]), 300.0)) ** 2
     if law[k, _STOPS + 2] != 0.0:

@@ -54,15 +54,16 @@ class Actuators:
 
     @property
     def laws(self) -> Array:
-        """(e, 15) as in `erls.equations.nodal.contract.Model`."""
+        """(e, 17) as in `erls.equations.nodal.contract.Model`."""
         found = []
         for joint, acts in zip(self.joints, self.acting, strict=True):
             own, drive = joint.forces, joint.drive
             gains = drive.gains if acts else (0.0, 0.0)
-            law = (own.stiffness, own.rest, own.damping, own.friction, own.transition_rate, *gains, drive.torque_limit)
+            law = (own.stiffness, own.rest, own.damping, *own.smooth_friction(False), *gains)
+            bounds = -drive.torque_limit, drive.torque_limit, 0.0
             stops = NO_STOPS if own.stops is None else own.stops.numbers
-            found.append([joint.rotor_inertia, *law, *stops])
-        return np.array(found, dtype=float).reshape(-1, 15)
+            found.append([joint.rotor_inertia, *law, *bounds, *stops])
+        return np.array(found, dtype=float).reshape(-1, 17)
 
     def wanted(self, times: Array) -> Array:
         """(k, e, 3) wanted coordinates, wanted rates, and torques besides, at times (k,)."""
@@ -76,6 +77,8 @@ class Actuators:
             result[:, k, 2] = lead(times)
             if drive.load is not None:
                 result[:, k, 2] += [drive.load.value(t) for t in times.tolist()]
+            if drive.prescribed and joint.forces.sticks:  # by the rate that is prescribed, which no iteration changes
+                result[:, k, 2] -= joint.forces.friction * np.sign(result[:, k, 1])
         return result
 
     @property

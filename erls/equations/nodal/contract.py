@@ -43,8 +43,9 @@ class Model(NamedTuple):
         (l, 2) where they act and in whose axes they are given, -1 for the world; (l, 3), (l, 6), (l,) whether the load
         keeps its direction there, rather than in the axes of its own node.
     actuator_nodes, actuator_frames, actuator_along, actuator_active, actuators : arrays
-        (a, 2), (a, 24), (a,) row of the twist, (a,), and (a, 15): rotor, stiffness, rest, damping, friction, transition
-        rate, proportional and derivative gain, limit, stops.
+        (a, 2), (a, 24), (a,) row of the twist, (a,), and (a, 17): rotor, stiffness, rest, damping, friction, transition
+        rate, proportional and derivative gain, what the motor gives at least and at most, friction of a joint that is
+        said to slide (as of `erls.equations.serial.records.Joint`), stops.
     contact_nodes, contacts : arrays
         (c, 2) what carries the plane, and the node, and (c, 21): the point in its node; in what carries the plane, a
         point of that and its three axes; the law, friction and its rate.
@@ -52,9 +53,10 @@ class Model(NamedTuple):
         (s, 2), and (s, 9): both points in their nodes, stiffness, damping, length without force.
     winding_nodes, winding_frames, windings : arrays
         Torsion springs: (w, 2), (w, 18) their axes in both nodes, and (w, 6): axis, stiffness, damping, rest.
-    joint_nodes, joint_frames, joint_drives, joint_rows, conditions, pitches : arrays
+    joint_nodes, joint_frames, joint_drives, joint_rows, conditions, pitches, released : arrays
         (j, 2), (j, 24), (j, 2) slide along z and turn about it per unit of the prescribed coordinate, (j + 1,) first
-        conditions, (m, 12) c, C, (m,) of threads, 0 of conditions that are linear.
+        conditions, (m, 12) c, C, (m,) of threads, 0 of conditions that are linear;
+        (m,) 1 of conditions that are out of use for a while.
     metres, place, order : arrays
         (n,) metres per unit; (N,) number of each unknown in the band, and the unknown of each number.
     """
@@ -92,6 +94,7 @@ class Model(NamedTuple):
     joint_rows: Indices
     conditions: Matrix
     pitches: Vector
+    released: Vector
     metres: Vector
     place: Indices
     order: Indices

@@ -22,6 +22,7 @@ from erls.equations.neighbours import small_motions
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain, build_chain
 from erls.equations.nodal.link_state import LinkView
+from erls.equations.nodal.locks import LockedSystem, dry_joints
 from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.nodal.parts import BeamRules, link_parts
@@ -34,6 +35,7 @@ from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
 from erls.equations.serial.state_series import StateSeries
 from erls.equations.stability import LARGEST, Stability, stability_of
+from erls.equations.switches.law import DryFriction
 from erls.maths import rotation_maps as rotations
 from erls.maths.saddle import Matrix
 from erls.maths.so3 import Array, cross
@@ -113,8 +115,19 @@ class Nodal:
 
     @property
     def size(self) -> int:
-        """18 numbers for each node, one for each joint and each of its conditions."""
-        return self._kept + self.system.size + self.system.constraints
+        """18 numbers for each node, one for each joint and each of its conditions, and one for dry friction."""
+        return self._kept + self.system.size + self.system.constraints + len(self.dry.places)
+
+    @cached_property
+    def dry(self) -> DryFriction:
+        """Friction of joints that may stick; places are those of their coordinates in y."""
+        return dry_joints(self.system)
+
+    @cached_property
+    def locked(self) -> LockedSystem | None:
+        """What is integrated, with modes of what acts in joints; None where nothing has any."""
+        switches = len(self.dry.places) or self.mechanism.limited
+        return LockedSystem(self.system) if switches else None
 
     def configuration(self, y: Array, v: Array) -> tuple[Nodes, Array]:
         """Configuration and twists of the nodes (n,)."""
@@ -122,7 +135,14 @@ class Nodal:
 
     def _found(self, y: Array) -> tuple[Array, Array]:
         """Rates of twists and multipliers."""
-        return y[self._kept : self._kept + self.system.size], y[self._kept + self.system.size :]
+        first = self._kept + self.system.size
+        return y[self._kept : first], y[first : first + self.system.constraints]
+
+    def _rubbing(self, y: Array) -> Array:
+        """(m,) friction of joints that may stick."""
+        if self.locked is None or not len(self.dry.places):
+            return np.zeros(0)
+        return self.locked.friction_of(y[-len(self.dry.places) :])
 
     def initial_state(self) -> tuple[Array, Array]:
         """Frames and joint coordinates at time 0; links turn with the joints as they are.
@@ -137,6 +157,7 @@ class Nodal:
         if self.chain.closing:  # links that bend at the start do not move as rigid ones do
             velocity = consistent_velocity(self.system, 0.0, q, velocity)
         a, multipliers = consistent_acceleration(self.system, 0.0, q, velocity)
+        multipliers = np.append(multipliers, np.zeros(len(self.dry.places)))
         return _stored(self.system, 0.0, q, velocity, a, lambda: multipliers)[:2]
 
     def carried_along(self, q: Nodes) -> Array:
@@ -147,11 +168,38 @@ class Nodal:
     def neighbours(self, t: float, y: Array, v: Array) -> NodalNeighbours:
         """States beside one, with accelerations and multipliers that go with it."""
         q, velocity = self.configuration(y, v)
-        return nodal_neighbours(self.system, t, q, velocity, _stored, self._names)
+        if self.locked is None:
+            return nodal_neighbours(self.system, t, q, velocity, _stored, self._names)
+        settled, kept = self.locked.settled(t, y[: self._kept], v[: self._kept]), self.system.constraints
+
+        locked = self.locked
+
+        def stored(
+            system: NodalSystem, t: float, q: Nodes, v: Array, a: Array, multipliers: Callable[[], Array]
+        ) -> tuple[Array, Array, Array]:
+            def every() -> Array:
+                found, given = multipliers(), -settled.modes * self.dry.sliding
+                result = np.concatenate([found[:kept], locked.friction_of(given)])
+                result[kept + settled.held] = found[kept:]
+                return result
+
+            return _stored(system, t, q, v, a, every)
+
+        def frozen(of: Nodal) -> NodalSystem:
+            assert of.locked is not None
+            return of.locked.frozen(settled, q)
+
+        return nodal_neighbours(frozen(self), t, q, velocity, stored, self._names, frozen)
 
     def spinning(self, joint: str, speed: float) -> SpinningNeighbours:
         """States beside a steady motion about or along a joint [rad/s or m/s]: see `spinning_neighbours`."""
-        return spinning_neighbours(self.mechanism, self.chain, joint, speed, _stored, self._names)
+
+        def stored(
+            system: NodalSystem, t: float, q: Nodes, v: Array, a: Array, multipliers: Callable[[], Array]
+        ) -> tuple[Array, Array, Array]:
+            return _stored(system, t, q, v, a, lambda: np.append(multipliers(), np.zeros(len(self.dry.places))))
+
+        return spinning_neighbours(self.mechanism, self.chain, joint, speed, stored, self._names)
 
     @property
     def _names(self) -> tuple[str, ...]:
@@ -200,7 +248,9 @@ class Nodal:
         found = [view.at(poses, self.chain.beams, bent) for view in self.views]
         angles, rates = y[:, self._joints].copy(), np.zeros((len(t), len(self.mechanism.joints)))
         for n, (q, velocity) in enumerate(at):
-            rates[n] = self.system.joint_motion(q, velocity, np.zeros(self.system.size))[1][: rates.shape[1]]
+            moving = self.system.joint_motion(q, velocity, np.zeros(self.system.size))[1]
+            moving[self.dry.places - self._frames] = v[n, self.dry.places]  # exactly zero at rest
+            rates[n] = moving[: rates.shape[1]]
             for k in self.mechanism.rotation_vectors:
                 psi = self.chain.seats[k].vector(q)
                 angles[n, k : k + 3] = psi
@@ -266,6 +316,7 @@ class Nodal:
         """Coordinate of a closing joint that has one, and its rate."""
         q, velocity = self.configuration(y, v)
         coordinates, rates, _ = self.system.joint_motion(q, velocity, np.zeros(self.system.size))
+        rates[self.dry.places - self._frames] = v[self.dry.places]
         return float(coordinates[self._moving[loop]]), float(rates[self._moving[loop]])
 
     def loop_effort(self, t: float, y: Array, v: Array, loop: int) -> float:
@@ -283,6 +334,10 @@ class Nodal:
             force = np.asarray(self.system.constraint_matrix(t, q).T @ multipliers).ravel()
             multipliers = smallest_multipliers(full, t, q, force, self._units)
         along = self.system.in_joints(t, q, velocity, a)
+        if self.locked is not None and len(self.dry.places):
+            numbers, friction = self.locked.numbers, self._rubbing(y)
+            along[numbers, 3] += friction
+            along[numbers, 4:] += friction[:, None] * self.locked.outward(t, q)
         return _Acting(q, full.rows.joint_of_row, full.constraint_matrix(t, q), multipliers, along)
 
     @cached_property

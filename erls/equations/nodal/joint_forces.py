@@ -126,6 +126,9 @@ def joint_forces(model: Model, work: Work, sample: Array) -> None:
         place, turn, reach, axes = _posed(model, work.poses, j, sample[3 * j])
         force = _ZERO, _ZERO
         for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
+            if model.released[row].real != 0.0:
+                work.violation[row] = 0.0
+                continue
             work.violation[row] = _violation(model, row, place, turn)
             along, about = _along(model, row, turn)
             strength = work.multipliers[row]
@@ -164,6 +167,11 @@ def joint_gradients(model: Model, work: Work, sample: Array, j: int) -> None:
     swing = times(turn, cross(apart[1], apart[0]))
     curve = product(product(turn, _tilde(apart[1])), _tilde(apart[1]))
     for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
+        if model.released[row].real != 0.0:
+            work.violation[row] = work.drift[row] = work.bias[row] = 0.0
+            for i in range(12):
+                work.gradient[row, i] = 0.0
+            continue
         work.violation[row] = _violation(model, row, place, turn)
         along, about = _along(model, row, turn)
         n, m = transposed(reach, axes, along, about)
@@ -206,6 +214,8 @@ def joint_stiffness(model: Model, work: Work, sample: Array, j: int, block: Arra
     p, r = vector(model.joint_frames, j, 12), nine(model.joint_frames, j, 15)
     pull, entries, thread = _ZERO, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0
     for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
+        if model.released[row].real != 0.0:
+            continue
         strength = work.multipliers[row]
         pull = plus(pull, scaled(strength, vector(model.conditions, row, 0)))
         thread += strength * model.pitches[row]

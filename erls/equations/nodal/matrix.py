@@ -93,6 +93,8 @@ def _add_joints(model: Model, work: Work, beta: float, table: Array, left: Array
     for j in range(len(model.joint_nodes)):
         for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
             size = 0.0
+            if model.released[row].real != 0.0:  # its multiplier does not change
+                _enter(table, model.place, n + row, n + row, 1.0)
             for side in range(2):
                 node = model.joint_nodes[j, side]
                 if node < 0:

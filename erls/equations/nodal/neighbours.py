@@ -7,8 +7,9 @@ order in x: a turned node sees its own velocity from other axes.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,13 @@ from erls.errors import Cause, SceneError
 from erls.maths.saddle import dense
 from erls.maths.so3 import Array
 
+SystemOf = Callable[[Any], NodalSystem]
 Stored = Callable[[NodalSystem, float, Nodes, Array, Array, Callable[[], Array]], tuple[Array, Array, Array]]
+
+
+def system_in(formulation: Any) -> NodalSystem:
+    """The system of a formulation of nodes."""
+    return formulation.system  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,8 @@ class NodalNeighbours:
         go with them.
     names : tuple of str
         (n,)
+    system_of : callable
+        What of a formulation is a system like this one.
     """
 
     system: NodalSystem
@@ -46,6 +55,7 @@ class NodalNeighbours:
     multipliers: Array
     stored: Stored
     names: tuple[str, ...]
+    system_of: SystemOf = field(default=system_in, kw_only=True)
 
     @cached_property
     def metres(self) -> Array:
@@ -145,14 +155,16 @@ class NodalNeighbours:
 
     def of(self, formulation: Formulation) -> NodalNeighbours:
         """See `Neighbours`."""
-        return replace(self, system=formulation.system)  # type: ignore[attr-defined]  # of nodes like this one
+        return replace(self, system=self.system_of(formulation))
 
 
 def nodal_neighbours(
-    system: NodalSystem, t: float, q: Nodes, v: Array, stored: Stored, names: tuple[str, ...]
-) -> NodalNeighbours:
+    system: NodalSystem, t: float, q: Nodes, v: Array, stored: Stored, names: tuple[str, ...],
+    system_of: SystemOf = system_in,
+) -> NodalNeighbours:  # fmt: skip
     """Of a state with the acceleration and the multipliers of the equations of motion."""
-    return NodalNeighbours(system, t, q, v, *consistent_acceleration(system, t, q, v), stored, names)
+    known = consistent_acceleration(system, t, q, v)
+    return NodalNeighbours(system, t, q, v, *known, stored, names, system_of=system_of)
 
 
 def names_of_nodes(owners: Sequence[str]) -> tuple[str, ...]:

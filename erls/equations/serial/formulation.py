@@ -9,13 +9,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg as la
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.dry_friction import DryFriction, Settled, dry_friction, settled
 from erls.equations.formulation import ContactSeries, FrameMotion, Reaction, TreeFormulation
 from erls.equations.linearization import Linearization
 from erls.equations.neighbours import small_motions
@@ -28,6 +27,7 @@ from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
 from erls.equations.series import mass_series, residual_series
 from erls.equations.stability import Bearing, Stability, stability_of, tumbling
+from erls.equations.switches.law import DryFriction, Freely, dry_friction, settled
 from erls.equations.system import metre_scales
 from erls.maths.records import python_reader
 from erls.maths.se3 import pose
@@ -53,6 +53,8 @@ class SerialFormulation(TreeFormulation):
     stiffness, damping, rest : (elastic,) arrays
         Of the elastic coordinates; what they are without load.
     """
+
+    along_coordinates: ClassVar[bool] = True
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
@@ -116,11 +118,11 @@ class SerialFormulation(TreeFormulation):
             The mass matrix is not positive definite; names the coordinate.
         """
         if self.dry is not None:
-            return self.settled(t, y, v, np.zeros(len(self.dry.places))).accelerations
+            return settled(self, t, y, v).accelerations
         return self._solver(t, y)(-self.residual(t, y, v, np.zeros(0)))
 
-    def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
-        """Which joints stick, and accelerations, by the set-valued law of friction; see `dry_friction.settled`.
+    def freely(self, t: float, y: Array, v: Array) -> Freely:
+        """A state without friction that sticks; see `erls.equations.switches.law`.
 
         Raises
         ------
@@ -128,7 +130,13 @@ class SerialFormulation(TreeFormulation):
             As `acceleration`.
         """
         assert self.dry is not None
-        return settled(self._solver(t, y), -self.residual(t, y, v, np.zeros(0)), v, self.dry, released)
+        places = self.dry.places
+        both = np.zeros((self.size, 1 + len(places)))
+        both[:, 0] = -self.residual(t, y, v, np.zeros(0))
+        both[places, 1 + np.arange(len(places))] = 1.0
+        both = self._solver(t, y)(both)
+        compliance = both[places, 1:]
+        return Freely(both[:, 0], both[:, 1:], both[places, 0], compliance, compliance.diagonal())
 
     def _solver(self, t: float, y: Array) -> Callable[[Array], Array]:
         """M⁻¹ of forces."""
@@ -213,7 +221,7 @@ class SerialFormulation(TreeFormulation):
         """States beside one, with the accelerations of the equations of motion."""
         if self.dry is None:
             return TreeNeighbours(self, t, y, v, self.acceleration(t, y, v))
-        found = self.settled(t, y, v, np.zeros(len(self.dry.places)))
+        found = settled(self, t, y, v)
         stuck = tuple(self.dry.places[found.modes == 0.0].tolist())
         return TreeNeighbours(self, t, y, v, found.accelerations, stuck)
 

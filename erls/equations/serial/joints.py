@@ -81,11 +81,11 @@ def wanted(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any,
 def effort(joint: Joint, reals: Array, integers: IntArray, t: float, angle: Any, rate: Any, feed: Any) -> Any:
     """Force of drive, spring, damper, friction and stops along a joint."""
     force = wanted(joint, reals, integers, t, angle, rate, feed)
-    if force.real > joint.limit.real:
-        force = 0.0 * force + joint.limit
-    elif force.real < -joint.limit.real:
-        force = 0.0 * force - joint.limit
-    force -= joint.stiffness * (angle - joint.rest) + joint.damping * rate
+    if force.real > joint.most.real:
+        force = 0.0 * force + joint.most
+    elif force.real < joint.least.real:
+        force = 0.0 * force + joint.least
+    force -= joint.stiffness * (angle - joint.rest) + joint.damping * rate - joint.rubbing
     if joint.friction != 0.0:
         force -= joint.friction * _saturated(rate / joint.transition)
     if len(joint.stops) > 0:
@@ -125,7 +125,8 @@ def gains(
         pushed, damped = stop_gains(joint.stops, angle, rate)
         stiffness += pushed
         damping += damped
-    if abs(wanted(joint, reals, integers, t, angle, rate, feed).real) <= joint.limit.real:  # else it gives no more
+    asked = wanted(joint, reals, integers, t, angle, rate, feed).real
+    if joint.least.real <= asked <= joint.most.real:  # else it gives no more
         stiffness += joint.gain
         damping += joint.rate_gain
     return stiffness, damping

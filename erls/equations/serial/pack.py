@@ -32,8 +32,6 @@ from erls.mechanism.links import Link, node_shape6
 from erls.mechanism.loops import LoopEnd
 from erls.mechanism.thermal import elastic_rest
 
-_SUDDEN = 1e-12  # rate that counts as rest, of friction on a motion that is prescribed
-
 
 def step_parts(before: Array, freedom: Freedom, after: Array) -> Array:
     """(4, 12) parts of the pose before · joint · after: constant, with cosine and sine of the coordinate, and with the
@@ -60,9 +58,7 @@ def force_record(
     put into memory.
     """
     gain, rate_gain = drive.gains
-    friction, transition = forces.friction, forces.transition_rate
-    if forces.law == "stick":  # of a coordinate that is free others take care (`erls.equations.dry_friction`)
-        friction, transition = friction if drive.prescribed else 0.0, _SUDDEN
+    friction, transition = forces.smooth_friction(drive.prescribed)
     return Joint(
         place=-1,
         component=-1,
@@ -79,7 +75,9 @@ def force_record(
         rotor=rotor_inertia,
         gain=gain,
         rate_gain=rate_gain,
-        limit=drive.torque_limit,
+        least=-drive.torque_limit,
+        most=drive.torque_limit,
+        rubbing=0.0,
         held=0.0,
         step=np.zeros((4, 12)),
         screw=np.zeros(6),

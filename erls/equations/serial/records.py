@@ -105,8 +105,13 @@ class Joint(NamedTuple):
         Of `erls.mechanism.contacts.Stops`; empty without.
     rotor : float
         Inertia along the joint [kg m² or kg].
-    gain, rate_gain, limit : float
-        Of the controller, and the most that the motor gives.
+    gain, rate_gain : float
+        Of the controller.
+    least, most : float
+        What the motor gives, between the limits either way; both are one of these while a motor is said to be at its
+        limit, and infinite while it is said to be within (`erls.equations.switches.motors`).
+    rubbing : float
+        Friction of a joint that is said to slide (`erls.equations.switches`).
     held : float
         Coordinate where feed-forward holds a joint without wanted motion.
     step : (4, 12) array
@@ -131,7 +136,9 @@ class Joint(NamedTuple):
     rotor: float
     gain: float
     rate_gain: float
-    limit: float
+    least: float
+    most: float
+    rubbing: float
     held: float
     step: Matrix
     screw: Vector

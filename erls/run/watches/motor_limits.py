@@ -1,4 +1,6 @@
-"""Motors at their limit during a run: what an adaptive integrator does not see."""
+"""Motors at their limit during a run, where an adaptive integrator does not see when that begins and ends: along
+angles that are no coordinates, and where modes follow statically.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +25,9 @@ class MotorLimits(Watch):
 
     @staticmethod
     def concerns(plan: Plan) -> bool:
-        """Motors with a limit, in steps that follow a tolerance."""
-        limited = any(joint.drive.torque_limit < np.inf for joint in plan.mechanism.joints)
-        return limited and options_of(plan.settings).step is None
+        """Motors with a limit that is not located (`erls.equations.switched`), in steps that follow a tolerance."""
+        blind = plan.settings.gauge == "minimum-norm" or plan.mechanism.bandwidth is not None
+        return blind and plan.mechanism.limited and options_of(plan.settings).step is None
 
     def after(self, ended: Ended) -> Finding:
         """Motors that reached their limit and left it."""

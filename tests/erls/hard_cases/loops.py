@@ -120,6 +120,31 @@ _BENT: dict[str, Any] = {
     ],
 }
 _PIVOT = {"name": "pivot", "type": "spherical", "link": "beam", "node": "tip", "position": [_SPAN + _GAP, 0.0, 0.0]}
+_SPRING, _RUB, _FAR, _AT = 20.0, 0.1, 0.1, 60.0  # N m/rad, N m in each joint of the tree, rad, degrees
+
+
+def _rubbing() -> dict[str, Any]:
+    """A parallelogram on a spring, displaced; three joints rub, and rest together."""
+    data = _parallelogram(_AT, tolerance=1e-6)
+    for joint in data["joints"]:
+        joint["friction"] = {"law": "stick", "force": _RUB}
+    data["joints"][0] |= {"stiffness": _SPRING, "rest": float(np.radians(_AT) - _FAR)}
+    return {**data, "gravity": [0.0, 0.0, 0.0]}
+
+
+def _comes_to_rest(t: Array) -> Array:
+    """Half cycles about places where spring and friction balance."""
+    rate = np.sqrt(_SPRING / (_LENGTH**2 * (2 * _LINK / 3 + _BAR)))
+    balance = 3 * _RUB / _SPRING
+    angle, x, begun = np.zeros_like(t), _FAR, 0.0
+    while abs(x) > balance:
+        middle = np.copysign(balance, x)
+        angle = np.where(t >= begun, middle + (x - middle) * np.cos(rate * (t - begun)), angle)
+        x, begun = 2 * middle - x, begun + np.pi / rate
+    angle = np.where(t >= begun, x, angle)
+    return _flat(0.5 + _LENGTH * np.exp(1j * (np.radians(_AT) - _FAR + angle)))
+
+
 _TURNED = _driven(loop_scenes.four_bar(), 60.0, 720.0)
 CASES = of_subject(
     "loops",
@@ -160,6 +185,12 @@ CASES = of_subject(
             told="no link gives way.*along x|assemble",
         ),
         _swung("parallelogram that swings", -60.0, 1e-4),
+        Case(
+            "parallelogram whose joints come to rest, and stick",
+            _rubbing(),
+            closed(_comes_to_rest, "closed form", 1e-9),
+            fast=("erls", "ffr"),
+        ),
         _swung("parallelogram with a third leg", -60.0, 1e-4, legs=3),
         _swung("parallelogram through its change point, adaptive", 60.0, 1e-6, simulation={"tolerance": 1e-6}),
         _swung("parallelogram through its change point, steps of 1 ms", 60.0, 1e-4, simulation={"step": 1e-3}),

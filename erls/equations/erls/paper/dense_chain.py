@@ -48,6 +48,8 @@ class DenseChain(SerialFormulation):
         ``"minimum-norm"`` or ``"joint-angle"``.
     """
 
+    along_coordinates = False
+
     def __init__(self, mechanism: Mechanism, gauge: str = "minimum-norm") -> None:
         super().__init__(mechanism)
         self.gauge, self.stiffened = gauge, stiffened(mechanism)

@@ -1,7 +1,7 @@
-"""Equations of motion while some joints stick and the others slide, over those of a system without this friction.
+"""Equations of motion of a tree some of whose joints stick, over those of the tree without this friction.
 
-Row k of a joint that sticks becomes a_k = 0, and column k is left out; of one that slides in the direction s, row k has
-s F_k more. Functions of the system are called by address, so that this is compiled once for all systems.
+Functions of the tree are called by address, so that this is compiled once for all systems. Which coordinates do not
+move is flagged (`erls.equations.switches.still`).
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import call_mass_matrix, call_residual, call_stiffness_and_damping
+from erls.equations.switches.still import still_forces, still_matrix
 from erls.maths.dense import backward, cholesky, forward
-from erls.maths.jit import kernel, part
+from erls.maths.jit import kernel
 from erls.maths.records import Indices, Matrix, Vector, reader
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
@@ -47,11 +48,14 @@ class Room(NamedTuple):
 
     Attributes
     ----------
+    held : (n,) array
+        1 of coordinates that do not move, 0 of others: set from outside.
     modes : (m,) array
         1 of a joint that slides on, -1 of one that slides back, 0 of one that sticks: set from outside.
     mass : (n, n) array
     """
 
+    held: Vector
     modes: Vector
     mass: Matrix
 
@@ -65,33 +69,19 @@ def residual(
 ) -> None:
     """M a - f, see `erls.equations.compiled_system`; of a joint that sticks, a_k."""
     own = read_frictions(reals, integers, integers[len(integers) - 1])
-    modes = read_room(scratch, integers, own.room).modes
     call_residual(own.residual, reals, integers, scratch, t, y, v, a, out)
-    for k in range(len(modes)):
-        place = own.places[k]
-        if modes[k] != 0.0:
-            out[place] += modes[k] * own.sliding[k]
-        else:
-            out[place] = a[place] if len(a) else 0.0
-
-
-@part
-def _hold(matrix: Array, place: int, diagonal: float) -> None:
-    """Row and column of a coordinate that does not move."""
-    for i in range(matrix.shape[0]):
-        matrix[place, i] = matrix[i, place] = 0.0
-    matrix[place, place] = diagonal
+    room = read_room(scratch, integers, own.room)
+    for k in range(len(room.modes)):
+        out[own.places[k]] += room.modes[k] * own.sliding[k]
+    still_forces(room.held, a, out)
 
 
 @kernel(contract.MASS_MATRIX, counted=False)
 def mass_matrix(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, out: Array) -> None:
     """M, with the unit matrix in rows and columns of joints that stick."""
     own = read_frictions(reals, integers, integers[len(integers) - 1])
-    modes = read_room(scratch, integers, own.room).modes
     call_mass_matrix(own.mass_matrix, reals, integers, scratch, t, y, out)
-    for k in range(len(modes)):
-        if modes[k] == 0.0:
-            _hold(out, own.places[k], 1.0)
+    still_matrix(read_room(scratch, integers, own.room).held, 1.0, out)
 
 
 @kernel(contract.STIFFNESS_AND_DAMPING, counted=False)
@@ -100,12 +90,10 @@ def stiffness_and_damping(
 ) -> None:
     """K and C, with zeros in rows and columns of joints that stick."""
     own = read_frictions(reals, integers, integers[len(integers) - 1])
-    modes = read_room(scratch, integers, own.room).modes
     call_stiffness_and_damping(own.stiffness_and_damping, reals, integers, scratch, t, y, v, stiffness, damping)
-    for k in range(len(modes)):
-        if modes[k] == 0.0:
-            _hold(stiffness, own.places[k], 0.0)
-            _hold(damping, own.places[k], 0.0)
+    held = read_room(scratch, integers, own.room).held
+    still_matrix(held, 0.0, stiffness)
+    still_matrix(held, 0.0, damping)
 
 
 @kernel(contract.ACCELERATION, counted=False)

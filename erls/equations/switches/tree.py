@@ -1,70 +1,63 @@
-"""A system some of whose joints stick: equations of motion with modes that are constant until they are set anew.
-
-Modes say of each joint whether it slides on (1) or back (-1) or sticks (0). Whoever integrates asks for `Sticking.left`
-along the motion; where it falls below zero a joint comes to rest or breaks away, and `Sticking.settle` sets the modes
-that follow (`erls.equations.dry_friction`). In between the equations are smooth.
-"""
+"""A tree of links some of whose joints stick, or whose motors come to their limits (`erls.equations.switches.base`)."""
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from erls.equations.system import SecondOrderSystem
+from erls.equations.switches.base import NO_FRICTION, Switches
+from erls.equations.switches.law import Freely, Settled, settled
 from erls.maths.so3 import Array
-from fe_import.model import IntArray
 
 if TYPE_CHECKING:
     from erls.equations.compiled_system import CompiledSystem
-    from erls.equations.dry_friction import DryFriction, Settled
+    from erls.equations.serial.formulation import SerialFormulation
+    from erls.equations.switches.kernels import Room
 
 
-class Rubbing(SecondOrderSystem, Protocol):
-    """Equations of motion that leave out friction that sticks, and know it."""
-
-    @property
-    def dry(self) -> DryFriction | None:
-        """Friction that sticks."""
-
-    def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
-        """What the set-valued law says at a state."""
-
-
-class Sticking:
+class SwitchedTree(Switches):
     """A `SecondOrderSystem` with modes.
 
     Parameters
     ----------
-    system : Rubbing
-        Compiled; ``dry`` is not None.
+    system : SerialFormulation
     """
 
-    def __init__(self, system: Rubbing) -> None:
-        assert system.dry is not None
-        assert system.compiled is not None
-        self._system, self._bare, self.dry = system, system.compiled, system.dry
+    def __init__(self, system: SerialFormulation) -> None:
+        from erls.equations.switches.motors import Asked, acting_in, motors_among  # here: they import the compiler
+
+        self._system, self._bare = system, system.compiled
         self.size, self.length_scales, self.breakpoints = system.size, system.length_scales, system.breakpoints
+        acting = acting_in(self._bare)
+        joints = system.mechanism.joints
+        motors = motors_among([joint.drive for joint in joints], [joint.name for joint in joints], acting)
+        super().__init__(system.dry or NO_FRICTION, motors, system.size)
+        self._asked = Asked(motors, self._bare, self._bare.residual)
 
     @cached_property
     def compiled(self) -> CompiledSystem:
-        """The equations; their working memory holds the modes."""
+        """The equations, with constants and working memory of their own, which hold the modes."""
+        from dataclasses import replace
+
         from erls.equations import compiled_system as contract  # here: they import the compiler
-        from erls.equations import sticking_kernels as own
+        from erls.equations.switches import kernels as own
         from erls.maths.calls import address_of
         from erls.maths.records import Memory
 
         bare, integers = self._bare, [int(i) for i in self._bare.integers]
-        constants, scratch = Memory(integers, bare.reals), Memory(integers, bare.scratch)
-        room = own.Room(np.zeros(len(self.dry.places)), np.zeros((self.size, self.size)))
+        constants, scratch = Memory(integers, bare.reals.copy()), Memory(integers, bare.scratch)
+        rubs = len(self.rubbing.places)
+        if not rubs:  # all functions of the tree are as they were
+            return replace(bare, reals=constants.numbers, scratch=scratch.numbers)
         whole = own.Frictions(
             residual=address_of(bare.residual, contract.RESIDUAL),
             mass_matrix=address_of(bare.mass_matrix, contract.MASS_MATRIX),
             stiffness_and_damping=address_of(bare.stiffness_and_damping, contract.STIFFNESS_AND_DAMPING),
-            room=scratch.put(room),
-            places=self.dry.places,
-            sliding=self.dry.sliding,
+            room=scratch.put(own.Room(np.zeros(self.size), self.modes[:rubs], np.zeros((self.size, self.size)))),
+            places=self.rubbing.places,
+            sliding=self.rubbing.sliding,
         )
         integers.append(constants.put(whole))
         return contract.CompiledSystem(
@@ -79,47 +72,41 @@ class Sticking:
         )
 
     @cached_property
-    def modes(self) -> Array:
-        """(m,) which equations read; see the module's docstring."""
-        from erls.equations import sticking_kernels as own  # here: it imports the compiler
+    def _room(self) -> Room:
+        """Which coordinates do not move, and modes, as the equations read them."""
+        from erls.equations.switches import kernels as own  # here: it imports the compiler
         from erls.maths.records import python_reader
 
         system = self.compiled
         frictions = python_reader(own.Frictions)(system.reals, system.integers, int(system.integers[-1]))
-        return python_reader(own.Room)(system.scratch, system.integers, frictions.room).modes
+        return python_reader(own.Room)(system.scratch, system.integers, frictions.room)
 
-    def settle(self, t: float, y: Array, v: Array, released: Array) -> Array:
-        """Set the modes that the law gives a state; its accelerations (n,). ``released`` as of `settled`."""
-        found = self._system.settled(t, y, v, released)
-        self.modes[:] = found.modes
-        return found.accelerations
+    def put(self, y: Array) -> None:
+        """Into constants and memory of the equations."""
+        system, rubs = self.compiled, len(self.rubbing.places)
+        self.motors.put(self.modes[rubs:], system.reals, system.integers)
+        if rubs:
+            self._room.held[:] = 0.0
+            self._room.held[self.fixed] = 1.0
+            self._room.modes[:] = self.modes[:rubs]
 
-    def brought_to_rest(self, t: float, y: Array, v: Array, joints: IntArray) -> Array:
-        """(n,) rates when some joints come to rest, by what rates they have left: an impulse along each, and along
-        those that stick, so that momentum along all other coordinates stays as it is.
-        """
-        if not len(joints):
-            return v
-        held = self.dry.places[np.union1d(np.flatnonzero(self.modes == 0.0), joints)]
-        answers = np.linalg.solve(self._system.mass_matrix(t, y), np.eye(self.size)[:, held])
-        result = np.array(v - answers @ np.linalg.solve(answers[held], v[held]))
-        result[held] = 0.0
-        return result
+    def freely(self, t: float, y: Array, v: Array) -> Freely:
+        """See `Switches`."""
+        return self._system.freely(t, y, v)
 
-    def left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
-        """(k, m) of states of a motion with these modes: rate in the direction of one that slides, static force less
-        friction of one that sticks. A mode ends where it falls below zero.
-        """
-        rates = self.modes * v[:, self.dry.places]
-        if self.modes.all():
-            return np.asarray(rates)
-        return np.asarray(np.where(self.modes == 0.0, self.dry.static - np.abs(self.holding(t, y, v, a)), rates))
+    def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
+        """See `Switches`."""
+        return settled(self._system, t, y, v, released)
+
+    def asked(self, t: Array, y: Array, v: Array) -> Array:
+        """See `Switches`."""
+        return self._asked(t, y, v)
 
     def holding(self, t: Array, y: Array, v: Array, a: Array) -> Array:
-        """(k, m) friction that balances each joint at states of a motion."""
+        """See `Switches`: what is out of balance without this friction."""
         from erls.equations.series import residual_series  # here: it imports the compiler
 
-        return np.asarray(residual_series(self._bare, t, y, v, a, self._address)[:, self.dry.places])
+        return np.asarray(residual_series(self._bare, t, y, v, a, self._address)[:, self.rubbing.places])
 
     @cached_property
     def _address(self) -> Any:
