@@ -286,6 +286,8 @@ def sweep(
 
     if resume and output is None:
         raise bad("there is nothing to go on with", "--resume", "no store", "give -o RUNS.sweep")
+    if not get:
+        raise bad("nothing is kept of the runs", "--get", "nothing", "e.g. --get 'max(tip.distance)'")
     asked = points_of(vary or [], sample, seed, points)
     check_output(output, [scene], set_ or [], (SUFFIX,), force, [] if points is None else [points])
     if table is not None:
