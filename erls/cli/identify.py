@@ -69,9 +69,9 @@ def _bounds(texts: list[str]) -> dict[str, tuple[float, float]]:
         key, _, ends = text.partition("=")
         try:
             low, high = (float(end) for end in ends.split(":"))
-            if not low < high:
-                raise ValueError
         except ValueError:
             raise bad("not of the form KEY=LOW:HIGH", "--bounds", text, "e.g. joints.hip.damping=0.01:1") from None
+        if not low < high:
+            raise bad("the lower bound must be below the upper one", "--bounds", text, "swap or change them")
         found[key.strip()] = (low, high)
     return found

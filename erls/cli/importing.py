@@ -46,7 +46,7 @@ def import_(
     """
     from erls.cli.reports import bad, write
     from erls.files.results import MARK, claim
-    from erls.importers.robot_scene import imported
+    from erls.importers.robot_scene import TUBE, imported
     from erls.importers.urdf import read_urdf
     from erls.scene.read import load_scene
 
@@ -58,6 +58,9 @@ def import_(
         name, equals, model = text.partition("=")
         if not equals or not name or not model:
             raise bad("not of the form LINK=DESCRIPTION.toml or LINK=tube", "--flexible", text, "e.g. forearm=tube")
+        if model.partition(":")[0] != TUBE and not (target.parent / model).is_file():
+            remedy = "write it first, or check the path, which starts at the scene"
+            raise bad(f"no such file: {model}", "--flexible", text, remedy)
         models[name] = model
     found = imported(read_urdf(robot), robot, target.parent, models, floating, hold, stops)
     files = {target.parent / "links" / name: text for name, text in found.links.items()}

@@ -64,7 +64,7 @@ def optimize(
     inputs = [problem, *read_by([given], loaded.record.set)]
     check_output(output, [given], loaded.record.set, (".html", ".json"), force, [problem])
     if scene is not None:
-        check_copy(scene, given)
+        check_copy(scene, given, "--scene")
         claim(scene, ".toml", inputs, force)
     if state is not None:
         if state.suffix != ".npz":

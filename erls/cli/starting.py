@@ -75,8 +75,11 @@ def copy(name: str, folder: Path | None = None, /, *, json: Json = False) -> Non
 
     shipped = _shipped()
     groups = sorted({path.relative_to(shipped).parts[0] for path in _scenes(shipped)})
-    group = name.strip("/").partition("/")[0]
+    group, _, scene = name.strip("/").partition("/")
     choose(group, ["all", *groups], "name", SceneError)
+    if scene:
+        stems = [str(path.relative_to(shipped / group).with_suffix("")) for path in _scenes(shipped / group)]
+        choose(scene.removesuffix(".toml"), stems, "name", SceneError)
     target = folder or Path("examples" if group == "all" else group)
     _copied(shipped if group == "all" else shipped / group, target)
     if json:

@@ -45,6 +45,7 @@ _TABLE = re.compile(
     rb'|phase \[1\],(.*\.z \[m\]"?)?\r?\n'  # of a mode
     rb"|formulation,elastic_modes,integrator,effects,"
     rb"|scene,formulation,deflection \[m\],"
+    rb"|point,[^\r\n]*,cause,message\r?\n"  # of a sweep
 )
 _END = 4_000_000  # bytes at either end of a file where its mark may be; films have it behind their index
 

@@ -34,7 +34,8 @@ def fitted_keys(scene: Scene, asked: Sequence[str]) -> list[str]:
             raise SceneError(Cause.BAD_REFERENCE, message, where="--fit", value=key, remedy=remedy)
         found += fits
     if not found or not all(found) or len(set(found)) < len(found):
-        message, remedy = "each number is fitted once", "e.g. --fit joints.elbow.damping"
+        message = "each number is fitted once" if asked else "there is nothing to fit"
+        remedy = "e.g. --fit joints.elbow.damping"
         raise SceneError(Cause.BAD_FIELD, message, where="--fit", value=", ".join(asked), remedy=remedy)
     return found
 

@@ -24,6 +24,7 @@ from fe_import.model import IntArray
 STEP = 1e-3
 """Of scenes that give none [s]."""
 
+_FEWEST = 3  # steps that a cubic table of drives needs
 _MOST = 50_000_000
 """Numbers of one matrix at all knots, 400 MB; there are some ten."""
 
@@ -95,7 +96,11 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     rigid = with_rigid(_with_drives(free, held), {link.name for link in mechanism.links})
     flexible, stiff = (Servoed(_tree(scene, each, conditions), conditions, drives) for each in (free, rigid))
     settings = scene.record.simulation
-    count = max(2, round(settings.duration / (settings.step or STEP)))
+    count = round(settings.duration / (settings.step or STEP))
+    if count < _FEWEST:
+        message, remedy = "too few steps for the duration", f"give {settings.duration / _FEWEST:.6g} s or less"
+        where = f"{scene.path}: simulation.step"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=settings.step, remedy=remedy)
     if count * flexible.tree.size**2 > _MOST:
         raise SceneError(
             Cause.BAD_FIELD,

@@ -104,7 +104,7 @@ def _confirmed_rows(found: Optimization) -> Rows:
     return rows
 
 
-_ACTIVE = ("constraint", "where", "over its limit", "multiplier")
+_ACTIVE = ("constraint", "where", "share of its limit", "multiplier")
 _STARTS = ("objective", "violation", "analyses", "status")
 
 

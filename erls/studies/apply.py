@@ -18,8 +18,16 @@ from erls.scene.read import load_chain
 ACCURACY_FIELDS = {"generalized_alpha": ("step",), "lobatto": ("tolerance",), "auto": ("tolerance",)}
 
 
-def check_copy(path: Path, scene: Path) -> None:
+def check_copy(path: Path, scene: Path, option: str = "--apply") -> None:
     """Refuse a copy that could not be written, or whose relative paths would lead elsewhere, before any work is done.
+
+    Parameters
+    ----------
+    path : Path
+        Of the copy.
+    scene : Path
+    option : str
+        That gave the path.
 
     Raises
     ------
@@ -35,7 +43,7 @@ def check_copy(path: Path, scene: Path) -> None:
     elif target.suffix != ".toml":
         message, remedy = "a scene is a TOML file", "end in .toml"
     if message:
-        raise SceneError(Cause.NOT_WRITABLE, message, where="--apply", value=str(path), remedy=remedy)
+        raise SceneError(Cause.NOT_WRITABLE, message, where=option, value=str(path), remedy=remedy)
 
 
 def write_copy(path: Path, scene: Path, overrides: Sequence[str], note: str) -> tuple[str, ...]:

@@ -167,6 +167,7 @@ def test_the_command_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "stopped at a bound" in capsys.readouterr().out
     faults = {
         "--bounds": [*command, "--bounds", "joints.hinge.stiffness=3"],
+        "below the upper": [*command, "--bounds", "joints.hinge.stiffness=3:1"],
         "not between": [*command, "--bounds", "joints.hinge.stiffness=2.7:3.5"],
         "--fit": command[:4],
         "no such file": [*command[:3], str(tmp_path / "none.csv"), *command[4:]],

@@ -120,3 +120,5 @@ def test_more_knots_than_memory_are_refused(arm: Path, capsys: pytest.CaptureFix
     """With how many there may be."""
     _, err = told(capsys, arm, "--set", "simulation.step=1e-7", code=2)
     assert "simulation.step: too many steps for 2 coordinates" in err
+    _, err = told(capsys, arm, "--set", "simulation.step=5.0", code=2)
+    assert "simulation.step: too few steps for the duration" in err

@@ -229,6 +229,12 @@ def test_interrupted_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         erls.optimize(CANTILEVER, resume=True, **given)
 
 
+def test_a_copy_elsewhere_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By the name of the option that asked for it."""
+    assert main(["optimize", str(CANTILEVER), "--scene", str(tmp_path / "best.toml")]) == 2
+    assert "--scene: the copy must lie beside the scene" in capsys.readouterr().err
+
+
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Table, page, scene of the best design: that has its mass and holds its limit."""
     copy, page = DATA / "written_by_a_test.toml", tmp_path / "page.html"

@@ -71,8 +71,10 @@ def test_examples_are_listed_and_copied(
     assert main(["examples", "copy", "all", "there/all"]) == 0
     assert len(list((tmp_path / "there/all").rglob("*.toml"))) == len(list(DATA.rglob("*.toml")))
     capsys.readouterr()
-    assert main(["examples", "copy", "robto"]) == 2
-    assert "did you mean 'robot'" in capsys.readouterr().err
+    for name, words in {"robto": "'robot'", "robot/two_lnk.toml": "'two_link'"}.items():
+        assert main(["examples", "copy", name, "none"]) == 2
+        assert f"did you mean {words}" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
 
 
 def test_a_folder_that_cannot_be_made_leaves_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,6 +23,8 @@ from sweep_cases import ANGLE, GET, GRID, SCENE, SHORT, TOLERANCE, height
 import erls
 from erls.cli.main import main
 from erls.errors import Cause, SceneError, SimulationError
+from erls.files.results import claim
+from erls.report.sweep_table import write_sweep_table
 from erls.run.record import Run
 from erls.studies.sweep import sweep as engine
 from erls.studies.sweep.points import SAMPLERS, Grid, points_of, sampled
@@ -81,8 +83,9 @@ def test_samples_fill_their_ranges(method: str) -> None:
         ([], "", "nothing is varied"),
         (["a"], "", "KEY=A:B:N"),
         (["a=1:2:x"], "", "KEY=A:B:N"),
-        (["a=1:2:0"], "", "KEY=A:B:N"),
+        (["a=1:2:0"], "", "1 to 10000000 values"),
         (["a=nan:2:3"], "", "KEY=A:B:N"),
+        (["a=1:2:20000000"], "", "1 to 10000000 values"),
         (["a=1:2"], "sobol", "METHOD:COUNT"),
         (["a=1:2"], "halton:9", "METHOD:COUNT"),
         (["a=1:2:3"], "sobol:8", "KEY=A:B with a sample"),
@@ -365,9 +368,51 @@ def test_words_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_runs_state_their_error_when_asked() -> None:
     """Not otherwise: judging costs more than the run."""
     grid = {ANGLE: (0.0,)}
-    assert np.isnan(erls.sweep(SCENE, grid, ["error"], overrides=SHORT).numbers[0, 0])
+    with pytest.raises(SceneError, match="--verdict"):
+        erls.sweep(SCENE, grid, ["error"], overrides=SHORT)
     stated = erls.sweep(SCENE, grid, ["error"], overrides=SHORT, verdict=True).numbers[0, 0]
     run = erls.simulate(erls.load_scene(SCENE, [*SHORT, f"{ANGLE}=0.0"]))
     assert isinstance(run, Run)
     assert run.accuracy is not None
     assert stated == run.accuracy.total
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("joints.shoudler.initial.position_deg", "no member 'shoudler'"),
+        ("joints.shoulder.initial.positon_deg", "did you mean 'position_deg'"),
+        ("links.l.model.sections.leg.widht", "did you mean 'width'"),
+    ],
+)
+def test_misspelt_keys_are_refused(key: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No point can be right: nothing is run, nothing written."""
+    command = ["study", "sweep", str(SCENE), "--vary", f"{key}=0.01,0.02", "--get", "tip.x@end"]
+    assert main([*command, "-o", str(tmp_path / "r.sweep"), "--table", str(tmp_path / "r.csv")]) == 2
+    assert words in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_values_that_are_no_good_fail_alone() -> None:
+    """The first one, too, which the keys are tried with."""
+    found = erls.sweep(SCENE, {"links.l.model.sections.leg.width": [0.0, 0.01]}, "tip.x@end", overrides=SHORT)
+    assert [row.number for row in found.failed] == [0]
+
+
+@pytest.mark.parametrize("values", [0.01, "0.01", np.array(0.01)])
+def test_a_value_is_no_list(values: Any) -> None:
+    """Refused with its key; so is asking for nothing."""
+    with pytest.raises(SceneError, match="not a list of values"):
+        erls.sweep(SCENE, {ANGLE: values}, GET, overrides=SHORT)
+    with pytest.raises(SceneError, match="nothing is kept"):
+        erls.sweep(SCENE, {ANGLE: [0.01]}, [], overrides=SHORT)
+
+
+def test_a_table_of_a_sweep_is_an_earlier_result(tmp_path: Path) -> None:
+    """Written over by the next; one of points is not."""
+    table = tmp_path / "r.csv"
+    write_sweep_table(table, erls.sweep(SCENE, {ANGLE: (0.0,)}, GET, overrides=SHORT))
+    claim(table, ".csv", [])
+    table.write_text(f"{ANGLE}\n0\n", encoding="utf-8")
+    with pytest.raises(SceneError, match=r"no \.csv file that erls wrote"):
+        claim(table, ".csv", [])

@@ -227,7 +227,13 @@ def test_faults_are_named_and_nothing_is_written(
 
 @pytest.mark.parametrize(
     ("flexible", "words"),
-    [("nix=tube", "no moving link"), ("b", "LINK=DESCRIPTION"), ("b=tube", "no beam"), ("b=tube:x", "no tube")],
+    [
+        ("nix=tube", "no moving link"),
+        ("b", "LINK=DESCRIPTION"),
+        ("b=tube", "no beam"),
+        ("b=tube:x", "no tube"),
+        ("b=none.toml", "no such file: none.toml"),
+    ],
 )
 def test_links_that_cannot_be_flexible(
     flexible: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -13,9 +13,12 @@ import numpy as np
 
 from erls.errors import Cause, SimulationError
 from erls.run.record import Run
+from erls.scene.chain import Scene
+from erls.scene.read import load_scene
 from erls.simulation.variants import Variants
 from erls.studies.sweep.quantities import quantity, values_of
 from erls.studies.sweep.store import Row
+from fe_import.description.link import load_link
 from fe_import.errors import ReportedError
 
 Reduction = Callable[[Run], Mapping[str, float]]
@@ -49,6 +52,39 @@ class Task:
     verdict: bool
 
 
+def check_keys(task: Task, values: Sequence[Any]) -> None:
+    """Refuse keys that lead nowhere; values that are no good are failures of their points.
+
+    Parameters
+    ----------
+    task : Task
+    values : sequence
+        Those of any point.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        UNKNOWN_FIELD, BAD_REFERENCE: a key misspelt.
+    """
+    try:
+        scene = load_scene(task.scene, _changes(task, values))
+        for link in scene.record.links if isinstance(scene, Scene) else ():
+            if link.model and link.changes:
+                load_link(scene.folder / link.model, changes=link.changes)
+    except ReportedError as problem:
+        unknown = str(problem.cause) == Cause.UNKNOWN_FIELD and _last(problem.where) in map(_last, task.keys)
+        if unknown or (str(problem.cause) == Cause.BAD_REFERENCE and problem.where.startswith("--set")):
+            raise
+
+
+def _last(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+def _changes(task: Task, values: Sequence[Any]) -> list[str]:
+    return [*task.overrides, *(f"{key}={json.dumps(value)}" for key, value in zip(task.keys, values, strict=True))]
+
+
 def evaluate(task: Task) -> list[Row]:
     """Run them; what fails is a row, too."""
     return [row_of(task, number, values, run_point(task, values)) for number, values in task.rows]
@@ -56,8 +92,7 @@ def evaluate(task: Task) -> list[Row]:
 
 def run_point(task: Task, values: Sequence[Any]) -> Run | ReportedError:
     """The run of a point, or its failure."""
-    own = [f"{key}={json.dumps(value)}" for key, value in zip(task.keys, values, strict=True)]
-    return _variants(task.scene).run([*task.overrides, *own], lambda t, duration: None, task.verdict)
+    return _variants(task.scene).run(_changes(task, values), lambda t, duration: None, task.verdict)
 
 
 def numbers_of(run: Run, quantities: Sequence[str] | Reduction) -> dict[str, float]:

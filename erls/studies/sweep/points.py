@@ -172,10 +172,10 @@ def _axis(text: str, as_range: bool) -> tuple[str, tuple[Any, ...]]:
             low, high = (_number(part) for part in parts)
             return key.strip(), (low, high)
         if len(parts) == 3:
-            count = int(parts[2])
-            if not 1 <= count <= MOST:
-                raise ValueError
-            return key.strip(), tuple(np.linspace(_number(parts[0]), _number(parts[1]), count).tolist())
+            low, high, count = _number(parts[0]), _number(parts[1]), int(parts[2])
+            if 1 <= count <= MOST:
+                return key.strip(), tuple(np.linspace(low, high, count).tolist())
+            raise _bad("--vary", text, f"a key has 1 to {MOST} values", "ask for more, or for fewer")
     except ValueError:
         form = "KEY=A:B with a sample" if as_range else "KEY=A:B:N or KEY=V,W"
         raise _bad("--vary", text, f"not of the form {form}", "e.g. --vary gravity.2=-9.81:0:5") from None

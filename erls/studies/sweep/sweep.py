@@ -21,7 +21,7 @@ from erls.run.record import Run
 from erls.scene.inputs import files_of
 from erls.scene.read import load_scene
 from erls.studies.pool import each
-from erls.studies.sweep.evaluate import Reduction, Task, evaluate, numbers_of, row_of, run_point
+from erls.studies.sweep.evaluate import Reduction, Task, check_keys, evaluate, numbers_of, row_of, run_point
 from erls.studies.sweep.executors import evaluated, workers_of
 from erls.studies.sweep.points import Grid, Points
 from erls.studies.sweep.quantities import quantity
@@ -186,8 +186,9 @@ def sweep(
     """
     begun = time.perf_counter()
     asked = _grid(points) if isinstance(points, Mapping) else points
-    kept = quantities if callable(quantities) else tuple(quantity(text).text for text in quantities)
+    kept = quantities if callable(quantities) else _kept(quantities, verdict)
     task = Task(Path(scene), tuple(overrides), asked.keys, [], kept, verdict)
+    check_keys(task, asked.row(0))
     about, target = _about(task, asked), None if store is None else Path(store)
     if target is not None:
         claim(target, SUFFIX, files_of(load_scene(task.scene, task.overrides)))
@@ -217,8 +218,26 @@ def sweep(
     )
 
 
+def _kept(asked: Sequence[str], verdict: bool) -> tuple[str, ...]:
+    """What is asked for, checked."""
+    found = tuple(quantity(text).text for text in ([asked] if isinstance(asked, str) else asked))
+    message = ""
+    if not found:
+        message, remedy = "nothing is kept of the runs", "e.g. --get 'max(tip.distance)'"
+    elif "error" in found and not verdict:
+        message, remedy = "runs of a sweep do not state their error unless asked to", "add --verdict (verdict=True)"
+    if message:
+        raise SceneError(Cause.BAD_FIELD, message, where="--get", value=", ".join(found) or "nothing", remedy=remedy)
+    return found
+
+
 def _grid(points: Mapping[str, Sequence[Any]]) -> Grid:
-    axes = {key: tuple(_plain(value) for value in values) for key, values in points.items()}
+    axes = {}
+    for key, values in points.items():
+        if np.isscalar(values) or getattr(values, "shape", None) == ():
+            message, remedy = "not a list of values", "put a single value into brackets, too"
+            raise SceneError(Cause.BAD_FIELD, message, where=f"points[{key!r}]", value=values, remedy=remedy)
+        axes[key] = tuple(_plain(value) for value in values)
     if not axes or not all(axes.values()):
         message, remedy = "a sweep needs at least one point", "give values by key"
         raise SceneError(Cause.BAD_FIELD, message, where="points", value=points, remedy=remedy)
