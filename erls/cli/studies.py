@@ -273,7 +273,7 @@ def sweep(
     workers
         Runs at a time; as many as cores unless given.
     force
-        Replace an existing file that is no store of a sweep, or no such table.
+        Replace a store that holds finished points, or an existing file that is no such store or table.
     json
         Print one JSON object.
     """
@@ -292,8 +292,6 @@ def sweep(
     check_output(output, [scene], set_ or [], (SUFFIX,), force, [] if points is None else [points])
     if table is not None:
         claim(table, ".csv", read_by([scene], set_ or []), force)
-    if force and output is not None and not resume:
-        output.unlink(missing_ok=True)
     executor = dask_client(scheduler) if scheduler else None
     with Progress("sweep") as advance:
         found = sweep(
@@ -303,6 +301,7 @@ def sweep(
             overrides=set_ or (),
             store=output,
             resume=resume,
+            force=force,
             retry=retry_failed,
             executor=executor,
             workers=workers,

@@ -233,6 +233,16 @@ def test_what_was_finished_is_not_run_again(tmp_path: Path, alone: np.ndarray, m
     assert swept(store=store, resume=True).ran == 0
 
 
+def test_a_store_with_finished_points_is_not_replaced_by_chance(tmp_path: Path) -> None:
+    """It may have taken a night; what holds none goes."""
+    store = tmp_path / "r.sweep"
+    one = {"overrides": SHORT, "store": store}
+    erls.sweep(SCENE, {ANGLE: (0.0,)}, GET, **one)
+    with pytest.raises(SceneError, match=r"1 finished points.*--resume.*--force"):
+        erls.sweep(SCENE, {ANGLE: (5.0,)}, GET, **one)
+    assert erls.sweep(SCENE, {ANGLE: (5.0,)}, GET, force=True, **one).rows[0].parameters == [5.0]
+
+
 def test_kill_9_loses_nothing_finished(tmp_path: Path, alone: np.ndarray) -> None:
     """What was told to be kept is there, whole, and the rest is run."""
     store = tmp_path / "r.sweep"

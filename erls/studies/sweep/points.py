@@ -92,6 +92,30 @@ class Listed:
         return tuple(row.tolist() if isinstance(row, np.ndarray) else row)
 
 
+def grid_of(points: Mapping[str, Sequence[Any]]) -> Grid:
+    """Values by key, as Python gives them.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: no values, or one that is no list.
+    """
+    axes = {}
+    for key, values in points.items():
+        if np.isscalar(values) or getattr(values, "shape", None) == ():
+            message, remedy = "not a list of values", "put a single value into brackets, too"
+            raise SceneError(Cause.BAD_FIELD, message, where=f"points[{key!r}]", value=values, remedy=remedy)
+        axes[key] = tuple(_plain(value) for value in values)
+    if not axes or not all(axes.values()):
+        message, remedy = "a sweep needs at least one point", "give values by key"
+        raise SceneError(Cause.BAD_FIELD, message, where="points", value=points, remedy=remedy)
+    return Grid(axes)
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value.tolist() if isinstance(value, np.ndarray) else value
+
+
 def sampled(ranges: Mapping[str, Sequence[float]], method: str, count: int, seed: int = 0) -> Listed:
     """Points spread over ranges.
 

@@ -124,6 +124,25 @@ def quantity(text: str) -> Quantity:
     return Quantity(asked, _plain(name), time=value)
 
 
+def kept_texts(asked: Sequence[str], verdict: bool) -> tuple[str, ...]:
+    """What is asked for, checked.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: nothing, not of one of the forms, or the error of runs that state none.
+    """
+    found = tuple(quantity(text).text for text in ([asked] if isinstance(asked, str) else asked))
+    message = ""
+    if not found:
+        message, remedy = "nothing is kept of the runs", "e.g. --get 'max(tip.distance)'"
+    elif "error" in found and not verdict:
+        message, remedy = "runs of a sweep do not state their error unless asked to", "add --verdict (verdict=True)"
+    if message:
+        raise SceneError(Cause.BAD_FIELD, message, where="--get", value=", ".join(found) or "nothing", remedy=remedy)
+    return found
+
+
 def values_of(run: Run, quantities: Sequence[Quantity]) -> list[float]:
     """Each of them.
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.files.optional import optional_package
+from erls.files.output import not_writable
 from erls.files.results import claim
 from erls.maths.so3 import Array
 from erls.run.record import Run
@@ -23,8 +24,8 @@ from erls.scene.read import load_scene
 from erls.studies.pool import each
 from erls.studies.sweep.evaluate import Reduction, Task, check_keys, evaluate, numbers_of, row_of, run_point
 from erls.studies.sweep.executors import evaluated, workers_of
-from erls.studies.sweep.points import Grid, Points
-from erls.studies.sweep.quantities import quantity
+from erls.studies.sweep.points import Grid, Points, grid_of
+from erls.studies.sweep.quantities import kept_texts, quantity
 from erls.studies.sweep.store import SUFFIX, Row, Store
 from fe_import.errors import ReportedError
 from fe_import.files.versions import package_version
@@ -131,6 +132,7 @@ def sweep(
     overrides: Sequence[str] = (),
     store: Path | str | None = None,
     resume: bool = False,
+    force: bool = False,
     retry: bool = False,
     executor: Any = None,
     workers: int | None = None,
@@ -150,9 +152,11 @@ def sweep(
     overrides : sequence of str
         ``KEY=VALUE`` of all points.
     store : Path or str, optional
-        File that keeps every point as it is finished; in memory unless given. What it held before goes, unless
+        File that keeps points as they are finished; in memory unless given.
     resume : bool
-        goes on with it: points that it holds are not run again.
+        Go on with the store: points that it holds are not run again.
+    force : bool
+        Replace a store that holds finished points, which is refused otherwise.
     retry : bool
         With ``resume``: run again what failed.
     executor : object, optional
@@ -185,15 +189,15 @@ def sweep(
     [[0.5], [0.4331]]
     """
     begun = time.perf_counter()
-    asked = _grid(points) if isinstance(points, Mapping) else points
-    kept = quantities if callable(quantities) else _kept(quantities, verdict)
+    asked = grid_of(points) if isinstance(points, Mapping) else points
+    kept = quantities if callable(quantities) else kept_texts(quantities, verdict)
     task = Task(Path(scene), tuple(overrides), asked.keys, [], kept, verdict)
     check_keys(task, asked.row(0))
     about, target = _about(task, asked), None if store is None else Path(store)
     if target is not None:
-        claim(target, SUFFIX, files_of(load_scene(task.scene, task.overrides)))
+        claim(target, SUFFIX, files_of(load_scene(task.scene, task.overrides)), force and not resume)
         if not resume:
-            target.unlink(missing_ok=True)
+            _make_room(target, force)
     with closing(Store(target)) as base:
         if base.empty:
             base.begin(about)
@@ -218,34 +222,15 @@ def sweep(
     )
 
 
-def _kept(asked: Sequence[str], verdict: bool) -> tuple[str, ...]:
-    """What is asked for, checked."""
-    found = tuple(quantity(text).text for text in ([asked] if isinstance(asked, str) else asked))
-    message = ""
-    if not found:
-        message, remedy = "nothing is kept of the runs", "e.g. --get 'max(tip.distance)'"
-    elif "error" in found and not verdict:
-        message, remedy = "runs of a sweep do not state their error unless asked to", "add --verdict (verdict=True)"
-    if message:
-        raise SceneError(Cause.BAD_FIELD, message, where="--get", value=", ".join(found) or "nothing", remedy=remedy)
-    return found
-
-
-def _grid(points: Mapping[str, Sequence[Any]]) -> Grid:
-    axes = {}
-    for key, values in points.items():
-        if np.isscalar(values) or getattr(values, "shape", None) == ():
-            message, remedy = "not a list of values", "put a single value into brackets, too"
-            raise SceneError(Cause.BAD_FIELD, message, where=f"points[{key!r}]", value=values, remedy=remedy)
-        axes[key] = tuple(_plain(value) for value in values)
-    if not axes or not all(axes.values()):
-        message, remedy = "a sweep needs at least one point", "give values by key"
-        raise SceneError(Cause.BAD_FIELD, message, where="points", value=points, remedy=remedy)
-    return Grid(axes)
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value.tolist() if isinstance(value, np.ndarray) else value
+def _make_room(target: Path, force: bool) -> None:
+    """Take away a store that was there, unless it holds what may have taken long."""
+    if target.exists() and not force:
+        with closing(Store(target)) as base:
+            held = 0 if base.empty else len(list(base.finished()))
+        if held:
+            remedy = "go on with it (--resume), name another, or replace it (--force)"
+            raise not_writable(target, f"it holds {held} finished points", remedy)
+    target.unlink(missing_ok=True)
 
 
 def _about(task: Task, points: Points) -> dict[str, Any]:
