@@ -46,11 +46,13 @@ from erls.maths.vectors import (
 
 @part
 def column(table: Array, j: int) -> Twist:
+    """Column j of a (6, n) table: its translational and its rotational part."""
     return (table[0, j], table[1, j], table[2, j]), (table[3, j], table[4, j], table[5, j])
 
 
 @part
 def set_column(table: Array, j: int, a: Twist) -> None:
+    """Put a twist or wrench into column j of a (6, n) table."""
     table[0, j], table[1, j], table[2, j] = a[0]
     table[3, j], table[4, j], table[5, j] = a[1]
 

@@ -79,6 +79,7 @@ def _bend(model: Model, poses: Array, before: Array, out: Array, e: int) -> tupl
 
 @part
 def section_force(model: Model, e: int, u: Vector, psi: Vector) -> Twist:
+    """Force [N] and moment [N m] of a section, of the strains of element e less those that it was built with."""
     built = model.beam_built
     return of_matrix(model.beam_stiffness, e, minus(u, vector(built, e, 0)), minus(psi, vector(built, e, 3)))
 
