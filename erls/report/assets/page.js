@@ -200,7 +200,14 @@
 
   function start() {
     document.querySelectorAll("table").forEach((table) => { if (table.tBodies[0]?.rows.length > 2) sortable(table); });
-    const draw = (box) => { if (box.dataset.drawn) return; box.dataset.drawn = "1"; (box.className === "view" ? drawView : drawPlot)(box); };
+    const draw = (box) => { // one that fails, for want of drawing in space say, keeps none of the others
+      if (box.dataset.drawn) return;
+      box.dataset.drawn = "1";
+      try { (box.className === "view" ? drawView : drawPlot)(box); } catch (failure) {
+        box.textContent = `This could not be drawn: ${failure.message}`;
+        console.error(failure);
+      }
+    };
     const seen = new IntersectionObserver((entries) => {
       for (const entry of entries) if (entry.isIntersecting) { seen.unobserve(entry.target); draw(entry.target); }
     }, { rootMargin: "400px" });
