@@ -167,7 +167,7 @@ class FEModel:
     stiffness_parts : dict of sparse CSC
         The stiffness split by kind of strain energy (frames), to name the modes; may be empty.
     kind : str
-        ``"frame"``, ``"solid"`` or ``"matrices"``.
+        ``"frame"``, ``"solid"`` (also with shells beside), ``"shell"`` or ``"matrices"``.
     source : str
         File that the model came from.
     stress : StressSource or None

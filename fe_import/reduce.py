@@ -161,15 +161,17 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
 def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) -> tuple[HealthCheck, ...]:
     if link.description.solid is None:
         return ()
-    from fe_import.elements.solid_stress import SolidStress  # frames have no use for it
+    from fe_import.elements.mixed_stress import MixedStress  # frames have no use for it
+    from fe_import.elements.solid_stress import SolidStress
     from fe_import.health.incompressible import check_incompressible
     from fe_import.health.mesh_error import check_mesh_error
     from fe_import.health.mesh_shape import check_mesh_shape
 
-    assert isinstance(model.stress, SolidStress)
+    source = model.stress.parts[0] if isinstance(model.stress, MixedStress) else model.stress
+    assert isinstance(source, SolidStress)
     limit = link.description.solid.mesh_error
-    shape = (*check_mesh_shape(model.stress.mesh), *check_incompressible(model.stress))
-    return (*shape, *check_mesh_error(model, model.stress, shapes, omega, limit, str(link.path)))
+    shape = (*check_mesh_shape(source.mesh), *check_incompressible(source))
+    return (*shape, *check_mesh_error(model, source, shapes, omega, limit, str(link.path)))
 
 
 def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck, ...]:

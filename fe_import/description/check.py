@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from fe_import.description.records import Damping, LinkDescription, Material
+from fe_import.description.records import Damping, Layer, LinkDescription, Material, Shell, ShellRegion
 from fe_import.description.reduction import check_reduction_options
 from fe_import.elements.sections import check_section
 from fe_import.errors import Cause, FEImportError, ReportedError
@@ -26,6 +26,7 @@ _CHOICES = {
     "frame.mass": ("consistent", "lumped"),
     "frame.torsion": ("saint-venant", "polar"),
     "solid.hex8": ("incompatible-modes", "compatible"),
+    "shell.mass": ("consistent", "lumped"),
 }
 
 
@@ -37,9 +38,10 @@ def check_link(link: LinkDescription, file: str) -> None:
     FEImportError
         Naming file, field, value and remedy.
     """
-    if [link.frame, link.solid, link.matrices].count(None) != 2:
-        message = "give exactly one of the tables 'frame', 'solid' and 'matrices'"
-        raise _fail(file, message, remedy="a link has one model")
+    meshed = link.solid if link.solid is not None else link.shell
+    if [link.frame, meshed, link.matrices].count(None) != 2:
+        message = "give exactly one of the tables 'frame', 'solid', 'shell' and 'matrices'"
+        raise _fail(file, message, remedy="a link has one model; only solid and shell go together")
     for field, options in _CHOICES.items():
         table, name = field.split(".")
         record = getattr(link, table)
@@ -63,9 +65,18 @@ def check_link(link: LinkDescription, file: str) -> None:
     if link.solid is not None and not 0 < link.solid.mesh_error < math.inf:
         message, remedy = "an error must be positive", "give a share, as 0.05 for 5 percent"
         raise _fail(f"{file}: solid.mesh_error", message, link.solid.mesh_error, remedy)
+    if link.shell is not None:
+        _check_shell(link, link.shell, f"{file}: shell")
+    for name, m in link.materials.items():
+        _check_fibres(link, m, f"{file}: materials.{name}")
     for name, section in link.sections.items():
         check_section(section, f"{file}: sections.{name}")
-    for table, nodes in (("frame", link.frame), ("solid", link.solid), ("matrices", link.matrices)):
+    for table, nodes in (
+        ("frame", link.frame),
+        ("solid", link.solid),
+        ("shell", link.shell),
+        ("matrices", link.matrices),
+    ):
         for name, position in nodes.nodes.items() if nodes is not None else ():
             place = f"{file}: {table}.nodes.{name}"
             if not name or "\0" in name:
@@ -107,6 +118,68 @@ def check_link(link: LinkDescription, file: str) -> None:
     if link.temperature_change is not None:
         _check_temperature(link, link.temperature_change, file)
     check_damping(link.damping, f"{file}: damping")
+
+
+def _check_shell(link: LinkDescription, shell: Shell, place: str) -> None:
+    """Where it comes from, and figures of its thickness."""
+    if bool(shell.mesh) == (link.solid is not None):
+        message = "shells beside a solid are of its mesh" if shell.mesh else "shells need a mesh"
+        raise _fail(f"{place}.mesh", message, shell.mesh or None, "name the mesh once, in [solid] or else in [shell]")
+    for field in ("ignore", "nodes") if link.solid is not None else ():
+        if getattr(shell, field):
+            raise _fail(f"{place}.{field}", "the solid has this field for the whole mesh", remedy="move it to [solid]")
+    if link.solid is not None and not shell.regions:
+        message, remedy = "shells beside a solid are named by their sets", "add [[shell.regions]]"
+        raise _fail(f"{place}.regions", message, remedy=remedy)
+    if shell.regions and (shell.material or shell.layers or shell.thickness is not None or shell.offset):
+        message = "give either 'regions' or one thickness for the whole mesh"
+        raise _fail(place, message, remedy="material, thickness, layers and offset of a set stand in its region")
+    if not 0 < shell.drilling <= 1:
+        raise _fail(f"{place}.drilling", "a share must be above 0 and at most 1", shell.drilling, "0.01 does well")
+    if shell.direction is not None and not (all(map(math.isfinite, shell.direction)) and any(shell.direction)):
+        raise _fail(f"{place}.direction", "a direction must be finite and not zero", shell.direction, "as [1, 0, 0]")
+    for made, where in (
+        [(shell, place)]
+        if not shell.regions
+        else [(region, f"{place}.regions[{k}]") for k, region in enumerate(shell.regions)]
+    ):
+        _check_thickness(link, made, where)
+
+
+def _check_thickness(link: LinkDescription, made: Shell | ShellRegion, place: str) -> None:
+    if bool(made.layers) == bool(made.material or made.thickness is not None):
+        message = "give either 'layers' or 'material' and 'thickness'"
+        raise _fail(place, message, remedy="layers are for laminates, from the bottom to the top")
+    if not math.isfinite(made.offset):
+        raise _fail(f"{place}.offset", "an offset must be finite", made.offset, "give a height above the nodes")
+    layers = [(layer, f"{place}.layers[{k}]") for k, layer in enumerate(made.layers)]
+    for layer, where in layers or [(Layer(made.material, made.thickness or 0.0), place)]:
+        choose(layer.material, link.materials, f"{where}.material")
+        if not (math.isfinite(layer.thickness) and layer.thickness > 0):
+            raise _fail(f"{where}.thickness", "a thickness must be positive", layer.thickness, "give a value above 0")
+        if not math.isfinite(layer.angle):
+            raise _fail(f"{where}.angle", "an angle must be finite", layer.angle, "give degrees")
+
+
+def _check_fibres(link: LinkDescription, m: Material, place: str) -> None:
+    """Moduli of a layer of fibres go together, and only in shells."""
+    fields = ("transverse_modulus", "shear_modulus", "transverse_shear_modulus")
+    given = [field for field in fields if getattr(m, field) is not None]
+    if not given:
+        return
+    if link.shell is None or link.solid is not None:
+        message, remedy = "only links of shells alone have layers of fibres", "remove it, or give the link as 'shell'"
+        raise _fail(f"{place}.{given[0]}", message, getattr(m, given[0]), remedy)
+    for field in given:
+        value = getattr(m, field)
+        if not (math.isfinite(value) and value > 0):
+            raise _fail(f"{place}.{field}", f"{field} must be positive", value, "give a value above 0")
+    if m.transverse_modulus is None or m.shear_modulus is None:
+        message = "'transverse_modulus' and 'shear_modulus' go together"
+        raise _fail(place, message, remedy="a layer of fibres has E1, E2, nu12 and G12")
+    if m.poissons_ratio**2 >= m.youngs_modulus / m.transverse_modulus:
+        message = "the square of Poisson's ratio must stay below E1 / E2"
+        raise _fail(f"{place}.poissons_ratio", message, m.poissons_ratio, "it is nu12, of tension along the fibres")
 
 
 def _check_temperature(link: LinkDescription, change: float, file: str) -> None:

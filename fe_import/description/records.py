@@ -45,7 +45,7 @@ class Units(_Record, frozen=True):
 
 
 class Material(_Record, frozen=True):
-    """Isotropic linear elastic material, in the stated units.
+    """Linear elastic material, isotropic unless it has a ``transverse_modulus``, in the stated units.
 
     Attributes
     ----------
@@ -57,12 +57,21 @@ class Material(_Record, frozen=True):
         ρ [kg/m³].
     thermal_expansion : float, optional
         Coefficient of linear thermal expansion α [1/K]; needed where the link has a ``temperature_change``.
+    transverse_modulus : float, optional
+        Of a layer of fibres: E2 [Pa] across them, and then E is E1, ν is ν12. Only shells may have such layers.
+    shear_modulus : float, optional
+        G12 = G13 [Pa]; needed with ``transverse_modulus``.
+    transverse_shear_modulus : float, optional
+        G23 [Pa]; G12 unless given.
     """
 
     youngs_modulus: float
     poissons_ratio: float
     density: float
     thermal_expansion: float | None = None
+    transverse_modulus: float | None = None
+    shear_modulus: float | None = None
+    transverse_shear_modulus: float | None = None
 
 
 class Member(_Record, frozen=True):
@@ -167,6 +176,93 @@ class Solid(_Record, frozen=True):
     ignore: list[str] = []
 
 
+class Layer(_Record, frozen=True):
+    """A layer of a shell.
+
+    Attributes
+    ----------
+    material : str
+        A name from ``[materials]``.
+    thickness : float
+        [m]
+    angle : float
+        Of its fibres, from ``direction`` about the normal [degrees].
+    """
+
+    material: str
+    thickness: float
+    angle: float = 0.0
+
+
+class ShellRegion(_Record, frozen=True):
+    """The shells of a named set of the mesh, and what they are made of; as in ``[shell]``.
+
+    Attributes
+    ----------
+    set : str
+        Element set of the mesh.
+    material : str
+        A name from ``[materials]``.
+    thickness : float, optional
+        [m]
+    layers : list of Layer
+        Instead of ``material`` and ``thickness``: from the bottom to the top.
+    offset : float
+        Height of the middle of the thickness above the nodes, along the normal [m].
+    """
+
+    set: str
+    material: str = ""
+    thickness: float | None = None
+    layers: list[Layer] = []
+    offset: float = 0.0
+
+
+class Shell(_Record, frozen=True):
+    """A link meshed with shells, triangles and quadrangles of 3 and 4 nodes with six components each.
+
+    Beside ``[solid]`` its mesh is that of the solid, and the sets of ``regions`` are the shells.
+
+    Attributes
+    ----------
+    mesh : str
+        As in ``[solid]``; every triangle and quadrangle of it is a shell. Left out beside ``[solid]``.
+    material : str
+        A name from ``[materials]``, for the whole mesh.
+    thickness : float, optional
+        [m]; positive.
+    layers : list of Layer
+        Instead of ``material`` and ``thickness``: from the bottom to the top, ``[[shell.layers]]``.
+    offset : float
+        Height of the middle of the thickness above the nodes, along the normal, about which the nodes of an element go
+        anticlockwise [m].
+    regions : list of ShellRegion
+        Instead of these: one for each set of shells, ``[[shell.regions]]``.
+    direction : (3,) floats, optional
+        Whose projection on the surface is the first axis of layers; needed where these are not isotropic.
+    nodes : dict of (3,) floats
+        Names for the mesh nodes nearest to these positions [m]; scenes may refer to them.
+    drilling : float
+        Stiffness by which the surface takes rotations about its normal along, in shares of G times the thickness.
+    mass : str
+        ``consistent`` with the interpolation of the elements, or ``lumped`` at the nodes.
+    ignore : list of str
+        Keywords, cards and types of elements of the mesh file that the link is to be without.
+    """
+
+    mesh: str = ""
+    material: str = ""
+    thickness: float | None = None
+    layers: list[Layer] = []
+    offset: float = 0.0
+    regions: list[ShellRegion] = []
+    direction: Vector | None = None
+    nodes: dict[str, Vector] = {}
+    drilling: float = 0.01
+    mass: str = "consistent"
+    ignore: list[str] = []
+
+
 class Matrices(_Record, frozen=True):
     """A link whose mass and stiffness matrices a finite-element program exported.
 
@@ -238,7 +334,7 @@ class Interface(_Record, frozen=True):
 
 
 class Recovery(_Record, frozen=True):
-    """Where stress (solids) or section forces (frames) can be found from the modal coordinates later.
+    """Where stress (solids, shells) or section forces (frames) can be found from the modal coordinates later.
 
     Attributes
     ----------
@@ -289,7 +385,7 @@ class Damping(_Record, frozen=True):
 
 
 class LinkDescription(_Record, frozen=True):
-    """A link: exactly one of ``frame``, ``solid`` and ``matrices``, its interfaces and its reduction.
+    """A link: one of ``frame``, ``solid``, ``shell`` and ``matrices`` (or solid and shell), interfaces, reduction.
 
     Attributes
     ----------
@@ -307,6 +403,8 @@ class LinkDescription(_Record, frozen=True):
         The link is made of beams.
     solid : Solid, optional
         The link is meshed with solid elements.
+    shell : Shell, optional
+        The link is meshed with shells; beside ``solid`` a part of it.
     matrices : Matrices, optional
         The link comes as exported matrices.
     masses : list of PointMass
@@ -329,6 +427,7 @@ class LinkDescription(_Record, frozen=True):
     sections: dict[str, Section] = {}
     frame: Frame | None = None
     solid: Solid | None = None
+    shell: Shell | None = None
     matrices: Matrices | None = None
     masses: list[PointMass] = []
     reduction: Reduction = Reduction()
@@ -340,4 +439,6 @@ class LinkDescription(_Record, frozen=True):
         """The files that it names, as they stand there."""
         if self.solid is not None:
             return [self.solid.mesh]
+        if self.shell is not None:
+            return [self.shell.mesh]
         return [] if self.matrices is None else [name for _, name in sorted(self.matrices.files.items())]

@@ -1,4 +1,4 @@
-"""A mesh of solid elements, of one type or several, and its surface: data only."""
+"""A mesh of solid elements, of shells, or of both, of one type or several, and its surface: data only."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fe_import.elements.attachments import Attachment
+from fe_import.elements.shell_elements import SHELL_ELEMENTS, ShellElement
 from fe_import.elements.solid_elements import SOLID_ELEMENTS, SolidElement
 from fe_import.model import Array, IntArray
 
@@ -32,6 +33,22 @@ class ElementBlock:
     def element(self) -> SolidElement:
         """The element type's entry in the registry."""
         return SOLID_ELEMENTS[self.type]
+
+    def __len__(self) -> int:
+        return len(self.elements)
+
+
+@dataclass(frozen=True)
+class ShellCells:
+    """Shell elements of one type: key of ``SHELL_ELEMENTS``, and nodes (m, k), anticlockwise seen from the top."""
+
+    type: str
+    elements: IntArray
+
+    @property
+    def element(self) -> ShellElement:
+        """The element type's entry in the registry."""
+        return SHELL_ELEMENTS[self.type]
 
     def __len__(self) -> int:
         return len(self.elements)
@@ -107,16 +124,16 @@ class MeshMaterials:
 
 @dataclass(frozen=True)
 class SolidMesh:
-    """Nodes, elements and named sets of a solid link.
+    """Nodes, elements and named sets of a link of solid elements or shells.
 
     Attributes
     ----------
     nodes : (n, 3) array
         Positions in the mesh frame, in the file's unit of length; every node belongs to an element.
     blocks : tuple of ElementBlock
-        Elements are counted through all blocks.
+        Solid elements, counted through all blocks.
     element_sets : dict
-        Name -> elements, rising.
+        Name -> solid elements, rising.
     node_sets : dict
         Name -> nodes, rising.
     source : str
@@ -132,6 +149,10 @@ class SolidMesh:
     attachments : tuple of Attachment
         Further nodes have negative numbers: those of the mesh and these in one array, counted from its end.
     materials : MeshMaterials
+    shells : tuple of ShellCells
+        Counted through all of them, from 0.
+    shell_sets : dict
+        Name -> shells, rising.
     """
 
     nodes: Array
@@ -145,6 +166,8 @@ class SolidMesh:
     further_names: dict[str, int] = field(default_factory=dict)
     attachments: tuple[Attachment, ...] = ()
     materials: MeshMaterials = field(default_factory=MeshMaterials)
+    shells: tuple[ShellCells, ...] = ()
+    shell_sets: dict[str, IntArray] = field(default_factory=dict)
 
     @staticmethod
     def uniform(nodes: Array, elements: IntArray, element_type: str, **further: Any) -> SolidMesh:
@@ -159,8 +182,23 @@ class SolidMesh:
 
     @property
     def count(self) -> int:
-        """Number of elements."""
+        """Number of solid elements."""
         return sum(map(len, self.blocks))
+
+    @property
+    def shell_count(self) -> int:
+        """Number of shells."""
+        return sum(map(len, self.shells))
+
+    @property
+    def all_elements(self) -> list[IntArray]:
+        """Nodes (m, k) of all elements, type by type, solids first."""
+        return [*(block.elements for block in self.blocks), *(cells.elements for cells in self.shells)]
+
+    @property
+    def shell_nodes(self) -> IntArray:
+        """Nodes of shells, rising; they turn."""
+        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(c.elements.ravel() for c in self.shells)]))
 
     def parts(self, chosen: IntArray | None = None) -> Iterator[tuple[ElementBlock, IntArray, IntArray]]:
         """Each block with its chosen elements: their rows in it, and their numbers through all blocks."""
@@ -184,10 +222,11 @@ class SolidMesh:
         return np.concatenate([self.nodes[own].mean(axis=1) for own in corners])
 
     def element_nodes(self, number: int) -> IntArray:
-        """(k,) nodes of one element."""
-        for block, rows, _ in self.parts(np.array([number])):
-            if len(rows):
-                return np.asarray(block.elements[rows[0]])
+        """(k,) nodes of one element; shells are counted behind the solids."""
+        for elements in self.all_elements:
+            if number < len(elements):
+                return np.asarray(elements[number])
+            number -= len(elements)
         raise IndexError(number)
 
 
@@ -215,8 +254,9 @@ class ElementFaces:
 
 def element_faces(mesh: SolidMesh) -> ElementFaces:
     """All faces of all elements, and which of them are one and the same."""
-    width = max(len(face) for block in mesh.blocks for face in block.element.faces)
-    nodes, corners, sizes, owner = [], [], [], []
+    width = max((len(face) for block in mesh.blocks for face in block.element.faces), default=4)
+    none = np.zeros(0, dtype=np.int64)
+    nodes, corners, sizes, owner = [none.reshape(0, width)], [none.reshape(0, 4)], [none], [none]
     for block, _, numbers in mesh.parts():
         for face, edges in zip(block.element.faces, block.element.cell.faces, strict=True):
             rows = np.full((len(block), width), -1, dtype=np.int64)
@@ -232,10 +272,11 @@ def element_faces(mesh: SolidMesh) -> ElementFaces:
 
 
 def boundary_faces(mesh: SolidMesh) -> list[IntArray]:
-    """Faces of one element only, anticlockwise seen from outside: an array (f, k) for each number of nodes k."""
+    """Faces of one solid only, anticlockwise seen from outside, then shells: arrays (f, k) of k nodes each."""
     faces = element_faces(mesh)
     alone = np.bincount(faces.label)[faces.label] == 1
-    return [faces.nodes[alone & (faces.sizes == k), :k] for k in np.unique(faces.sizes[alone])]
+    solids = [faces.nodes[alone & (faces.sizes == k), :k] for k in np.unique(faces.sizes[alone])]
+    return [*solids, *(cells.elements for cells in mesh.shells)]
 
 
 # a face of n nodes -> triangles over its nodes (corners, then mid-edge nodes, then centre), same sense

@@ -40,6 +40,8 @@ class InterfaceFace:
         ``rigid``, ``averaged`` or ``node``.
     weights : (k,) array or None
         Positive weights of the nodes, for the average; equal ones when None.
+    turns : bool
+        Whether its nodes turn, as those of shells do, and go with the interface node in this, too: an edge will do.
     """
 
     name: str
@@ -47,6 +49,7 @@ class InterfaceFace:
     position: Array
     coupling: str = "rigid"
     weights: Array | None = None
+    turns: bool = False
 
     @property
     def shares(self) -> Array:
@@ -95,7 +98,6 @@ def interface_face(
             remedy=f"node sets of this mesh: {known}",
         )
     nodes = mesh.node_sets[node_set]
-    _check_count(name, nodes, mesh.source)
     place = _centroid(mesh, nodes) if position is None else np.asarray(position, dtype=float)
     shares = area_weights(mesh, nodes, name) if weights == "area" else None
     return InterfaceFace(name, nodes, place, coupling, shares)
@@ -145,20 +147,21 @@ def _check_weights(face: InterfaceFace, weights: Array, source: str) -> None:
         )
 
 
-def _check_count(name: str, nodes: IntArray, source: str) -> None:
-    if len(nodes) < 3:
+def _check_count(face: InterfaceFace, source: str) -> None:
+    least = 1 if face.turns else 3
+    if len(face.nodes) < least:
         raise _faulty(
-            f"interface {name!r} has too few nodes to carry rotations",
+            f"interface {face.name!r} has too few nodes to carry rotations",
             source,
-            value=len(nodes),
-            limit="at least 3, not on one line",
+            value=len(face.nodes),
+            limit="at least 1" if face.turns else "at least 3, not on one line",
         )
 
 
 def _check_face(face: InterfaceFace, nodes: Array, source: str) -> None:
     if face.coupling == "node":
         return
-    _check_count(face.name, face.nodes, source)
+    _check_count(face, source)
     if face.nodes[0] < 0 or face.nodes[-1] >= len(nodes):
         raise _faulty(
             f"interface {face.name!r} names nodes that do not exist",
@@ -167,6 +170,9 @@ def _check_face(face: InterfaceFace, nodes: Array, source: str) -> None:
             limit=f"0 ... {len(nodes) - 1}",
         )
     points = nodes[face.nodes]
+    if face.turns:
+        _check_place(face, points, float(np.linalg.norm(np.ptp(nodes, axis=0))), source)
+        return
     size, whole = (float(np.linalg.norm(np.ptp(p, axis=0))) for p in (points, nodes))
     if size <= SMALL * whole:
         raise _faulty(
@@ -185,6 +191,10 @@ def _check_face(face: InterfaceFace, nodes: Array, source: str) -> None:
             limit=f"above {NARROW:g}",
             remedy="couple a face, not an edge",
         )
+    _check_place(face, points, size, source)
+
+
+def _check_place(face: InterfaceFace, points: Array, size: float, source: str) -> None:
     if np.shape(face.position) != (3,) or not np.isfinite(face.position).all():
         raise _faulty(
             f"position of interface {face.name!r} is not three numbers",

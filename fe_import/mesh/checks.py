@@ -1,4 +1,7 @@
-"""Faults of a solid mesh that would give wrong matrices or a wrong mechanism without a word."""
+"""Faults of a mesh that would give wrong matrices or a wrong mechanism without a word.
+
+Elements are counted through the solids, then through the shells.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -35,14 +39,15 @@ def check_mesh(mesh: SolidMesh) -> None:
     _check_coordinates(mesh)
     _check_repeated_nodes(mesh)
     _check_coincident_nodes(mesh)
-    _check_shapes(mesh)
-    _check_mid_nodes(mesh)
+    if mesh.blocks:
+        _check_shapes(mesh)
+        _check_mid_nodes(mesh)
+    if mesh.shells:
+        _check_shell_shapes(mesh)
     _check_connections(mesh)
 
 
-def _faulty(
-    mesh: SolidMesh, message: str, remedy: str, cause: Cause = Cause.MESH, **details: Any
-) -> FEImportError:
+def _faulty(mesh: SolidMesh, message: str, remedy: str, cause: Cause = Cause.MESH, **details: Any) -> FEImportError:
     return FEImportError(cause, message, where=mesh.source, remedy=remedy, **details)
 
 
@@ -66,13 +71,13 @@ def _check_coordinates(mesh: SolidMesh) -> None:
 
 
 def _check_repeated_nodes(mesh: SolidMesh) -> None:
-    twice = [(np.diff(np.sort(block.elements, axis=1), axis=1) == 0).any(axis=1) for block in mesh.blocks]
+    twice = [(np.diff(np.sort(elements, axis=1), axis=1) == 0).any(axis=1) for elements in mesh.all_elements]
     bad = np.flatnonzero(np.concatenate(twice))
     if bad.size:
         raise _faulty(
             mesh,
             f"{bad.size} elements use a node twice, the first is {_element(mesh, int(bad[0]))}",
-            "replace collapsed elements by wedges, pyramids or tetrahedra",
+            "replace collapsed elements by wedges, pyramids, tetrahedra or triangles",
         )
 
 
@@ -134,6 +139,32 @@ def _check_shapes(mesh: SolidMesh) -> None:
         )
 
 
+def _check_shell_shapes(mesh: SolidMesh) -> None:
+    """Quadrangles must be convex and triangles have an area; seen from all corners on the same side."""
+    worst = []
+    for cells in mesh.shells:
+        corners = mesh.nodes[cells.elements]
+        ahead = np.roll(corners, -1, axis=1) - corners
+        back = np.roll(corners, 1, axis=1) - corners
+        normals = np.cross(ahead, back)
+        scale = np.linalg.norm(ahead, axis=2) * np.linalg.norm(back, axis=2)
+        whole = normals.sum(axis=1)
+        length = np.linalg.norm(whole, axis=1, keepdims=True)
+        along = np.einsum("ekc,ec->ek", normals, whole / np.where(length > 0, length, 1.0))
+        worst.append((along / np.where(scale > 0, scale, 1.0)).min(axis=1))
+    found = np.concatenate(worst)
+    bad = np.flatnonzero(found <= FLAT)
+    if bad.size:
+        raise _faulty(
+            mesh,
+            f"{bad.size} of {len(found)} shells have no area or a corner that turns back, "
+            f"the first is {_element(mesh, mesh.count + int(bad[0]))}",
+            "refine or repair the mesh there",
+            value=float(f"{found[bad[0]]:.3g}"),
+            limit=f"sine of the angle at each corner above {FLAT:g}",
+        )
+
+
 def _check_mid_nodes(mesh: SolidMesh) -> None:
     """Neighbours must share the mid-side nodes of a shared edge or face, and nobody else may use them."""
     corners = np.unique(np.concatenate([b.elements[:, : b.element.corners].ravel() for b in mesh.blocks]))
@@ -180,6 +211,12 @@ def _repeated(values: IntArray) -> IntArray:
 
 
 def _check_connections(mesh: SolidMesh) -> None:
+    solids = _solid_parts(mesh) if mesh.blocks else np.zeros(0, dtype=np.int64)
+    _check_parts(mesh, np.concatenate([solids, solids.max(initial=-1) + 1 + _shell_parts(mesh)]))
+
+
+def _solid_parts(mesh: SolidMesh) -> IntArray:
+    """(elements,) which of them faces join; faces of three, and two of the same corners, are refused."""
     faces = element_faces(mesh)
     label, owner = faces.label, faces.owner
     crowded = np.flatnonzero(np.bincount(label)[label] > 2)
@@ -198,18 +235,54 @@ def _check_connections(mesh: SolidMesh) -> None:
             f"two elements have the same corners, one is {_element(mesh, int(shared.row[twins.argmax()]))}",
             "remove doubled elements",
         )
-    _check_parts(mesh, connected_components(shared, directed=False)[1])
+    return np.asarray(connected_components(shared, directed=False)[1], dtype=np.int64)
+
+
+def _shell_parts(mesh: SolidMesh) -> IntArray:
+    """(shells,) which of them edges join; two of the same corners are refused."""
+    edges, owners, corners, start = [], [], [], 0
+    for cells in mesh.shells:
+        numbers = start + np.arange(len(cells))
+        for k in range(cells.element.corners):
+            edges.append(cells.elements[:, [k, (k + 1) % cells.element.corners]])
+            owners.append(numbers)
+        rows = np.full((len(cells), 4), -1, dtype=np.int64)
+        rows[:, : cells.element.corners] = cells.elements
+        corners.append(np.sort(rows, axis=1))
+        start += len(cells)
+    if not start:
+        return np.zeros(0, dtype=np.int64)
+    _, first, times = np.unique(np.concatenate(corners), axis=0, return_index=True, return_counts=True)
+    if (times > 1).any():
+        one = _element(mesh, mesh.count + int(first[times > 1][0]))
+        raise _faulty(mesh, f"two shells have the same corners, one is {one}", "remove doubled elements")
+    label = np.unique(np.sort(np.concatenate(edges), axis=1), axis=0, return_inverse=True)[1].ravel()
+    owner = np.concatenate(owners)
+    incidence = sp.csr_array((np.ones(len(label)), (owner, label)), shape=(start, int(label.max()) + 1))
+    return np.asarray(connected_components(incidence @ incidence.T, directed=False)[1], dtype=np.int64)
 
 
 def _check_parts(mesh: SolidMesh, part: IntArray) -> None:
-    """Parts of the mesh (elements,) that no face joins must be joined by attachments, and so must further nodes."""
+    """Parts of the mesh (elements,) that no face or edge joins need attachments, and so do further nodes.
+
+    A shell is joined to the solid whose nodes it shares.
+    """
     count, further = int(part.max()) + 1, len(mesh.further_nodes)
-    vertex = np.empty(len(mesh.nodes) + further, dtype=np.int64)  # of the graph of parts, then further nodes
+    vertex = np.full(len(mesh.nodes) + further, -1, dtype=np.int64)  # of the graph of parts, then further nodes
     for block, _, numbers in mesh.parts():
         vertex[block.elements] = part[numbers][:, None]
+    joined, start = [np.zeros((0, 2), dtype=np.int64)], mesh.count
+    of_solids = vertex.copy()
+    for cells in mesh.shells:
+        own = np.repeat(part[start : start + len(cells), None], cells.elements.shape[1], axis=1)
+        there = of_solids[cells.elements]
+        joined.append(np.column_stack([own[there >= 0], there[there >= 0]]))
+        vertex[cells.elements[there < 0]] = own[there < 0]
+        start += len(cells)
     vertex[len(mesh.nodes) :] = count + np.arange(further)
     rows = [vertex[np.array(nodes_of(item), dtype=np.int64)] for item in mesh.attachments]
     pairs = np.array([(own[0], other) for own in rows for other in own[1:]], dtype=np.int64).reshape(-1, 2)
+    pairs = np.concatenate([pairs, *joined])
     graph = sp.coo_array((np.ones(len(pairs)), pairs.T), shape=(count + further,) * 2)
     together = connected_components(graph, directed=False)[1]
     apart = np.setdiff1d(together[count:], together[:count])
@@ -219,9 +292,9 @@ def _check_parts(mesh: SolidMesh, part: IntArray) -> None:
         listed = ", ".join(f'"{name}"' for name in sorted(names))
         raise _faulty(
             mesh,
-            f"{', '.join(sorted(names))} on a node that nothing joins to the solid, "
+            f"{', '.join(sorted(names))} on a node that nothing joins to the mesh, "
             f"at {mesh.further_nodes[first].tolist()}",
-            f"join it (*RIGID BODY, RBE2 ...), or ignore = [{listed}] in [solid]",
+            f"join it (*RIGID BODY, RBE2 ...), or ignore = [{listed}]",
             cause=Cause.DISCONNECTED,
         )
     part = together[:count][part]
@@ -230,11 +303,11 @@ def _check_parts(mesh: SolidMesh, part: IntArray) -> None:
         sizes = np.bincount(part)
         rarest = int(np.where(sizes > 0, sizes, sizes.max() + 1).argmin())
         smallest = _element(mesh, int((part == rarest).argmax()))
-        one, others = (mesh.nodes_of(np.flatnonzero(own)) for own in (part == part[0], part != part[0]))
+        one, others = (_nodes_of(mesh, own) for own in (part == part[0], part != part[0]))
         touching = np.intersect1d(one, others).size > 0
         raise _faulty(
             mesh,
-            f"the mesh has {parts} parts that no element face joins"
+            f"the mesh has {parts} parts that no element {'edge' if mesh.shells else 'face'} joins"
             + (" (they touch at nodes or edges only)" if touching else "")
             + f", the smallest of {sizes[rarest]} elements, with {smallest}",
             "fuse the parts before meshing, or mesh each link alone",
@@ -242,3 +315,9 @@ def _check_parts(mesh: SolidMesh, part: IntArray) -> None:
             value=parts,
             limit=1,
         )
+
+
+def _nodes_of(mesh: SolidMesh, chosen: NDArray[np.bool_]) -> IntArray:
+    """Nodes of the chosen elements (elements,)."""
+    elements = [row for rows in mesh.all_elements for row in rows]
+    return np.unique(np.concatenate([elements[k] for k in np.flatnonzero(chosen)]))

@@ -1,4 +1,4 @@
-"""Masses, springs and constraints that a mesh file attaches to a solid, in its matrices and its independent dofs.
+"""Shells, and masses, springs and constraints that a mesh file attaches, in the matrices and the independent dofs.
 
 Constraints are eliminated exactly, in this order: rigid bodies, ties, equations, averages. What cannot be (a component
 that follows twice, a circle) is refused; a tie or an equation that follows from others changes nothing.
@@ -65,14 +65,14 @@ def attached_nodes(mesh: SolidMesh) -> AttachedNodes:
     nodes = np.vstack([mesh.nodes, mesh.further_nodes])
     dof_map = np.full((len(nodes), 6), -1, dtype=np.int64)
     dof_map[:, :3] = np.arange(3 * len(nodes)).reshape(-1, 3)
-    turning = sorted({node for item in mesh.attachments for node in needs_rotations(item)})
+    asked = {node % len(nodes) for item in mesh.attachments for node in needs_rotations(item)}
+    turning = sorted(asked | set(mesh.shell_nodes.tolist()))
     dof_map[turning, 3:] = 3 * len(nodes) + np.arange(3 * len(turning)).reshape(-1, 3)
     return AttachedNodes(nodes, dof_map, 3 * (len(nodes) + len(turning)))
 
 
-def attached_matrices(mesh: SolidMesh, where: AttachedNodes) -> tuple[sp.csc_array, sp.csc_array]:
-    """(rows, rows) mass and stiffness of point masses, springs and beams."""
-    mass, stiffness = _Entries(), _Entries()
+def add_attached(mesh: SolidMesh, where: AttachedNodes, mass: Entries, stiffness: Entries) -> None:
+    """Matrices of point masses, springs and beams."""
     for item in mesh.attachments:
         if isinstance(item, AttachedMass):
             dofs = where.dof_map[item.node]
@@ -90,23 +90,30 @@ def attached_matrices(mesh: SolidMesh, where: AttachedNodes) -> tuple[sp.csc_arr
             present = np.ix_(dofs >= 0, dofs >= 0)  # a node of a solid does not turn where the beam's end is pinned
             for entries, block in zip((mass, stiffness), beam_matrices(item), strict=True):
                 entries.add(dofs[dofs >= 0], block[present])
-    return mass.matrix(where.rows), stiffness.matrix(where.rows)
 
 
-class _Entries:
+class Entries:
+    """Element matrices that become a sparse one."""
+
     def __init__(self) -> None:
-        self.rows: list[IntArray] = []
-        self.blocks: list[Array] = []
+        self._rows: list[IntArray] = []
+        self._blocks: list[Array] = []
 
     def add(self, rows: IntArray, block: Array) -> None:
-        self.rows.append(rows)
-        self.blocks.append(block)
+        """One (k, k) of rows (k,)."""
+        self.add_all(rows[None], block[None])
+
+    def add_all(self, rows: IntArray, blocks: Array) -> None:
+        """Some (e, k, k) of rows (e, k)."""
+        self._rows.append(rows)
+        self._blocks.append(blocks)
 
     def matrix(self, size: int) -> sp.csc_array:
+        """(size, size), their sum."""
         none = np.zeros(0, dtype=np.int64)
-        i = np.concatenate([none, *(np.repeat(r, len(r)) for r in self.rows)])
-        j = np.concatenate([none, *(np.tile(r, len(r)) for r in self.rows)])
-        values = np.concatenate([np.zeros(0), *(b.ravel() for b in self.blocks)])
+        i = np.concatenate([none, *(np.repeat(r, r.shape[1], axis=1).ravel() for r in self._rows)])
+        j = np.concatenate([none, *(np.tile(r, (1, r.shape[1])).ravel() for r in self._rows)])
+        values = np.concatenate([np.zeros(0), *(b.ravel() for b in self._blocks)])
         return sp.coo_array((values, (i, j)), shape=(size, size)).tocsc()
 
 
@@ -182,9 +189,7 @@ def _following(state: Dependence, followers: IntArray, terms: sp.csr_array) -> D
     return state.following(columns, expression)
 
 
-def _with_tie(
-    state: Dependence, item: TiedNodes, mesh: SolidMesh, where: AttachedNodes
-) -> tuple[Dependence, int]:
+def _with_tie(state: Dependence, item: TiedNodes, mesh: SolidMesh, where: AttachedNodes) -> tuple[Dependence, int]:
     """Ties of nodes to faces, and how many nodes are too far away; what follows already does so by equations."""
     faces = _faces(item, mesh)
     own = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(f.ravel() for f in faces)]))
@@ -209,9 +214,7 @@ def _with_tie(
         assert found is not None
         for row in np.flatnonzero(~free):
             one = terms[[row]]
-            found = _with_equation(
-                found, np.array([followers[row], *one.indices]), np.array([-1.0, *one.data])
-            )
+            found = _with_equation(found, np.array([followers[row], *one.indices]), np.array([-1.0, *one.data]))
     return found, int((~near).sum())
 
 

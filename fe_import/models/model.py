@@ -45,9 +45,9 @@ def build_model(link: LinkFile) -> FEModel:
 
         model = matrices_model(link)
     else:
-        from fe_import.models.solid import solid_model  # scikit-fem and meshio are heavy
+        from fe_import.models.solid import meshed_model  # scikit-fem and meshio are heavy
 
-        model = solid_model(link)
+        model = meshed_model(link)
     model = add_masses(model, description.masses, where)
     return to_si(model, description, where)
 

@@ -1,16 +1,19 @@
-"""From the description of a solid link to its finite-element model."""
+"""From the description of a link meshed with solids or shells to its finite-element model."""
 
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from fe_import.description.link import LinkFile
-from fe_import.description.records import Interface, LinkDescription, Solid
+from fe_import.description.records import Interface, LinkDescription, Shell, Solid, Vector
 from fe_import.elements.attachments import AttachedBeam, AttachedSpring, needs_rotations
 from fe_import.elements.elasticity import turned_moduli
+from fe_import.elements.mixed_stress import MixedStress
+from fe_import.elements.shell_stress import ShellPart, shell_stress
 from fe_import.elements.solid import SolidMaterial, assemble_solid, volume
 from fe_import.elements.solid_mesh import FILLING, SolidMesh, surface_triangles
 from fe_import.elements.solid_orders import raised, with_incompatible_modes
@@ -19,13 +22,14 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
 from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
-from fe_import.mesh.read import read_mesh
-from fe_import.model import Array, FEModel, IntArray
-from fe_import.models.attached import attached_constraints, attached_matrices, attached_nodes
+from fe_import.mesh.read import Wanted, read_mesh
+from fe_import.model import Array, FEModel, IntArray, StressSource
+from fe_import.models.attached import AttachedNodes, Entries, add_attached, attached_constraints, attached_nodes
 from fe_import.models.hinges import check_hinges
+from fe_import.models.shell import add_shells, shell_parts
 
 
-def solid_model(link: LinkFile) -> FEModel:
+def meshed_model(link: LinkFile) -> FEModel:
     """Read the mesh, assemble mass and stiffness, and let each interface node move its face.
 
     Raises
@@ -34,36 +38,41 @@ def solid_model(link: LinkFile) -> FEModel:
         A faulty mesh, set, material or interface.
     """
     description, where = link.description, str(link.path)
-    solid = description.solid
-    if solid is None:
-        raise FEImportError(Cause.BAD_FIELD, "not a solid link", where=where)
-    path = link.folder / solid.mesh
-    if "\0" in solid.mesh or not path.is_file():
+    solid, shell = description.solid, description.shell
+    table, name = ("solid", solid.mesh) if solid is not None else ("shell", "" if shell is None else shell.mesh)
+    path = link.folder / name
+    if "\0" in name or not path.is_file():
         raise FEImportError(
             Cause.FILE_NOT_FOUND,
             "no such mesh file",
-            where=f"{where}: solid.mesh",
-            value=solid.mesh,
+            where=f"{where}: {table}.mesh",
+            value=name,
             remedy="give a path that starts at the folder of the link description",
         )
-    return mesh_model(read_mesh(path, solid.ignore), description, where)
+    sets = () if shell is None else tuple(region.set for region in shell.regions)
+    wanted = Wanted(solid is not None, shell is not None, sets if solid is not None else ())
+    return mesh_model(read_mesh(path, (solid or shell or Shell()).ignore, wanted), description, where)
 
 
 def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEModel:
-    """The model of a checked mesh; see `solid_model`."""
-    solid = description.solid
-    assert solid is not None
-    if solid.raise_order:
-        mesh = raised(mesh)
-    if solid.hex8 == "incompatible-modes":
-        mesh = with_incompatible_modes(mesh)
-    materials, own = _materials(description, solid, mesh, where), not (solid.material or solid.regions)
-    mass, stiffness = assemble_solid(mesh, materials, _fillings(mesh, materials, where))
-    faces, untied = _faces(description, solid, mesh, where), dict[str, int]()
-    if mesh.attachments:
+    """The model of a checked mesh; see `meshed_model`."""
+    solid, shell = description.solid, description.shell
+    names = {} if solid is None and shell is None else (solid or shell or Shell()).nodes
+    materials: list[SolidMaterial] = []
+    if solid is not None:
+        if solid.raise_order:
+            mesh = raised(mesh)
+        if solid.hex8 == "incompatible-modes":
+            mesh = with_incompatible_modes(mesh)
+        materials = _materials(description, solid, mesh, where)
+        mass, stiffness = assemble_solid(mesh, materials, _fillings(mesh, materials, where))
+    own = solid is None or not (solid.material or solid.regions)
+    parts = [] if shell is None else shell_parts(description, shell, mesh, where)
+    faces, untied = _faces(description, names, mesh, where), dict[str, int]()
+    if mesh.attachments or mesh.shells:
         places = attached_nodes(mesh)
-        added, springs = attached_matrices(mesh, places)
-        mass, stiffness = _sum(mass, added), _sum(stiffness, springs)
+        added = _added(mesh, places, parts, "consistent" if shell is None else shell.mass)
+        mass, stiffness = added if solid is None else (_sum(mass, added[0]), _sum(stiffness, added[1]))
         constraints, untied = attached_constraints(mesh, places)
         coupled = couple_interfaces(places.nodes, faces, where, places.dof_map, places.rows, constraints)
     else:
@@ -80,16 +89,33 @@ def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEM
         interface_nodes=coupled.interface_nodes,
         independent=coupled.independent,
         coupling=coupled.coupling,
-        node_names=_named_nodes(solid, mesh, where),
+        node_names=_named_nodes(names, "solid" if solid is not None else "shell", mesh, where),
         triangles=surface_triangles(mesh),
-        kind="solid",
+        kind="shell" if solid is None else "solid",
         source=where,
-        stress=solid_stress(mesh, materials),
+        stress=_stress(mesh, materials, parts),
         left_out={name: n for name, n in mesh.left_out.items() if not own or name not in mesh.materials.names},
-        materials=_constants(mesh, own),
+        materials=_constants(mesh, own and solid is not None),
         notes=_attached_notes(mesh, untied),
         second_order_lack=_second_order_lack(mesh),
     )
+
+
+def _added(
+    mesh: SolidMesh, places: AttachedNodes, parts: list[ShellPart], form: str
+) -> tuple[sp.csc_array, sp.csc_array]:
+    """Mass and stiffness of what turns: shells and attachments."""
+    mass, stiffness = Entries(), Entries()
+    add_attached(mesh, places, mass, stiffness)
+    add_shells(parts, places, form, mass, stiffness)
+    return mass.matrix(places.rows), stiffness.matrix(places.rows)
+
+
+def _stress(mesh: SolidMesh, materials: list[SolidMaterial], parts: list[ShellPart]) -> StressSource:
+    if not parts:
+        return solid_stress(mesh, materials)
+    shells = shell_stress(mesh.nodes, parts, mesh.node_sets, mesh.shell_sets)
+    return shells if not mesh.blocks else MixedStress((solid_stress(mesh, materials), shells))
 
 
 def _sum(matrix: sp.csc_array, added: sp.csc_array) -> sp.csc_array:
@@ -108,8 +134,10 @@ def _attached_notes(mesh: SolidMesh, untied: dict[str, int]) -> dict[str, str]:
 
 def _second_order_lack(mesh: SolidMesh) -> str:
     """Why there is no second-order field: nodes that turn, and springs, would need theirs."""
+    if mesh.shells and mesh.blocks:
+        return "the link is of solid elements and shells"
     turning = any(needs_rotations(item) or isinstance(item, AttachedSpring) for item in mesh.attachments)
-    return "the mesh file attaches springs, or nodes that turn, to the solid" if turning else ""
+    return "the mesh file attaches springs, or nodes that turn" if turning else ""
 
 
 def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[SolidMaterial]:
@@ -198,18 +226,19 @@ def _constants(mesh: SolidMesh, own: bool) -> dict[str, tuple[float, float, floa
     return result
 
 
-def _faces(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> list[InterfaceFace]:
+def _faces(link: LinkDescription, given: dict[str, Vector], mesh: SolidMesh, where: str) -> list[InterfaceFace]:
     result = []
-    names = _named_nodes(solid, mesh, where)
+    table, turns = "shell" if link.solid is None else "solid", set(mesh.shell_nodes.tolist())
+    names = _named_nodes(given, table, mesh, where)
     for k, interface in enumerate(link.interfaces):
         place = f"{where}: interfaces[{k}]"
         if bool(interface.node) == bool(interface.face):
             raise FEImportError(
                 Cause.INTERFACE,
-                "an interface of a solid link sits on a face, or on a node that turns",
+                "an interface of a meshed link sits on a face, or on a node that turns",
                 where=place,
                 value=interface.node or None,
-                remedy="give face = SET, or node = NAME for a node of a beam or of a rigid body",
+                remedy="give face = SET, or node = NAME for a node of a shell, of a beam or of a rigid body",
             )
         if interface.node:
             result.append(_node(interface, mesh, names, place))
@@ -218,7 +247,7 @@ def _faces(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str) -> 
         try:
             weights = interface.weights or ("area" if interface.coupling == "averaged" else "uniform")
             face = interface_face(mesh, interface.name, interface.face, position, interface.coupling, weights)
-            result.append(face)
+            result.append(replace(face, turns=interface.coupling == "rigid" and turns.issuperset(face.nodes.tolist())))
         except FEImportError as problem:  # found in the mesh, to be mended in the description
             problem.where = f"{place}.face"
             problem.remedy = problem.remedy or "name a face of the mesh with 3 nodes or more, not on one line"
@@ -238,7 +267,7 @@ def _node(interface: Interface, mesh: SolidMesh, names: dict[str, int], place: s
             where=f"{place}.node",
             value=interface.node,
             limit=", ".join(sorted(known)) or "none is named",
-            remedy="give face = SET, or a node of a beam or of a rigid body by the set that holds it alone",
+            remedy="give face = SET, or a node of a shell, a beam or a rigid body by the set that holds it alone",
         )
     for field in ("position", "weights"):
         if getattr(interface, field):
@@ -255,19 +284,19 @@ def _positions(mesh: SolidMesh) -> Array:
     return np.vstack([mesh.nodes, mesh.further_nodes])
 
 
-def _named_nodes(solid: Solid, mesh: SolidMesh, where: str) -> dict[str, int]:
+def _named_nodes(given: dict[str, Vector], table: str, mesh: SolidMesh, where: str) -> dict[str, int]:
     """Nodes of the mesh, and of what is attached to it, nearest to the named positions."""
     result = {}
     nodes = _positions(mesh)
     limit = 0.05 * float(np.linalg.norm(np.ptp(nodes, axis=0)))
-    for name, position in solid.nodes.items():
+    for name, position in given.items():
         distance = np.linalg.norm(nodes - np.asarray(position), axis=1)
         nearest = int(distance.argmin())
         if not distance[nearest] <= limit:
             raise FEImportError(
                 Cause.BAD_REFERENCE,
                 "no mesh node near this position",
-                where=f"{where}: solid.nodes.{name}",
+                where=f"{where}: {table}.nodes.{name}",
                 value=tuple(position),
                 limit=f"{limit:.4g}, nearest {distance[nearest]:.4g}",
                 remedy="positions are in the mesh's frame and units",

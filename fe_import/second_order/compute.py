@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from fe_import.modal.second_order import SecondOrder
@@ -31,24 +33,29 @@ def second_order(model: FEModel, shapes: Array, reference: int) -> tuple[SecondO
         return None, f"not available: more than {MOST_MODES} elastic modes; keep fewer (reduction.elastic_modes)"
     if model.second_order_lack:
         return None, f"not available: {model.second_order_lack}"
-    if model.kind == "solid":
+    if model.kind in ("solid", "shell"):
         if count > MOST_MODES_OF_SOLIDS:
             return None, (
-                f"not available: more than {MOST_MODES_OF_SOLIDS} elastic modes of a solid; keep fewer "
+                f"not available: more than {MOST_MODES_OF_SOLIDS} elastic modes of a meshed link; keep fewer "
                 "(reduction.elastic_modes)"
             )
         if len(model.independent) > MOST_DOFS_OF_SOLIDS:
             return None, (
-                f"not available: a solid of more than {MOST_DOFS_OF_SOLIDS} dofs; mesh it more coarsely, or split the "
-                "link into substructures"
+                f"not available: a meshed link of more than {MOST_DOFS_OF_SOLIDS} dofs; mesh it more coarsely, "
+                "or split the link into substructures"
             )
-        from fe_import.elements.solid_stress import SolidStress  # scikit-fem is heavy
-        from fe_import.second_order.solid import solid_second_order
+        from fe_import.elements.shell_stress import ShellStress  # heavy
+        from fe_import.elements.solid_stress import SolidStress
+        from fe_import.second_order.element_forces import shell_forces, solid_forces
+        from fe_import.second_order.elements import elements_second_order
 
-        assert isinstance(model.stress, SolidStress)
-        return solid_second_order(
-            model, model.stress, shapes, reference, _named_nodes(model)
-        ), "from its solid elements"
+        source = model.stress
+        if isinstance(source, ShellStress):
+            forces, made = partial(shell_forces, source, model.dof_map), "from its shells"
+        else:
+            assert isinstance(source, SolidStress)
+            forces, made = partial(solid_forces, source, model.dof_map), "from its solid elements"
+        return elements_second_order(model, forces, shapes, reference, _named_nodes(model)), made
     if model.beams is not None:
         if not model.beams.is_tree:
             return None, (

@@ -212,7 +212,7 @@ def test_a_rigid_bar_and_equations(tmp_path):
             cards += ["," + ",".join(words[at : at + 8]) for at in range(9, len(words), 8)]
     (tmp_path / "mpc").mkdir()
     text = [grid(901, ROOT), at_tip, far, *beam, *cards]
-    with pytest.raises(FEImportError, match="CBAR on a node that nothing joins to the solid"):  # no case selects any
+    with pytest.raises(FEImportError, match="CBAR on a node that nothing joins to the mesh"):  # no case selects any
         link(tmp_path / "mpc", *text)
     path = tmp_path / "mpc" / "bar.bdf"
     cases = path.read_text()

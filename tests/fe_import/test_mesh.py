@@ -258,7 +258,7 @@ def test_sets_with_foreign_nodes(tmp_path):
     sets = {"REFERENCE": np.array([8]), "END": mesh.node_sets["x1"]}
     found = read_mesh(written(tmp_path / "box.inp", orphaned, point_sets=sets))
     assert sorted(found.node_sets) == ["END"]
-    assert "1 nodes that belong to no solid element" in found.lost_sets["REFERENCE"]
+    assert "1 nodes that belong to no element" in found.lost_sets["REFERENCE"]
     with pytest.raises(FEImportError, match="'REFERENCE', which is not usable: it holds 1 nodes"):
         interface_face(found, "A", "REFERENCE")
 

@@ -28,7 +28,8 @@ from fe_import.second_order.composition import twice_turned
 from fe_import.second_order.compute import MOST_DOFS_OF_SOLIDS, MOST_MODES, MOST_MODES_OF_SOLIDS, second_order
 from fe_import.second_order.frame import frame_second_order
 from fe_import.second_order.moments import of_inertia, of_masses
-from fe_import.second_order.solid import solid_second_order
+from fe_import.second_order.element_forces import solid_forces
+from fe_import.second_order.elements import elements_second_order
 
 THIRD, FOURTH = 7.0, 13.0  # least ratios of an error at twice the amplitude: 8 and 16, less what comes after
 

@@ -1,7 +1,7 @@
-"""Second-order field of a solid: modal derivatives that keep the strains of Green and Lagrange linear in the modes.
+"""Second-order field of solids and shells: modal derivatives that keep finite strains linear in the modes.
 
-With modes u = φ_a q_a those strains hold, in second order, ε(u₂) + ½ ∇uᵀ∇u. They cannot vanish everywhere; the field
-that makes them smallest in energy, the reference interface at rest, solves for each pair of modes
+With modes u = φ_a q_a the strains of Green and Lagrange hold, in second order, ε(u₂) + ½ ∇uᵀ∇u. They cannot vanish
+everywhere; the field that makes them smallest in energy, the reference interface at rest, solves for each pair of modes
 
     K Ψ_ab = -∫ ε(δ) : C : sym(∇φ_aᵀ ∇φ_b) dV
 
@@ -12,13 +12,10 @@ Nodes that follow an interface are turned finitely with it: ½ (θ_a × (θ_b ×
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from fe_import.elements.elasticity import stress_of_gradient
-from fe_import.elements.solid_assembly import chunks, motion_of_modes, slopes
-from fe_import.elements.solid_stress import SolidStress
 from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import expanded
@@ -29,8 +26,11 @@ from fe_import.solver.sparse import factorize
 _BLOCK_VALUES = 20_000_000  # entries of second-order fields held at a time
 
 
-def solid_second_order(
-    model: FEModel, solid: SolidStress, shapes: Array, reference: int, nodes: IntArray
+Forces = Callable[[Array, IntArray, IntArray], Array]  # of fields (d, n) and pairs of them, (d, pairs)
+
+
+def elements_second_order(
+    model: FEModel, forces: Forces, shapes: Array, reference: int, nodes: IntArray
 ) -> SecondOrder:
     """Solve for all pairs of elastic modes, a few at a time.
 
@@ -38,8 +38,8 @@ def solid_second_order(
     ----------
     model : FEModel
         In SI.
-    solid : SolidStress
-        Its elements.
+    forces : callable
+        ∫ ε(δ) : C : sym(∇φ_aᵀ ∇φ_b) dV of its elements, see `fe_import.second_order.element_forces`.
     shapes : (d, m) array
         Modes, the six rigid-body ones first.
     reference : int
@@ -63,7 +63,7 @@ def solid_second_order(
     weights, moving = _weights(model), np.asarray(model.mass @ shapes[:, 6:])[places]
     linear, moment, modal = np.zeros((3, m, m)), np.zeros((3, 3, m, m)), np.zeros((n, m, m))
     turned = model.dof_map[nodes][:, 3] >= 0
-    for some, fields in _solved(model, solid, relative, rows, first, second):
+    for some, fields in _solved(model, forces, relative, rows, first, second):
         stored[0][:, :, some] = fields[model.dof_map[nodes, :3]]
         stored[1][turned, :, some] = fields[model.dof_map[nodes[turned], 3:]]
         found = weights.T @ fields  # S, then ∫ρ x ⊗ Ψ
@@ -88,7 +88,7 @@ def solid_second_order(
 
 
 def _solved(
-    model: FEModel, solid: SolidStress, relative: Array, clamped: IntArray, first: IntArray, second: IntArray
+    model: FEModel, forces: Forces, relative: Array, clamped: IntArray, first: IntArray, second: IntArray
 ) -> Iterator[tuple[slice, Array]]:
     """Fields (d, some) of consecutive pairs."""
     _, stiffness = model.reduced_matrices()
@@ -102,7 +102,7 @@ def _solved(
     for begin in range(0, len(first), step):
         some = slice(begin, begin + step)
         given = _followed(model, relative, first[some], second[some])
-        force = -_membrane_forces(solid, relative, model.dof_map, first[some], second[some]) - model.stiffness @ given
+        force = -forces(relative, first[some], second[some]) - model.stiffness @ given
         reduced = force if model.coupling is None else model.coupling.T @ force
         fields = np.zeros((len(independent), force.shape[1]))
         fields[free] = solve(np.ascontiguousarray(reduced[free]))
@@ -118,31 +118,6 @@ def _followed(model: FEModel, relative: Array, first: IntArray, second: IntArray
         for node in others:
             arm = model.nodes[node] - interface.position
             result[model.dof_map[node, :3]] += twice_turned(theta, arm)[:, first, second]
-    return result
-
-
-def _membrane_forces(solid: SolidStress, fields: Array, dof_map: IntArray, first: IntArray, second: IntArray) -> Array:
-    """(d, pairs) ∫ ε(δ) : C : sym(∇φ_aᵀ ∇φ_b) dV."""
-    mesh = solid.mesh
-    result = np.zeros((len(fields), len(first)))
-    for element, nodes, some in chunks(mesh):
-        points, weights = element.quadrature(element.stiffness_order)
-        corners, k = mesh.nodes[nodes], element.size
-        derivatives, volume = slopes(element, corners, points)  # ∂_a of shape k
-        volume *= weights
-        moduli = solid.moduli_of(some)
-        modes = motion_of_modes(element, corners, moduli)
-        moved = fields[dof_map[nodes, :3]]  # (e, k, 3, n)
-        gradient = np.einsum("eqak,ekcn->eqacn", derivatives[..., :k], moved)  # ∂_a u_c
-        for begin in range(0, len(first), 64):
-            pairs = slice(begin, begin + 64)
-            product = np.einsum("eqacp,eqbcp->eqabp", gradient[..., first[pairs]], gradient[..., second[pairs]])
-            parts = stress_of_gradient(product, moduli)
-            stress = parts[:, :, ((0, 3, 5), (3, 1, 4), (5, 4, 2))]
-            forces = np.einsum("eqak,eqacp,eq->ekcp", derivatives, stress, volume, optimize=True)
-            inner = forces[:, k:].reshape(len(nodes), -1, forces.shape[3])
-            forces = forces[:, :k] + (modes.swapaxes(1, 2) @ inner).reshape(len(nodes), k, 3, -1)
-            np.add.at(result[:, pairs], dof_map[nodes, :3].ravel(), forces.reshape(-1, forces.shape[-1]))
     return result
 
 

@@ -1,0 +1,124 @@
+"""Shells of a mesh: what they are made of, by the link description, and their matrices over the nodes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fe_import.description.records import Layer, LinkDescription, Material, Shell, ShellRegion
+from fe_import.elements.laminates import Lamina, Laminate, plane_stress
+from fe_import.elements.shell import ShellBlock, element_matrices, lumped
+from fe_import.elements.shell_stress import ShellPart
+from fe_import.elements.solid_mesh import SolidMesh
+from fe_import.errors import Cause, FEImportError
+from fe_import.files.toml import choose
+from fe_import.model import Array, IntArray
+from fe_import.models.attached import AttachedNodes, Entries
+
+_CHUNK = 4000  # elements whose matrices are held at a time
+_ACROSS = 1e-3  # sine of the angle between a direction and the normal of a shell
+
+
+def shell_parts(link: LinkDescription, shell: Shell, mesh: SolidMesh, where: str) -> list[ShellPart]:
+    """Shells with one make and of one type each, in the order of the mesh.
+
+    Raises
+    ------
+    FEImportError
+        ``BAD_REFERENCE``: an unknown set; ``BAD_FIELD``: shells of no region or of two, layers without a direction,
+        or with one that stands on the surface.
+    """
+    makes = [laminate(link, made) for made in shell.regions] or [laminate(link, shell)]
+    which = _assigned(shell, mesh, where)
+    parts, start = [], 0
+    for cells in mesh.shells:
+        numbers = start + np.arange(len(cells))
+        for k, make in enumerate(makes):
+            own = numbers[which[numbers] == k]
+            if not len(own):
+                continue
+            nodes = cells.elements[own - start]
+            reference = None
+            if not make.isotropic:
+                reference = _directions(shell, mesh.nodes[nodes], where)
+            count = len(own)
+            stiffness, moments = np.tile(make.stiffness(), (count, 1, 1)), np.tile(make.moments(), (count, 1))
+            block = ShellBlock(cells.element, nodes, stiffness, moments, reference)
+            parts.append(ShellPart(block, own, make, shell.drilling))
+        start += len(cells)
+    return parts
+
+
+def add_shells(parts: list[ShellPart], where: AttachedNodes, form: str, mass: Entries, stiffness: Entries) -> None:
+    """Matrices of shells; ``form`` of the mass as in the description."""
+    for part in parts:
+        block = part.block
+        for begin in range(0, len(block.nodes), _CHUNK):
+            some = part.some(slice(begin, begin + _CHUNK)).block
+            masses, stiffnesses, _ = element_matrices(some, where.nodes[some.nodes], part.drilling)
+            rows = where.dof_map[some.nodes].reshape(len(some.nodes), -1)
+            mass.add_all(rows, lumped(masses) if form == "lumped" else masses)
+            stiffness.add_all(rows, stiffnesses)
+
+
+def laminate(link: LinkDescription, made: Shell | ShellRegion) -> Laminate:
+    """Of checked fields."""
+    layers = made.layers or [Layer(made.material, made.thickness or 0.0)]
+    return Laminate(tuple(_lamina(link.materials[layer.material], layer) for layer in layers), made.offset)
+
+
+def _lamina(m: Material, layer: Layer) -> Lamina:
+    shear = m.youngs_modulus / (2 * (1 + m.poissons_ratio)) if m.shear_modulus is None else m.shear_modulus
+    second = m.youngs_modulus if m.transverse_modulus is None else m.transverse_modulus
+    across = shear if m.transverse_shear_modulus is None else m.transverse_shear_modulus
+    plane = plane_stress(m.youngs_modulus, second, m.poissons_ratio, shear)
+    return Lamina(plane, np.array([shear, across]), m.density, layer.thickness, math.radians(layer.angle))
+
+
+def _assigned(shell: Shell, mesh: SolidMesh, where: str) -> IntArray:
+    """(shells,) number of the region of each."""
+    if not shell.regions:
+        return np.zeros(mesh.shell_count, dtype=np.int64)
+    which = np.full(mesh.shell_count, -1, dtype=np.int64)
+    for k, region in enumerate(shell.regions):
+        place = f"{where}: shell.regions[{k}].set"
+        choose(region.set, mesh.shell_sets, place)
+        own = mesh.shell_sets[region.set]
+        if (which[own] >= 0).any():
+            other = shell.regions[int(which[own].max())].set
+            raise FEImportError(
+                Cause.BAD_FIELD, f"shells of this set are of set {other!r}, too", where=place, value=region.set,
+                remedy="give every shell one region",
+            )  # fmt: skip
+        which[own] = k
+    if (which < 0).any():
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            f"{(which < 0).sum()} of {len(which)} shells are of no region",
+            where=f"{where}: shell.regions",
+            remedy="add a region for their set",
+        )
+    return which
+
+
+def _directions(shell: Shell, corners: Array, where: str) -> Array:
+    if shell.direction is None:
+        raise FEImportError(
+            Cause.BAD_FIELD, "layers that are not isotropic need a direction", where=f"{where}: shell.direction",
+            remedy="give the direction from which their angles count, as [1, 0, 0]",
+        )  # fmt: skip
+    direction = np.asarray(shell.direction) / np.linalg.norm(shell.direction)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    across = np.linalg.norm(np.cross(direction, normals), axis=1)
+    if across.min() < _ACROSS:
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            "the direction of layers stands on the surface of some shells",
+            where=f"{where}: shell.direction",
+            value=shell.direction,
+            limit=f"sine of the angle to the normal above {_ACROSS:g}, at {corners[across.argmin()].mean(axis=0)}",
+            remedy="give another direction, or split the link",
+        )
+    return np.tile(direction, (len(corners), 1))
