@@ -9,10 +9,11 @@ from fe_import.abaqus.elements import solid_type
 from fe_import.abaqus.orientations import orientation
 from fe_import.abaqus.statements import Unused, numbers, only, option
 from fe_import.elements.elasticity import checked_moduli, largest_youngs_modulus, orthotropic_moduli
-from fe_import.elements.solid_mesh import Filling, MeshMaterial, MeshMaterials, MeshSection
+from fe_import.elements.solid_mesh import Filling, MeshMaterial, MeshMaterials, MeshSection, ShellSection
 from fe_import.model import Array
 
 USED = ("MATERIAL", "ELASTIC", "DENSITY", "SOLID SECTION", "ORIENTATION")
+SHELL_SECTION = "SHELL SECTION"
 _ORDER = [0, 1, 2, 3, 5, 4]  # of decks: 11, 22, 33, 12, 13, 23
 _KINDS = {  # type of *ELASTIC -> numbers that it has
     **dict.fromkeys(("ISO", "ISOTROPIC"), 2),
@@ -41,7 +42,34 @@ def deck_materials(deck: Deck) -> MeshMaterials:
             sections.append(MeshSection(deck.element_sets.names.get(key, key), name, axes))
     except (Unused, ValueError) as reason:
         lack = str(reason)
-    return MeshMaterials(constants, tuple(sections), orientations, lack, USED)
+    shells, shell_lack = _shell_sections(deck, constants)
+    return MeshMaterials(constants, tuple(sections), orientations, lack, USED, shells=shells, shell_lack=shell_lack)
+
+
+def _shell_sections(deck: Deck, constants: dict[str, MeshMaterial]) -> tuple[tuple[ShellSection, ...], str]:
+    """All of them with their materials, or why they are not used."""
+    found = []
+    statements = [s for s in deck.statements if s.name == SHELL_SECTION]
+    if not statements:
+        return (), f"it has no *{SHELL_SECTION}"
+    try:
+        for statement in statements:
+            only(statement, "ELSET", "MATERIAL", "OFFSET", "ORIENTATION", "SECTION INTEGRATION", "POISSON")
+            name = option(statement, "MATERIAL").upper()
+            constants[name] = isotropic(deck, name)
+            thickness = numbers(statement.rows[0])[0] if statement.rows else 0.0
+            if not thickness > 0:
+                raise Unused("a section of shells lacks its thickness")
+            text = statement.options.get("OFFSET", "0").upper()
+            share = {"SPOS": 0.5, "SNEG": -0.5}.get(text) if text.isalpha() else numbers([text])[0]
+            if share is None:
+                raise Unused(f"an offset {text} of shells is not followed")
+            key = option(statement, "ELSET").upper()
+            shown = deck.element_sets.names.get(key, key)
+            found.append(ShellSection(shown, name, thickness, -share * thickness))  # nodes lie above the middle
+    except (Unused, ValueError) as reason:
+        return (), str(reason)
+    return tuple(found), ""
 
 
 def filling(deck: Deck, statement: Statement) -> Filling:

@@ -120,6 +120,9 @@ def check_link(link: LinkDescription, file: str) -> None:
     check_damping(link.damping, f"{file}: damping")
 
 
+_NOT_OF_THICKNESS = ("mesh", "direction", "nodes", "drilling", "mass", "ignore")
+
+
 def _check_shell(link: LinkDescription, shell: Shell, place: str) -> None:
     """Where it comes from, and figures of its thickness."""
     if bool(shell.mesh) == (link.solid is not None):
@@ -147,6 +150,8 @@ def _check_shell(link: LinkDescription, shell: Shell, place: str) -> None:
 
 
 def _check_thickness(link: LinkDescription, made: Shell | ShellRegion, place: str) -> None:
+    if isinstance(made, Shell) and made == Shell(**{f: getattr(made, f) for f in _NOT_OF_THICKNESS}):
+        return  # the mesh file has sections
     if bool(made.layers) == bool(made.material or made.thickness is not None):
         message = "give either 'layers' or 'material' and 'thickness'"
         raise _fail(place, message, remedy="layers are for laminates, from the bottom to the top")

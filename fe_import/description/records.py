@@ -221,7 +221,8 @@ class ShellRegion(_Record, frozen=True):
 class Shell(_Record, frozen=True):
     """A link meshed with shells, triangles and quadrangles of 3 and 4 nodes with six components each.
 
-    Beside ``[solid]`` its mesh is that of the solid, and the sets of ``regions`` are the shells.
+    Beside ``[solid]`` its mesh is that of the solid, and the sets of ``regions`` are the shells. Without any material,
+    thickness and layers an input deck brings them (``*SHELL SECTION``, ``PSHELL``).
 
     Attributes
     ----------

@@ -81,6 +81,16 @@ class MeshSection:
     orientation: str = ""
 
 
+@dataclass(frozen=True)
+class ShellSection:
+    """A set of shells of a mesh file, its isotropic material, thickness, and height of its middle above the nodes."""
+
+    elements: str
+    material: str
+    thickness: float
+    offset: float = 0.0
+
+
 FILLING = "NONSTRUCTURAL MASS"  # keyword of a filling
 
 
@@ -112,6 +122,9 @@ class MeshMaterials:
         What of the file they are made of.
     fillings : tuple of Filling
         Nonstructural masses, whatever the materials are.
+    shells : tuple of ShellSection
+    shell_lack : str
+        Why these cannot be used; empty when they can.
     """
 
     constants: dict[str, MeshMaterial] = field(default_factory=dict)
@@ -120,6 +133,8 @@ class MeshMaterials:
     lack: str = "it is none that brings materials"
     names: tuple[str, ...] = ()
     fillings: tuple[Filling, ...] = ()
+    shells: tuple[ShellSection, ...] = ()
+    shell_lack: str = "it is none that brings sections of shells"
 
 
 @dataclass(frozen=True)

@@ -98,9 +98,11 @@ def interface_face(
             remedy=f"node sets of this mesh: {known}",
         )
     nodes = mesh.node_sets[node_set]
+    turns = coupling == "rigid" and bool(np.isin(nodes, mesh.shell_nodes).all())
+    _check_count(name, nodes, turns, mesh.source)
     place = _centroid(mesh, nodes) if position is None else np.asarray(position, dtype=float)
     shares = area_weights(mesh, nodes, name) if weights == "area" else None
-    return InterfaceFace(name, nodes, place, coupling, shares)
+    return InterfaceFace(name, nodes, place, coupling, shares, turns)
 
 
 def _centroid(mesh: SolidMesh, nodes: IntArray) -> Array:
@@ -147,21 +149,20 @@ def _check_weights(face: InterfaceFace, weights: Array, source: str) -> None:
         )
 
 
-def _check_count(face: InterfaceFace, source: str) -> None:
-    least = 1 if face.turns else 3
-    if len(face.nodes) < least:
+def _check_count(name: str, nodes: IntArray, turns: bool, source: str) -> None:
+    if len(nodes) < (1 if turns else 3):
         raise _faulty(
-            f"interface {face.name!r} has too few nodes to carry rotations",
+            f"interface {name!r} has too few nodes to carry rotations",
             source,
-            value=len(face.nodes),
-            limit="at least 1" if face.turns else "at least 3, not on one line",
+            value=len(nodes),
+            limit="at least 1" if turns else "at least 3, not on one line",
         )
 
 
 def _check_face(face: InterfaceFace, nodes: Array, source: str) -> None:
     if face.coupling == "node":
         return
-    _check_count(face, source)
+    _check_count(face.name, face.nodes, face.turns, source)
     if face.nodes[0] < 0 or face.nodes[-1] >= len(nodes):
         raise _faulty(
             f"interface {face.name!r} names nodes that do not exist",

@@ -13,7 +13,7 @@ from fe_import.model import Array
 from fe_import.nastran.cards import Card
 from fe_import.nastran.grid import GridPoints
 
-_PROPERTY = re.compile(r"P(BAR|BEAM|ELAS|BUSH|SOLID)L?\Z")
+_PROPERTY = re.compile(r"P(BAR|BEAM|ELAS|BUSH|SOLID|SHEL)L?\Z")
 _MATERIAL = re.compile(r"MAT\d+\Z")
 _MOST_DIGITS = 9
 

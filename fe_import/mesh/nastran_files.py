@@ -22,7 +22,7 @@ from fe_import.files.includes import included_name, resolved
 from fe_import.files.text import TextFile
 from fe_import.mesh.nastran_attachments import READERS, attached
 from fe_import.mesh.nastran_bulk import Bulk, Unused
-from fe_import.mesh.nastran_materials import solid_materials
+from fe_import.mesh.nastran_materials import mesh_materials
 from fe_import.mesh.orders import HEIGHT_FIRST
 from fe_import.mesh.raw import Block, LeftOut, RawMesh
 from fe_import.model import IntArray
@@ -143,6 +143,7 @@ def _mesh(bulk: Bulk, cases: dict[int, str]) -> RawMesh:
     owners: dict[str, list[int]] = {}
     labels: set[int] = set()
     left_out: list[tuple[str, str, str]] = []
+    shells: set[int] = set()  # their properties
     attachments, reasons = _attachments(bulk, properties)
     for card in cards:
         kind_of_card = card.name.rstrip("_")  # as meshio writes those of second order
@@ -153,6 +154,11 @@ def _mesh(bulk: Bulk, cases: dict[int, str]) -> RawMesh:
         elif marks:
             shape, nodes = _SHAPES[marks][0], [card.integer(k) for k in range(3, 3 + marks)]
             left_out.append((card.name, card.where, ""))
+        elif kind_of_card in SURFACES:
+            count = SURFACES[kind_of_card]
+            shape, nodes = _SHAPES[count][0], [card.integer(k) for k in range(3, 3 + count)]
+            left_out += _of_shell(card, count)
+            shells.add(card.integer(2))
         else:
             why = f" ({reasons[card.name]})" if card.name in reasons else ""
             left_out.append((card.name, card.where, loss(card.name) + why))
@@ -178,7 +184,8 @@ def _mesh(bulk: Bulk, cases: dict[int, str]) -> RawMesh:
     for entry in _counted(left_out):
         known = entry.name in used or (entry.name in READERS and entry.name not in reasons)
         mesh.left_out.append(replace(entry, loss="", used=entry.name in used) if known else entry)
-    mesh.materials = solid_materials(bulk, {n for shape in cells if dimensions[shape] == 3 for n in owners[shape]})
+    solids = {n for shape in cells if dimensions[shape] == 3 for n in owners[shape]}
+    mesh.materials = mesh_materials(bulk, solids, shells)
     _add_properties(mesh, [np.array(owners[shape]) for shape in cells])
     _add_sets(mesh, cards, cases, place)
     return mesh
@@ -224,6 +231,12 @@ def _solid(card: Card, linear: str, quadratic: str) -> tuple[str, list[int]]:
             return kind, [given[k] for k in HEIGHT_FIRST.get(kind, range(len(given)))]
     sizes = " or ".join(str(MESH_ELEMENTS[kind].size) for kind in (linear, quadratic))
     raise card.fault("another number of grid points than these elements have", sum(map(bool, given)), sizes)
+
+
+def _of_shell(card: Card, count: int) -> Iterable[tuple[str, str, str]]:
+    yield card.name, card.where, loss(card.name)
+    if any(card.field(k) not in ("", "0", "0.", "0.0") for k in range(4 + count, len(card.fields) + 1)):
+        yield f"offset or thicknesses of {card.name}", card.where, "offsets and thicknesses of single shells"
 
 
 def _of_grid(card: Card) -> Iterable[tuple[str, str, str]]:

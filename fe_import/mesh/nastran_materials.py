@@ -1,4 +1,4 @@
-"""Materials of solids in bulk data: PSOLID with MAT1, MAT9, MAT11, and the coordinate system of the material."""
+"""Materials in bulk data: PSOLID with MAT1, MAT9, MAT11 and the system of the material; PSHELL with MAT1."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fe_import.elements.elasticity import checked_moduli, largest_youngs_modulus, orthotropic_moduli
-from fe_import.elements.solid_mesh import MeshMaterial, MeshMaterials, MeshSection
+from fe_import.elements.solid_mesh import MeshMaterial, MeshMaterials, MeshSection, ShellSection
 from fe_import.mesh.nastran_bulk import Bulk, Unused
 from fe_import.model import Array
 from fe_import.nastran.cards import Card
@@ -17,8 +17,8 @@ USED = ("PSOLID", "MAT1", "MAT9", "MAT11")
 _SAME = 1e-3  # share by which E, G and Poisson's ratio of one MAT1 may disagree
 
 
-def solid_materials(bulk: Bulk, owners: set[int]) -> MeshMaterials:
-    """Materials of the properties of solid elements."""
+def mesh_materials(bulk: Bulk, owners: set[int], shells: set[int]) -> MeshMaterials:
+    """Materials of the properties of solid elements, and of shells."""
     constants: dict[str, MeshMaterial] = {}
     sections: list[MeshSection] = []
     orientations: dict[str, Callable[[Array], Array]] = {}
@@ -39,7 +39,34 @@ def solid_materials(bulk: Bulk, owners: set[int]) -> MeshMaterials:
             sections.append(MeshSection(f"PID:{number}", name, axes))
     except (Unused, ValueError) as reason:
         lack = str(reason)
-    return MeshMaterials(constants, tuple(sections), orientations, lack, USED)
+    shell_sections, shell_lack = _shell_sections(bulk, shells, constants)
+    return MeshMaterials(
+        constants, tuple(sections), orientations, lack, USED, shells=shell_sections, shell_lack=shell_lack
+    )
+
+
+def _shell_sections(
+    bulk: Bulk, owners: set[int], constants: dict[str, MeshMaterial]
+) -> tuple[tuple[ShellSection, ...], str]:
+    """PSHELL of one material, which bends and shears as a solid plate; or why they are not used."""
+    found = []
+    try:
+        for number in sorted(owners):
+            card = bulk.property(number, ("PSHELL",))
+            material, thickness = card.integer(2), card.real(3, 0.0)
+            plain = card.integer(4, 0) == material and card.integer(6, material) == material
+            plain &= abs(card.real(5, 1.0) - 1) < _SAME and abs(card.real(7, 5 / 6) - 5 / 6) < _SAME
+            if not (plain and thickness > 0 and card.real(8, 0.0) == 0):
+                raise Unused(f"PSHELL {number} is no plate of one material without nonstructural mass")
+            own = bulk.materials.get(material)
+            if own is None or own.name != "MAT1":
+                raise Unused(f"material {material} of PSHELL {number} is no MAT1 of this file")
+            name = f"MAT1:{material}"
+            constants[name] = _isotropic(own)
+            found.append(ShellSection(f"PID:{number}", name, thickness))
+    except (Unused, ValueError) as reason:
+        return (), str(reason)
+    return tuple(found), "" if found else "its shells have no PSHELL"
 
 
 def _axes(frame: Frame) -> Callable[[Array], Array]:

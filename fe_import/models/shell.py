@@ -29,8 +29,14 @@ def shell_parts(link: LinkDescription, shell: Shell, mesh: SolidMesh, where: str
         ``BAD_REFERENCE``: an unknown set; ``BAD_FIELD``: shells of no region or of two, layers without a direction,
         or with one that stands on the surface.
     """
-    makes = [laminate(link, made) for made in shell.regions] or [laminate(link, shell)]
-    which = _assigned(shell, mesh, where)
+    if shell.regions:
+        makes = [laminate(link, made) for made in shell.regions]
+        sets = [(region.set, f"shell.regions[{k}].set") for k, region in enumerate(shell.regions)]
+    elif shell.material or shell.layers:
+        makes, sets = [laminate(link, shell)], []
+    else:
+        makes, sets = _of_mesh(mesh, where)
+    which = _assigned(sets, mesh, where)
     parts, start = [], 0
     for cells in mesh.shells:
         numbers = start + np.arange(len(cells))
@@ -76,27 +82,47 @@ def _lamina(m: Material, layer: Layer) -> Lamina:
     return Lamina(plane, np.array([shear, across]), m.density, layer.thickness, math.radians(layer.angle))
 
 
-def _assigned(shell: Shell, mesh: SolidMesh, where: str) -> IntArray:
-    """(shells,) number of the region of each."""
-    if not shell.regions:
+def _of_mesh(mesh: SolidMesh, where: str) -> tuple[list[Laminate], list[tuple[str, str]]]:
+    """Makes and sets of the sections that the mesh file brings."""
+    found = mesh.materials
+    if found.shell_lack:
+        raise FEImportError(
+            Cause.BAD_FIELD,
+            f"no 'material' and 'thickness', and the sections of the mesh file cannot be used: {found.shell_lack}",
+            where=f"{where}: shell",
+            remedy="give material and thickness for the whole mesh, or [[shell.regions]] for its sets",
+        )
+    makes, sets = [], []
+    for section in found.shells:
+        m = found.constants[section.material]
+        material = Material(m.youngs_modulus, m.poissons_ratio, m.density)
+        layer = _lamina(material, Layer(section.material, section.thickness))
+        makes.append(Laminate((layer,), section.offset))
+        sets.append((section.elements, "shell"))
+    return makes, sets
+
+
+def _assigned(sets: list[tuple[str, str]], mesh: SolidMesh, where: str) -> IntArray:
+    """(shells,) number of the make of each, from sets and the fields that name them."""
+    if not sets:
         return np.zeros(mesh.shell_count, dtype=np.int64)
     which = np.full(mesh.shell_count, -1, dtype=np.int64)
-    for k, region in enumerate(shell.regions):
-        place = f"{where}: shell.regions[{k}].set"
-        choose(region.set, mesh.shell_sets, place)
-        own = mesh.shell_sets[region.set]
+    for k, (name, field) in enumerate(sets):
+        place = f"{where}: {field}"
+        choose(name, mesh.shell_sets, place)
+        own = mesh.shell_sets[name]
         if (which[own] >= 0).any():
-            other = shell.regions[int(which[own].max())].set
+            other = sets[int(which[own].max())][0]
             raise FEImportError(
-                Cause.BAD_FIELD, f"shells of this set are of set {other!r}, too", where=place, value=region.set,
+                Cause.BAD_FIELD, f"shells of this set are of set {other!r}, too", where=place, value=name,
                 remedy="give every shell one region",
             )  # fmt: skip
         which[own] = k
     if (which < 0).any():
         raise FEImportError(
             Cause.BAD_FIELD,
-            f"{(which < 0).sum()} of {len(which)} shells are of no region",
-            where=f"{where}: shell.regions",
+            f"{(which < 0).sum()} of {len(which)} shells are of no region or section",
+            where=f"{where}: shell",
             remedy="add a region for their set",
         )
     return which

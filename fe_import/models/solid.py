@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -67,6 +66,9 @@ def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEM
         materials = _materials(description, solid, mesh, where)
         mass, stiffness = assemble_solid(mesh, materials, _fillings(mesh, materials, where))
     own = solid is None or not (solid.material or solid.regions)
+    brought = (solid is not None and own) or (
+        shell is not None and not (shell.material or shell.layers or shell.regions)
+    )
     parts = [] if shell is None else shell_parts(description, shell, mesh, where)
     faces, untied = _faces(description, names, mesh, where), dict[str, int]()
     if mesh.attachments or mesh.shells:
@@ -95,7 +97,7 @@ def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEM
         source=where,
         stress=_stress(mesh, materials, parts),
         left_out={name: n for name, n in mesh.left_out.items() if not own or name not in mesh.materials.names},
-        materials=_constants(mesh, own and solid is not None),
+        materials=_constants(mesh, brought),
         notes=_attached_notes(mesh, untied),
         second_order_lack=_second_order_lack(mesh),
     )
@@ -228,7 +230,7 @@ def _constants(mesh: SolidMesh, own: bool) -> dict[str, tuple[float, float, floa
 
 def _faces(link: LinkDescription, given: dict[str, Vector], mesh: SolidMesh, where: str) -> list[InterfaceFace]:
     result = []
-    table, turns = "shell" if link.solid is None else "solid", set(mesh.shell_nodes.tolist())
+    table = "shell" if link.solid is None else "solid"
     names = _named_nodes(given, table, mesh, where)
     for k, interface in enumerate(link.interfaces):
         place = f"{where}: interfaces[{k}]"
@@ -247,7 +249,7 @@ def _faces(link: LinkDescription, given: dict[str, Vector], mesh: SolidMesh, whe
         try:
             weights = interface.weights or ("area" if interface.coupling == "averaged" else "uniform")
             face = interface_face(mesh, interface.name, interface.face, position, interface.coupling, weights)
-            result.append(replace(face, turns=interface.coupling == "rigid" and turns.issuperset(face.nodes.tolist())))
+            result.append(face)
         except FEImportError as problem:  # found in the mesh, to be mended in the description
             problem.where = f"{place}.face"
             problem.remedy = problem.remedy or "name a face of the mesh with 3 nodes or more, not on one line"

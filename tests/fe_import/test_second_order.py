@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +27,10 @@ from fe_import.reduce import reduce_link
 from fe_import.second_order.beams import POINTS, line_fields
 from fe_import.second_order.composition import twice_turned
 from fe_import.second_order.compute import MOST_DOFS_OF_SOLIDS, MOST_MODES, MOST_MODES_OF_SOLIDS, second_order
-from fe_import.second_order.frame import frame_second_order
-from fe_import.second_order.moments import of_inertia, of_masses
 from fe_import.second_order.element_forces import solid_forces
 from fe_import.second_order.elements import elements_second_order
+from fe_import.second_order.frame import frame_second_order
+from fe_import.second_order.moments import of_inertia, of_masses
 
 THIRD, FOURTH = 7.0, 13.0  # least ratios of an error at twice the amplitude: 8 and 16, less what comes after
 
@@ -171,7 +172,7 @@ def test_modal_terms_are_the_mass_between_modes_and_field(tmp_path: Path, kind: 
     shapes, every = orthonormal(model, 3), np.arange(len(model.nodes))
     if kind == "solid":
         assert isinstance(model.stress, SolidStress)
-        found = solid_second_order(model, model.stress, shapes, 0, every)
+        found = elements_second_order(model, partial(solid_forces, model.stress, model.dof_map), shapes, 0, every)
     else:
         assert model.beams is not None
         found = frame_second_order(model, model.beams, shapes, 0, every)
@@ -239,7 +240,9 @@ def test_energy_of_solids_stays_quadratic_to_third_order(tmp_path: Path, couplin
     shapes = orthonormal(model, 2)
     solid = model.stress
     assert isinstance(solid, SolidStress)
-    found = solid_second_order(model, solid, shapes, 0, np.arange(len(model.nodes)))
+    found = elements_second_order(
+        model, partial(solid_forces, solid, model.dof_map), shapes, 0, np.arange(len(model.nodes))
+    )
     motions, rows = model.rigid_body_modes(), model.dof_map[model.interface_nodes[0].node]
     relative = shapes - motions @ np.linalg.solve(motions[rows], shapes[rows])
     left, bare = [], []
@@ -358,7 +361,7 @@ def test_matrices_and_many_modes_have_no_field(tmp_path: Path) -> None:
     for bare, count, reason in (
         (replace(model, beams=None, kind="matrices"), 2, "no elements"),
         (model, MOST_MODES + 1, "keep fewer"),
-        (replace(model, kind="solid"), MOST_MODES_OF_SOLIDS + 1, "modes of a solid"),
+        (replace(model, kind="solid"), MOST_MODES_OF_SOLIDS + 1, "modes of a meshed link"),
         (replace(model, kind="solid", independent=np.arange(MOST_DOFS_OF_SOLIDS + 1)), 2, "mesh it more coarsely"),
     ):
         field, statement = second_order(bare, shapes[:, : 6 + count], 0)
