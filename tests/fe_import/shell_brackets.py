@@ -1,0 +1,107 @@
+"""A bracket, a sheet of 5 mm of aluminium folded by a right angle: free frequencies of shells, solids, CalculiX."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse.linalg as sla
+from calculix import calculix_frequencies
+from link_files import write_toml
+from numpy.typing import NDArray
+from shell_meshes import ShellGrid, shell_grid, write_deck
+
+from fe_import.description.link import load_link
+from fe_import.models.model import build_model
+
+ALU = {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0}
+THICKNESS = 0.005
+
+
+def bracket(turns: int) -> ShellGrid:
+    """A foot of 0.2 by 0.1 m and an upright of 0.15 m."""
+    half = 8 * turns
+
+    def place(a: float, b: float) -> tuple[float, float, float]:
+        s = 14 * turns * a
+        if s <= half + 1e-9:
+            return 0.2 - 0.2 * s / half, 0.1 * b, 0.0
+        return 0.0, 0.1 * b, 0.15 * (s - half) / (6 * turns)
+
+    return shell_grid(14 * turns, 4 * turns, place, "quad4")
+
+
+def _frequencies(path: Path) -> NDArray[np.float64]:
+    """Of the whole model, not reduced."""
+    mass, stiffness = build_model(load_link(path)).reduced_matrices()
+    shift = (2 * np.pi * 50.0) ** 2
+    squares = sla.eigsh(stiffness, 12, mass, sigma=-shift, return_eigenvectors=False)
+    return np.asarray(np.sqrt(np.sort(squares)[6:]) / (2 * np.pi))
+
+
+def shell_bracket(folder: Path, turns: int) -> NDArray[np.float64]:
+    """The first six [Hz]; 8, 6 and 4 elements times ``turns`` along its sides."""
+    grid = bracket(turns)
+    write_deck(folder / f"shells{turns}.inp", grid, ends=False)
+    shell = {"mesh": f"shells{turns}.inp", "material": "m", "thickness": THICKNESS,
+             "nodes": {"c": grid.nodes[grid.at[0, 2 * turns]].tolist()}}  # fmt: skip
+    return _frequencies(write_toml(folder / f"shells{turns}.toml", {
+        "materials": {"m": ALU}, "shell": shell, "interfaces": [{"name": "hub", "node": "c"}],
+    }))  # fmt: skip
+
+
+def calculix_bracket(folder: Path, turns: int) -> NDArray[np.float64]:
+    """The same of CalculiX's S8R."""
+    grid = bracket(turns)
+    nodes, middles, rows = grid.nodes.tolist(), dict[tuple[int, int], int](), []
+    for row in grid.elements.tolist():
+        own = []
+        for a, b in zip(row, [*row[1:], row[0]], strict=True):
+            pair = (min(a, b), max(a, b))
+            if pair not in middles:
+                middles[pair] = len(nodes)
+                nodes.append(((grid.nodes[a] + grid.nodes[b]) / 2).tolist())
+            own.append(middles[pair])
+        rows.append([*row, *own])
+    deck = ["*NODE", *(f"{k + 1}, {x:.12g}, {y:.12g}, {z:.12g}" for k, (x, y, z) in enumerate(nodes))]
+    deck += ["*ELEMENT, TYPE=S8R, ELSET=E", *(", ".join(str(n + 1) for n in [k, *row]) for k, row in enumerate(rows))]
+    deck += ["*MATERIAL, NAME=M", "*ELASTIC", "7e10, .33", "*DENSITY", "2700.,"]
+    deck += ["*SHELL SECTION, ELSET=E, MATERIAL=M", f"{THICKNESS}"]
+    return calculix_frequencies(folder, deck, 12)[6:]
+
+
+def solid_bracket(folder: Path, turns: int) -> NDArray[np.float64]:
+    """The same of hexahedra of 20 nodes about the same middle surface, mitred at the fold."""
+    grid, half = bracket(turns), THICKNESS / 2
+    x, z = grid.nodes[:, 0], grid.nodes[:, 2]
+    fold = (np.abs(x) < 1e-12) & (np.abs(z) < 1e-12)
+    away = np.where((z > 1e-12)[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    away[fold] = [1.0, 0.0, 1.0]
+    nodes = np.vstack([grid.nodes - half * away, grid.nodes + half * away])
+    count = len(grid.nodes)
+    corners = np.hstack([grid.elements, grid.elements + count])
+    if np.linalg.det(nodes[corners[0, [1, 3, 4]]] - nodes[corners[0, 0]]) < 0:
+        corners = corners[:, [4, 5, 6, 7, 0, 1, 2, 3]]
+    every, middles, rows = nodes.tolist(), dict[tuple[int, int], int](), []
+    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    for row in corners.tolist():
+        own = []
+        for a, b in edges:
+            pair = (min(row[a], row[b]), max(row[a], row[b]))
+            if pair not in middles:
+                middles[pair] = len(every)
+                every.append(((nodes[pair[0]] + nodes[pair[1]]) / 2).tolist())
+            own.append(middles[pair])
+        rows.append([*row, *own])
+    root = [*grid.at[0], *(grid.at[0] + count)]
+    lines = ["*NODE", *(f"{k + 1}, {p[0]:.12g}, {p[1]:.12g}, {p[2]:.12g}" for k, p in enumerate(every))]
+    lines.append("*ELEMENT, TYPE=C3D20, ELSET=E")
+    for k, row in enumerate(rows):
+        given = [str(n + 1) for n in [k, *row]]
+        lines += [", ".join(given[:11]) + ",", ", ".join(given[11:])]
+    lines += ["*NSET, NSET=ROOT", *(f"{n + 1}," for n in root)]
+    (folder / "solid.inp").write_text("\n".join(lines) + "\n")
+    return _frequencies(write_toml(folder / "solid.toml", {
+        "materials": {"m": ALU}, "solid": {"mesh": "solid.inp", "material": "m"},
+        "interfaces": [{"name": "hub", "face": "ROOT", "coupling": "averaged", "weights": "uniform"}],
+    }))  # fmt: skip
