@@ -28,7 +28,7 @@ from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest
 from erls.run.bodies.run import BodyRun
 from erls.scene.bodies.analyses import Buckling, Dynamics, Frequencies
-from erls.scene.bodies.schema import BodyScene
+from erls.scene.bodies.schema import BodyScene, BodySceneRecord
 
 _LOOKS = 101
 _REMEDIES = {
@@ -71,7 +71,9 @@ def stated_bodies(run: BodyMotion | BodyRest) -> BodyMotion | BodyRest:
 def mesh_error(run: BodyRun) -> tuple[float | None, str]:
     """Of the reported nodes [m], from a mesh of twice the elements; None, and why, where that has no solution."""
     scene = run.scene
-    if not scene.record.beams:
+    if any(shell.mesh for shell in scene.record.shells):
+        return None, "the mesh of a shell from a file cannot be refined here"
+    if not (scene.record.beams or scene.record.shells):
         return 0.0, ""
     try:
         own, finer = _both(run, _refined(scene))
@@ -86,11 +88,9 @@ def mesh_error(run: BodyRun) -> tuple[float | None, str]:
 def _refined(scene: BodyScene) -> BodyScene:
     """The same with `FINER` times the elements; inner nodes that are named keep their places."""
     record = scene.record
-    beams = {beam.name for beam in record.beams}
 
     def renamed(name: str) -> str:
-        beam, slash, number = name.rpartition("/")
-        return f"{beam}/{FINER * int(number)}" if slash and beam in beams and number.isdigit() else name
+        return _renamed(name, record)
 
     def moved(item: object) -> object:
         own: dict[str, object] = {key: renamed(getattr(item, key)) for key in ("node", "to") if hasattr(item, key)}
@@ -102,6 +102,10 @@ def _refined(scene: BodyScene) -> BodyScene:
     finer = msgspec.structs.replace(
         record,
         beams=[msgspec.structs.replace(beam, elements=FINER * beam.elements) for beam in record.beams],
+        shells=[
+            msgspec.structs.replace(shell, elements=(FINER * shell.elements[0], FINER * shell.elements[1]))
+            for shell in record.shells
+        ],
         masses=[moved(x) for x in record.masses],
         connections=[moved(x) for x in record.connections],
         springs=[moved(x) for x in record.springs],
@@ -110,6 +114,14 @@ def _refined(scene: BodyScene) -> BodyScene:
         report=[renamed(name) for name in record.report],
     )
     return replace(scene, record=finer)
+
+
+def _renamed(name: str, record: BodySceneRecord) -> str:
+    """A node of a beam or shell in a mesh of `FINER` times the elements."""
+    part, *places = name.split("/")
+    names = {beam.name for beam in record.beams} | {shell.name for shell in record.shells}
+    inner = part in names and all(map(str.isdigit, places))
+    return "/".join([part, *(str(FINER * int(k)) for k in places)]) if inner else name
 
 
 def _both(run: BodyRun, scene: BodyScene) -> tuple[Array, Array]:
@@ -121,13 +133,8 @@ def _both(run: BodyRun, scene: BodyScene) -> tuple[Array, Array]:
         The finer one has no solution.
     """
     finer = assemble(scene)
-    beams = {beam.name for beam in scene.record.beams}
-    nodes, others = [], []
-    for name in run.point_names:
-        beam, slash, number = name.rpartition("/")
-        inner = bool(slash) and beam in beams and number.isdigit()
-        nodes.append(run.assembly.numbers[name])
-        others.append(finer.numbers[f"{beam}/{FINER * int(number)}" if inner else name])
+    nodes = [run.assembly.numbers[name] for name in run.point_names]
+    others = [finer.numbers[_renamed(name, scene.record)] for name in run.point_names]
     if isinstance(run, BodyRest):
         analysis = run.scene.record.simulation
         assert not isinstance(analysis, Dynamics)

@@ -14,7 +14,7 @@ def body_report(run: BodyRun, times: Sequence[float] = ()) -> str:
     """Summary of a run of bodies, nodes and connections at given times: its end, or all load steps, unless given."""
     s = run.summary(times or ([run.end] if isinstance(run, BodyMotion) else ()))
     lines = [
-        f"{s['scene']}: {s['analysis']} on {s['group']}, {s['bodies']} bodies, {s['elements']} beam elements, "
+        f"{s['scene']}: {s['analysis']} on {s['group']}, {s['bodies']} bodies, {s['elements']} elements, "
         f"{s['nodes']} nodes, {s['conditions']} conditions"
     ]
     dynamic = s["analysis"] == "dynamics"

@@ -90,7 +90,7 @@ _WORDS: dict[Any, str] = {
     schema.BoolType: "true or false",
     schema.AnyType: "any",
 }
-_COUNTS = {2: "two", 3: "three"}
+_COUNTS = {2: "two", 3: "three", 4: "four"}
 
 
 def field_tables() -> dict[str, str]:

@@ -60,7 +60,7 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
                 remedy="give a file that erls wrote",
             )
         return _modal_info(read_modal_file(path))
-    if not {"joints", "simulation", "links", "bodies", "beams"}.isdisjoint(read_toml(path, SceneError)):
+    if not {"joints", "simulation", "links", "bodies", "beams", "shells"}.isdisjoint(read_toml(path, SceneError)):
         scene = load_scene(path)
         return _body_scene_info(scene) if isinstance(scene, BodyScene) else _scene_info(scene)
     return _link_info(load_link(path))
@@ -138,6 +138,7 @@ def _body_scene_info(scene: BodyScene) -> tuple[dict[str, Any], str]:
     record = scene.record
     rows = [(b.name, "rigid body", f"{b.mass:g} kg") for b in record.bodies]
     rows += [(b.name, "beam", f"{b.start} to {b.end}, {b.elements} elements") for b in record.beams]
+    rows += [(s.name, "shell", s.mesh or f"{' x '.join(map(str, s.elements))} elements") for s in record.shells]
     rows += [(c.name, c.type, f"{c.node} to {c.to}") for c in record.connections]
     simulation = msgspec.to_builtins(record.simulation)
     text = f"{scene.name}: scene of bodies and beams\n\n" + table(("name", "kind", ""), rows)

@@ -116,7 +116,7 @@ def _in_order(record: SceneRecord) -> SceneRecord:
 
 def is_body_scene(data: dict[str, Any]) -> bool:
     """Whether tables are those of a scene of bodies."""
-    return not {"bodies", "beams"}.isdisjoint(data) and {"joints", "links"}.isdisjoint(data)
+    return not {"bodies", "beams", "shells"}.isdisjoint(data) and {"joints", "links"}.isdisjoint(data)
 
 
 def _with_integrator(record: SceneRecord) -> SceneRecord:

@@ -157,10 +157,10 @@ class BodyPose(Pose):
         return [places[numbers[name]] for name in self.figure.run.point_names]
 
     def nodes(self, magnification: float) -> list[Array]:
-        """(p, 3) of each beam, then of each body."""
-        beams = self._lines(magnification)
+        """(p, 3) of each beam, then of each shell, then of each body."""
+        shells = self._surfaces(magnification)
         bodies = [self._body_places(k, magnification) for k in range(len(self.figure.arms))]
-        return beams + bodies
+        return self._lines(magnification) + shells + bodies
 
     def deflections(self) -> list[Array]:
         """(p,) against where they are built, at rest; zeros of motions, and of modes, whose amplitude means nothing."""
@@ -175,11 +175,15 @@ class BodyPose(Pose):
         return np.asarray(self.poses[-1, :3, 3])
 
     def parts(self, magnification: float, unit: float) -> list[Part]:
-        """Beams, then bodies, then springs."""
+        """Beams, then shells, bodies and springs."""
         record, found, none = self.figure.run.scene.record, [], np.zeros((0, 3), dtype=np.int64)
         moved = [1e3 * lengths for lengths in self.deflections()]
         for line, values in zip(self._lines(magnification), moved, strict=False):
             found.append(Part(part_surface(line, none, [list(range(len(line)))], 0, values, unit)))
+        surfaces = self.figure.run.assembly.shells.values()
+        for surface, places in zip(surfaces, self._surfaces(magnification), strict=True):
+            triangles = surface.cells[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+            found.append(Part(part_surface(places, triangles, [], 0, moved[len(found)], unit)))
         for k, (body, values) in enumerate(zip(record.bodies, moved[len(found) :], strict=True)):
             found.append(_coloured(self._body(k, body, magnification, unit), float(values[-1])))
         for spring in record.springs:
@@ -214,6 +218,9 @@ class BodyPose(Pose):
             nodes = [own[0].nodes[0], *(e.nodes[1] for e in own)]
             cells = [("line", np.stack([np.arange(len(own)), np.arange(1, len(own) + 1)], axis=1))]
             found.append(PartMesh(name, shown[nodes], cells, (true - built)[nodes]))
+        for name, surface in assembly.shells.items():
+            at = surface.nodes
+            found.append(PartMesh(name, shown[at], [("quad", surface.cells)], (true - built)[at]))
         for body in self.figure.run.scene.record.bodies:
             node = [assembly.numbers[body.name]]
             found.append(PartMesh(body.name, shown[node], [("vertex", np.array([[0]]))], (true - built)[node]))
@@ -222,6 +229,11 @@ class BodyPose(Pose):
     def _lines(self, magnification: float) -> list[Array]:
         lines = self.figure.lines(self.poses, self.bent)
         return [self._magnified(a, b, magnification) for a, b in zip(lines, self.figure.origin_lines, strict=True)]
+
+    def _surfaces(self, magnification: float) -> list[Array]:
+        """(p, 3) nodes of each shell."""
+        places = self._magnified(self.poses[:, :3, 3], self.figure.origin[:, :3, 3], magnification)
+        return [places[surface.nodes] for surface in self.figure.run.assembly.shells.values()]
 
     def _magnified(self, places: Array, origin: Array, magnification: float) -> Array:
         return places if magnification == 1.0 else np.asarray(origin + magnification * (places - origin))

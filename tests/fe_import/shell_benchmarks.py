@@ -42,7 +42,7 @@ def roof(n: int, kind: str) -> float:
     _, stiffness = grid.matrices(plate(4.32e8, 0.0, 0.25))
     corners = grid.nodes[grid.elements]
     ends = (corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
-    if kind == "quad4":
+    if kind != "tri3":
         ends = (corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     areas = np.linalg.norm(np.cross(*ends), axis=1) / 2
     force = np.zeros(6 * len(grid.nodes))

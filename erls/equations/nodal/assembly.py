@@ -36,10 +36,13 @@ _STEPPED = (
 )  # methods of a system that compiled steps stand for
 
 
+_DERIVATIVES = {"beam_forces": "beam_derivatives", "shell_forces": "shell_derivatives"}
+
+
 @cache
 def functions(*kinds: str) -> Functions:
     """Loaded with the first system, together with modules of these kinds of elements: not every run is one of nodes."""
-    own, more = "erls.equations.nodal", ("beam_derivatives",) if "beam_forces" in kinds else ()
+    own, more = "erls.equations.nodal", tuple(d for f, d in _DERIVATIVES.items() if f in kinds)
     with compiling_beside(*(f"{own}.{name}" for name in (*kinds, *more, "outputs", "blocks", "matrix", "step"))):
         from erls.equations.nodal.sums import forces, move, remember
     from erls.equations.nodal.blocks import blocks, conditions, weighted

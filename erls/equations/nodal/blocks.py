@@ -17,6 +17,7 @@ from erls.equations.nodal.contract import (
     call_actuator_derivatives,
     call_beam_derivatives,
     call_contact_derivatives,
+    call_shell_derivatives,
     call_spring_derivatives,
     read_layout,
     read_model,
@@ -82,6 +83,8 @@ def blocks(reals: Array, integers: IntArray, scratch: Array, material: int) -> N
         call_actuator_derivatives(known.actuator_derivatives, reals, integers, scratch, material)
     if known.contact_derivatives >= 0:
         call_contact_derivatives(known.contact_derivatives, reals, integers, scratch, material)
+    if known.shell_derivatives >= 0:
+        call_shell_derivatives(known.shell_derivatives, reals, integers, scratch, material)
     if known.spring_derivatives >= 0:
         call_spring_derivatives(known.spring_derivatives, reals, integers, scratch, material)
     at = len(model.pairs) - len(model.joint_nodes)

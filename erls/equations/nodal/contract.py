@@ -49,6 +49,10 @@ class Model(NamedTuple):
     contact_nodes, contacts : arrays
         (c, 2) what carries the plane, and the node, and (c, 21): the point in its node; in what carries the plane, a
         point of that and its three axes; the law, friction and its rate.
+    shell_nodes, shell_frames, shell_built, shell_rises, shell_areas, shell_stiffness : arrays
+        (q, 4) corners; (q, 48) frames of the surface at them, in their nodes; at each point of the quadrature (q, 48)
+        slopes of the surface along both reference coordinates as built, (q, 16) of these coordinates along its local
+        axes, (q, 4) area; (q, 9, 9). A shell stands in ``pairs`` six times, for each two of its corners.
     spring_nodes, springs : arrays
         (s, 2), and (s, 9): both points in their nodes, stiffness, damping, length without force.
     winding_nodes, winding_frames, windings : arrays
@@ -83,6 +87,12 @@ class Model(NamedTuple):
     actuators: Matrix
     contact_nodes: Pairs
     contacts: Matrix
+    shell_nodes: Pairs
+    shell_frames: Matrix
+    shell_built: Matrix
+    shell_rises: Matrix
+    shell_areas: Matrix
+    shell_stiffness: Stack
     spring_nodes: Pairs
     springs: Matrix
     winding_nodes: Pairs
@@ -128,6 +138,8 @@ class Work(NamedTuple):
         Their weighted sum, in the coordinates of the system.
     rows, shape, bends : (6, 12) arrays
         Of one beam.
+    strained, corners : arrays
+        Of one shell: (9, 24) its strains at a point by the twists of its nodes, (24, 24) its stiffness.
     gradient, drift, bias : arrays
         Of each condition: (m, 12) by the twists of both nodes, (m,) by time, (m,) Φ̈ − B a.
     factors : (k, 3, 6, 6) array
@@ -156,6 +168,8 @@ class Work(NamedTuple):
     rows: Matrix
     shape: Matrix
     bends: Matrix
+    strained: Matrix
+    corners: Matrix
     gradient: Matrix
     drift: Vector
     bias: Vector
@@ -202,6 +216,8 @@ class Layout(NamedTuple):
         Those of `actuator_forces`.
     contact_forces, contact_derivatives, contact_energies : int
         Those of `contact_forces`.
+    shell_forces, shell_derivatives, shell_energies : int
+        Those of `shell_forces` and `shell_derivatives`.
     spring_forces, wind_springs, spring_derivatives, spring_energies : int
         Those of `spring_forces`, for springs along a line and about an axis.
     samples : int
@@ -232,6 +248,9 @@ class Layout(NamedTuple):
     contact_forces: int
     contact_derivatives: int
     contact_energies: int
+    shell_forces: int
+    shell_derivatives: int
+    shell_energies: int
     spring_forces: int
     wind_springs: int
     spring_derivatives: int
@@ -291,6 +310,9 @@ call_spring_forces = caller(FORCES, "erls.equations.nodal.spring_forces:spring_f
 call_wind_springs = caller(REMEMBER, "erls.equations.nodal.spring_forces:wind_springs")
 call_spring_derivatives = caller(BLOCKS, "erls.equations.nodal.spring_forces:spring_derivatives")
 call_spring_energies = caller(ENERGIES, "erls.equations.nodal.spring_forces:spring_energies")
+call_shell_forces = caller(FORCES, "erls.equations.nodal.shell_forces:shell_forces")
+call_shell_derivatives = caller(BLOCKS, "erls.equations.nodal.shell_derivatives:shell_derivatives")
+call_shell_energies = caller(ENERGIES, "erls.equations.nodal.shell_forces:shell_energies")
 call_contact_forces = caller(FORCES, "erls.equations.nodal.contact_forces:contact_forces")
 call_contact_derivatives = caller(BLOCKS, "erls.equations.nodal.contact_forces:contact_derivatives")
 call_contact_energies = caller(ENERGIES, "erls.equations.nodal.contact_forces:contact_energies")

@@ -60,6 +60,7 @@ def used_kinds(model: Model) -> list[str]:
         "beam_forces": len(model.beam_nodes),
         "actuator_forces": len(model.actuator_nodes),
         "contact_forces": len(model.contact_nodes),
+        "shell_forces": len(model.shell_nodes),
         "spring_forces": len(model.spring_nodes) + len(model.winding_nodes),
     }
     return [name for name, count in has.items() if count]
@@ -106,6 +107,9 @@ def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Fun
         contact_forces=address_for(contract.call_contact_forces, "contact_forces" in used),
         contact_derivatives=address_for(contract.call_contact_derivatives, "contact_forces" in used),
         contact_energies=address_for(contract.call_contact_energies, "contact_forces" in used),
+        shell_forces=address_for(contract.call_shell_forces, "shell_forces" in used),
+        shell_derivatives=address_for(contract.call_shell_derivatives, "shell_forces" in used),
+        shell_energies=address_for(contract.call_shell_energies, "shell_forces" in used),
         spring_forces=address_for(contract.call_spring_forces, "spring_forces" in used),
         wind_springs=address_for(contract.call_wind_springs, "spring_forces" in used),
         spring_derivatives=address_for(contract.call_spring_derivatives, "spring_forces" in used),

@@ -19,6 +19,7 @@ from erls.equations.nodal.loads import NodalLoads
 from erls.equations.nodal.nodes import rows_of
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.equations.nodal.scatter import IntArray
+from erls.equations.nodal.shell import Shells
 from erls.equations.nodal.springs import Springs
 from erls.equations.nodal.turning_springs import TurningSprings
 from erls.maths.so3 import Array
@@ -35,9 +36,10 @@ class Kinds:
         self.loads = _one(elements, NodalLoads) or NodalLoads([])
         self.actuators = _all(elements, Actuators)
         self.contacts = _one(elements, Contacts) or Contacts([])
+        self.shells = _one(elements, Shells) or Shells([], np.zeros((0, 4, 4)))
         self.springs = _all(elements, Springs) or [Springs([])]
         self.windings = _all(elements, TurningSprings) or [TurningSprings([])]
-        known = (Beams, RigidBodies, NodalLoads, Actuators, Contacts, Springs, TurningSprings)
+        known = (Beams, RigidBodies, NodalLoads, Actuators, Contacts, Shells, Springs, TurningSprings)
         strange = [type(e).__name__ for e in elements if not isinstance(e, known)]
         if strange:
             raise TypeError(f"there are no functions of {strange[0]}")
@@ -45,7 +47,7 @@ class Kinds:
     @property
     def pairs(self) -> IntArray:
         """(E, 2) nodes of all elements, in the order of `Model`."""
-        sets: list[Elements] = [self.beams, self.bodies, self.loads, *self.actuators, self.contacts]
+        sets: list[Elements] = [self.beams, self.bodies, self.loads, *self.actuators, self.contacts, self.shells]
         return np.concatenate([_pairs(e.nodes) for e in [*sets, *self.springs, *self.windings]])
 
 
@@ -88,6 +90,12 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
         actuators=_joined([a.laws for a in actuators], 17),
         contact_nodes=kinds.contacts.nodes,
         contacts=kinds.contacts.laws,
+        shell_nodes=kinds.shells.corners,
+        shell_frames=kinds.shells.frames,
+        shell_built=kinds.shells.built,
+        shell_rises=kinds.shells.rises,
+        shell_areas=kinds.shells.areas,
+        shell_stiffness=kinds.shells.stiffness,
         spring_nodes=np.concatenate([s.nodes for s in kinds.springs]),
         springs=np.concatenate([s.laws for s in kinds.springs]),
         winding_nodes=np.concatenate([s.nodes for s in kinds.windings]),
@@ -120,6 +128,8 @@ def room(model: Model) -> Work:
         "blocks": (e, 3, 12, 12),
         "whole": (e, 12, 12),
         **dict.fromkeys(("rows", "shape", "bends"), (6, 12)),
+        "strained": (9, 24),
+        "corners": (24, 24),
         "gradient": (m, 12),
         "factors": (k, 3, 6, 6),
         "turning": (k, 3, 3),

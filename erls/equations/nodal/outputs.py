@@ -10,6 +10,7 @@ from erls.equations.nodal.contract import (
     call_actuator_energies,
     call_beam_energies,
     call_contact_energies,
+    call_shell_energies,
     call_spring_energies,
     call_store_actuators,
     read_layout,
@@ -23,7 +24,9 @@ from erls.maths.vectors import cross, dot, nine, plus, put, scaled, three, times
 
 @kernel(ENERGIES, counted=False)
 def energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
-    """Kinetic, elastic of beams, gravity, springs, what is elastic in joints and contacts; loads are work from outside.
+    """Kinetic, elastic of beams and shells, gravity, springs, what is elastic in joints and contacts.
+
+    Loads are work from outside.
     """
     known = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
@@ -36,6 +39,8 @@ def energies(reals: Array, integers: IntArray, scratch: Array, out: Array) -> No
         kinetic, gravity = body_energy(model, work, k)
         out[0] += kinetic
         out[2] += gravity
+    if known.shell_energies >= 0:
+        call_shell_energies(known.shell_energies, reals, integers, scratch, out)
     if known.spring_energies >= 0:
         call_spring_energies(known.spring_energies, reals, integers, scratch, out)
     if known.contact_energies >= 0:

@@ -12,6 +12,7 @@ from erls.equations.nodal.contract import (
     call_beam_forces,
     call_bend_beams,
     call_contact_forces,
+    call_shell_forces,
     call_spring_forces,
     call_turn_actuators,
     call_wind_springs,
@@ -44,6 +45,8 @@ def forces(reals: Array, integers: IntArray, scratch: Array, last: Array) -> Non
         call_actuator_forces(known.actuator_forces, reals, integers, scratch, last)
     if known.contact_forces >= 0:
         call_contact_forces(known.contact_forces, reals, integers, scratch, last)
+    if known.shell_forces >= 0:
+        call_shell_forces(known.shell_forces, reals, integers, scratch, last)
     if known.spring_forces >= 0:
         call_spring_forces(known.spring_forces, reals, integers, scratch, last)
     joint_forces(model, work, sample)

@@ -5,7 +5,16 @@ from __future__ import annotations
 from erls.errors import SceneError
 from erls.mechanism.joint_types import DRIVEN_TYPES, HOLDING_TYPES, JOINT_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
-from erls.scene.bodies.schema import GROUND, Beam, BodySceneRecord, Connection, Load, Spring, TurningSpring
+from erls.scene.bodies.schema import (
+    GROUND,
+    Beam,
+    BodySceneRecord,
+    Connection,
+    Load,
+    ShellSurface,
+    Spring,
+    TurningSpring,
+)
 from erls.scene.check_sensors import check_sensors
 from erls.scene.checks import (
     bad,
@@ -26,6 +35,8 @@ from fe_import.files.toml import choose
 
 FORMULATIONS = ("nodal",)
 MOST_ELEMENTS = 100_000
+EDGES = ("start", "end", "left", "right")
+"""Sets of a patch of shells."""
 
 
 def check_body_scene(scene: BodySceneRecord, file: str) -> None:
@@ -52,6 +63,9 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
             where = f"{file}: materials.{beam.material}.thermal_expansion"
             check_expansion(scene.materials[beam.material], where, SceneError)
     nodes += [f"{b.name}/{k}" for b in scene.beams for k in range(1, b.elements)]
+    for k, shell in enumerate(scene.shells):
+        _check_shell(shell, scene, nodes, f"{file}: shells[{k}]")
+    nodes += [name for shell in scene.shells for name in _of_shell(shell, scene)]
     for k, mass in enumerate(scene.masses):
         choose(mass.node, nodes, f"{file}: masses[{k}].node", SceneError)
         not_negative(f"{file}: masses[{k}].mass", mass.mass)
@@ -71,9 +85,11 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
     for k, name in enumerate(scene.report):
         choose(name, nodes, f"{file}: report[{k}]", SceneError)
     ends = {end for beam in scene.beams for end in (beam.start, beam.end)}
+    ends |= {corner for shell in scene.shells for corner in shell.corners or ()}
     for name in scene.nodes:
-        if name not in ends:
-            raise bad(f"{file}: nodes.{name}", "no beam ends at this node", None, "remove it, or add the beam")
+        if name not in ends and not any(shell.mesh for shell in scene.shells):
+            message = "no beam ends at this node, and no shell"
+            raise bad(f"{file}: nodes.{name}", message, None, "remove it, or add what ends there")
 
 
 def _check_simulation(s: Analysis, place: str) -> None:
@@ -101,10 +117,11 @@ def _check_all_names(scene: BodySceneRecord, file: str) -> list[str]:
     bodies = [(f"{file}: bodies[{k}].name", body.name) for k, body in enumerate(scene.bodies)]
     named = [(f"{file}: nodes.{name}", name) for name in scene.nodes] + bodies
     check_names([("", GROUND), *named])
-    for kind in ("beams", "connections", "contacts"):
+    for kind in ("beams", "shells", "connections", "contacts"):
         check_names((f"{file}: {kind}[{k}].name", x.name) for k, x in enumerate(getattr(scene, kind)))
-    if not scene.bodies and not scene.beams:
-        raise bad(f"{file}: bodies", "a scene needs a body or a beam", None, "add [[bodies]] or [[beams]]")
+    if not (scene.bodies or scene.beams or scene.shells):
+        remedy = "add [[bodies]], [[beams]] or [[shells]]"
+        raise bad(f"{file}: bodies", "a scene needs a body, a beam or a shell", None, remedy)
     return [name for _, name in named]
 
 
@@ -136,6 +153,40 @@ def _check_beam(beam: Beam, scene: BodySceneRecord, nodes: list[str], place: str
         raise bad(f"{place}.elements", message, beam.elements, f"give 1 to {MOST_ELEMENTS}")
     if beam.local_z is not None and not any(beam.local_z):
         raise bad(f"{place}.local_z", "a direction is needed", beam.local_z, "give a direction across the beam")
+
+
+def _check_shell(shell: ShellSurface, scene: BodySceneRecord, nodes: list[str], place: str) -> None:
+    if (shell.corners is None) == (not shell.mesh):
+        message = "a shell lies between four corners or comes from a mesh"
+        raise bad(place, message, shell.mesh or None, "give one of 'corners' and 'mesh'")
+    for k, corner in enumerate(shell.corners or ()):
+        choose(corner, nodes, f"{place}.corners[{k}]", SceneError)
+    if shell.corners is not None and len(set(shell.corners)) < 4:
+        raise bad(f"{place}.corners", "four different nodes", list(shell.corners), "name each once")
+    if not all(n >= 1 for n in shell.elements) or shell.elements[0] * shell.elements[1] > MOST_ELEMENTS:
+        message = "no such number of elements"
+        raise bad(f"{place}.elements", message, list(shell.elements), f"give 1 or more, {MOST_ELEMENTS} in all at most")
+    if any(sign in shell.name for sign in "/:"):
+        raise bad(f"{place}.name", "a name of a shell has no / and no :", shell.name, "they name its nodes and sets")
+    choose(shell.material, scene.materials, f"{place}.material", SceneError)
+    positive(f"{place}.thickness", shell.thickness)
+    if not 0 < shell.drilling <= 10:
+        raise bad(f"{place}.drilling", "no such share", shell.drilling, "give more than 0, and at most 10")
+    if not 0 <= shell.fold_deg <= 180:
+        raise bad(f"{place}.fold_deg", "no such angle", shell.fold_deg, "give 0 to 180 degrees")
+
+
+def _of_shell(shell: ShellSurface, scene: BodySceneRecord) -> list[str]:
+    """Names of the nodes and sets of a patch; what is said of those of a mesh, which are known when it is read."""
+    if shell.mesh:
+        asked = [*(x.node for x in (*scene.masses, *scene.connections, *scene.springs, *scene.loads, *scene.contacts))]
+        asked += [*(x.to for x in (*scene.connections, *scene.springs)), *scene.report]
+        asked += [getattr(sensor, "point", "") for sensor in scene.sensors]
+        return [name for name in asked if name.startswith((f"{shell.name}/", f"{shell.name}:"))]
+    along, across = shell.elements
+    inside = {(0, 0), (along, 0), (along, across), (0, across)}  # corners have names of their own
+    found = [(i, j) for i in range(along + 1) for j in range(across + 1) if (i, j) not in inside]
+    return [*(f"{shell.name}/{i}/{j}" for i, j in found), *(f"{shell.name}:{edge}" for edge in EDGES)]
 
 
 def _check_connection(joint: Connection, nodes: list[str], place: str) -> None:

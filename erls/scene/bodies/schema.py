@@ -95,6 +95,44 @@ class Beam(Record, frozen=True):
     temperature_change: float = 0.0
 
 
+class ShellSurface(Record, frozen=True):
+    """A geometrically exact shell: a flat or twisted patch between four nodes, or a mesh.
+
+    Attributes
+    ----------
+    name : str
+        Of the shell and of its nodes: NAME/I/J of a patch, NAME/K of a mesh, K from 0 in the order of its file. Their
+        sets are NAME:SET; a connection, mass or load of a set is one of each of its nodes, loads in shares of the
+        length of its edges. A patch has the sets ``start``, ``end``, ``left`` and ``right``.
+    corners : (4,) str
+        Nodes or bodies around a patch: I runs from the first to the second, J from the first to the fourth.
+    elements : (2,) int
+        Of a patch, along I and J.
+    mesh : str
+        Instead of corners: a file of quadrangles, in metres; named nodes that lie on one of its nodes are the same.
+    material : str
+        A name from ``[materials]``; needed.
+    thickness : float
+        [m]; needed.
+    offset : float
+        Height of the middle of the thickness above the nodes, along the normal [m].
+    drilling : float
+        Stiffness against rotations about the normal that the surface does not share, in shares of its shear stiffness.
+    fold_deg : float
+        Elements that meet at a larger angle keep their own normals: a fold; the others share one [deg].
+    """
+
+    name: str
+    corners: tuple[str, str, str, str] | None = None
+    elements: tuple[int, int] = (1, 1)
+    mesh: str = ""
+    material: str = ""
+    thickness: float = 0.0
+    offset: float = 0.0
+    drilling: float = 1.0
+    fold_deg: float = 25.0
+
+
 class Connection(Record, frozen=True):
     """A joint between a node and the ground or another node.
 
@@ -105,7 +143,7 @@ class Connection(Record, frozen=True):
     type : str
         What it leaves free.
     node : str
-        A node, a body, or an inner node of a beam.
+        A node, a body, an inner node of a beam, a node or a set of a shell.
     to : str
         Another one.
     position : (3,) floats, optional
@@ -192,12 +230,12 @@ Spring = LineSpring | TurningSpring
 
 
 class Load(Record, frozen=True):
-    """A force and a moment at a node.
+    """A force and a moment at a node, or over a set of a shell's nodes.
 
     Attributes
     ----------
     node : str
-        A node, a body, or an inner node of a beam.
+        A node, a body, an inner node of a beam, a node or a set of a shell.
     force : (3,) floats
         [N], in the world's axes.
     moment : (3,) floats
@@ -217,7 +255,7 @@ class Load(Record, frozen=True):
 
 
 class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
-    """A scene: named nodes that beams run between, bodies, what connects and loads them, and what is to be found.
+    """A scene: named nodes, beams and shells between them, bodies, what joins and loads them, and what is to be found.
 
     Attributes
     ----------
@@ -237,6 +275,8 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
         Rigid bodies, ``[[bodies]]``.
     beams : list of Beam
         Geometrically exact beams, ``[[beams]]``.
+    shells : list of ShellSurface
+        Geometrically exact shells, ``[[shells]]``.
     masses : list of PointMass
         Rigid masses on nodes, ``[[masses]]``.
     connections : list of Connection
@@ -260,6 +300,7 @@ class BodySceneRecord(SceneTables, frozen=True, kw_only=True):
     nodes: dict[str, Vector] = {}
     bodies: list[Body] = []
     beams: list[Beam] = []
+    shells: list[ShellSurface] = []
     masses: list[PointMass] = []
     connections: list[Connection] = []
     springs: list[Spring] = []

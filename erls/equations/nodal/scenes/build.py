@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from erls.equations.nodal.assembly import NodalSystem
@@ -17,8 +19,10 @@ from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies, RigidBody
 from erls.equations.nodal.scenes.beam_mesh import course
 from erls.equations.nodal.scenes.contacts import contacts
+from erls.equations.nodal.scenes.shell_mesh import Surface, surface
 from erls.equations.nodal.scenes.springs import springs
 from erls.equations.nodal.section import BeamSection, beam_section
+from erls.equations.nodal.shell import Shells, lumped_shells
 from erls.errors import Cause, SceneError
 from erls.maths.groups import R3_SO3, SE3
 from erls.maths.motion_maps import inverse
@@ -33,6 +37,7 @@ from erls.scene.bodies.schema import Beam as BeamRecord
 from erls.scene.bodies.schema import BodyScene, BodySceneRecord, Connection, Load
 from erls.scene.build_loops import two_axes
 from fe_import.elements.sections import section_constants
+from fe_import.files.toml import choose
 from fe_import.models.inertia import inertia_matrix
 
 
@@ -56,6 +61,8 @@ class Assembly:
         At the start, as the system's group has it.
     beams : dict
         Elements of each beam, in their order.
+    shells : dict
+        Nodes and elements of each shell.
     """
 
     system: NodalSystem
@@ -65,11 +72,12 @@ class Assembly:
     reported: tuple[str, ...]
     velocity: Array
     beams: dict[str, list[Beam]]
+    shells: dict[str, Surface]
 
     @property
     def elements(self) -> int:
-        """Number of beam elements."""
-        return sum(map(len, self.beams.values()))
+        """Number of elements of beams and shells."""
+        return sum(map(len, self.beams.values())) + sum(len(s.elements) for s in self.shells.values())
 
 
 def assemble(scene: BodyScene) -> Assembly:
@@ -88,8 +96,14 @@ def assemble(scene: BodyScene) -> Assembly:
         beam.name: _elements(record, beam, numbers, poses, f"{file}: beams[{k}]", file)
         for k, beam in enumerate(record.beams)
     }
+    shells = {
+        shell.name: surface(record, shell, numbers, poses, scene.folder, f"{file}: shells[{k}]")
+        for k, shell in enumerate(record.shells)
+    }
+    record = _without_sets(record, shells, numbers, file)
     gravity, built = np.array(record.gravity), np.array(poses)
-    bodies = _bodies(record, numbers, file)
+    plates = [element for own in shells.values() for element in own.elements]
+    bodies = _bodies(record, numbers, file) + lumped_shells(plates, built)
     dynamic = isinstance(record.simulation, Dynamics)
     loads = [
         _load(x, numbers[x.node], Place(scene.folder, f"{file}: loads[{k}]"), dynamic)
@@ -98,6 +112,8 @@ def assemble(scene: BodyScene) -> Assembly:
     elements: list[Elements] = []
     if beams:
         elements.append(Beams([e for own in beams.values() for e in own], built, gravity))
+    if plates:
+        elements.append(Shells(plates, built))
     if bodies:
         elements.append(RigidBodies(bodies, gravity))
     if loads:
@@ -114,7 +130,48 @@ def assemble(scene: BodyScene) -> Assembly:
     system = NodalSystem(built, elements, joints, group) if left_out else full
     reported = tuple(dict.fromkeys([*record.nodes, *(b.name for b in record.bodies), *record.report]))
     velocity = _velocity(record, numbers, built, world)
-    return Assembly(system, full, left_out, numbers, reported, velocity, beams)
+    return Assembly(system, full, left_out, numbers, reported, velocity, beams, shells)
+
+
+def _without_sets(
+    record: BodySceneRecord, shells: dict[str, Surface], numbers: dict[str, int], file: str
+) -> BodySceneRecord:
+    """The record with a connection, mass or load for each node of a set.
+
+    Raises
+    ------
+    SceneError
+        BAD_REFERENCE: a node or set that a mesh does not have.
+    """
+    if not shells:
+        return record
+    sets = {name: found for own in shells.values() for name, found in own.sets.items()}
+    names: dict[int, str] = {}
+    for name, number in numbers.items():
+        names.setdefault(number, name)
+    changed: dict[str, list[Any]] = {}
+    for kind in ("masses", "connections", "loads"):
+        changed[kind] = []
+        for k, item in enumerate(getattr(record, kind)):
+            if item.node not in sets:
+                choose(item.node, [*numbers, *sets], f"{file}: {kind}[{k}].node", SceneError)
+                changed[kind].append(item)
+                continue
+            for number, share in zip(*sets[item.node], strict=True):
+                own: dict[str, Any] = {"node": names[int(number)]}
+                if kind == "connections":
+                    own["name"] = f"{item.name}/{names[int(number)]}"
+                elif kind == "masses":
+                    own["mass"] = item.mass * share
+                else:
+                    own |= {part: tuple(share * x for x in getattr(item, part)) for part in ("force", "moment")}
+                changed[kind].append(msgspec.structs.replace(item, **own))
+    for kind in ("springs", "contacts"):
+        for k, item in enumerate(getattr(record, kind)):
+            choose(item.node, list(numbers), f"{file}: {kind}[{k}].node", SceneError)
+    for k, name in enumerate(record.report):
+        choose(name, list(numbers), f"{file}: report[{k}]", SceneError)
+    return msgspec.structs.replace(record, **changed)
 
 
 def _elements(

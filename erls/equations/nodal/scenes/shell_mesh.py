@@ -1,0 +1,176 @@
+"""The shells of a scene as elements: patches between four nodes, meshes, normals at their nodes, sets."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from erls.equations.nodal.shell import Shell
+from erls.errors import Cause, SceneError
+from erls.maths.motion_maps import poses as as_poses
+from erls.maths.se3 import pose
+from erls.maths.so3 import Array
+from erls.scene.bodies.check import EDGES
+from erls.scene.bodies.schema import BodySceneRecord, ShellSurface
+from fe_import.elements.laminates import Lamina, Laminate, plane_stress
+from fe_import.model import IntArray
+
+_SAME = 1e-6  # of the size of a mesh: a named node that lies on one of it
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Nodes and elements of one shell.
+
+    Attributes
+    ----------
+    elements : list of Shell
+    nodes : (n,) int array
+        Those of the surface.
+    cells : (e, 4) int array
+        Its elements, as places in ``nodes``.
+    sets : dict
+        Numbers of nodes, and their shares of the set's length.
+    """
+
+    elements: list[Shell]
+    nodes: IntArray
+    cells: IntArray
+    sets: dict[str, tuple[IntArray, Array]]
+
+
+def surface(
+    record: BodySceneRecord, shell: ShellSurface, numbers: dict[str, int], poses: list[Array], folder: Path, place: str
+) -> Surface:
+    """Of one shell; its own nodes are added to ``numbers`` and ``poses``.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        A mesh that cannot be read, or holds anything but quadrangles; a corner that turns back.
+    """
+    if shell.corners is None:
+        places, cells, sets = _read(shell, folder, place)
+        names = [f"{shell.name}/{k}" for k in range(len(places))]
+        own = _numbered(places, names, numbers, poses, merge=set(record.nodes))
+    else:
+        places, cells, sets, names = _patch(shell, numbers, poses)
+        own = _numbered(places, names, numbers, poses, merge=set())
+    edges = _shares(places, cells, sets)
+    frames = corner_frames(places, cells, shell.fold_deg, place)
+    make = _laminate(record, shell)
+    stiffness, moments = make.stiffness(), make.moments()
+    elements = [
+        Shell(tuple(own[cell].tolist()), frame, stiffness, moments, shell.drilling)
+        for cell, frame in zip(cells, frames, strict=True)
+    ]
+    found = {f"{shell.name}:{name}": (own[nodes], share) for name, (nodes, share) in edges.items()}
+    return Surface(elements, own, cells, found)
+
+
+def _patch(
+    shell: ShellSurface, numbers: dict[str, int], poses: list[Array]
+) -> tuple[Array, IntArray, dict[str, IntArray], list[str]]:
+    assert shell.corners is not None
+    a, b, c, d = (poses[numbers[name]][:3, 3] for name in shell.corners)
+    along, across = shell.elements
+    r, s = np.meshgrid(np.linspace(0, 1, along + 1), np.linspace(0, 1, across + 1), indexing="ij")
+    r, s = r[..., None], s[..., None]
+    places = (1 - r) * ((1 - s) * a + s * d) + r * ((1 - s) * b + s * c)
+    at = np.arange((along + 1) * (across + 1)).reshape(along + 1, across + 1)
+    cells = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    sets = dict(zip(EDGES, (at[0], at[-1], at[:, 0], at[:, -1]), strict=True))
+    names = [f"{shell.name}/{i}/{j}" for i in range(along + 1) for j in range(across + 1)]
+    for corner, k in zip(shell.corners, (at[0, 0], at[-1, 0], at[-1, -1], at[0, -1]), strict=True):
+        names[int(k)] = corner
+    return places.reshape(-1, 3), cells, sets, names
+
+
+def _read(shell: ShellSurface, folder: Path, place: str) -> tuple[Array, IntArray, dict[str, IntArray]]:
+    from fe_import.mesh.read import Wanted, read_mesh  # heavy: most scenes have no mesh
+
+    path = folder / shell.mesh
+    if "\0" in shell.mesh or not path.is_file():
+        remedy = "give a path that starts at the folder of the scene"
+        raise SceneError(
+            Cause.FILE_NOT_FOUND, "no such mesh file", where=f"{place}.mesh", value=shell.mesh, remedy=remedy
+        )
+    mesh = read_mesh(path, (), Wanted(solids=False, shells=True))
+    if [cells.type for cells in mesh.shells] != ["quad4"]:
+        kinds = ", ".join(f"{len(cells)} {cells.type}" for cells in mesh.shells)
+        message, remedy = "only quadrangles bend by large angles", "mesh the surface with quadrangles alone"
+        raise SceneError(Cause.BAD_FIELD, message, where=f"{place}.mesh", value=kinds, remedy=remedy)
+    return mesh.nodes, mesh.shells[0].elements, mesh.node_sets
+
+
+def _numbered(
+    places: Array, names: list[str], numbers: dict[str, int], poses: list[Array], merge: set[str]
+) -> IntArray:
+    """Numbers of the nodes of a surface: those that are there, and new ones."""
+    size = float(np.linalg.norm(np.ptp(places, axis=0)))
+    known = {name: poses[numbers[name]][:3, 3] for name in merge}
+    found = []
+    for place, name in zip(places, names, strict=True):
+        same = next((other for other, at in known.items() if np.linalg.norm(at - place) <= _SAME * size), name)
+        if same not in numbers:
+            numbers[same] = len(poses)
+            poses.append(pose(position=place))
+        numbers.setdefault(name, numbers[same])
+        found.append(numbers[same])
+    return np.array(found, dtype=np.int64)
+
+
+def _shares(places: Array, cells: IntArray, sets: dict[str, IntArray]) -> dict[str, tuple[IntArray, Array]]:
+    """Nodes of each set with their shares of the length of the edges between them; equal ones where there are none."""
+    edges = np.unique(np.sort(np.concatenate([cells[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1), axis=0)
+    lengths = np.linalg.norm(places[edges[:, 0]] - places[edges[:, 1]], axis=1)
+    result = {}
+    for name, nodes in sets.items():
+        share = np.zeros(len(places))
+        inside = np.isin(edges, nodes).all(axis=1)
+        np.add.at(share, edges[inside], lengths[inside, None] / 2)
+        own = share[nodes] if inside.any() else np.ones(len(nodes))
+        result[name] = nodes, own / own.sum()
+    return result
+
+
+def corner_frames(places: Array, cells: IntArray, fold_deg: float, where: str) -> Array:
+    """(e, 4, 4, 4) frames at the corners: z the mean normal of the elements there that meet at no fold."""
+    corners = places[cells]
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    normals = np.cross(ahead, back)
+    lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
+    turned = np.einsum("ekc,ec->ek", normals, normals.sum(axis=1)) <= 0
+    if turned.any() or not lengths.all():
+        bad = int(turned.any(axis=1).argmax())
+        raise SceneError(
+            Cause.BAD_FIELD, "a quadrangle without area, or with a corner that turns back", where=where,
+            value=f"about {np.round(corners[bad].mean(axis=0), 6).tolist()}", remedy="mend the mesh there",
+        )  # fmt: skip
+    normals /= lengths
+    means, least = normals.copy(), np.cos(np.radians(fold_deg))
+    flat, owner = normals.reshape(-1, 3), cells.ravel()
+    order = np.argsort(owner, kind="stable")
+    starts = np.searchsorted(owner[order], np.arange(len(places) + 1))
+    for first, end in itertools.pairwise(starts):
+        meeting = order[first:end]
+        near = flat[meeting] @ flat[meeting].T >= least
+        means.reshape(-1, 3)[meeting] = near @ flat[meeting]
+    means /= np.linalg.norm(means, axis=-1, keepdims=True)
+    one = corners[:, 1] + corners[:, 2] - corners[:, 0] - corners[:, 3]
+    two = corners[:, 2] + corners[:, 3] - corners[:, 0] - corners[:, 1]
+    one, two = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (one, two))
+    middle = one + np.cross(two, np.cross(one, two))  # as of `fe_import.elements.shell_elements.middle_axis`
+    x = middle[:, None] - np.einsum("ekc,ec->ek", means, middle)[..., None] * means
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    return as_poses(np.stack([x, np.cross(means, x), means], axis=-1), corners)
+
+
+def _laminate(record: BodySceneRecord, shell: ShellSurface) -> Laminate:
+    m = record.materials[shell.material]
+    shear = m.youngs_modulus / (2 * (1 + m.poissons_ratio))
+    plane = plane_stress(m.youngs_modulus, m.youngs_modulus, m.poissons_ratio, shear)
+    return Laminate((Lamina(plane, np.full(2, shear), m.density, shell.thickness),), shell.offset)
