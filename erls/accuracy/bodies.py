@@ -71,7 +71,7 @@ def stated_bodies(run: BodyMotion | BodyRest) -> BodyMotion | BodyRest:
 def mesh_error(run: BodyRun) -> tuple[float | None, str]:
     """Of the reported nodes [m], from a mesh of twice the elements; None, and why, where that has no solution."""
     scene = run.scene
-    if any(shell.mesh for shell in scene.record.shells):
+    if not all(shell.corners for shell in scene.record.shells):
         return None, "the mesh of a shell from a file cannot be refined here"
     if not (scene.record.beams or scene.record.shells):
         return 0.0, ""

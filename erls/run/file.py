@@ -23,7 +23,7 @@ from erls.run.chain.file import read_chain, write_chain
 from erls.run.chain.run import ChainRun
 from erls.run.knots import End
 from erls.run.record import Run
-from erls.scene.bodies.schema import BodyScene
+from erls.scene.bodies.schema import BodyScene, ShellSurface
 from erls.scene.read import checked
 from erls.scene.records import SceneFile
 from fe_import.files.hdf5.files import open_for_reading, write_array, write_atomically, write_attribute, write_strings
@@ -118,8 +118,20 @@ def _fill_output(group: h5py.Group, run: Run) -> None:
             write_array(group, f"output/{name}", curve.values, curve.unit, curve.text)
 
 
+def _mesh(shell: ShellSurface, folder: Path, place: str) -> dict[str, Any]:
+    """What the mesh of a shell holds, as fields of its record."""
+    from erls.equations.nodal.scenes.shell_mesh import mesh_of  # here: most scenes have none
+
+    places, cells, sets = mesh_of(shell, folder, place)
+    return {
+        "places": places.tolist(),
+        "cells": cells.tolist(),
+        "sets": {name: own.tolist() for name, own in sets.items()},
+    }
+
+
 def self_contained(scene: S) -> S:
-    """The scene with the tables of its CSV files written into it."""
+    """The scene with the tables of its CSV files, and the meshes of its shells, written into it."""
 
     def inline(value: Any) -> Any:
         if isinstance(value, (list, tuple)):
@@ -136,7 +148,12 @@ def self_contained(scene: S) -> S:
             return {**value, "times": times, "values_deg" if degrees else "values": values.tolist()}
         return {k: inline(v) for k, v in value.items()}
 
-    found = checked(inline(msgspec.to_builtins(scene.record)), scene.path, str(scene.path))
+    data = inline(msgspec.to_builtins(scene.record))
+    if isinstance(scene, BodyScene):
+        for k, shell in enumerate(scene.record.shells):
+            if shell.mesh:
+                data["shells"][k] |= {"mesh": "", **_mesh(shell, scene.folder, f"{scene.path}: shells[{k}]")}
+    found = checked(data, scene.path, str(scene.path))
     assert isinstance(found, type(scene))
     return found
 

@@ -22,6 +22,8 @@ def files_of_link(link: LinkFile) -> list[Path]:
 def files_of(scene: AnyScene) -> list[Path]:
     """The scene, its links with what they name, and its tables; what cannot be read is left to who reads it."""
     found = [scene.path, *(scene.folder / name for name in _tables(msgspec.to_builtins(scene.record)))]
+    if not isinstance(scene, Scene):
+        found += [scene.folder / shell.mesh for shell in scene.record.shells if shell.mesh]
     for link in scene.record.links if isinstance(scene, Scene) else ():
         if link.modal_file:
             found.append(scene.folder / link.modal_file)

@@ -87,7 +87,7 @@ def check_body_scene(scene: BodySceneRecord, file: str) -> None:
     ends = {end for beam in scene.beams for end in (beam.start, beam.end)}
     ends |= {corner for shell in scene.shells for corner in shell.corners or ()}
     for name in scene.nodes:
-        if name not in ends and not any(shell.mesh for shell in scene.shells):
+        if name not in ends and all(shell.corners for shell in scene.shells):
             message = "no beam ends at this node, and no shell"
             raise bad(f"{file}: nodes.{name}", message, None, "remove it, or add what ends there")
 
@@ -156,9 +156,14 @@ def _check_beam(beam: Beam, scene: BodySceneRecord, nodes: list[str], place: str
 
 
 def _check_shell(shell: ShellSurface, scene: BodySceneRecord, nodes: list[str], place: str) -> None:
-    if (shell.corners is None) == (not shell.mesh):
+    if [shell.corners is not None, bool(shell.mesh), bool(shell.places)].count(True) != 1:
         message = "a shell lies between four corners or comes from a mesh"
-        raise bad(place, message, shell.mesh or None, "give one of 'corners' and 'mesh'")
+        raise bad(place, message, shell.mesh or None, "give one of 'corners' and 'mesh', or 'places' with 'cells'")
+    numbers = [k for row in (*shell.cells, *shell.sets.values()) for k in row]
+    if numbers and not (min(numbers) >= 0 and max(numbers) < len(shell.places)):
+        raise bad(f"{place}.cells", "numbers of places that are not there", max(numbers), "they count from 0")
+    if bool(shell.places) != bool(shell.cells):
+        raise bad(f"{place}.cells", "'places' and 'cells' go together", None, "give both, or a mesh")
     for k, corner in enumerate(shell.corners or ()):
         choose(corner, nodes, f"{place}.corners[{k}]", SceneError)
     if shell.corners is not None and len(set(shell.corners)) < 4:
@@ -178,7 +183,7 @@ def _check_shell(shell: ShellSurface, scene: BodySceneRecord, nodes: list[str], 
 
 def _of_shell(shell: ShellSurface, scene: BodySceneRecord) -> list[str]:
     """Names of the nodes and sets of a patch; what is said of those of a mesh, which are known when it is read."""
-    if shell.mesh:
+    if shell.corners is None:
         asked = [*(x.node for x in (*scene.masses, *scene.connections, *scene.springs, *scene.loads, *scene.contacts))]
         asked += [*(x.to for x in (*scene.connections, *scene.springs)), *scene.report]
         asked += [getattr(sensor, "point", "") for sensor in scene.sensors]

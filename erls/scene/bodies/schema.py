@@ -110,6 +110,8 @@ class ShellSurface(Record, frozen=True):
         Of a patch, along I and J.
     mesh : str
         Instead of corners: a file of quadrangles, in metres; named nodes that lie on one of its nodes are the same.
+    places, cells, sets : lists
+        Instead of a file what it holds: positions [m], four of these around each quadrangle, sets of these by name.
     material : str
         A name from ``[materials]``; needed.
     thickness : float
@@ -126,6 +128,9 @@ class ShellSurface(Record, frozen=True):
     corners: tuple[str, str, str, str] | None = None
     elements: tuple[int, int] = (1, 1)
     mesh: str = ""
+    places: list[Vector] = []
+    cells: list[tuple[int, int, int, int]] = []
+    sets: dict[str, list[int]] = {}
     material: str = ""
     thickness: float = 0.0
     offset: float = 0.0

@@ -53,7 +53,7 @@ def surface(
         A mesh that cannot be read, or holds anything but quadrangles; a corner that turns back.
     """
     if shell.corners is None:
-        places, cells, sets = _read(shell, folder, place)
+        places, cells, sets = mesh_of(shell, folder, place)
         names = [f"{shell.name}/{k}" for k in range(len(places))]
         own = _numbered(places, names, numbers, poses, merge=set(record.nodes))
     else:
@@ -89,7 +89,17 @@ def _patch(
     return places.reshape(-1, 3), cells, sets, names
 
 
-def _read(shell: ShellSurface, folder: Path, place: str) -> tuple[Array, IntArray, dict[str, IntArray]]:
+def mesh_of(shell: ShellSurface, folder: Path, place: str) -> tuple[Array, IntArray, dict[str, IntArray]]:
+    """Positions, quadrangles and sets of a shell that comes from a mesh.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        As of `surface`.
+    """
+    if shell.places:
+        sets = {name: np.array(own, dtype=np.int64) for name, own in shell.sets.items()}
+        return np.array(shell.places, dtype=float), np.array(shell.cells, dtype=np.int64), sets
     from fe_import.mesh.read import Wanted, read_mesh  # heavy: most scenes have no mesh
 
     path = folder / shell.mesh
@@ -118,7 +128,6 @@ def _numbered(
         if same not in numbers:
             numbers[same] = len(poses)
             poses.append(pose(position=place))
-        numbers.setdefault(name, numbers[same])
         found.append(numbers[same])
     return np.array(found, dtype=np.int64)
 
