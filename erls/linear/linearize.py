@@ -129,10 +129,19 @@ def state_of(given: AnyScene | Run | Path | str, at: float | str, tell: Message 
     if isinstance(at, str) or at == 0.0:
         built = build_mechanism(scene, tell)
         return plant_of(built.mechanism, scene, at, None, built.warnings)
+    _refuse_later(at, scene.record.simulation.duration, str(scene.path))
     settings = msgspec.structs.replace(scene.record.simulation, duration=at, output_step=None)
     short = Scene(scene.path, msgspec.structs.replace(scene.record, simulation=settings))
     run = simulate(short, tell=tell, verdict=False)
     return plant_of(run.formulation.mechanism, scene, at, run, run.warnings)
+
+
+def _refuse_later(at: float, duration: float, file: str) -> None:
+    """Refuse a time after the end of the motion, as runs do."""
+    if at > duration:
+        message = "the motion ends before this time"
+        remedy = f"give a time up to the duration, or let {file} run longer: simulation.duration"
+        raise SceneError(Cause.TIME_OUT_OF_RANGE, message, where="at", value=at, limit=f"{duration:g} s", remedy=remedy)
 
 
 def _of_bodies(given: BodyScene | Run, at: float | str, tell: Message) -> StateOf:
@@ -157,6 +166,7 @@ def _of_bodies(given: BodyScene | Run, at: float | str, tell: Message) -> StateO
     else:
         assert not isinstance(at, str)
         if isinstance(given, BodyScene):
+            _refuse_later(at, analysis.duration, str(scene.path))
             short = msgspec.structs.replace(analysis, duration=at)
             record = msgspec.structs.replace(scene.record, simulation=short)
             given = simulate(BodyScene(scene.path, record), tell=tell, verdict=False)

@@ -35,9 +35,8 @@ def transmission_zeros(a: Array, b: Array, c: Array, d: Array) -> Array:
         return _square_zeros(a, b, c, d)
     mixed = np.random.default_rng(0).standard_normal((2, min(inputs, outputs), max(inputs, outputs)))
     size = max(float(np.abs(np.linalg.eigvals(a)).max(initial=0.0)), 1e-300)
-    found = []
+    units, found = _units(b, c, d), []
     for one in mixed:
-        units = _units(a, b, c, d)
         if outputs > inputs:
             found.append(_square_zeros(a, b, one @ (c * units[1][:, None]), one @ (d * units[1][:, None])))
         else:
@@ -51,7 +50,7 @@ def transmission_zeros(a: Array, b: Array, c: Array, d: Array) -> Array:
     return np.array(kept, dtype=complex)
 
 
-def _units(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
+def _units(b: Array, c: Array, d: Array) -> tuple[Array, Array]:
     """(r,) and (p,) factors of inputs and outputs that make them alike."""
     columns, rows = np.abs(np.vstack([b, d])).max(axis=0), np.abs(np.hstack([c, d])).max(axis=1)
     return 1 / np.where(columns > 0, columns, 1.0), 1 / np.where(rows > 0, rows, 1.0)

@@ -81,7 +81,17 @@ class LinkSecondOrder:
     inboard: int
 
     def node(self, node: int) -> Array:
-        """(6, m, m) second-order displacement and rotation vector of a node."""
+        """(6, m, m) second-order displacement and rotation vector of a node, known from the second time on."""
+        if node not in self._nodes:
+            self._nodes[node] = self._anchored(node)
+        return self._nodes[node]
+
+    @cached_property
+    def _nodes(self) -> dict[int, Array]:
+        return {}
+
+    def _anchored(self, node: int) -> Array:
+        """Relative to the inboard node."""
         found = _node(self.model, self.field, node)
         arm = self.model.nodes[node] - self.model.nodes[self.inboard]
         lift = self._inboard

@@ -68,31 +68,25 @@ def _within(seeds: Seeds, first: int, end: int) -> dict[int, Array]:
 
 def _steps_back(stretch: Stretch, seeds: Seeds, state: Array, multipliers: Array) -> Array:
     """λ (j s, n, c) at the nodes of a stretch, and derivatives by (4, n, c) at its start from those at its end."""
-    scheme, shape = stretch.scheme, state.shape
-    _, damping, stiffness = stretch.tangents
-    to_y, to_v = stretch.history
-    kept, added = stretch.moved_on
-    count, n, columns = scheme.count, shape[1], shape[2]
-    nodes = count, n, columns
-    flat = state.reshape(4, -1)
-    for step in range(len(stretch.h) - 1, -1, -1):
-        h, rows, rescaled = float(stretch.h[step]), stretch.rows(step), stretch.rescaled(step)
-        right = added[step].T @ flat
-        asked = _asked(seeds, rows, nodes)
+    scheme, (_, n, columns) = stretch.scheme, state.shape
+    nodes, flat = (scheme.count, n, columns), state.reshape(4, -1)
+    for number in range(len(stretch.h) - 1, -1, -1):
+        step = stretch.step(number)
+        right = step.added.T @ flat
+        asked = _asked(seeds, step.rows, nodes)
         if asked is not None:
             by_y, by_v, by_a = asked
-            right = right + by_a + (h * h * scheme.places.T) @ by_y + (h * scheme.rates.T) @ by_v
-        t = float(stretch.knots.t[rows.start])
-        found = -solve(stretch.blocks[step], right.reshape(count * n, columns), True, t).reshape(nodes)
-        multipliers[rows] = found
-        before_y = (stiffness[rows].swapaxes(1, 2) @ found).reshape(count, -1)
-        before_v = (damping[rows].swapaxes(1, 2) @ found).reshape(count, -1)
+            right = right + by_a + (step.h**2 * scheme.places.T) @ by_y + (step.h * scheme.rates.T) @ by_v
+        found = -solve(step.block, right.reshape(-1, columns), True, step.t).reshape(nodes)
+        multipliers[step.rows] = found
+        before_y = (step.stiffness.swapaxes(1, 2) @ found).reshape(scheme.count, -1)
+        before_v = (step.damping.swapaxes(1, 2) @ found).reshape(scheme.count, -1)
         if asked is not None:
             before_y, before_v = before_y + asked[0], before_v + asked[1]
-        flat = kept[step].T @ flat + to_y[step].T @ before_y + to_v[step].T @ before_v
-        if rescaled is not None:
-            flat = rescaled.T @ flat
-    return flat.reshape(shape)
+        flat = step.kept.T @ flat + step.to_y.T @ before_y + step.to_v.T @ before_v
+        if step.rescaled is not None:
+            flat = step.rescaled.T @ flat
+    return flat.reshape(state.shape)
 
 
 def _asked(seeds: Seeds, rows: slice, nodes: tuple[int, int, int]) -> Array | None:

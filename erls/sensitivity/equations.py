@@ -44,6 +44,39 @@ class Walk(NamedTuple):
     leg: Leg
 
 
+class Step(NamedTuple):
+    """What the methods need of a step of s nodes, both ways.
+
+    Attributes
+    ----------
+    t : float
+        Of its first node [s].
+    h : float
+        [s]
+    rows : slice
+        Its nodes among those of the stretch.
+    rescaled : array or None
+        See `Scheme.rescaled`; None where nothing changes.
+    block : (s n, s n) array
+        Of the accelerations, overwritten by `solve`.
+    damping, stiffness : (s, n, n) arrays
+    to_y, to_v, kept, added : arrays
+        See `Scheme.history` and `Scheme.moved_on`.
+    """
+
+    t: float
+    h: float
+    rows: slice
+    rescaled: Array | None
+    block: Array
+    damping: Array
+    stiffness: Array
+    to_y: Array
+    to_v: Array
+    kept: Array
+    added: Array
+
+
 @dataclass(frozen=True)
 class Stretch:
     """Whole steps of a leg, linearized.
@@ -92,15 +125,20 @@ class Stretch:
         """See `Scheme.moved_on`."""
         return self.scheme.moved_on(self.h)
 
-    def rescaled(self, step: int) -> Array | None:
-        """See `Scheme.rescaled`; None where nothing changes."""
+    def step(self, number: int) -> Step:
+        """One of them."""
+        rows = slice(number * self.scheme.count, (number + 1) * self.scheme.count)
+        _, damping, stiffness = self.tangents
+        to_y, to_v = (part[number] for part in self.history)
+        kept, added = (part[number] for part in self.moved_on)
+        t, h, block = float(self.knots.t[rows.start]), float(self.h[number]), self.blocks[number]
+        own = damping[rows], stiffness[rows], to_y, to_v, kept, added
+        return Step(t, h, rows, self._rescaled(number), block, *own)
+
+    def _rescaled(self, step: int) -> Array | None:
         before = float(self.h[step - 1]) if step else self.before
         found = self.scheme.rescaled(float(self.h[step]), before)
         return None if found[3, 3] == 1 else found
-
-    def rows(self, step: int) -> slice:
-        """Nodes of a step among those of the stretch."""
-        return slice(step * self.scheme.count, (step + 1) * self.scheme.count)
 
 
 def solve(block: Array, right: Array, transposed: bool, t: float) -> Array:

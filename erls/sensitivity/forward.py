@@ -55,24 +55,18 @@ def stepped(
 
 def _steps(stretch: Stretch, forces: Array, state: Array, out: Array) -> Array:
     """Derivatives ``out`` (j s, 3, n, p) at the nodes of a stretch, and (4, n, p) at its end."""
-    scheme, shape = stretch.scheme, state.shape
-    _, damping, stiffness = stretch.tangents
-    to_y, to_v = stretch.history
-    kept, added = stretch.moved_on
-    count, n, columns = scheme.count, shape[1], shape[2]
-    nodes = count, n, columns
-    flat = state.reshape(4, -1)
-    for step, h in enumerate(stretch.h.tolist()):
-        rows, rescaled = stretch.rows(step), stretch.rescaled(step)
-        if rescaled is not None:
-            flat = rescaled @ flat
-        y, v = to_y[step] @ flat, to_v[step] @ flat
-        right = forces[rows] + damping[rows] @ v.reshape(nodes) + stiffness[rows] @ y.reshape(nodes)
-        t = float(stretch.knots.t[rows.start])
-        a = -solve(stretch.blocks[step], right.reshape(count * n, columns), False, t).reshape(count, -1)
-        y += (h * h * scheme.places) @ a
-        v += (h * scheme.rates) @ a
+    scheme, (_, n, columns) = stretch.scheme, state.shape
+    nodes, flat = (scheme.count, n, columns), state.reshape(4, -1)
+    for number in range(len(stretch.h)):
+        step = stretch.step(number)
+        if step.rescaled is not None:
+            flat = step.rescaled @ flat
+        y, v = step.to_y @ flat, step.to_v @ flat
+        right = forces[step.rows] + step.damping @ v.reshape(nodes) + step.stiffness @ y.reshape(nodes)
+        a = -solve(step.block, right.reshape(-1, columns), False, step.t).reshape(scheme.count, -1)
+        y += (step.h**2 * scheme.places) @ a
+        v += (step.h * scheme.rates) @ a
         for k, x in enumerate((y, v, a)):
-            out[rows, k] = x.reshape(nodes)
-        flat = kept[step] @ flat + added[step] @ a
-    return flat.reshape(shape)
+            out[step.rows, k] = x.reshape(nodes)
+        flat = step.kept @ flat + step.added @ a
+    return flat.reshape(state.shape)

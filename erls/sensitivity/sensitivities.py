@@ -127,6 +127,9 @@ def sensitivities(
     if method not in get_args(Method):
         message, remedy = "no such method", f"take one of {', '.join(get_args(Method))}"
         raise SceneError(Cause.BAD_FIELD, message, where="method", value=method, remedy=remedy)
+    if not outputs:
+        message, remedy = "nothing is differentiated", "give one function of a run at least, by a name"
+        raise SceneError(Cause.BAD_FIELD, message, where="outputs", value=0, limit=1, remedy=remedy)
     if isinstance(scene, ChainRun):
         run, keys = scene, parameters_of(scene.scene, parameters)
     else:
@@ -198,8 +201,6 @@ def _adjoint(
     askings: Sequence[tuple[Asking, dict[int, Array]]], keys: Sequence[Parameter], scheme: Scheme
 ) -> dict[str, dict[str, Array]]:
     derivatives: dict[str, dict[str, Array]] = {asking.name: {} for asking, _ in askings}
-    if not askings:
-        return derivatives
     run = askings[0][0].run
     ends = np.cumsum([asking.value.size for asking, _ in askings]).tolist()
     columns = [slice(end - asking.value.size, end) for end, (asking, _) in zip(ends, askings, strict=True)]

@@ -291,6 +291,7 @@ def test_zeros_of_more_outputs_than_inputs() -> None:
         ({"outputs": ["point.tip.x", "point.tip.x"]}, Cause.BAD_REFERENCE, "named twice"),
         ({"at": "somewhere"}, Cause.BAD_FIELD, "'equilibrium'"),
         ({"at": -1.0}, Cause.TIME_OUT_OF_RANGE, "0 or later"),
+        ({"at": 1e3}, Cause.TIME_OUT_OF_RANGE, "ends before this time"),
         ({"at": float("nan")}, Cause.TIME_OUT_OF_RANGE, "0 or later"),
     ],
 )

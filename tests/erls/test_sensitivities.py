@@ -258,6 +258,12 @@ def test_refusals(overrides: list[str], keys: Any, told: str) -> None:
         erls.sensitivities(scene, {"tip": lambda run: run.position("tip", 0.0)}, keys)
 
 
+def test_no_outputs_are_refused() -> None:
+    """Before anything runs."""
+    with pytest.raises(ReportedError, match="one function of a run at least"):
+        erls.sensitivities(erls.load_scene(L), {}, ["gravity.2"])
+
+
 def test_halved_steps() -> None:
     """The algorithmic acceleration moves along as `erls.integrate.alpha_steps.Steps.set_step` moves it."""
     y, v, a, algorithmic = np.random.default_rng(1).normal(size=4)

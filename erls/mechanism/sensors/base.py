@@ -14,7 +14,7 @@ Rules for a new kind of sensor:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 import numpy as np
@@ -101,14 +101,18 @@ class Seen(Protocol):
     def node(self, at: Node) -> NodeMotion:
         """Motion of a node."""
 
-    def link_axes(self, link: int) -> Array:
-        """(k, 3, 3) mesh axes of a link, which turn with its inboard interface."""
-
     def pull(self, link: int) -> Array:
         """(k, 3) gravity and forces per mass on what sits on a link [m/s²], world axes."""
 
     def joint(self, at: Moved) -> JointMotion:
         """Motion of a joint."""
+
+
+class SeenLinks(Seen, Protocol):
+    """A chain of links at k times: sensors of what only links have are bound by a `Finder` that knows links."""
+
+    def link_axes(self, link: int) -> Array:
+        """(k, 3, 3) mesh axes of a link, which turn with its inboard interface."""
 
     def joint_force(self, at: Moved) -> JointForce:
         """Forces along it."""
@@ -149,12 +153,12 @@ class Sensor(NamedTuple):
     columns : sequence of (str, str)
         Name of each component, empty for the only one, and its unit.
     read : callable
-        (k, c) readings of a `Seen`.
+        (k, c) readings of the `Seen` of the mechanism whose `Finder` bound it, of links a `SeenLinks`.
     """
 
     name: str
     columns: Sequence[tuple[str, str]]
-    read: Callable[[Seen], Array]
+    read: Callable[[Any], Array]
 
 
 class SensorRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="type"):
@@ -167,10 +171,6 @@ class SensorRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """
 
     name: str
-
-    def bind(self, finder: Finder, place: Place) -> Sensor:
-        """Check, and say what is read."""
-        raise NotImplementedError
 
 
 class PointSensor(SensorRecord, frozen=True, kw_only=True):
@@ -187,7 +187,7 @@ class PointSensor(SensorRecord, frozen=True, kw_only=True):
     point: str
     direction: tuple[float, float, float] | None = None
 
-    def along(self, unit: str, vectors: Callable[[Seen], Array], place: Place) -> Sensor:
+    def along(self, unit: str, vectors: Callable[[Any], Array], place: Place) -> Sensor:
         """Reading of vectors (k, 3): their components, or the one that is asked for."""
         if self.direction is None:
             return Sensor(self.name, [(axis, unit) for axis in "xyz"], vectors)
@@ -207,7 +207,7 @@ class TurningSensor(PointSensor, frozen=True, kw_only=True):
 
     axes: str = "node"
 
-    def own_axes(self, finder: Finder, place: Place) -> tuple[Node, Callable[[Seen, Array], Array]]:
+    def own_axes(self, finder: Finder, place: Place) -> tuple[Node, Callable[[Any, Array], Array]]:
         """The node, and what turns vectors (k, 3) of the world into these axes."""
         place.choice("axes", self.axes, AXES)
         at = finder.node(self.point, self.axes == "node", place)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from erls.maths.so3 import Array
 from erls.mechanism.place import Place
-from erls.mechanism.sensors.base import Finder, Seen, Sensor
+from erls.mechanism.sensors.base import Finder, SeenLinks, Sensor
 from erls.mechanism.sensors.joints import JointSensor
 
 
@@ -23,10 +23,10 @@ class Effort(JointSensor, frozen=True, kw_only=True, tag="effort"):
             remedy = "use side = 'motor'"
             raise place.error("side", "what the rotor of a closing joint takes is not known", "load", remedy=remedy)
 
-        def motor(seen: Seen) -> Array:
+        def motor(seen: SeenLinks) -> Array:
             return seen.joint_force(at).drive[:, None] / at.gear_ratio
 
-        def load(seen: Seen) -> Array:
+        def load(seen: SeenLinks) -> Array:
             force = seen.joint_force(at)
             total = force.drive + force.passive
             if at.rotor:

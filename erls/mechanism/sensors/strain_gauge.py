@@ -6,7 +6,7 @@ import numpy as np
 
 from erls.maths.so3 import Array
 from erls.mechanism.place import Place
-from erls.mechanism.sensors.base import Finder, Seen, Sensor, SensorRecord, unit_vector
+from erls.mechanism.sensors.base import Finder, SeenLinks, Sensor, SensorRecord, unit_vector
 
 
 class StrainGauge(SensorRecord, frozen=True, kw_only=True, tag="strain_gauge"):
@@ -42,7 +42,7 @@ class StrainGauge(SensorRecord, frozen=True, kw_only=True, tag="strain_gauge"):
         at = finder.site(self.point, "", self.element, place)
         row = self.strain_row(finder, place)
 
-        def read(seen: Seen) -> Array:
+        def read(seen: SeenLinks) -> Array:
             return np.asarray((seen.recovered(at) @ row)[:, None])
 
         return Sensor(self.name, [("", "1")], read)

@@ -14,7 +14,7 @@ from erls.equations.serial.motion_series import spin_of
 from erls.errors import SceneError
 from erls.maths.so3 import Array, cross_all
 from erls.mechanism.place import Place
-from erls.mechanism.sensors.base import JointForce, JointMotion, Moved, Node, NodeMotion, Sensor, Site
+from erls.mechanism.sensors.base import JointMotion, Moved, Node, NodeMotion, Sensor, Site
 from erls.run.bodies.connections import ONE_COORDINATE, joint_frames
 from erls.scene.bodies.schema import BodyScene
 from fe_import.files.toml import choose
@@ -92,10 +92,6 @@ class BodyInstants:
             self._nodes[at.node] = node_motion(*self.run.moving(self.t, [at.node]))
         return self._nodes[at.node]
 
-    def link_axes(self, link: int) -> Array:
-        """Nobody asks: there are no links."""
-        raise NotImplementedError
-
     def pull(self, link: int) -> Array:
         """(k, 3) gravity [m/s²]."""
         return np.tile(np.array(self.run.scene.record.gravity), (len(self.t), 1))
@@ -120,14 +116,6 @@ class BodyInstants:
         speed = outer.velocity + cross_all(outer.spin, second[:, :3, 3] - outer.place)
         speed = speed - inner.velocity - cross_all(inner.spin, first[:, :3, 3] - inner.place)
         return _dot(axis, speed) + _dot(cross_all(inner.spin, axis), second[:, :3, 3] - first[:, :3, 3])
-
-    def joint_force(self, at: Moved) -> JointForce:
-        """Nobody asks: `BodyFinder` refuses it."""
-        raise NotImplementedError
-
-    def recovered(self, at: Site) -> Array:
-        """Nobody asks: `BodyFinder` refuses it."""
-        raise NotImplementedError
 
 
 def _dot(a: Array, b: Array) -> Array:
