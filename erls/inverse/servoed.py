@@ -36,6 +36,7 @@ _LARGEST = 0.3  # rad, and of the size of a link: a change of joint coordinates 
 _SETTLED = 1e-8  # of the same: a change after which the next one is below rounding
 _SINGULAR = 1e-7  # of the largest singular value of ∂h/∂s: no joint coordinate follows
 _REACHED = 1e-6  # of the size of a link: gap that a search for the nearest place may leave
+_STEEP = 0.1  # of the largest metres per unit of a coordinate, the smallest that count
 _SEARCH = 200  # iterations of that search
 
 
@@ -88,14 +89,18 @@ class Servoed:
         Loops, whose conditions and forces stand behind those of the demand and of the drives.
     """
 
-    def __init__(self, tree: SerialFormulation, conditions: Conditions, drives: IntArray, closing: Closing | None = None) -> None:
+    def __init__(
+        self, tree: SerialFormulation, conditions: Conditions, drives: IntArray, closing: Closing | None = None
+    ) -> None:
         self.tree, self.conditions = tree, conditions
         self.system = tree.compiled
         self.closing, self.driven = closing, np.searchsorted(tree.free_joints, drives)
         self.size = size_of(tree.mechanism) or 1.0
         joints = len(tree.free_joints)
         turns = np.array([tree.mechanism.joints[k].freedom.turns for k in tree.free_joints.tolist()], dtype=bool)
-        units = np.concatenate([np.where(turns, 1.0, self.size), self.size / self.metres[joints:]])
+        least = _STEEP * float(self.metres.max(initial=0.0))
+        elastic = self.size / np.maximum(self.metres[joints:], least)
+        units = np.concatenate([np.where(turns, 1.0, self.size), elastic])
         self.dependent = self.driven if closing is None else self._following(joints, units)
         self.internal = np.setdiff1d(np.arange(tree.size), self.dependent)
         self._units = units[self.dependent]

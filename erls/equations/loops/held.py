@@ -53,9 +53,7 @@ def gradients(reals: Array, integers: IntArray, scratch: Array, t: Array, y: Arr
 
 
 @kernel(_MOTIONS, counted=False)
-def motions(
-    reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array
-) -> None:
+def motions(reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array, out: Array) -> None:
     """Rows (r, 3 + n) of ``out``: Φ, Φ̇, Φ̈ at zero accelerations, and Φ_y of the conditions in use."""
     loops = read_loops(reals, integers, integers[len(integers) - 1])
     room = read_loop_room(scratch, integers, loops.room)
