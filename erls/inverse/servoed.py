@@ -170,8 +170,8 @@ class Servoed:
         if self.closing is None:
             return found
         loops = self.closing.held(demand.t, y, v)
-        both = [np.concatenate(pair, axis=1) for pair in zip(found[:4], loops, strict=True)]
-        return Held(*both, found.metres)
+        gap, rate, bias, rows = (np.concatenate(pair, axis=1) for pair in zip(found[:4], loops, strict=True))
+        return Held(gap, rate, bias, rows, found.metres)
 
     def settled(self, demand: Demand, y: Array) -> Array:
         """(k, n) places near ``y`` at which the conditions hold, its internal coordinates as they are.
