@@ -54,12 +54,16 @@ class Inversion:
     @property
     def efforts(self) -> dict[str, Array]:
         """(k,) each, by joint [N m or N]."""
-        return dict(zip(self.problem.drives, self.states.efforts.T, strict=True))
+        return dict(zip(self.problem.drives, self._driving(self.states), strict=True))
 
     @property
     def rigid_efforts(self) -> dict[str, Array]:
         """The same of rigid links."""
-        return dict(zip(self.problem.drives, self.rigid.efforts.T, strict=True))
+        return dict(zip(self.problem.drives, self._driving(self.rigid), strict=True))
+
+    def _driving(self, states: States) -> Array:
+        """(r, k) efforts of the drives alone."""
+        return states.efforts[:, : len(self.problem.drives)].T
 
     @property
     def start(self) -> dict[str, float]:
@@ -97,7 +101,7 @@ class Inversion:
         """
         begins = self.problem.conditions.breakpoints
         first = max(begins[0], float(self.t[0])) if begins else float(self.t[0])
-        return max([0.0, *(first - self._moves(each, threshold) for each in self.states.efforts.T)])
+        return max([0.0, *(first - self._moves(each, threshold) for each in self._driving(self.states))])
 
     def _moves(self, effort: Array, threshold: float) -> float:
         beyond = np.abs(effort - effort[0])

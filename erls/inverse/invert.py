@@ -138,6 +138,8 @@ def rigid_motion(problem: Problem) -> States:
     servoed, demand = problem.rigid, problem.conditions.demand(problem.t)
     y = followed(servoed, problem.conditions, problem.t)
     assert not servoed.count
+    if servoed.closing is not None:
+        servoed.closing.refuse_uncontrolled(demand.t, y, servoed.driven, servoed.metres)
     internal = Internal(servoed, demand, y, Basis(*(np.zeros((0, 0)),) * 4))
     every = np.arange(len(problem.t))
     internal.look(np.zeros((len(every), 0)))

@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.registry import TREES, system_of
 from erls.equations.serial.formulation import SerialFormulation
 from erls.errors import Cause, SceneError
+from erls.inverse.closing import Closing
 from erls.inverse.conditions import Conditions, conditions_of
 from erls.inverse.frames import with_ends
 from erls.inverse.servoed import Servoed
@@ -31,7 +33,6 @@ _MOST = 50_000_000
 _SYSTEMS = {
     "nodal": ("formulation", "use erls or ffr; erls invert --confirm nodal runs the drives on nodal elements"),
     "pieces": ("formulation", "leave links in one piece (substructures = 1)"),
-    "loops": ("", "remove [[loops]]"),
     "quasi-static": ("bandwidth", "remove it: fast internal motions follow by inverse.bandwidth"),
     "absolute": ("coordinates", "use coordinates = 'independent'"),
 }
@@ -88,13 +89,8 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     conditions = conditions_of(scene, mechanism)
     _refuse_number(scene, conditions, [mechanism.joints[k].name for k in drives.tolist()])
     free = _with_drives(mechanism, {k: Drive() for k in drives.tolist()})
-    held = {
-        k: Drive("motion", motion=joint.drive.motion or piecewise([], [joint.position]))
-        for k, joint in enumerate(free.joints)
-        if not joint.drive.prescribed and k not in drives.tolist()
-    }
-    rigid = with_rigid(_with_drives(free, held), {link.name for link in mechanism.links})
-    flexible, stiff = (Servoed(_tree(scene, each, conditions), conditions, drives) for each in (free, rigid))
+    flexible = _servoed(scene, free, conditions, drives)
+    stiff = _rigid(scene, with_rigid(free, {link.name for link in mechanism.links}), conditions, drives)
     settings = scene.record.simulation
     count = round(settings.duration / (settings.step or STEP))
     if count < _FEWEST:
@@ -129,6 +125,26 @@ def unknown_drives(scene: Scene, mechanism: Mechanism) -> IntArray:
 def _with_drives(mechanism: Mechanism, drives: dict[int, Drive]) -> Mechanism:
     joints = (replace(joint, drive=drives[k]) if k in drives else joint for k, joint in enumerate(mechanism.joints))
     return replace(mechanism, joints=tuple(joints), static_start=False)
+
+
+def _servoed(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: IntArray) -> Servoed:
+    settings = scene.record.simulation
+    closing = Closing(ClosedChain(TREES[settings.formulation](mechanism, settings))) if mechanism.loops else None
+    return Servoed(_tree(scene, mechanism, conditions), conditions, drives, closing)
+
+
+def _rigid(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: IntArray) -> Servoed:
+    """Of rigid links, with the joints held that neither are driven nor close loops."""
+    moving = set(drives.tolist())
+    if mechanism.loops:
+        closed = _servoed(scene, mechanism, conditions, drives)
+        moving |= set(closed.tree.free_joints[closed.dependent].tolist())
+    held = {
+        k: Drive("motion", motion=joint.drive.motion or piecewise([], [joint.position]))
+        for k, joint in enumerate(mechanism.joints)
+        if not joint.drive.prescribed and k not in moving
+    }
+    return _servoed(scene, _with_drives(mechanism, held), conditions, drives)
 
 
 def _tree(scene: Scene, mechanism: Mechanism, conditions: Conditions) -> SerialFormulation:
@@ -179,16 +195,17 @@ def _refuse(scene: Scene, mechanism: Mechanism) -> None:
     kind = system_of(mechanism, settings)
     if kind in _SYSTEMS:
         field, remedy = _SYSTEMS[kind]
-        raise refused(field, f"a scene with {getattr(settings, field)!r}" if field else "a scene with loops", remedy)
+        raise refused(field, f"a scene with {getattr(settings, field)!r}", remedy)
     if settings.gauge == "minimum-norm":
         raise refused("gauge", "the minimum-norm gauge", "use gauge = 'joint-angle'")
     if settings.effects == "auto":
         raise refused("effects", "a scene that chooses its effects", "use 'all', or the names of effects")
     if mechanism.rotation_vectors:
         raise refused("", "a joint that turns by a rotation vector", "use universal and revolute joints")
-    for joint in mechanism.joints:
-        if joint.forces.sticks or joint.forces.stops:
-            raise refused("", f"joint {joint.name!r} with stops or with friction that sticks", "remove them")
+    closing = [(loop.name, loop.freedom.forces) for loop in mechanism.loops if loop.freedom is not None]
+    for name, forces in [*((joint.name, joint.forces) for joint in mechanism.joints), *closing]:
+        if forces.sticks or forces.stops:
+            raise refused("", f"joint {name!r} with stops or with friction that sticks", "remove them")
     if mechanism.contacts:
         raise refused("", "a scene with contacts", "remove [[contacts]]")
 
@@ -203,7 +220,7 @@ def followed(servoed: Servoed, conditions: Conditions, t: Array) -> Array:
         OUT_OF_REACH, SINGULAR_SERVO: says when.
     """
     demand = conditions.demand(t)
-    y = servoed.tree.undeformed_start()[0][None]
+    y = servoed.beginning[None]
     result = np.empty((len(t), y.shape[1]))
     for k in range(len(t)):
         one = demand.part(slice(k, k + 1))

@@ -24,10 +24,11 @@ from erls.equations.serial.formulation import SerialFormulation
 from erls.equations.series import residual_series
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SimulationError
+from erls.inverse.closing import Closing, following
 from erls.inverse.conditions import Conditions, Demand, Held, Joints
 from erls.inverse.frames import point_motions
 from erls.maths.so3 import Array
-from erls.sensitivity.tangents import Evaluation, Knots, steps_of
+from erls.sensitivity.tangents import Evaluation, Knots, Tangents, steps_of
 from fe_import.model import IntArray
 
 _ITERATIONS = 40
@@ -35,6 +36,7 @@ _LARGEST = 0.3  # rad, and of the size of a link: a change of joint coordinates 
 _SETTLED = 1e-8  # of the same: a change after which the next one is below rounding
 _SINGULAR = 1e-7  # of the largest singular value of ∂h/∂s: no joint coordinate follows
 _REACHED = 1e-6  # of the size of a link: gap that a search for the nearest place may leave
+_STEEP = 0.1  # of the largest metres per unit of a coordinate, the smallest that count
 _SEARCH = 200  # iterations of that search
 
 
@@ -46,7 +48,7 @@ class States(NamedTuple):
     y, v, a : (k, n) arrays
         Independent coordinates and their derivatives.
     efforts : (k, r) array
-        Of the unknown drives [N m or N].
+        Of the unknown drives [N m or N], then multipliers of loops.
     """
 
     y: Array
@@ -83,16 +85,55 @@ class Servoed:
     conditions : Conditions
     drives : (r,) int array
         Joints that they drive; as many as there are conditions.
+    closing : Closing or None
+        Loops, whose conditions and forces stand behind those of the demand and of the drives.
     """
 
-    def __init__(self, tree: SerialFormulation, conditions: Conditions, drives: IntArray) -> None:
+    def __init__(
+        self, tree: SerialFormulation, conditions: Conditions, drives: IntArray, closing: Closing | None = None
+    ) -> None:
         self.tree, self.conditions = tree, conditions
         self.system = tree.compiled
-        self.dependent = np.searchsorted(tree.free_joints, drives)
-        self.internal = np.setdiff1d(np.arange(tree.size), self.dependent)
+        self.closing, self.driven = closing, np.searchsorted(tree.free_joints, drives)
         self.size = size_of(tree.mechanism) or 1.0
-        turns = np.array([tree.mechanism.joints[k].freedom.turns for k in drives.tolist()])
-        self._units = np.where(turns, 1.0, self.size)
+        joints = len(tree.free_joints)
+        turns = np.array([tree.mechanism.joints[k].freedom.turns for k in tree.free_joints.tolist()], dtype=bool)
+        least = _STEEP * float(self.metres.max(initial=0.0))
+        elastic = self.size / np.maximum(self.metres[joints:], least)
+        units = np.concatenate([np.where(turns, 1.0, self.size), elastic])
+        self.dependent = self.driven if closing is None else self._following(joints, units)
+        self.internal = np.setdiff1d(np.arange(tree.size), self.dependent)
+        self._units = units[self.dependent]
+
+    def _following(self, joints: int, units: Array) -> IntArray:
+        """Driven joints, then others, then elastic coordinates where joints do not close the loops.
+
+        Raises
+        ------
+        SimulationError
+            SINGULAR_SERVO: conditions depend on each other at the start.
+        """
+        y = self.beginning[None]
+        rows = self.held(self.conditions.demand(np.zeros(1)), y, np.zeros_like(y)).rows[0] * units
+        rest = np.setdiff1d(np.arange(joints), self.driven)
+        found = following(rows, (self.driven, rest, np.arange(joints, self.tree.size)))
+        if len(found) < len(rows):
+            raise SimulationError(
+                Cause.SINGULAR_SERVO,
+                f"{self._names} cannot all be held: loops leave some of them no motion of their own",
+                where="the start",
+                remedy="demand as many independent motions as the loops leave, or start from another position",
+            )
+        return found
+
+    @cached_property
+    def beginning(self) -> Array:
+        """(n,) undeformed links where the scene starts, loops closed."""
+        return self.tree.undeformed_start()[0] if self.closing is None else self.closing.chain.start.y
+
+    @property
+    def _names(self) -> str:
+        return ", ".join(each.name for each in self.conditions.every)
 
     @property
     def count(self) -> int:
@@ -125,7 +166,12 @@ class Servoed:
         """Conditions at k states."""
         prescribed = len(self.tree.prescribed_joints)
         points = point_motions(self.system, len(self.conditions.points), prescribed, demand.t, y, v)
-        return self.conditions.held(demand, points, self.joints(demand.t, y, v))
+        found = self.conditions.held(demand, points, self.joints(demand.t, y, v))
+        if self.closing is None:
+            return found
+        loops = self.closing.held(demand.t, y, v)
+        gap, rate, bias, rows = (np.concatenate(pair, axis=1) for pair in zip(found[:4], loops, strict=True))
+        return Held(gap, rate, bias, rows, found.metres)
 
     def settled(self, demand: Demand, y: Array) -> Array:
         """(k, n) places near ``y`` at which the conditions hold, its internal coordinates as they are.
@@ -158,7 +204,7 @@ class Servoed:
         """Say why the conditions cannot be held at a time: nothing gets there, or joint coordinates do not follow."""
         one, place = demand.part(slice(k, k + 1)), np.nan_to_num(y[k : k + 1])
         nearest = self._nearest(one, place)
-        names = ", ".join(each.name for each in self.conditions.every)
+        names = self._names if self.closing is None else f"{self._names} (loops {self.closing.names})"
         where = f"t = {float(demand.t[k]):.6g} s"
         if nearest > _REACHED * self.size:
             raise SimulationError(
@@ -225,14 +271,18 @@ class Servoed:
     def missing(self, demand: Demand, states: States) -> Array:
         """(k, n + p) forces out of balance, and what accelerations lack of those that are demanded."""
         y, v, a, efforts = states
-        forces = residual_series(self.system, demand.t, y, v, a)
-        forces[:, self.dependent] -= efforts
+        p = len(self.driven)
+        if self.closing is None:
+            forces = residual_series(self.system, demand.t, y, v, a)
+        else:
+            forces = self.closing.forces(demand.t, y, v, a, efforts[:, p:])
+        forces[:, self.driven] -= efforts[:, :p]
         held = self.held(demand, y, v)
         return np.hstack([forces, held.bias + np.einsum("kpn,kn->kp", held.rows, a)])
 
     def tangents(self, demand: Demand, states: States) -> Derivatives:
         """Of `missing`, conditions held up to rates."""
-        own = Evaluation(self.steps).tangents(self.system, Knots(demand.t, states.y, states.v, states.a))
+        own = self.plain_tangents(demand.t, states)
         rows = self.held(demand, states.y, states.v).rows
         by_place, last_by_place, last_by_rate = self._kinematics(demand, states)
         s, z, m, p = self.dependent, self.internal, self.count, len(self.dependent)
@@ -244,9 +294,18 @@ class Servoed:
         forces = own.stiffness @ places + own.damping @ later, own.damping @ rates, own.mass
         last = last_by_place @ places + last_by_rate @ later, last_by_rate @ rates, rows
         pushed = np.zeros((len(rows), self.tree.size + p, p))
-        pushed[:, s, np.arange(p)] = -1.0
+        driven = len(self.driven)
+        pushed[:, self.driven, np.arange(driven)] = -1.0
+        pushed[:, : self.tree.size, driven:] = rows[:, driven:].transpose(0, 2, 1)
         by = [np.concatenate(pair, axis=1) for pair in zip(forces, last, strict=True)]
         return Derivatives(by[0], by[1], by[2], pushed)
+
+    def plain_tangents(self, t: Array, states: States) -> Tangents:
+        """Of the forces at times (k,), efforts and multipliers as they are."""
+        y, v, a, efforts = states
+        if self.closing is None:
+            return Evaluation(self.steps).tangents(self.system, Knots(t, y, v, a))
+        return self.closing.tangents(Knots(t, y, v, a), efforts[:, len(self.driven) :], self.steps)
 
     def _kinematics(self, demand: Demand, states: States) -> tuple[Array, Array, Array]:
         """(k, p, n) derivatives of ḣ by q, and of ḧ by q and by q̇."""

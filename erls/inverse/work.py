@@ -19,7 +19,6 @@ from erls.inverse.problem import Problem
 from erls.inverse.servoed import States
 from erls.inverse.two_point import Ends, Solved, collocate, ends_of
 from erls.maths.so3 import Array
-from erls.sensitivity.tangents import Evaluation, Knots
 
 _TOLERANCE = 1e-11  # m: change that ends iterations
 _ROUGH = 1e-4  # m: the same of those that give others a start
@@ -53,21 +52,23 @@ class Work:
         self._known: dict[int, Ends] = {}
         servoed = problem.flexible
         self.demand: Demand = problem.conditions.demand(problem.t)
-        self.near = np.tile(servoed.tree.undeformed_start()[0], (len(problem.t), 1))
-        self.near[:, servoed.dependent] = rigid.y[:, problem.rigid.dependent]
+        self.near = np.tile(servoed.beginning, (len(problem.t), 1))
+        joints = servoed.tree.free_joints
+        self.near[:, : len(joints)] = problem.rigid.joints(problem.t, rigid.y, rigid.v).angles[:, joints]
         m = servoed.count
         start = Internal(servoed, self.demand.part(slice(0, 1)), self.near[:1], self._whole())
-        start.look(np.zeros((1, 2 * m)))
+        start.look(np.concatenate([self.near[:1, servoed.internal], np.zeros((1, m))], axis=1))
         start.learn(np.zeros(1, dtype=np.int64))
         first = start.tangents()[0]
         metres = servoed.metres[servoed.internal]
         units = 1 / np.maximum(metres, _STEEP * metres.max(initial=0.0))
         both = np.concatenate([units, units / problem.step])
         zeros = np.linalg.eigvals(first * both / both[:, None]).astype(complex) if m else np.zeros(0, dtype=complex)
-        own = Evaluation(servoed.steps).tangents(
-            servoed.system, Knots(self.demand.t[:1], *(x for x in start.states[:3]))
-        )
-        motions = Linearization(own.mass[0], own.damping[0], own.stiffness[0], np.eye(servoed.tree.size))
+        own, loops = servoed.plain_tangents(self.demand.t[:1], start.states), servoed.closing
+        ways = np.eye(servoed.tree.size)
+        if loops is not None:
+            ways = loops.ways(self.demand.t[:1], start.states.y, servoed.metres)
+        motions = Linearization(own.mass[0], own.damping[0], own.stiffness[0], ways)
         self._units = units
         self.nature = nature_of(zeros, motions, self._limit(), _EXCITED * self._slowest(), float(problem.t[-1]))
         self._take(basis_of(first[m:, :m], units, self.nature.limit))
@@ -144,7 +145,7 @@ class Work:
         for number in range(_PASSES):
             found = self._solved(method, x, progress)
             x, iterations = found.x, iterations + found.iterations
-            efforts = internal.states.efforts
+            efforts = internal.states.efforts[:, : len(self.problem.drives)]
             if not self.basis.fast.shape[1]:
                 left = 0.0
             elif number:

@@ -76,12 +76,12 @@ class Evaluation:
         n = y.shape[1]
         damping, stiffness = np.empty((2, len(t), n, n))
         for j in range(n):
-            damping[:, :, j] = _difference(lambda x: residual_series(system, t, y, x, a), v, j, self.steps[j])
-            stiffness[:, :, j] = _difference(lambda x: residual_series(system, t, x, v, a), y, j, self.steps[j])
+            damping[:, :, j] = difference(lambda x: residual_series(system, t, y, x, a), v, j, self.steps[j])
+            stiffness[:, :, j] = difference(lambda x: residual_series(system, t, x, v, a), y, j, self.steps[j])
         return Tangents(mass, damping, stiffness)
 
 
-def _difference(forces, x: Array, place: int, step: float) -> Array:  # type: ignore[no-untyped-def]
+def difference(forces, x: Array, place: int, step: float) -> Array:  # type: ignore[no-untyped-def]
     """(k, n) central difference of forces (k, n) of states (k, n) by one of their coordinates."""
     above, below = x.copy(), x.copy()
     above[:, place] += step

@@ -234,6 +234,12 @@ class CompiledLoops(CompiledSystem):
         held.gradients(*self._arrays, _numbers(t), _numbers(y), out)
         return out
 
+    def motions(self, t: Array, y: Array, v: Array) -> Array:
+        """(k, r, 3 + n) Φ, Φ̇, Φ̈ at zero accelerations, and Φ_y of the conditions in use, at many states."""
+        out = np.empty((len(t), self.kept, 3 + self.size))
+        held.motions(*self._arrays, _numbers(t), _numbers(y), _numbers(v), out)
+        return out
+
     def held(self, t: Array, y: Array, v: Array, a: Array, multipliers: Array) -> Array:
         """(k, n) the same at many states, with forces Φ_yᵀ λ of multipliers (k, r) of the conditions in use."""
         out = np.empty((len(t), self.size))
