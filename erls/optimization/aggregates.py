@@ -1,8 +1,9 @@
 """Constraints as a few smooth values, whose derivatives a run backward finds: for many variables.
 
-The rows of a constraint (times, ends of elements) go into one value for each of its places, the Kreisselmeier-Steinhauser
-function of their shares of the limit, which is never below the largest. A derivative of a value is that of a weighted
-sum of components, so that the adjoint method needs one column for each, and no derivative of a component is formed.
+The rows of a constraint (times, ends of elements) go into one value for each of its places: the function of G.
+Kreisselmeier and R. Steinhauser of their shares of the limit, which is never below the largest. A derivative of a value
+is that of a weighted sum of components, so that the adjoint method needs one column for each, and no derivative of a
+component is formed.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ class Aggregates:
         """By how much values are above the largest row, at most, in shares of the limit; of each constraint."""
         found = self._dynamics.evaluate(x)
         result = []
-        for shares, groups in zip(self._dynamics.rules.shares(found.components), self._dynamics.rules.groups, strict=True):
+        rules = self._dynamics.rules
+        for shares, groups in zip(rules.shares(found.components), rules.groups, strict=True):
             values, largest = aggregate(shares, groups)[0], np.full(int(groups.max()) + 1, -np.inf)
             np.maximum.at(largest, groups, shares)
             held = values >= values.max() - 1e-2  # those that may hold the design

@@ -22,8 +22,8 @@ from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.equations import Nodal
 from erls.equations.nodal.joints import Joint
 from erls.equations.nodal.parts import BeamRules
-from erls.equations.serial.state_series import state_series
 from erls.equations.registry import closed_start_of, formulate
+from erls.equations.serial.state_series import state_series
 from erls.maths import motion_maps as motions
 from erls.maths.saddle import dense
 from erls.maths.se3 import pose

@@ -23,6 +23,7 @@ Asked = Callable[[ChainRun], Array]
 _ALL = "constraints"
 _FORWARD: tuple[Method, ...] = ("forward",)
 _BACKWARD: tuple[Method, ...] = ("adjoint", "forward")  # nodal runs have no way back yet
+_LARGE = 0.25  # of a field: modes of slender links turn with the fourth power of a diameter
 _STEP = 2e-5  # of a variable: vibrations that fall out of step make large third derivatives
 
 
@@ -38,11 +39,12 @@ def derivatives(
     SimulationError
         A run beside the design failed.
     """
-    keys = [p.key for p in problem.parameters]
+    keys = _sizes(problem, design.x)
+    sums = None if weights is None else {_ALL: weights}
     refused: SceneError | None = None
     for method in _FORWARD if weights is None else _BACKWARD:
         try:
-            found = sensitivities(run, {_ALL: asked}, keys, method, weights=None if weights is None else {_ALL: weights})
+            found = sensitivities(run, {_ALL: asked}, keys, method, weights=sums)
         except SceneError as refusal:
             if refusal.cause != Cause.NO_DERIVATIVE:
                 raise
@@ -62,6 +64,14 @@ def derivatives(
         ) from None
     whole = differences(designs, design, asked)
     return whole if weights is None else weights @ whole, "differences"
+
+
+def _sizes(problem: Problem, x: Array) -> dict[str, float]:
+    """How large a change of each field is large: a share of what it is, or of what it may go through."""
+    values = np.abs(problem.factors @ x)
+    spans = np.abs(problem.factors) @ (problem.upper - problem.lower)
+    sizes = _LARGE * np.where(values > 0, np.minimum(values, spans), spans)
+    return {p.key: float(size) for p, size in zip(problem.parameters, sizes, strict=True)}
 
 
 def differences(designs: Designs, design: Design, asked: Asked) -> Array:
