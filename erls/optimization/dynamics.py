@@ -87,6 +87,10 @@ class Dynamics:
         """Count from nothing."""
         self.run_s, self.gradient_s = 0.0, 0.0
 
+    def keep(self) -> None:
+        """Write what is known to the file of the memory."""
+        self._memory.flush()
+
     def place(self, mechanism: Mechanism) -> Place:
         """Of a mechanism; of all designs the same unless variables move nodes."""
         for place in self._places:

@@ -127,6 +127,8 @@ def outcome(method: str, dynamics: Dynamics, x: Array, told: Told) -> Outcome:
         METHODS[method](dynamics, x, way, lambda analysis: told(method, len(way.history), analysis))
     except KeyboardInterrupt:
         way.status, way.x = INTERRUPTED, None
+    finally:
+        dynamics.keep()
     return _outcome(method, dynamics, x, way, time.perf_counter() - begun)
 
 
