@@ -1,10 +1,11 @@
 """Published robots and what comes out here, side by side: objective, diameters, analyses, processor time, more starts.
 
-    python benchmarks/optimization.py [--starts N] [--optimizers] [PROBLEM ...]
+    python benchmarks/optimization.py [--starts N] [--optimizers] [--derivatives] [PROBLEM ...]
 
 With --starts every method begins N times, first from 50 mm, then from diameters drawn between the bounds. With
 --optimizers SciPy's methods are shown beside sequential convex programming. Deflections are also those of the published
-designs, at every step.
+designs, at every step. With --derivatives those of aggregates are held against central differences of runs, where a
+problem asks for them, at its start.
 """
 
 from __future__ import annotations
@@ -16,7 +17,11 @@ from pathlib import Path
 import numpy as np
 
 import erls
+from erls.optimization.aggregates import Aggregates
 from erls.optimization.confirm import simulated
+from erls.optimization.dynamics import Dynamics
+from erls.optimization.evaluation import beside
+from erls.optimization.memory import Memory
 from erls.optimization.problem import load_problem
 from erls.report.tables import table
 
@@ -56,11 +61,31 @@ def published(name: str) -> list[tuple[str, ...]]:
     return rows
 
 
+def derivatives(name: str, share: float = 1e-4) -> tuple[str, ...]:
+    """Of logarithms, at the start: largest difference over the largest derivative of the same value.
+
+    Runs iterate to 1e-9, since at their usual tolerance differences of them have noise of 1e-4.
+    """
+    problem = load_problem(DATA / f"{name}.toml", ['set=["simulation.tolerance=1e-9"]'])
+    seen = Aggregates(Dynamics(problem, Memory(problem)))
+
+    def values(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([c[:, 0] for c in seen.evaluate(x).components])
+
+    start = problem.start
+    exact = np.concatenate([j[:, 0] for j in seen.differentiate(seen.evaluate(start)).jacobians])
+    sides = beside(start, problem.upper - problem.lower, share)
+    expected = np.stack([(values(above) - values(below)) / (2 * step) for above, below, step in sides], axis=1)
+    apart, size = np.abs((exact - expected) * start).max(axis=1), np.abs(exact * start).max(axis=1)
+    return name, str(len(start)), f"{(apart / size).max():.1e}"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("problems", nargs="*", default=PUBLISHED)
     parser.add_argument("--starts", type=int, default=1)
     parser.add_argument("--optimizers", action="store_true")
+    parser.add_argument("--derivatives", action="store_true")
     asked = parser.parse_args()
     rows: list[tuple[str, ...]] = []
     for name in asked.problems:
@@ -69,6 +94,10 @@ def main() -> None:
             rows += designs(name, [f'settings.optimizer="{optimizer}"'], f", {optimizer}")
     head = "problem", "method", "objective", "variables / 1000", "analyses", "inner", "wall [s]", "spread"
     print(table(head, rows))
+    if asked.derivatives:
+        rows = [derivatives(name) for name in asked.problems if name == "three_link"]
+        print("\nDerivatives of aggregates, backward over the run\n")
+        print(table(("problem", "variables", "largest relative difference"), rows))
     rows = [row for name in asked.problems if name in PUBLISHED[:4] for row in published(name)]
     if rows:
         print("\nPublished designs, simulated here\n")

@@ -69,21 +69,27 @@ class Dynamics:
         self._places: list[Place] = []
         self._ran: ChainRun | None = None
         self.start = self.designs.at(problem.start)
+        limits = self.limits(self.start)
         self.rules = Rules(
             problem.lower,
             problem.upper,
             problem.powers,
             tuple(c.name for c in record.constraints),
             tuple(c.limit for c in record.constraints),
-            tuple(limit.measure for limit in self.limits(self.start)),
+            tuple(limit.measure for limit in limits),
             tuple(c.times == "aggregate" for c in record.constraints),
             tuple(c.times == "all" for c in record.constraints),
+            tuple(limit.groups for limit in limits),
             Objective(problem, self.numbers),
         )
 
     def fresh(self) -> None:
         """Count from nothing."""
         self.run_s, self.gradient_s = 0.0, 0.0
+
+    def keep(self) -> None:
+        """Write what is known to the file of the memory."""
+        self._memory.flush()
 
     def place(self, mechanism: Mechanism) -> Place:
         """Of a mechanism; of all designs the same unless variables move nodes."""
@@ -137,21 +143,25 @@ class Dynamics:
     def differentiate(self, found: Evaluation) -> Evaluation:
         """With derivatives along the run."""
         x, sizes = found.x, [c.size for c in found.components]
-        whole, own = self._memory.get(x, "jacobian"), self._memory.get(x, "flexible")
-        if whole is None or own is None:
-            begun = time.perf_counter()
-            whole, own = self._jacobians(x)
-            self.gradient_s += time.perf_counter() - begun
-            self._memory.put(x, jacobian=whole, flexible=own)
         ends = np.cumsum(sizes)[:-1]
         parts = [
             [j.reshape(*c.shape, len(x)) for j, c in zip(np.split(each, ends), found.components, strict=True)]
-            for each in (whole, own)
+            for each in self.derivatives(x)
         ]
         return self.rules.differentiated(found, *parts)
 
-    def _jacobians(self, x: Array) -> tuple[Array, Array]:
-        """(n, v) of all components, and the part of them that stiffness makes."""
+    def derivatives(self, x: Array, weights: Array | None = None) -> tuple[Array, Array]:
+        """(n, v) of all components, or (m, v) of weighted sums (m, n) of them, and what stiffness makes of these."""
+        names = ("jacobian", "flexible") if weights is None else ("slopes of sums", "flexible slopes of sums")
+        whole, own = (self._memory.get(x, name) for name in names)
+        if whole is None or own is None:
+            begun = time.perf_counter()
+            whole, own = self._derivatives(x, weights)
+            self.gradient_s += time.perf_counter() - begun
+            self._memory.put(x, **dict(zip(names, (whole, own), strict=True)))
+        return whole, own
+
+    def _derivatives(self, x: Array, weights: Array | None) -> tuple[Array, Array]:
         last = self._ran
         known = last is not None and last.scene.record == scene_at(self.problem, x).record
         design = self.designs.at(x)
@@ -162,15 +172,19 @@ class Dynamics:
             motion = self.motion_of(other)
             return np.concatenate([limit.exact(motion).ravel() for limit in limits])
 
-        whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked)
+        def summed(rows: Array) -> Array:
+            return rows if weights is None else weights @ rows
+
+        whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked, weights)
         motion = self.motion_of(run)
         if not self.designs.moving:
-            whole = whole + np.concatenate([self._of_sections(x, motion, k, limit) for k, limit in enumerate(limits)])
+            each = [self._of_sections(x, motion, k, limit) for k, limit in enumerate(limits)]
+            whole = whole + summed(np.concatenate(each))
         if self.designs.moving or not flexible(self.start.scene):
             return whole, whole
         static = FrozenLoads(self, x, motion, True)
         own = static.differentiate(static.evaluate(x)).jacobians
-        return whole, np.concatenate([j.reshape(-1, len(x)) for j in own])
+        return whole, summed(np.concatenate([j.reshape(-1, len(x)) for j in own]))
 
     def _of_sections(self, x: Array, motion: Motion, k: int, limit: Limit) -> Array:
         """(n, v) what variables change of components at the same motion: sections have other sizes."""

@@ -4,7 +4,7 @@ Rules for a new constraint: one record in `erls.optimization.records`, one class
 tells components (n, q) of a motion, ``increments`` what small displacements of its nodes add to them, of many
 directions at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, it asks
 the run, and equivalent static loads cannot treat it; with ``of_sections`` components depend on sections at the same
-motion, too.
+motion, too. ``groups`` numbers the places that rows belong to: each has one value where times are aggregated.
 """
 
 from __future__ import annotations
@@ -63,6 +63,7 @@ class Limit(Protocol):
     at: IntArray
     of_shape: bool
     of_sections: bool
+    groups: IntArray
 
     def exact(self, motion: Motion) -> Array:
         """(n, q) components in a motion."""
@@ -89,6 +90,7 @@ class Deflection:
 
     def __init__(self, record: DeflectionLimit, at: IntArray, mechanism: Mechanism, nodal: Nodal) -> None:
         self.name, self.limit, self.at = record.name, record.limit, at
+        self.groups = np.zeros(len(at), dtype=np.int64)
         self._parts = [_part(term, mechanism, nodal) for term in terms_of(record)]
 
     def exact(self, motion: Motion) -> Array:
@@ -152,6 +154,7 @@ class Stress:
         outlines = outlines_of(mechanism, settings, numbers, x)
         wanted = np.isin(outlines.links, [mechanism.bodies[k] for k in links])
         self._elements = np.flatnonzero(wanted)
+        self.groups = np.tile(np.repeat(np.arange(len(self._elements)), 2), len(at))
         self._factors = outlines.factors[wanted]
         self._stiffness = sections_of(mechanism, settings, numbers, x)[wanted]
         rounds = outlines.rounds[wanted]
@@ -184,6 +187,7 @@ class Effort:
 
     def __init__(self, record: EffortLimit, at: IntArray) -> None:
         self.name, self.limit, self.at, self._joint = record.name, record.limit, at, record.joint
+        self.groups = np.zeros(len(at), dtype=np.int64)
 
     def exact(self, motion: Motion) -> Array:
         """(k, 1)"""

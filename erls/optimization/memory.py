@@ -9,6 +9,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import time
+import zipfile
 from pathlib import Path
 
 import msgspec
@@ -19,9 +21,11 @@ from erls.files.output import replacing
 from erls.maths.so3 import Array
 from erls.optimization.problem import Problem
 from erls.scene.build import link_description
+from fe_import.files.versions import package_version
 
 _FORMAT = "erls optimization 1"
-_MOST = 2_000_000_000
+_MOST = 2_000_000_000  # bytes of all arrays
+_SHARE = 0.02  # of the time that writing may take: a file of all analyses is written as a whole
 
 
 class Memory:
@@ -31,7 +35,7 @@ class Memory:
     ----------
     problem : Problem
     path : Path, optional
-        File that is written after each analysis.
+        File that is written after analyses, as often as takes no more than a small share of the time, and by `flush`.
     resume : bool
         Read it first.
 
@@ -44,6 +48,7 @@ class Memory:
     def __init__(self, problem: Problem, path: Path | None = None, resume: bool = False) -> None:
         self.path, self._key = path, key_of(problem)
         self._known: dict[str, Array] = {}
+        self._due, self._unwritten = 0.0, False
         if path is not None and resume:
             self._read(path)
 
@@ -55,8 +60,18 @@ class Memory:
         """Keep arrays of a design."""
         for name, array in arrays.items():
             self._known[self._name(x, name)] = np.asarray(array)
-        if self.path is not None:
-            self._write(self.path)
+        self._unwritten = True
+        if time.monotonic() >= self._due:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what the file has not."""
+        if self.path is None or not self._unwritten:
+            return
+        begun = time.monotonic()
+        self._write(self.path)
+        ended = time.monotonic()
+        self._due, self._unwritten = ended + (ended - begun) / _SHARE, False
 
     @staticmethod
     def _name(x: Array, name: str) -> str:
@@ -71,8 +86,9 @@ class Memory:
         found: dict[str, Array] = {}
         about = None
         try:
-            if path.stat().st_size > _MOST:
-                raise ValueError("too large")
+            with zipfile.ZipFile(path) as whole:
+                if sum(entry.file_size for entry in whole.infolist()) > _MOST:
+                    raise ValueError("too large")
             with path.open("rb") as data, np.load(data, allow_pickle=False) as file:
                 for name in file.files:
                     found[name] = np.asarray(file[name])
@@ -94,10 +110,11 @@ class Memory:
 
 
 def key_of(problem: Problem) -> str:
-    """SHA-256 of what designs and their motions depend on, limits and settings apart."""
+    """SHA-256 of what designs and their motions depend on, the version with it, limits and settings apart."""
     record = problem.record
     named = [record.variables, record.constraints]
-    digest = hashlib.sha256(msgspec.json.encode([problem.scene.record, *named], order="deterministic"))
+    about = [package_version("erls"), problem.scene.record, *named]
+    digest = hashlib.sha256(msgspec.json.encode(about, order="deterministic"))
     for link in problem.scene.record.links:
         if link.model:
             digest.update(link_description(problem.scene, link).content_hash().encode())

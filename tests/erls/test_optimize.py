@@ -13,10 +13,12 @@ import erls
 from erls.cli.main import main
 from erls.errors import Cause, SceneError
 from erls.optimization import dynamics as running
+from erls.optimization.aggregates import Aggregates
+from erls.optimization.confirm import simulated
 from erls.optimization.dynamics import Dynamics
 from erls.optimization.equivalent_loads import FrozenLoads
-from erls.optimization.evaluation import aggregate
-from erls.optimization.gradients import _differences
+from erls.optimization.evaluation import aggregate, beside
+from erls.optimization.gradients import differences
 from erls.optimization.memory import Memory
 from erls.optimization.problem import load_problem
 from erls.optimization.records import Settings
@@ -95,11 +97,35 @@ def test_derivatives_of_runs(robot: Dynamics) -> None:
         return np.concatenate([limit.exact(motion).ravel() for limit in at])
 
     assert len(limits) == 3
-    differences = _differences(robot.designs, design, asked)
+    expected = differences(robot.designs, design, asked)
     exact = np.concatenate([j.reshape(-1, 4) for j in found.jacobians])
     sizes = np.cumsum([0, *(c.size for c in found.components)])
     for first, end in pairwise(sizes.tolist()):
-        assert exact[first:end] == pytest.approx(differences[first:end], abs=1e-5 * np.abs(exact[first:end]).max())
+        assert exact[first:end] == pytest.approx(expected[first:end], abs=1e-5 * np.abs(exact[first:end]).max())
+
+
+def test_aggregates_backward_over_the_run() -> None:
+    """A diameter, a ratio that six tubes share and a gain, against differences of runs: 1e-5 of the largest."""
+    keys = ", ".join(f'"links.hand.model.sections.s{k}.diameter_ratio"' for k in range(1, 7))
+    variables = (
+        'variables=[{name="d", keys=["links.hand.model.sections.s5.outer_diameter"], lower=0.02, upper=0.06},'
+        f'{{name="ratio", keys=[{keys}], lower=0.6, upper=0.9}},'
+        '{name="gain", keys=["joints.wrist.drive.proportional_gain"], lower=2e3, upper=2e4, power=-1}]'
+    )
+    short = 'set=["simulation.duration=0.03"]'
+    samples = [f"constraints.{k}.samples=4" for k in (0, 1)]
+    problem = load_problem(DATA / "three_link.toml", [short, variables, *samples])
+    dynamics = Dynamics(problem, Memory(problem))
+    seen = Aggregates(dynamics)
+    found = seen.differentiate(seen.evaluate(problem.start))
+    assert dynamics.gradient == "adjoint"
+    assert [c.shape for c in found.components] == [(1, 1), (18, 1)]
+    for above, below, step in beside(problem.start, problem.upper - problem.lower, 1e-4):
+        v = int(np.flatnonzero(above != below)[0])
+        sides = (seen.evaluate(x).components for x in (above, below))
+        for more, less, exact in zip(*sides, found.jacobians, strict=True):
+            expected = (more - less) / (2 * step)
+            assert exact[..., v] == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -160,14 +186,23 @@ def test_smallest_deflection_of_a_given_mass_bound() -> None:
     assert outcome.objective == pytest.approx(sag, rel=1e-3)
 
 
+def test_no_step_passes_a_limit() -> None:
+    """Of samples some steps may; where every step is one, none does."""
+    changes = ['settings.methods=["esl-system"]', 'constraints.0.samples="every-step"', SHORT]
+    found = erls.optimize(ROBOT, changes=changes, confirm=False)
+    assert found.best.status == "converged"
+    assert simulated(found.problem, found.best.x, lambda text: None).violation <= 5e-4
+
+
 def test_aggregate_is_on_the_safe_side() -> None:
-    shares = np.array([0.3, 0.99, 1.0])
-    value, slopes = aggregate(shares)
-    assert shares.max() <= value <= shares.max() + np.log(3) / 200
+    shares, groups = np.array([0.3, 0.99, 1.0]), np.array([1, 0, 0])
+    values, slopes = aggregate(shares, groups)
+    assert values[1] == pytest.approx(0.3)
+    assert 1.0 <= values[0] <= 1.0 + np.log(2) / 200
     h = 1e-6
     for k, way in enumerate(np.eye(3)):
-        rate = (aggregate(shares + h * way)[0] - aggregate(shares - h * way)[0]) / (2 * h)
-        assert slopes[k] == pytest.approx(rate, abs=1e-6)
+        rate = (aggregate(shares + h * way, groups)[0] - aggregate(shares - h * way, groups)[0]) / (2 * h)
+        assert slopes[:, k] == pytest.approx(rate, abs=1e-6)
 
 
 def test_aggregated_times_come_near() -> None:
@@ -290,6 +325,12 @@ FAULTS = [
     (["settings.methods=[]"], Cause.BAD_FIELD, "no method", "settings.methods"),
     (["settings.optimizer=\"best\""], Cause.BAD_REFERENCE, "unknown name", "settings.optimizer"),
     (["settings.design_tolerance=2.0"], Cause.BAD_FIELD, "not a share", "settings.design_tolerance"),
+    (["constraints.0.samples=\"sometimes\""], Cause.BAD_REFERENCE, "unknown name", "constraints[0].samples"),
+    (["settings.derivatives=\"none\""], Cause.BAD_REFERENCE, "unknown name", "settings.derivatives"),
+    (["settings.derivatives=\"aggregates\""], Cause.BAD_FIELD, "aggregates alone", "constraints[0].times"),
+    (["settings.derivatives=\"aggregates\"", "constraints.0.times=\"aggregate\"",
+      "objective=[{quantity=\"deflection\", of=\"sag\"}]"],
+     Cause.BAD_FIELD, "aggregates alone", "objective[0].quantity"),
     (["settings.starts=0"], Cause.BAD_FIELD, "number of runs", "settings.starts"),
     (["settings.seed=-1"], Cause.BAD_FIELD, "not a seed", "settings.seed"),
     (["published={integrated={objective=1.0, variables={d9=1.0}}}"], Cause.BAD_REFERENCE, "d9", "published.integrated"),
