@@ -59,7 +59,7 @@ def _rigid(link: Link) -> Link:
 def nodal_of(mechanism: Mechanism, settings: Simulation) -> Nodal:
     """The mechanism as nodal elements; links that are not made of beams are rigid ones there."""
     if not all(of_beams(link) for link in mechanism.links):
-        links = [link if of_beams(link) else _rigid(link) for link in mechanism.links]
+        links = tuple(link if of_beams(link) else _rigid(link) for link in mechanism.links)
         mechanism = replace(mechanism, links=links)
     if settings.formulation == "nodal":
         found = formulate(mechanism, settings)

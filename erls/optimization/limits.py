@@ -41,6 +41,8 @@ from erls.run.chain.run import ChainRun
 from fe_import.files.toml import choose
 from fe_import.model import IntArray
 
+_NONE = 1e-9  # of the limit: compression that is rounding
+
 Bases = list[Basis]
 """Of the links that a constraint looks at."""
 
@@ -264,7 +266,7 @@ class Frequency(Limit):
 
 
 class Buckling(Limit):
-    """Asked load factors over those that are there, one row for each time and link; below 0 in tension."""
+    """Asked load factors over those that are there, one row for each time and link; 0 in tension."""
 
     measure: Measure = LargestEigenvalue()
     of_shape, of_sections = True, True
@@ -308,7 +310,7 @@ class Buckling(Limit):
 
     def told(self, values: Array) -> Array:
         """Load factors; infinite in tension."""
-        return np.asarray(np.where(values > 0, self._asked / np.maximum(values, 1e-300), np.inf))
+        return np.asarray(np.where(values > _NONE, self._asked / np.maximum(values, _NONE), np.inf))
 
     def _twists(self, motion: Motion, w: Array | None) -> Array:
         found = motion.twists[self.at]

@@ -153,7 +153,7 @@ class Stretch(_Record, frozen=True):
     factors : list of float
         Of the distance from the plane, at each station; between them linear, beyond them as at the last.
     along : str
-        The axis along which factors change; the other two of the mesh may be named, unless there is one factor.
+        Another axis, along which factors change; needed where there is more than one.
     at : list of float
         Stations on that axis, rising.
     about : float
