@@ -27,6 +27,7 @@ class Cause(enum.StrEnum):
     INCONSISTENT_START = "start that does not fulfil the constraints"
     LOOP_OPEN = "loop cannot be closed"
     CHANGE_POINT = "loop may go on in two ways"
+    NO_DERIVATIVE = "derivative not known yet"
     NO_EQUILIBRIUM = "no static equilibrium"
     UNSTABLE_START = "unstable static equilibrium"
     NEWTON_FAILED = "Newton iteration did not converge"

@@ -125,7 +125,7 @@ class Approximation:
         return quadratic.value(change) + timed, slope
 
     def rows(self, omega: Array, k: int, rows: IntArray) -> tuple[Array, Array]:
-        """Shares (n,) of the limit of some rows of constraint k, with slopes (n, v); one value where aggregated."""
+        """Shares (n,) of the limit of some rows of constraint k, with slopes (n, v); of each place where aggregated."""
         limit = self.rules.limits[k]
         assert limit is not None
         components, jacobian = self._linear(omega, k, rows)
@@ -134,8 +134,8 @@ class Approximation:
         slopes = np.einsum("nq,nqv->nv", measure.slope(components), jacobian) / limit
         if not self.rules.aggregated[k]:
             return shares, slopes
-        value, weights = aggregate(shares)
-        return np.array([value]), (weights @ slopes)[None]
+        values, weights = aggregate(shares, self.rules.groups[k])
+        return values, weights @ slopes
 
     def solved(self, lower: Array, upper: Array) -> Step:
         """Within bounds (v,) of the design."""
@@ -167,7 +167,10 @@ class Approximation:
             for n, (share, column) in enumerate(zip(values.tolist(), slopes, strict=True)):
                 if share >= 1 - _ACTIVE:
                     columns.append(column)
-                    row = int(shares.argmax()) if self.rules.aggregated[k] else int(rows[n])
+                    row = int(rows[n])
+                    if self.rules.aggregated[k]:
+                        own = np.flatnonzero(self.rules.groups[k] == n)
+                        row = int(own[shares[own].argmax()])
                     known.append(Held(k, row, share, 0.0))
         span, x = self.rules.upper - self.rules.lower, self.powers.back(omega)
         for v in range(len(x)):

@@ -24,7 +24,7 @@ _PENALTY = 10.0  # of a violation beyond the band, in objectives of the start
 _BAND = 10.0  # of the tolerance of violations
 _SHORTER, _LONGER, _SMALLEST = 0.35, 1.5, 1e-6
 _TURNED = 0.5  # of a variable's last step, once it has turned back twice in a row
-_OPTIMAL = 5e-3  # of the objective's slope: what multipliers may leave where steps are held back
+_IDLE = 1e-2  # of the tolerance of designs: smaller steps come to nothing
 _NO_FARTHER = 1e-3  # of the variables: a run that fails so near to one that does not
 _SAME = 1e-8  # of the objective of the start
 
@@ -102,7 +102,8 @@ def sequential_convex(
             held = current.violation <= settings.violation_tolerance
             if change <= settings.design_tolerance and (held or step.slack):
                 free = bool((np.abs(step.x - current.x) < 0.99 * reach).all())  # not held back
-                if free or near.held(np.ones(len(x)))[1] <= _OPTIMAL:
+                idle = free and (change <= _IDLE * settings.design_tolerance or bool(step.slack))
+                if idle or near.held(np.ones(len(x)))[1] <= settings.optimality_tolerance:
                     return Found(current, step.x, "converged" if held else "infeasible", change, count)
             if count >= most:
                 return Found(current, step.x, "budget", change, count)

@@ -84,6 +84,7 @@ class Dynamics:
             tuple(limit.measure for limit in limits),
             tuple(c.times == "aggregate" for c in record.constraints),
             tuple(c.times == "all" for c in record.constraints),
+            tuple(limit.groups for limit in limits),
             Objective(problem, self.numbers),
         )
 
@@ -143,21 +144,25 @@ class Dynamics:
     def differentiate(self, found: Evaluation) -> Evaluation:
         """With derivatives along the run."""
         x, sizes = found.x, [c.size for c in found.components]
-        whole, own = self._memory.get(x, "jacobian"), self._memory.get(x, "flexible")
-        if whole is None or own is None:
-            begun = time.perf_counter()
-            whole, own = self._jacobians(x)
-            self.gradient_s += time.perf_counter() - begun
-            self._memory.put(x, jacobian=whole, flexible=own)
         ends = np.cumsum(sizes)[:-1]
         parts = [
             [j.reshape(*c.shape, len(x)) for j, c in zip(np.split(each, ends), found.components, strict=True)]
-            for each in (whole, own)
+            for each in self.derivatives(x)
         ]
         return self.rules.differentiated(found, *parts)
 
-    def _jacobians(self, x: Array) -> tuple[Array, Array]:
-        """(n, v) of all components, and the part of them that stiffness makes."""
+    def derivatives(self, x: Array, weights: Array | None = None) -> tuple[Array, Array]:
+        """(n, v) of all components, or (m, v) of weighted sums (m, n) of them, and what stiffness makes of these."""
+        names = ("jacobian", "flexible") if weights is None else ("slopes of sums", "flexible slopes of sums")
+        whole, own = (self._memory.get(x, name) for name in names)
+        if whole is None or own is None:
+            begun = time.perf_counter()
+            whole, own = self._derivatives(x, weights)
+            self.gradient_s += time.perf_counter() - begun
+            self._memory.put(x, **dict(zip(names, (whole, own), strict=True)))
+        return whole, own
+
+    def _derivatives(self, x: Array, weights: Array | None) -> tuple[Array, Array]:
         last = self._ran
         known = last is not None and last.scene.record == scene_at(self.problem, x).record
         design = self.designs.at(x)
@@ -169,14 +174,17 @@ class Dynamics:
             motion = self.motion_of(other)
             return np.concatenate([one.exact(motion, b).ravel() for one, b in zip(limits, bases, strict=True)])
 
-        whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked)
+        def summed(rows: Array) -> Array:
+            return rows if weights is None else weights @ rows
+
+        whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked, weights)
         each = [self._of_sections(design, motion, k, *one) for k, one in enumerate(zip(limits, bases, strict=True))]
-        whole = whole + np.concatenate(each)
+        whole = whole + summed(np.concatenate(each))
         if self.designs.moving or not flexible(self.start.scene):
             return whole, whole
         static = FrozenLoads(self, x, motion, True)
         own = static.differentiate(static.evaluate(x)).jacobians
-        return whole, np.concatenate([j.reshape(-1, len(x)) for j in own])
+        return whole, summed(np.concatenate([j.reshape(-1, len(x)) for j in own]))
 
     def _of_sections(self, design: Design, motion: Motion, k: int, limit: Limit, basis: Bases | None) -> Array:
         """(n, v) what variables change of components at the same motion: sections have other sizes."""

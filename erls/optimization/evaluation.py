@@ -16,6 +16,7 @@ import numpy as np
 from erls.maths.so3 import Array
 from erls.optimization.measures import Measure
 from erls.optimization.objective import Objective, Quadratic
+from fe_import.model import IntArray
 
 
 @dataclass(frozen=True)
@@ -71,9 +72,11 @@ class Rules:
     limits : tuple of float or None
     measures : tuple of Measure
     aggregated : tuple of bool
-        Which constraints hold one smooth value over all times.
+        Which constraints hold one smooth value over all times for each of their places.
     every : tuple of bool
         Which constraints keep all rows in approximations.
+    groups : tuple of (n,) arrays
+        Numbers of the places of rows: what deflects, an element, a drive.
     objective : Objective
     """
 
@@ -85,6 +88,7 @@ class Rules:
     measures: tuple[Measure, ...]
     aggregated: tuple[bool, ...]
     every: tuple[bool, ...]
+    groups: tuple[IntArray, ...]
     objective: Objective
 
     def beside(self, x: Array, share: float) -> Iterator[tuple[Array, Array, float]]:
@@ -128,9 +132,10 @@ def beside(x: Array, span: Array, share: float) -> Iterator[tuple[Array, Array, 
 _KS = 200.0  # of the Kreisselmeier-Steinhauser function of shares: ln(n)/200 above their largest
 
 
-def aggregate(shares: Array) -> tuple[float, Array]:
-    """Smooth largest value of (n,), never below it, and its slopes (n,)."""
-    largest = float(shares.max())
-    weights = np.exp(_KS * (shares - largest))
-    total = float(weights.sum())
-    return largest + float(np.log(total)) / _KS, weights / total
+def aggregate(shares: Array, groups: IntArray) -> tuple[Array, Array]:
+    """Smooth largest values (g,) of (n,) in groups that are numbered from 0, never below them, and slopes (g, n)."""
+    member = groups == np.arange(int(groups.max()) + 1)[:, None]
+    largest = np.where(member, shares, -np.inf).max(axis=1)
+    weights = np.where(member, np.exp(np.minimum(_KS * (shares - largest[:, None]), 0.0)), 0.0)
+    total = weights.sum(axis=1)
+    return largest + np.log(total) / _KS, weights / total[:, None]

@@ -23,15 +23,15 @@ from erls.equations.nodal.equations import Nodal
 from erls.equations.nodal.joints import Joint
 from erls.equations.nodal.parts import BeamRules
 from erls.equations.registry import closed_start_of, formulate
+from erls.equations.serial.state_series import state_series
 from erls.maths import motion_maps as motions
 from erls.maths.saddle import dense
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import Link, truncated
-from erls.mechanism.sensors.base import Node
 from erls.optimization.rigid import RigidMotion
-from erls.run.chain.instants import Instants
+from erls.run.chain.node_motion import node_poses as node_poses_of
 from erls.run.chain.run import ChainRun
 from erls.scene.settings import Simulation
 from fe_import.model import IntArray
@@ -206,16 +206,13 @@ def node_poses(run: ChainRun, times: Array, nodal: Nodal) -> Array:
     own = run.formulation
     y, v = run.coordinates(times)
     if isinstance(own, Nodal):
-        return np.array([own.configuration(*at)[0].poses for at in zip(y, v, strict=True)])
-    seen = Instants(own, times, y, v, np.zeros_like(y))
+        return own.system.poses_stored(y)
+    states = state_series(own, times, y, v)
     result = np.zeros((len(times), nodal.system.count, 4, 4))
-    result[..., 3, 3] = 1.0
     start = nodal.chain.system.start.poses
     for k, (nodes, link) in enumerate(zip(nodal.chain.nodes, nodal.mechanism.links, strict=True)):
         root = nodal.place_of(k, link.inboard.node)
         places = (motions.inverse(start[root]) @ start[nodes])[:, :3, 3] + link.inboard.position
-        for n, place in enumerate(places):
-            node = int(np.linalg.norm(link.model.nodes - place, axis=1).argmin())
-            moved = seen.node(Node(k, node))
-            result[:, nodes.start + n, :3, :3], result[:, nodes.start + n, :3, 3] = moved.turn, moved.place
+        apart = np.linalg.norm(link.model.nodes[:, None] - places, axis=2)
+        result[:, nodes] = node_poses_of(own.mechanism, states, k, apart.argmin(axis=0))
     return result

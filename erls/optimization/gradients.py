@@ -15,19 +15,21 @@ from erls.optimization.evaluation import beside
 from erls.optimization.problem import Problem
 from erls.run.chain.run import ChainRun
 from erls.scene.integrators import FIXED_STEP
-from erls.sensitivity.sensitivities import sensitivities
+from erls.sensitivity.sensitivities import Method, sensitivities
 
 Asked = Callable[[ChainRun], Array]
 """(n,) what a run gives."""
 
 _ALL = "constraints"
+_FORWARD: tuple[Method, ...] = ("forward",)
+_BACKWARD: tuple[Method, ...] = ("adjoint", "forward")  # nodal runs have no way back yet
 _STEP = 2e-5  # of a variable: vibrations that fall out of step make large third derivatives
 
 
 def derivatives(
-    problem: Problem, designs: Designs, design: Design, run: ChainRun, asked: Asked
+    problem: Problem, designs: Designs, design: Design, run: ChainRun, asked: Asked, weights: Array | None = None
 ) -> tuple[Array, str]:
-    """(n, v) by all variables, and how they were found.
+    """(n, v) by all variables, or (m, v) of weighted sums (m, n), and how they were found.
 
     Raises
     ------
@@ -37,25 +39,33 @@ def derivatives(
         A run beside the design failed.
     """
     keys = [p.key for p in problem.parameters]
-    try:
-        found = sensitivities(run, {_ALL: asked}, keys, "forward").derivatives[_ALL]
-    except SceneError as refusal:
-        if refusal.cause != Cause.BAD_FIELD or "not known yet" not in refusal.message:
-            raise
-        settings = problem.scene.record.simulation
-        if settings.integrator != FIXED_STEP:
-            raise SceneError(
-                Cause.BAD_FIELD,
-                f"{refusal.message}, and differences of runs whose steps change are noise",
-                where=refusal.where,
-                value=settings.integrator,
-                remedy=f"{refusal.remedy}; or give simulation.step",
-            ) from None
-        return _differences(designs, design, asked), "differences"
-    return np.stack([found[key] for key in keys], axis=-1) @ problem.factors, "sensitivities"
+    refused: SceneError | None = None
+    for method in _FORWARD if weights is None else _BACKWARD:
+        try:
+            found = sensitivities(run, {_ALL: asked}, keys, method, weights=None if weights is None else {_ALL: weights})
+        except SceneError as refusal:
+            if refusal.cause != Cause.NO_DERIVATIVE:
+                raise
+            refused = refusal
+            continue
+        slopes = np.stack([found.derivatives[_ALL][key] for key in keys], axis=-1) @ problem.factors
+        return slopes, "sensitivities" if found.method == "forward" else found.method
+    assert refused is not None
+    settings = problem.scene.record.simulation
+    if settings.integrator != FIXED_STEP:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            f"{refused.message}, and differences of runs whose steps change are noise",
+            where=refused.where,
+            value=settings.integrator,
+            remedy=f"{refused.remedy}; or give simulation.step",
+        ) from None
+    whole = differences(designs, design, asked)
+    return whole if weights is None else weights @ whole, "differences"
 
 
-def _differences(designs: Designs, design: Design, asked: Asked) -> Array:
+def differences(designs: Designs, design: Design, asked: Asked) -> Array:
+    """(n, v) by all variables, from runs on both sides of a design."""
     problem, columns = designs.problem, []
     for above, below, step in beside(design.x, problem.upper - problem.lower, _STEP):
         more, less = (asked(run_of(designs.at(x))) for x in (above, below))

@@ -4,7 +4,8 @@ Rules for a new constraint: one record in `erls.optimization.records`, one class
 tells components (n, q) of a motion, ``increments`` what small displacements of its nodes add to them, of many
 directions at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, it asks
 the run, and equivalent static loads cannot treat it; with ``of_sections`` components depend on sections at the same
-motion, too. Where components are told in modes of a design, ``basis`` gives these, for whoever compares designs.
+motion, too. ``groups`` numbers the places that rows belong to: each has one value where times are aggregated. Where
+components are told in modes of a design, ``basis`` gives these, for whoever compares designs.
 """
 
 from __future__ import annotations
@@ -79,6 +80,7 @@ class Limit(Protocol):
     at: IntArray
     of_shape: bool
     of_sections: bool
+    groups: IntArray
 
     def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
         """(n, q) components in a motion."""
@@ -120,6 +122,7 @@ class Deflection(Limit):
 
     def __init__(self, record: DeflectionLimit, at: IntArray, mechanism: Mechanism, nodal: Nodal) -> None:
         self.name, self.limit, self.at = record.name, record.limit, at
+        self.groups = np.zeros(len(at), dtype=np.int64)
         self._parts = [_part(term, mechanism, nodal) for term in terms_of(record)]
 
     def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
@@ -193,6 +196,7 @@ class Stress(Limit):
         outlines = outlines_of(mechanism, settings, numbers, x)
         wanted = np.isin(outlines.links, [mechanism.bodies[k] for k in links])
         self._elements = np.flatnonzero(wanted)
+        self.groups = np.tile(np.repeat(np.arange(len(self._elements)), 2), len(at))
         self._factors = outlines.factors[wanted]
         self._stiffness = sections_of(mechanism, settings, numbers, x)[wanted]
         rounds = outlines.rounds[wanted]
@@ -225,6 +229,7 @@ class Effort(Limit):
 
     def __init__(self, record: EffortLimit, at: IntArray) -> None:
         self.name, self.limit, self.at, self._joint = record.name, record.limit, at, record.joint
+        self.groups = np.zeros(len(at), dtype=np.int64)
 
     def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
         """(k, 1)"""
@@ -245,6 +250,7 @@ class Frequency(Limit):
     def __init__(self, record: FrequencyLimit, at: IntArray, held: list[HeldLink]) -> None:
         self.name, self.at, self._asked, self._held = record.name, at, record.limit or 1.0, held
         self.limit = None if record.limit is None else 1.0
+        self.groups = np.arange(len(held))
 
     def basis(self, motion: Motion, r: Array | None = None, w: Array | None = None) -> Bases:
         """Modes of each link."""
@@ -283,6 +289,7 @@ class Buckling(Limit):
     ) -> None:
         self.name, self.at, self._asked, self._held = record.name, at, record.limit or 1.0, held
         self.limit = None if record.limit is None else 1.0
+        self.groups = np.tile(np.arange(len(held)), len(at))
         settings = problem.scene.record.simulation
         outlines = elements_by_link(mechanism, settings, numbers, x)
         self._elements = [np.flatnonzero(outlines == mechanism.bodies[k]) for k in links_of(record, problem.scene)]

@@ -25,6 +25,18 @@ class Measure(Protocol):
         """(n, q) by the components."""
 
 
+class Itself:
+    """A single component as it is."""
+
+    def value(self, components: Array) -> Array:
+        """(n,)"""
+        return components[:, 0]
+
+    def slope(self, components: Array) -> Array:
+        """(n, 1)"""
+        return np.ones_like(components)
+
+
 class Length:
     """Root of the sum of squares."""
 

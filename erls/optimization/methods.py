@@ -10,10 +10,11 @@ import numpy as np
 
 from erls.maths.so3 import Array
 from erls.optimization import equivalent_loads
+from erls.optimization.aggregates import Aggregates
 from erls.optimization.convex import Found, relative_change, sequential_convex
 from erls.optimization.dynamics import Dynamics
 from erls.optimization.equivalent_loads import FrozenLoads
-from erls.optimization.evaluation import Evaluation
+from erls.optimization.evaluation import Evaluation, Rules
 from erls.optimization.optimality import Optimality, optimality
 from erls.optimization.result import BUDGET, CONVERGED, INFEASIBLE, INTERRUPTED, STALLED, Analysis, Outcome
 from erls.optimization.scipy_methods import scipy_method
@@ -43,6 +44,10 @@ class Way:
         Differentiated, where a method ended.
     x : (v,) array or None
         Where it ended, unless at the last analysis.
+    rules : Rules or None
+        Of what it evaluated, unless those of the runs.
+    excess : tuple of float
+        Of each constraint, by how much a smooth value was above the largest row, in shares of the limit.
     """
 
     history: list[Analysis]
@@ -50,6 +55,8 @@ class Way:
     status: str = INTERRUPTED
     last: Evaluation | None = None
     x: Array | None = None
+    rules: Rules | None = None
+    excess: tuple[float, ...] = ()
 
 
 def integrated(dynamics: Dynamics, x: Array, way: Way, told: Callable[[Analysis], None]) -> None:
@@ -60,8 +67,11 @@ def integrated(dynamics: Dynamics, x: Array, way: Way, told: Callable[[Analysis]
         way.history.append(Analysis(found.x, found.objective, found.violation, change))
         told(way.history[-1])
 
-    found = OPTIMIZERS[settings.optimizer](dynamics, x, settings, settings.most_analyses, tell)
-    way.status, way.last, way.x = found.status, found.best, found.best.x
+    seen = Aggregates(dynamics) if settings.derivatives == "aggregates" else dynamics
+    found = OPTIMIZERS[settings.optimizer](seen, x, settings, settings.most_analyses, tell)
+    way.status, way.last, way.x, way.rules = found.status, found.best, found.best.x, seen.rules
+    if isinstance(seen, Aggregates):
+        way.excess = tuple(seen.excess(found.best.x))
 
 
 def equivalent(
@@ -121,7 +131,7 @@ def outcome(method: str, dynamics: Dynamics, x: Array, told: Told) -> Outcome:
 
 
 def _outcome(method: str, dynamics: Dynamics, start: Array, way: Way, wall_s: float) -> Outcome:
-    rules, names = dynamics.rules, dynamics.problem.names
+    rules, names = way.rules or dynamics.rules, dynamics.problem.names
     tolerance = dynamics.problem.record.settings.violation_tolerance
     best = min(way.history, key=lambda a: (max(0.0, a.violation - tolerance), a.objective), default=None)
     x = start if best is None else best.x
@@ -154,5 +164,6 @@ def _outcome(method: str, dynamics: Dynamics, start: Array, way: Way, wall_s: fl
         dynamics.run_s,
         dynamics.gradient_s,
         worst=rules.names[worst] if worst >= 0 else "",
+        excess=dict(zip(rules.names, way.excess, strict=False)),
         peaks={name: float(own.max()) for name, own in zip(rules.names, shares, strict=False) if len(own)},
     )

@@ -12,7 +12,9 @@ import numpy as np
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.optimization.records import (
+    DERIVATIVES,
     ENDS,
+    EVERY_STEP,
     FRAMES,
     METHODS,
     OPTIMIZERS,
@@ -34,6 +36,7 @@ from erls.run.file import self_contained
 from erls.scene.build import link_description
 from erls.scene.chain import Scene
 from erls.scene.checks import bad, check_names, positive
+from erls.scene.integrators import FIXED_STEP
 from erls.scene.overrides import apply_override, in_scene
 from erls.scene.read import load_chain
 from erls.sensitivity.parameters import Parameter, parameters_of
@@ -105,8 +108,11 @@ class Problem:
         if isinstance(constraint, FrequencyLimit):
             return np.zeros(1)
         settings = self.scene.record.simulation
-        found = np.linspace(0.0, settings.duration, constraint.samples)
-        if settings.step is not None and settings.integrator == "generalized_alpha":
+        count, fixed = constraint.samples, settings.step is not None and settings.integrator == FIXED_STEP
+        if isinstance(count, str):
+            count = round(settings.duration / (settings.step or settings.duration)) + 1
+        found = np.linspace(0.0, settings.duration, count)
+        if fixed and settings.step is not None:
             found = np.minimum(np.round(found / settings.step) * settings.step, settings.duration)
         return np.unique(found)
 
@@ -233,7 +239,13 @@ def _parameters(record: ProblemRecord, scene: Scene, file: str) -> tuple[tuple[P
 def _check_constraint(constraint: AnyConstraint, scene: Scene, place: str) -> None:
     positive(f"{place}.limit", constraint.limit)
     choose(constraint.times, TIMES, f"{place}.times", SceneError)
-    if not 2 <= constraint.samples <= 100_000:
+    fixed = scene.record.simulation.step is not None and scene.record.simulation.integrator == FIXED_STEP
+    if isinstance(constraint.samples, str):
+        choose(constraint.samples, (EVERY_STEP,), f"{place}.samples", SceneError)
+        if not fixed:
+            message, remedy = "the steps of this run are its own choice", "give a number, or simulation.step"
+            raise bad(f"{place}.samples", message, constraint.samples, remedy)
+    elif not 2 <= constraint.samples <= 100_000:
         raise bad(f"{place}.samples", "not a number of samples", constraint.samples, "give 2 to 100000")
     record = scene.record
     if isinstance(constraint, DeflectionLimit):
@@ -295,15 +307,33 @@ def _check_goal(goal: Goal, record: ProblemRecord, scene: Scene, place: str) -> 
     choose(goal.of, known, f"{place}.of", SceneError)
 
 
+def _check_aggregates(record: ProblemRecord, file: str) -> None:
+    """Nothing but aggregates may be asked for."""
+    remedy = 'use settings.derivatives = "components"'
+    if not record.constraints:
+        raise bad(f"{file}: settings.derivatives", "there is nothing to aggregate", "aggregates", remedy)
+    for k, constraint in enumerate(record.constraints):
+        if constraint.times != "aggregate" or constraint.limit is None:
+            message = "derivatives of aggregates alone are asked for"
+            raise bad(f"{file}: constraints[{k}].times", message, constraint.times, f'use "aggregate", or {remedy}')
+    for k, goal in enumerate(record.objective):
+        if goal.quantity != "mass":
+            message = "derivatives of aggregates alone are asked for, not of what objectives measure over time"
+            raise bad(f"{file}: objective[{k}].quantity", message, goal.quantity, remedy)
+
+
 def _check_settings(record: ProblemRecord, file: str) -> None:
     s, place = record.settings, f"{file}: settings"
     choose(s.optimizer, OPTIMIZERS, f"{place}.optimizer", SceneError)
+    choose(s.derivatives, DERIVATIVES, f"{place}.derivatives", SceneError)
+    if s.derivatives == "aggregates":
+        _check_aggregates(record, file)
     if not s.methods:
         raise bad(f"{place}.methods", "no method", None, f"name some of {', '.join(METHODS)}")
     for k, method in enumerate(s.methods):
         choose(method, METHODS, f"{place}.methods[{k}]", SceneError)
     check_names((f"{place}.methods[{k}]", method) for k, method in enumerate(s.methods))
-    for name in ("design_tolerance", "violation_tolerance", "move_limit"):
+    for name in ("design_tolerance", "violation_tolerance", "optimality_tolerance", "move_limit"):
         if not 0 < getattr(s, name) < 1:
             raise bad(f"{place}.{name}", "not a share", getattr(s, name), "give a number between 0 and 1")
     for name, most in (("most_analyses", 10_000), ("starts", 1000)):

@@ -8,6 +8,8 @@ METHODS = ("integrated", "esl-system", "esl-component")
 OPTIMIZERS = ("scp", "slsqp", "trust-constr")
 QUANTITIES, OVER_TIME = ("mass", "deflection", "effort", "stress"), ("peak", "rms")
 TIMES = ("all", "active", "aggregate")
+DERIVATIVES = ("components", "aggregates")
+EVERY_STEP = "every-step"
 FRAMES = ("world", "link")
 ENDS = ("cantilever", "clamped", "pinned")
 """Names that fields take."""
@@ -95,16 +97,18 @@ class Constraint(Record, frozen=True, kw_only=True, tag_field="type"):
     limit : float, optional
         The largest value, of a frequency and of a load factor the smallest; a constraint without one holds nothing, and
         lends its value to an objective.
-    samples : int
-        Times, evenly spaced over the run with both ends, each rounded to a step of a run with fixed steps.
+    samples : int or str
+        Times, evenly spaced over the run with both ends, each rounded to a step of a run with fixed steps; or
+        ``every-step`` of such a run.
     times : str
         ``all`` samples are constraints of their own; of the ``active`` ones those near their limit alone; or one
-        smooth ``aggregate`` of all (G. Kreisselmeier, R. Steinhauser, 1979), which lies on the safe side.
+        smooth ``aggregate`` of all for each element or point (G. Kreisselmeier, R. Steinhauser, 1979), which lies on
+        the safe side.
     """
 
     name: str
     limit: float | None = None
-    samples: int = 51
+    samples: int | str = 51
     times: str = "active"
 
 
@@ -215,10 +219,15 @@ class Settings(Record, frozen=True):
         whole mechanism, or of each link alone.
     optimizer : str
         ``scp`` (sequential convex programming), or SciPy's ``slsqp`` or ``trust-constr``.
+    derivatives : str
+        Of ``integrated``: of all ``components`` that are limited, at every sample; or, for many variables, of the
+        ``aggregates`` alone, backward over the run, where the times of all constraints are aggregated.
     design_tolerance : float
         Largest relative change of a variable from one design to the next.
     violation_tolerance : float
         By how much constraints may be passed, relative to their limits.
+    optimality_tolerance : float
+        Of ``scp``: what multipliers may leave of the objective's slope, over that (Karush, Kuhn, Tucker).
     most_analyses : int
         Runs of the motion that a method may take.
     move_limit : float
@@ -231,8 +240,10 @@ class Settings(Record, frozen=True):
 
     methods: tuple[str, ...] = ("esl-system", "integrated")
     optimizer: str = "scp"
+    derivatives: str = "components"
     design_tolerance: float = 5e-4
     violation_tolerance: float = 5e-4
+    optimality_tolerance: float = 1e-3
     most_analyses: int = 40
     move_limit: float = 0.5
     starts: int = 1

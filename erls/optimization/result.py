@@ -107,6 +107,8 @@ class Outcome:
         The constraint that is passed farthest.
     peaks : dict of str to float
         Largest value of every constraint over its limit, at the samples of the last analysis.
+    excess : dict of str to float
+        Where smooth values were held in place of the largest: by how much they are above these, in shares of the limit.
     """
 
     method: str
@@ -127,6 +129,7 @@ class Outcome:
     further: tuple[tuple[float, float, int, str], ...] = ()
     worst: str = ""
     peaks: dict[str, float] = field(default_factory=dict)
+    excess: dict[str, float] = field(default_factory=dict)
 
     @property
     def idle(self) -> list[str]:
@@ -213,6 +216,7 @@ def _outcome(problem: Problem, o: Outcome) -> dict[str, Any]:
         "reason": REASONS[o.status],
         "kkt_residual": o.residual,
         "idle_constraints": o.idle,
+        "aggregates_above_largest": o.excess,
         "active": [
             {"name": a.name, "row": a.row, "share": a.share, "multiplier": a.multiplier} for a in o.active
         ],

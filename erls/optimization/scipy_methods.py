@@ -78,7 +78,7 @@ class _Scaled:
         return np.concatenate([s for s, _ in rows]), jacobian
 
     def _one(self, shares: Array, k: int) -> Array:
-        return np.array([aggregate(shares)[0]]) if self.rules.aggregated[k] else shares
+        return aggregate(shares, self.rules.groups[k])[0] if self.rules.aggregated[k] else shares
 
 
 def scipy_method(name: str) -> Callable[..., Found]:

@@ -59,6 +59,8 @@ def _reason(o: Outcome) -> str:
         text += f"; {o.worst or 'a constraint'} passes its limit by {100 * o.violation:.3g} %"
     for name in o.idle:
         text += f"; {name} holds nothing: it comes to {100 * o.peaks[name]:.3g} % of its limit"
+    for name, share in o.excess.items():
+        text += f"; {name} is held as a smooth value, {100 * share:.2g} % of the limit above the largest"
     return text
 
 

@@ -66,10 +66,12 @@ class Asking:
     name : str
         For messages.
     run : ChainRun
+    weights : (m, size) array, optional
+        Of sums of its components, whose derivatives are asked for in place of theirs.
     """
 
-    def __init__(self, output: Output, name: str, run: ChainRun) -> None:
-        self.output, self.name, self.run = output, name, run
+    def __init__(self, output: Output, name: str, run: ChainRun, weights: Array | None = None) -> None:
+        self.output, self.name, self.run, self._weights = output, name, run, weights
         self._own = {f.name: getattr(run, f.name) for f in fields(ChainRun)}
         formulation: Any = run.formulation
         tree: Any = getattr(formulation, "bare", formulation)  # under the loops
@@ -86,8 +88,22 @@ class Asking:
         """Of the output, that `by_knots` takes."""
         return EVALUATIONS * len(self.groups) * len(self.parts) * len(self.steps)
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of what is differentiated."""
+        return self.value.shape if self._weights is None else (len(self._weights),)
+
+    @property
+    def count(self) -> int:
+        """Of numbers that are differentiated."""
+        return self.value.size if self._weights is None else len(self._weights)
+
+    def summed(self, value: Array) -> Array:
+        """What is differentiated of an output or of its derivative."""
+        return value if self._weights is None else np.asarray(self._weights @ value.ravel())
+
     def by_knots(self) -> dict[int, Array]:
-        """(3, n, c) derivatives of the c components by the states at some knots, by number.
+        """(3, n, c) derivatives of the c components, or sums, by the states at some knots, by number.
 
         Raises
         ------
@@ -95,15 +111,18 @@ class Asking:
             BAD_FIELD: the output knows the motion by other ways than the run's states at fixed times.
         """
         s = self.run.solution
-        n, count = s.y.shape[1], self.value.size
-        found = np.zeros((len(self.times), 2, n, count))
+        n = s.y.shape[1]
+        found = np.zeros((len(self.times), 2, n, self.count))
         result: dict[int, Array] = {}
         for group in self.groups:
             for part in self.parts:
                 whole = slopes(partial(self._moved_together, group=group, part=part), np.eye(n), self.steps)
                 for time in group:
                     own = self.depends[time]
-                    found[time, part][:, own] = whole.T[:, own]
+                    if self._weights is None:
+                        found[time, part][:, own] = whole.T[:, own]
+                    else:
+                        found[time, part] = whole.T[:, own] @ self._weights.T[own]
         for time, by_state in enumerate(found):
             right = int(knots_after(s.t, self.times[time : time + 1])[0])
             knots = np.array([right - 1, right])
@@ -169,13 +188,15 @@ class Asking:
             return self._as_whole(y, v, a)
 
         found = (8 * (moved(1.0) - moved(-1.0)) - (moved(2.0) - moved(-2.0))) / 12
-        expected = np.zeros(self.value.size)
-        largest = np.zeros(self.value.size)
+        expected = np.zeros(self.count)
+        largest = np.zeros(self.count)
         for knot, seed in seeds.items():
             terms = seed * waves[knot][..., None]
             expected += terms.sum(axis=(0, 1))
             largest += np.abs(terms).sum(axis=(0, 1))
         rounding = 1e-12 * np.abs(self.value).max(initial=0.0)
+        if self._weights is not None:
+            rounding = rounding * np.abs(self._weights).sum(axis=1)
         if (np.abs(found - expected) > _AGREES * np.maximum(largest, np.abs(found)) + rounding).any():
             raise SceneError(
                 Cause.BAD_FIELD,
@@ -186,7 +207,7 @@ class Asking:
 
     def _as_whole(self, y: Array, v: Array, a: Array) -> Array:
         moved = replace(self.run, solution=replace(self.run.solution, y=y, v=v, a=a))
-        return value_of(self.output, moved, self.name).ravel()
+        return self.summed(value_of(self.output, moved, self.name)).ravel()
 
 
 def _weights(ends: Array, t: float) -> Array:

@@ -30,6 +30,7 @@ from erls.sensitivity.parameters import Parameter, parameters_of
 from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
 from erls.sensitivity.variants import Difference, differences
 from erls.simulation.simulate import simulate
+from fe_import.files.toml import choose
 
 _ROOM = 50_000_000
 """Numbers of derivatives of a motion that are held at a time, 400 MB: more parameters go one group after the other."""
@@ -77,6 +78,7 @@ def sensitivities(
     parameters: Sequence[str] | Mapping[str, float],
     method: Method = "auto",
     *,
+    weights: Mapping[str, Array] | None = None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Sensitivities:
     """Differentiate what a run gives by numbers of its scene.
@@ -98,6 +100,9 @@ def sensitivities(
         ``"forward"``: all states of the run by each parameter, for outputs of any size. ``"adjoint"``: backward over
         the run, for few outputs by many parameters; outputs must ask the run at fixed times. ``"auto"``: the one that
         asks outputs less often. Both agree to 1e-9.
+    weights : mapping of str to (m, size) array, optional
+        By name of an output: factors of its components, one after the other. Derivatives are then those of the m sums,
+        which cost the adjoint method what m numbers cost, however many components go into them.
     tell : callable, optional
         Told about each preparation that takes time.
 
@@ -138,17 +143,37 @@ def sensitivities(
     refuse_run(run)
     values = {name: value_of(output, run, name) for name, output in outputs.items()}
     with announcing(tell):
-        askings = _askings(run, outputs, values, len(keys), method)
+        sums = _sums(weights or {}, values)
+        askings = _askings(run, outputs, values, sums, len(keys), method)
         if askings is None:
-            derivatives = _forward(run, outputs, values, keys)
+            derivatives = _forward(run, outputs, values, sums, keys)
         else:
             derivatives = _adjoint(askings, keys, scheme_of(run))
     at = {one.key: one.value for one in keys}
     return Sensitivities(run, at, values, derivatives, "forward" if askings is None else "adjoint")
 
 
+def _sums(weights: Mapping[str, Array], values: Mapping[str, Array]) -> dict[str, Array]:
+    """(m, size) factors of outputs, by name."""
+    found = {}
+    for name, given in weights.items():
+        choose(name, list(values), "weights", SceneError)
+        found[name] = np.asarray(given, dtype=float)
+        if found[name].ndim != 2 or found[name].shape[1] != values[name].size:
+            message, remedy = "factors do not fit the output", f"give (m, {values[name].size}) of them"
+            raise SceneError(
+                Cause.BAD_FIELD, message, where=f"weights of {name}", value=found[name].shape, remedy=remedy
+            )
+    return found
+
+
 def _askings(
-    run: ChainRun, outputs: Mapping[str, Output], values: Mapping[str, Array], parameters: int, method: Method
+    run: ChainRun,
+    outputs: Mapping[str, Output],
+    values: Mapping[str, Array],
+    sums: Mapping[str, Array],
+    parameters: int,
+    method: Method,
 ) -> list[tuple[Asking, dict[int, Array]]] | None:
     """For the adjoint method, outputs with their derivatives by states; None for the forward one.
 
@@ -162,10 +187,11 @@ def _askings(
             what = "nodal runs" if _of_nodes(run) else "runs with contacts, stops or joints that stick"
             raise _refusal(f"{what} by the adjoint method", "method", "take 'auto' or 'forward'")
         return None
-    few = sum(value.size for value in values.values()) < parameters and parameters > _FEW
+    sizes = [len(sums[name]) if name in sums else value.size for name, value in values.items()]
+    few = sum(sizes) < parameters and parameters > _FEW
     if not chosen and not few:
         return None
-    found = [Asking(output, name, run) for name, output in outputs.items()]
+    found = [Asking(output, name, run, sums.get(name)) for name, output in outputs.items()]
     if not chosen and sum(asking.evaluations for asking in found) > EVALUATIONS * parameters * len(outputs):
         return None
     try:
@@ -180,6 +206,7 @@ def _forward(
     run: ChainRun,
     outputs: Mapping[str, Output],
     values: Mapping[str, Array],
+    sums: Mapping[str, Array],
     keys: Sequence[Parameter],
 ) -> dict[str, dict[str, Array]]:
     derivatives: dict[str, dict[str, Array]] = {name: {} for name in outputs}
@@ -190,6 +217,8 @@ def _forward(
         for k, one in enumerate(found):
             for name, output in outputs.items():
                 derivative = derivative_of(output, name, run, one, motion[..., k], metres, values[name])
+                if name in sums:
+                    derivative = sums[name] @ derivative.ravel()
                 derivatives[name][one.parameter.key] = derivative
     return derivatives
 
@@ -201,8 +230,8 @@ def _adjoint(
     if not askings:
         return derivatives
     run = askings[0][0].run
-    ends = np.cumsum([asking.value.size for asking, _ in askings]).tolist()
-    columns = [slice(end - asking.value.size, end) for end, (asking, _) in zip(ends, askings, strict=True)]
+    ends = np.cumsum([asking.count for asking, _ in askings]).tolist()
+    columns = [slice(end - asking.count, end) for end, (asking, _) in zip(ends, askings, strict=True)]
     n = run.solution.y.shape[1]
     seeds: dict[int, Array] = {}
     for (_, by_knots), own in zip(askings, columns, strict=True):
@@ -213,7 +242,7 @@ def _adjoint(
     for one, row in zip(found, through, strict=True):
         for (asking, _), own in zip(askings, columns, strict=True):
             held = own_derivative(asking.output, asking.name, run, one, asking.value)
-            derivatives[asking.name][one.parameter.key] = np.asarray(held + row[own].reshape(asking.value.shape))
+            derivatives[asking.name][one.parameter.key] = asking.summed(held) + row[own].reshape(asking.shape)
     return derivatives
 
 
@@ -256,7 +285,7 @@ def refuse_run(run: ChainRun) -> None:
     Raises
     ------
     SceneError
-        BAD_FIELD: names what.
+        NO_DERIVATIVE: names what.
     """
     refuse(run.scene, run.formulation.mechanism)
     if run.failure is not None:
@@ -276,7 +305,7 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
     Raises
     ------
     SceneError
-        BAD_FIELD: names what.
+        NO_DERIVATIVE: names what.
     """
     settings, where = scene.record.simulation, f"{scene.path}: simulation"
     if settings.output_step is not None:
@@ -304,4 +333,4 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
 
 
 def _refusal(what: str, where: str, remedy: str) -> SceneError:
-    return SceneError(Cause.BAD_FIELD, f"derivatives of {what} are not known yet", where=where, remedy=remedy)
+    return SceneError(Cause.NO_DERIVATIVE, f"derivatives of {what} are not known yet", where=where, remedy=remedy)

@@ -115,7 +115,7 @@ class Modes:
         Raises
         ------
         SceneError
-            BAD_FIELD: the run was made in parts.
+            NO_DERIVATIVE: the run was made in parts.
         """
         t, v = run.solution.t, run.solution.v
         found = []
@@ -126,7 +126,7 @@ class Modes:
                 modes = np.sign(rates[np.abs(rates).argmax(axis=0), np.arange(rates.shape[1])])
             elif switched:
                 message = "derivatives of a run in parts are not known yet"
-                raise SceneError(Cause.BAD_FIELD, message, where=str(run.scene.path), remedy="run it in one piece")
+                raise SceneError(Cause.NO_DERIVATIVE, message, where=str(run.scene.path), remedy="run it in one piece")
             found.append(Piece(first, end, leg, modes, switched))
         return found
 

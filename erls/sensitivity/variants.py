@@ -165,7 +165,7 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, 
             formulation.kept = base.kept  # of rows that follow from one another, any others would do as well
         if _times(formulation, nodal) != _times(base, nodal):
             raise SceneError(
-                Cause.BAD_FIELD,
+                Cause.NO_DERIVATIVE,
                 "times at which forces jump depend on this parameter: derivatives through them are not known yet",
                 where=f"parameter {parameter.key}",
                 value=parameter.value,

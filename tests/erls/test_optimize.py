@@ -16,7 +16,7 @@ from erls.optimization import dynamics as running
 from erls.optimization.dynamics import Dynamics
 from erls.optimization.equivalent_loads import FrozenLoads
 from erls.optimization.evaluation import aggregate
-from erls.optimization.gradients import _differences
+from erls.optimization.gradients import differences
 from erls.optimization.memory import Memory
 from erls.optimization.problem import load_problem
 from erls.optimization.records import Settings
@@ -95,11 +95,11 @@ def test_derivatives_of_runs(robot: Dynamics) -> None:
         return np.concatenate([limit.exact(motion).ravel() for limit in at])
 
     assert len(limits) == 3
-    differences = _differences(robot.designs, design, asked)
+    expected = differences(robot.designs, design, asked)
     exact = np.concatenate([j.reshape(-1, 4) for j in found.jacobians])
     sizes = np.cumsum([0, *(c.size for c in found.components)])
     for first, end in pairwise(sizes.tolist()):
-        assert exact[first:end] == pytest.approx(differences[first:end], abs=1e-5 * np.abs(exact[first:end]).max())
+        assert exact[first:end] == pytest.approx(expected[first:end], abs=1e-5 * np.abs(exact[first:end]).max())
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -162,7 +162,8 @@ def test_smallest_deflection_of_a_given_mass_bound() -> None:
 
 def test_aggregate_is_on_the_safe_side() -> None:
     shares = np.array([0.3, 0.99, 1.0])
-    value, slopes = aggregate(shares)
+    groups = np.array([0, 1, 1])
+    value, slopes = aggregate(shares, groups)
     assert shares.max() <= value <= shares.max() + np.log(3) / 200
     h = 1e-6
     for k, way in enumerate(np.eye(3)):

@@ -47,7 +47,8 @@ def test_frequency_of_a_cantilever() -> None:
 def test_a_heavy_tip_lowers_the_frequency() -> None:
     """Rayleigh: k/(M + 33/140 m), k = 3EI/L³; it is 2e-4 too high at these masses."""
     tip = 'payloads=[{point="tip", mass=0.35}]'
-    changes = [ONE, 'settings.methods=["esl-system"]', scene(tip), 'constraints=[{type="frequency", name="f", limit=1.0}]']
+    limit = 'constraints=[{type="frequency", name="f", limit=1.0}]'
+    changes = [ONE, 'settings.methods=["esl-system"]', scene(tip), limit]
     (outcome,) = erls.optimize(CANTILEVER, changes=changes).outcomes
     stiffness = 3 * E * WIDTH * outcome.x[0] ** 3 / 12
     assert np.sqrt(stiffness / (0.35 + 33 / 140 * outcome.mass)) / (2 * np.pi) == pytest.approx(1.0, rel=3e-4)

@@ -19,12 +19,11 @@ from erls.equations.nodal.contacts import Contacts, NodalContact
 from erls.equations.nodal.elements import Elements
 from erls.equations.nodal.joints import GROUND, Joint, Motion
 from erls.equations.nodal.loads import NodalLoad, NodalLoads
-from erls.equations.nodal.nodes import Nodes, twists_of
+from erls.equations.nodal.nodes import Nodes, poses_of, twists_of
 from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.equations.nodal.seat import Seat
-from erls.maths import motion_maps as motions
 from erls.maths.rotation_maps import exp
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
@@ -64,11 +63,16 @@ class ChainSystem(NodalSystem):
 
     def from_stored(self, y: Array, v: Array) -> tuple[Nodes, Array]:
         """Configuration and velocity from what `stored` gives, interpolated or not; rotations made orthogonal."""
-        place, rate = (x[: 12 * self.count].reshape(-1, 12) for x in (y, v))
-        left, _, right = np.linalg.svd(place[:, 3:].reshape(-1, 3, 3))
-        turn = left @ right
-        near = replace(self.start, turned=y[12 * self.count :].copy())
-        return self.at(motions.poses(turn, place[:, :3]), near), twists_of(turn, rate).ravel()
+        poses, near = self.poses_stored(y[None])[0], replace(self.start, turned=y[12 * self.count :].copy())
+        rate = v[: 12 * self.count].reshape(-1, 12)
+        return self.at(poses, near), twists_of(poses[:, :3, :3], rate).ravel()
+
+    def poses_stored(self, y: Array) -> Array:
+        """(k, N, 4, 4) of the nodes, from what `stored` gives at k times."""
+        poses = poses_of(y[:, : 12 * self.count].reshape(len(y), self.count, 12))
+        left, _, right = np.linalg.svd(poses[..., :3, :3])
+        poses[..., :3, :3] = left @ right
+        return poses
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,13 @@ from __future__ import annotations
 import numpy as np
 
 from erls.equations.serial.motion_series import MotionSeries, spin_of
+from erls.equations.serial.state_series import StateSeries
 from erls.maths.rotation_maps import exp, skews, tangent, tangent_derivative
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.links import node_shape6
 from erls.mechanism.sensors.base import NodeMotion
+from fe_import.model import IntArray
 
 
 def node_motion(mechanism: Mechanism, motion: MotionSeries, link: int, node: int) -> NodeMotion:
@@ -55,6 +57,24 @@ def node_motion(mechanism: Mechanism, motion: MotionSeries, link: int, node: int
         _turned(turn, w + own_spin),
         _turned(turn, dw + own_rate + _turned(spinning, own_spin)),
     )
+
+
+def node_poses(mechanism: Mechanism, states: StateSeries, link: int, nodes: IntArray) -> Array:
+    """(k, N, 4, 4) places and axes alone of nodes of a link, as `node_motion` has them."""
+    result = np.zeros((len(states.times), len(nodes), 4, 4))
+    result[..., 3, 3] = 1.0
+    if states.nodes is not None and states.turns is not None:
+        result[..., :3, 3], result[..., :3, :3] = states.nodes[link][:, nodes], states.turns[link][:, nodes]
+        return result
+    own, q = mechanism.links[link], states.modal[link]
+    moved = q @ np.concatenate([np.vstack(node_shape6(own.model, n)) for n in nodes.tolist()]).T
+    moved = moved.reshape(len(q), len(nodes), 6)
+    if "foreshortening" in mechanism.effects and own.second_order is not None:
+        bent = np.stack([own.second_order.bending(n) for n in nodes.tolist()])
+        moved = moved + np.einsum("ka,nija,kj->kni", q, bent, q, optimize=True) / 2
+    result[..., :3, 3] = own.model.nodes[nodes] + moved[..., :3]
+    result[..., :3, :3] = exp(moved[..., 3:].reshape(-1, 3)).reshape(*moved.shape[:-1], 3, 3)
+    return np.asarray(states.poses[link][:, None] @ result)
 
 
 def _displacements(mechanism: Mechanism, motion: MotionSeries, link: int, node: int) -> tuple[Array, ...]:
