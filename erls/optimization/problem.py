@@ -161,6 +161,9 @@ def load_problem(path: Path | str, changes: Sequence[str] = ()) -> Problem:
 def _check_tables(record: ProblemRecord, file: str) -> None:
     if not record.variables:
         raise bad(f"{file}: variables", "nothing may change", None, "add [[variables]]")
+    if not record.constraints:
+        message = "nothing must hold, so that the least mass lies at bounds"
+        raise bad(f"{file}: constraints", message, None, "add [[constraints]]")
     for table in ("variables", "constraints"):
         check_names((f"{file}: {table}[{k}].name", one.name) for k, one in enumerate(getattr(record, table)))
 
