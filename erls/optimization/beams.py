@@ -18,6 +18,7 @@ from erls.optimization.link_numbers import LinkNumbers
 from erls.scene.settings import Simulation
 from fe_import.description.records import LinkDescription
 from fe_import.elements.sections import Circular, Rectangular, RectangularTube, Section, Tubular
+from fe_import.model import IntArray
 from fe_import.models.frame_parts import frame_parts
 from fe_import.models.model import unit_factors
 
@@ -43,12 +44,13 @@ def sections_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, 
 
 def _stiffness(link: Link, description: LinkDescription, settings: Simulation) -> Array:
     """Of the elements of a link."""
-    made = link_parts(replace(link, description=description), _elements(settings), 1, rules_of(settings))
+    made = link_parts(replace(link, description=description), elements_of(settings), 1, rules_of(settings))
     lengths = [float(np.linalg.norm(beam.frames[1, :3, 3] - beam.frames[0, :3, 3])) for beam in made.beams]
     return np.array([beam.section.stiffness / length for beam, length in zip(made.beams, lengths, strict=True)])
 
 
-def _elements(settings: Simulation) -> int | None:
+def elements_of(settings: Simulation) -> int | None:
+    """Elements of each member, unless the description says."""
     return settings.elements_per_member if settings.formulation == "nodal" else None
 
 
@@ -60,6 +62,15 @@ def _described(mechanism: Mechanism, links: LinkNumbers, x: Array) -> list[tuple
         if description is not None and description.frame is not None:
             found.append((k, number, description))
     return found
+
+
+def elements_by_link(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, x: Array) -> IntArray:
+    """(e,) numbers in the mechanism of the links of all elements."""
+    found = [
+        np.full(len(links.kept("sections", k, x, partial(_stiffness, mechanism.links[n], about, settings))), n)
+        for k, n, about in _described(mechanism, links, x)
+    ]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *found])
 
 
 class Outlines(NamedTuple):
@@ -100,7 +111,7 @@ def _outlines(number: int, description: LinkDescription, settings: Simulation) -
     """Of the elements of a link."""
     frame, factors, rounds = description.frame, [], []
     assert frame is not None
-    mesh = frame_parts(description, frame, description.name, _elements(settings)).mesh
+    mesh = frame_parts(description, frame, description.name, elements_of(settings)).mesh
     metre = unit_factors(description, description.name)[0]
     for member, elements in zip(frame.members, mesh.members, strict=True):
         section = description.sections[member.section]

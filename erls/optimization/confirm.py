@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import msgspec
+import numpy as np
 
 from erls.errors import SimulationError
 from erls.maths.so3 import Array
@@ -73,13 +74,15 @@ def _looked(
     own = Problem(problem.path, record, scene, x, problem.parameters, problem.factors, problem.powers)
     looking = Dynamics(own, Memory(own), tell, times)
     motion = looking.motion_of(run)
-    values, at, curves = {}, {}, {}
+    values, at, curves, violation = {}, {}, {}, -1.0
     for limit in looking.limits(looking.start):
         found = limit.measure.value(limit.exact(motion))
-        rows = found.reshape(len(times), -1).max(axis=1)
-        curves[limit.name] = rows
-        values[limit.name], at[limit.name] = float(rows.max()), float(times[int(rows.argmax())])
-    shares = [values[c.name] / c.limit - 1 for c in problem.record.constraints if c.limit is not None]
-    return Confirmed(name, values, at, max(shares, default=-1.0), instants=times, curves=curves)
+        rows = np.broadcast_to(found.reshape(len(limit.at), -1).max(axis=1), times.shape)
+        worst = int(rows.argmax())
+        curves[limit.name] = limit.told(rows)
+        values[limit.name], at[limit.name] = float(curves[limit.name][worst]), float(times[worst])
+        if limit.limit is not None:
+            violation = max(violation, float(rows[worst]) / limit.limit - 1)
+    return Confirmed(name, values, at, violation, instants=times, curves=curves)
 
 

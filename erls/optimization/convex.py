@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
 from erls.optimization.approximation import Approximation
 from erls.optimization.evaluation import Evaluation, Evaluator
@@ -24,6 +25,7 @@ _BAND = 10.0  # of the tolerance of violations
 _SHORTER, _LONGER, _SMALLEST = 0.35, 1.5, 1e-6
 _TURNED = 0.5  # of a variable's last step, once it has turned back twice in a row
 _IDLE = 1e-2  # of the tolerance of designs: smaller steps come to nothing
+_NO_FARTHER = 1e-3  # of the variables: a run that fails so near to one that does not
 _SAME = 1e-8  # of the objective of the start
 
 
@@ -105,8 +107,15 @@ def sequential_convex(
                     return Found(current, step.x, "converged" if held else "infeasible", change, count)
             if count >= most:
                 return Found(current, step.x, "budget", change, count)
-            trial = evaluator.evaluate(step.x)
             count += 1
+            try:
+                trial = evaluator.evaluate(step.x)
+            except SimulationError as failure:
+                if failure.cause is Cause.INTERRUPTED or moves.max() < _NO_FARTHER:
+                    raise
+                moves = _SHORTER * np.minimum(moves, change)  # designs that cannot move are none
+                told(Evaluation(step.x, np.nan, (), np.inf), change)
+                continue
             told(trial, change)
             if merit(trial, step.pressure) <= merit(current, step.pressure) + _SAME:
                 break

@@ -15,11 +15,12 @@ from erls.optimization.equivalent_loads import FrozenLoads, flexible
 from erls.optimization.evaluation import Evaluation, Rules
 from erls.optimization.frozen import Frozen, frozen, nodal_of, node_poses
 from erls.optimization.gradients import derivatives
-from erls.optimization.limits import Limit, Motion, limit_of
+from erls.optimization.limits import Bases, Limit, Motion, limit_of
 from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.memory import Memory
 from erls.optimization.objective import Objective
 from erls.optimization.problem import Problem
+from erls.optimization.records import FrequencyLimit
 from erls.run.chain.run import ChainRun
 
 _STEP = 1e-4  # of variables: what they change of a measure by themselves
@@ -63,9 +64,13 @@ class Dynamics:
         self.designs, self.numbers = Designs(problem, tell), LinkNumbers(problem)
         self.run_s, self.gradient_s, self.gradient = 0.0, 0.0, ""
         record = problem.record
-        samples = [problem.times(c) if times is None else times for c in record.constraints]
+        samples = [problem.times(c) for c in record.constraints]
+        samples = [own if times is None or len(own) == 1 else times for own in samples]
         self.times = np.unique(np.concatenate([*samples, [0.0]]))
         self.at = [np.searchsorted(self.times, own) for own in samples]
+        self._weighs = any(p.key.split(".")[0] in ("payloads", "joints") for p in problem.parameters) and any(
+            isinstance(c, FrequencyLimit) for c in record.constraints
+        )  # payloads and motors on links
         self._places: list[Place] = []
         self._ran: ChainRun | None = None
         self.start = self.designs.at(problem.start)
@@ -75,7 +80,7 @@ class Dynamics:
             problem.upper,
             problem.powers,
             tuple(c.name for c in record.constraints),
-            tuple(c.limit for c in record.constraints),
+            tuple(limit.limit for limit in limits),
             tuple(limit.measure for limit in limits),
             tuple(c.times == "aggregate" for c in record.constraints),
             tuple(c.times == "all" for c in record.constraints),
@@ -107,7 +112,7 @@ class Dynamics:
 
     def limits_at(self, x: Array) -> list[Limit]:
         """The same where variables move no node."""
-        return self._limits(self.start.mechanism, x)
+        return self._beside(self.start, x)
 
     def _limits(self, mechanism: Mechanism, x: Array) -> list[Limit]:
         nodal = self.place(mechanism).nodal
@@ -166,32 +171,36 @@ class Dynamics:
         known = last is not None and last.scene.record == scene_at(self.problem, x).record
         design = self.designs.at(x)
         run = last if last is not None and known else run_of(design)
-        limits = self.limits(design)
+        limits, motion = self.limits(design), self.motion_of(run)
+        bases = [limit.basis(motion) for limit in limits]
 
         def asked(other: ChainRun) -> Array:
             motion = self.motion_of(other)
-            return np.concatenate([limit.exact(motion).ravel() for limit in limits])
+            return np.concatenate([one.exact(motion, b).ravel() for one, b in zip(limits, bases, strict=True)])
 
         def summed(rows: Array) -> Array:
             return rows if weights is None else weights @ rows
 
         whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked, weights)
-        motion = self.motion_of(run)
-        if not self.designs.moving:
-            each = [self._of_sections(x, motion, k, limit) for k, limit in enumerate(limits)]
-            whole = whole + summed(np.concatenate(each))
+        each = [self._of_sections(design, motion, k, *one) for k, one in enumerate(zip(limits, bases, strict=True))]
+        whole = whole + summed(np.concatenate(each))
         if self.designs.moving or not flexible(self.start.scene):
             return whole, whole
         static = FrozenLoads(self, x, motion, True)
         own = static.differentiate(static.evaluate(x)).jacobians
         return whole, summed(np.concatenate([j.reshape(-1, len(x)) for j in own]))
 
-    def _of_sections(self, x: Array, motion: Motion, k: int, limit: Limit) -> Array:
+    def _of_sections(self, design: Design, motion: Motion, k: int, limit: Limit, basis: Bases | None) -> Array:
         """(n, v) what variables change of components at the same motion: sections have other sizes."""
+        x, count = design.x, len(design.x)
         if not limit.of_sections:
-            return np.zeros((limit.exact(motion).size, len(x)))
+            return np.zeros((limit.exact(motion).size, count))
         columns = []
         for side, other, step in self.rules.beside(x, _STEP):
-            above, below = (self.limits_at(at)[k].exact(motion).ravel() for at in (side, other))
+            above, below = (self._beside(design, at)[k].exact(motion, basis).ravel() for at in (side, other))
             columns.append((above - below) / (2 * step))
         return np.stack(columns, axis=-1)
+
+    def _beside(self, design: Design, x: Array) -> list[Limit]:
+        """Constraints at values beside a design, for its motion."""
+        return self._limits(self.designs.at(x).mechanism if self._weighs else design.mechanism, x)

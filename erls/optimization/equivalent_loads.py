@@ -23,7 +23,7 @@ from erls.optimization.beams import assembled, clamped_flexibility, scattered, s
 from erls.optimization.design import Design, Designs
 from erls.optimization.evaluation import Evaluation, Rules
 from erls.optimization.frozen import Frozen
-from erls.optimization.limits import Limit, Motion
+from erls.optimization.limits import Bases, Limit, Motion
 from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.problem import Problem
 from erls.scene.build import link_description
@@ -120,15 +120,16 @@ class FrozenLoads:
         change = r - self._base[0], w - self._base[1]
         return self.rules.evaluation(x, [self._components(limit, *change) for limit in self._source.limits_at(x)])
 
-    def _components(self, limit: Limit, r: Array, w: Array) -> Array:
+    def _components(self, limit: Limit, r: Array, w: Array, basis: Bases | None = None) -> Array:
         """Those of the run, which loads that are held hold as well, and what r and w add to them."""
-        return limit.exact(self._motion) + limit.increments(self._frozen, r, w)
+        return limit.moved(self._motion, r, w, basis)
 
     def differentiate(self, found: Evaluation) -> Evaluation:
         """With derivatives: dC = -C dK C."""
         x = found.x
         r, w, flexibility = self._response(x)
         limits, change = self._source.limits_at(x), (r - self._base[0], w - self._base[1])
+        bases = [limit.basis(self._motion, *change) for limit in limits]
         columns: list[list[Array]] = [[] for _ in limits]
         for above, below, step in self.rules.beside(x, _STEP):
             rate = (self._sections(above) - self._sections(below)) / (2 * step)
@@ -136,9 +137,9 @@ class FrozenLoads:
             moved = self._joined(flexibility, alone, None)
             beside = [self._source.limits_at(side) if limits_vary(limits) else limits for side in (above, below)]
             for k, limit in enumerate(limits):
-                column = limit.increments(self._frozen, moved[0], alone + moved[1])
+                column = limit.increments(self._frozen, moved[0], alone + moved[1], bases[k])
                 if limit.of_sections:
-                    own = [self._components(other[k], *change) for other in beside]
+                    own = [self._components(other[k], *change, bases[k]) for other in beside]
                     column = column + (own[0] - own[1]) / (2 * step)
                 columns[k].append(column)
         return self.rules.differentiated(found, [np.stack(column, axis=-1) for column in columns])

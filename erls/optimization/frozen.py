@@ -29,6 +29,7 @@ from erls.maths.saddle import dense
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.links import Link, truncated
 from erls.optimization.rigid import RigidMotion
 from erls.run.chain.node_motion import node_poses as node_poses_of
 from erls.run.chain.run import ChainRun
@@ -43,8 +44,23 @@ def rules_of(settings: Simulation) -> BeamRules:
     return BeamRules(residual_bending_flexibility=True)
 
 
+def of_beams(link: Link) -> bool:
+    """Whether a link is known by beams, or is rigid; others are known by their modes alone."""
+    return not link.elastic_modes or (link.description is not None and link.description.frame is not None)
+
+
+def _rigid(link: Link) -> Link:
+    """A link as it would be if it did not deform."""
+    none = np.zeros(0)
+    kept = link.invariants.truncated(np.arange(6))
+    return replace(link, model=truncated(link.model, 0), invariants=kept, stiffness=none, damping=none)
+
+
 def nodal_of(mechanism: Mechanism, settings: Simulation) -> Nodal:
-    """The mechanism as nodal elements."""
+    """The mechanism as nodal elements; links that are not made of beams are rigid ones there."""
+    if not all(of_beams(link) for link in mechanism.links):
+        links = tuple(link if of_beams(link) else _rigid(link) for link in mechanism.links)
+        mechanism = replace(mechanism, links=links)
     if settings.formulation == "nodal":
         found = formulate(mechanism, settings)
         assert isinstance(found, Nodal)

@@ -4,7 +4,8 @@ Rules for a new constraint: one record in `erls.optimization.records`, one class
 tells components (n, q) of a motion, ``increments`` what small displacements of its nodes add to them, of many
 directions at a time; where a constraint does not follow from where nodes are, ``of_shape`` is false, it asks
 the run, and equivalent static loads cannot treat it; with ``of_sections`` components depend on sections at the same
-motion, too. ``groups`` numbers the places that rows belong to: each has one value where times are aggregated.
+motion, too. ``groups`` numbers the places that rows belong to: each has one value where times are aggregated. Where
+components are told in modes of a design, ``basis`` gives these, for whoever compares designs.
 """
 
 from __future__ import annotations
@@ -20,15 +21,31 @@ from erls.errors import SceneError
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.optimization.beams import outlines_of, sections_of
-from erls.optimization.frozen import Frozen
+from erls.mechanism.sensors.base import Node
+from erls.optimization.beams import elements_by_link, outlines_of, sections_of
+from erls.optimization.eigenvalues import MODES, Basis, HeldLink, LargestEigenvalue, basis_of, components, held_link
+from erls.optimization.frozen import Frozen, of_beams
 from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.measures import EdgedSection, Length, Measure, RoundSection
-from erls.optimization.problem import Problem, stressed, terms_of
-from erls.optimization.records import AnyConstraint, DeflectionLimit, EffortLimit, StressLimit, Term
+from erls.optimization.problem import Problem, links_of, terms_of
+from erls.optimization.records import (
+    AnyConstraint,
+    BucklingLimit,
+    DeflectionLimit,
+    EffortLimit,
+    FrequencyLimit,
+    StressLimit,
+    Term,
+)
+from erls.run.chain.instants import Instants
 from erls.run.chain.run import ChainRun
 from fe_import.files.toml import choose
 from fe_import.model import IntArray
+
+_NONE = 1e-9  # of the limit: compression that is rounding
+
+Bases = list[Basis]
+"""Of the links that a constraint looks at."""
 
 
 @dataclass(frozen=True)
@@ -65,24 +82,39 @@ class Limit(Protocol):
     of_sections: bool
     groups: IntArray
 
-    def exact(self, motion: Motion) -> Array:
+    def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
         """(n, q) components in a motion."""
 
-    def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
+    def increments(self, frozen: Frozen, r: Array, w: Array, basis: Bases | None = None) -> Array:
         """(n, q) what displacements r (k, 6 L), w (k, 6 N) of all times add."""
+
+    def moved(self, motion: Motion, r: Array, w: Array, basis: Bases | None = None) -> Array:
+        """(n, q) components of a motion with displacements added."""
+        return self.exact(motion, basis) + self.increments(motion.frozen, r, w, basis)
+
+    def basis(self, motion: Motion, r: Array | None = None, w: Array | None = None) -> Bases | None:
+        """In what its components are told, at a motion with displacements added."""
+        return None
+
+    def told(self, values: Array) -> Array:
+        """Measured values as users know them, beside the limit of the problem."""
+        return values
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A term of a deflection: node, place of the point from it, axes and components."""
+    """A term of a deflection: node, place of the point from it, axes and components; and the node of a link that is
+    known by its modes alone.
+    """
 
     node: int
     offset: Array
     on_link: bool
     components: list[int]
+    modal: Node | None = None
 
 
-class Deflection:
+class Deflection(Limit):
     """Of named points."""
 
     measure: Measure = Length()
@@ -93,7 +125,7 @@ class Deflection:
         self.groups = np.zeros(len(at), dtype=np.int64)
         self._parts = [_part(term, mechanism, nodal) for term in terms_of(record)]
 
-    def exact(self, motion: Motion) -> Array:
+    def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
         """(k, q)"""
         frozen, found = motion.frozen, []
         for part in self._parts:
@@ -101,6 +133,8 @@ class Deflection:
             rigid = frozen.frames[self.at, link]
             own, root = motion.poses[self.at, part.node], motion.poses[self.at, frozen.roots[link]]
             place = own[:, :3, 3] + own[:, :3, :3] @ part.offset
+            if part.modal is not None:
+                place = self._seen(motion, part.modal)
             undeformed = frozen.local[part.node, :3, 3] + frozen.local[part.node, :3, :3] @ part.offset
             if part.on_link:
                 moved = np.einsum("kji,kj->ki", root[:, :3, :3], place - root[:, :3, 3]) - undeformed
@@ -109,7 +143,14 @@ class Deflection:
             found.append(moved[:, part.components])
         return np.concatenate(found, axis=1)
 
-    def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
+    def _seen(self, motion: Motion, node: Node) -> Array:
+        """(k, 3) a node of a run."""
+        assert motion.run is not None
+        times = motion.frozen.times[self.at]
+        y, v = motion.run.coordinates(times)
+        return Instants(motion.run.formulation, times, y, v, np.zeros_like(y)).node(node).place
+
+    def increments(self, frozen: Frozen, r: Array, w: Array, basis: Bases | None = None) -> Array:
         """(k, q)"""
         found = []
         for part in self._parts:
@@ -134,14 +175,15 @@ def _part(term: Term, mechanism: Mechanism, nodal: Nodal) -> _Part:
     point = mechanism.points[names.index(term.point)]
     link = mechanism.links[point.link]
     root = nodal.place_of(point.link, link.inboard.node)
-    node = root if not link.elastic_modes else nodal.place_of(point.link, point.node)
+    modal = None if of_beams(link) else Node(point.link, point.node)
+    node = root if modal is not None or not link.elastic_modes else nodal.place_of(point.link, point.node)
     start = nodal.chain.system.start.poses
     place = link.inboard.position + (motions.inverse(start[root]) @ start[node])[:3, 3]
     offset = link.model.nodes[point.node] - place
-    return _Part(node, offset, term.frame == "link", ["xyz".index(c) for c in term.components])
+    return _Part(node, offset, term.frame == "link", ["xyz".index(c) for c in term.components], modal)
 
 
-class Stress:
+class Stress(Limit):
     """Largest normal stress at both ends of elements, one row for each time and end."""
 
     of_shape, of_sections = True, True
@@ -150,7 +192,7 @@ class Stress:
         self, record: StressLimit, at: IntArray, mechanism: Mechanism, problem: Problem, numbers: LinkNumbers, x: Array
     ) -> None:
         self.name, self.limit, self.at = record.name, record.limit, at
-        settings, links = problem.scene.record.simulation, stressed(record, problem.scene)
+        settings, links = problem.scene.record.simulation, links_of(record, problem.scene)
         outlines = outlines_of(mechanism, settings, numbers, x)
         wanted = np.isin(outlines.links, [mechanism.bodies[k] for k in links])
         self._elements = np.flatnonzero(wanted)
@@ -160,11 +202,11 @@ class Stress:
         rounds = outlines.rounds[wanted]
         self.measure: Measure = RoundSection() if rounds.all() else EdgedSection()  # which is never below it
 
-    def exact(self, motion: Motion) -> Array:
+    def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
         """(k e 2, 3)"""
         return self._stresses(motion.frozen, motion.twists[self.at][:, self._elements])
 
-    def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
+    def increments(self, frozen: Frozen, r: Array, w: Array, basis: Bases | None = None) -> Array:
         """(k e 2, 3)"""
         places, strains = frozen.places[self._elements], frozen.strains[self._elements]
         return self._stresses(frozen, np.einsum("ejl,kel->kej", strains, w[self.at][:, places]))
@@ -179,7 +221,7 @@ class Stress:
         return np.stack(ends, axis=2).reshape(-1, 3)
 
 
-class Effort:
+class Effort(Limit):
     """Of a joint's drive."""
 
     measure: Measure = Length()
@@ -189,14 +231,110 @@ class Effort:
         self.name, self.limit, self.at, self._joint = record.name, record.limit, at, record.joint
         self.groups = np.zeros(len(at), dtype=np.int64)
 
-    def exact(self, motion: Motion) -> Array:
+    def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
         """(k, 1)"""
         assert motion.run is not None
         return motion.run.joint_effort(self._joint, motion.frozen.times[self.at])[:, None]
 
-    def increments(self, frozen: Frozen, r: Array, w: Array) -> Array:
+    def increments(self, frozen: Frozen, r: Array, w: Array, basis: Bases | None = None) -> Array:
         """(k, 1) loads that are held change nothing."""
         return np.zeros((len(self.at), 1))
+
+
+class Frequency(Limit):
+    """(f₀/f)² of links, one row for each."""
+
+    measure: Measure = LargestEigenvalue()
+    of_shape, of_sections = True, True
+
+    def __init__(self, record: FrequencyLimit, at: IntArray, held: list[HeldLink]) -> None:
+        self.name, self.at, self._asked, self._held = record.name, at, record.limit or 1.0, held
+        self.limit = None if record.limit is None else 1.0
+        self.groups = np.arange(len(held))
+
+    def basis(self, motion: Motion, r: Array | None = None, w: Array | None = None) -> Bases:
+        """Modes of each link."""
+        return [basis_of(link.stiffness, [link.mass]) for link in self._held]
+
+    def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
+        """(links, q²)"""
+        pairs = zip(self._held, basis or self.basis(motion), strict=True)
+        found = [components(link.stiffness, [link.mass], own) for link, own in pairs]
+        return (2 * np.pi * self._asked) ** 2 * np.concatenate(found)
+
+    def increments(self, frozen: Frozen, r: Array, w: Array, basis: Bases | None = None) -> Array:
+        """(links, q²) displacements change nothing."""
+        return np.zeros((len(self._held), MODES**2))
+
+    def told(self, values: Array) -> Array:
+        """[Hz]"""
+        return np.asarray(self._asked / np.sqrt(values))
+
+
+class Buckling(Limit):
+    """Asked load factors over those that are there, one row for each time and link; 0 in tension."""
+
+    measure: Measure = LargestEigenvalue()
+    of_shape, of_sections = True, True
+
+    def __init__(
+        self,
+        record: BucklingLimit,
+        at: IntArray,
+        held: list[HeldLink],
+        mechanism: Mechanism,
+        problem: Problem,
+        numbers: LinkNumbers,
+        x: Array,
+    ) -> None:
+        self.name, self.at, self._asked, self._held = record.name, at, record.limit or 1.0, held
+        self.limit = None if record.limit is None else 1.0
+        self.groups = np.tile(np.arange(len(held)), len(at))
+        settings = problem.scene.record.simulation
+        outlines = elements_by_link(mechanism, settings, numbers, x)
+        self._elements = [np.flatnonzero(outlines == mechanism.bodies[k]) for k in links_of(record, problem.scene)]
+        self._stiffness = sections_of(mechanism, settings, numbers, x)
+
+    def basis(self, motion: Motion, r: Array | None = None, w: Array | None = None) -> Bases:
+        """Modes of each link at each time."""
+        twists = self._twists(motion, w)
+        pairs = zip(self._held, self._elements, strict=True)
+        return [basis_of(link.stiffness, list(link.softening(self._forces(twists, own)))) for link, own in pairs]
+
+    def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
+        """(k links, q²)"""
+        return self._components(self._twists(motion, None), basis or self.basis(motion))
+
+    def moved(self, motion: Motion, r: Array, w: Array, basis: Bases | None = None) -> Array:
+        """(k links, q²) in modes of their own unless others are given."""
+        return self._components(self._twists(motion, w), basis or self.basis(motion, r, w))
+
+    def increments(self, frozen: Frozen, r: Array, w: Array, basis: Bases | None = None) -> Array:
+        """(k links, q²) of modes that are given."""
+        assert basis is not None
+        none = np.zeros_like(self._added(frozen, w))
+        return self._components(self._added(frozen, w), basis) - self._components(none, basis)
+
+    def told(self, values: Array) -> Array:
+        """Load factors; infinite in tension."""
+        return np.asarray(np.where(values > _NONE, self._asked / np.maximum(values, _NONE), np.inf))
+
+    def _twists(self, motion: Motion, w: Array | None) -> Array:
+        found = motion.twists[self.at]
+        return found if w is None else found + self._added(motion.frozen, w)
+
+    def _added(self, frozen: Frozen, w: Array) -> Array:
+        return np.asarray(np.einsum("ejl,kel->kej", frozen.strains, w[self.at][:, frozen.places]))
+
+    def _forces(self, twists: Array, elements: IntArray) -> Array:
+        return np.asarray(np.einsum("ej,kej->ke", self._stiffness[elements, 0], twists[:, elements]))
+
+    def _components(self, twists: Array, basis: Bases) -> Array:
+        found = [
+            components(link.stiffness, list(link.softening(self._forces(twists, own))), modes)
+            for link, own, modes in zip(self._held, self._elements, basis, strict=True)
+        ]
+        return self._asked * np.stack(found, axis=1).reshape(len(twists) * len(found), -1)
 
 
 def limit_of(
@@ -213,4 +351,9 @@ def limit_of(
         return Deflection(record, at, mechanism, nodal)
     if isinstance(record, StressLimit):
         return Stress(record, at, mechanism, problem, numbers, x)
-    return Effort(record, at)
+    if isinstance(record, EffortLimit):
+        return Effort(record, at)
+    held = [held_link(problem, mechanism, numbers, x, k, record.ends) for k in links_of(record, problem.scene)]
+    if isinstance(record, FrequencyLimit):
+        return Frequency(record, at, held)
+    return Buckling(record, at, held, mechanism, problem, numbers, x)

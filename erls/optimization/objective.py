@@ -17,6 +17,7 @@ from erls.scene.build import link_description, link_model
 from erls.scene.chain import Scene
 from fe_import.description.records import LinkDescription
 from fe_import.models.frame_parts import frame_parts
+from fe_import.models.model import build_model
 
 _STEP = 1e-3  # of the variables: masses are polynomials of low order in dimensions
 _SHARP = 60.0  # of a largest value over time: the mean of so high powers
@@ -68,6 +69,11 @@ def _mass(scene: Scene, k: int, description: LinkDescription | None) -> float:
     file = None
     if description is not None:
         file = replace(link_description(scene, scene.record.links[k]), description=description)
+        if description.matrices is None:  # by its mesh, without a reduction
+            model = build_model(file)
+            along = np.zeros(model.mass.shape[0])
+            along[model.dof_map[:, 0]] = 1.0
+            return float(along @ (model.mass @ along))
     return float(link_model(scene, k, lambda text: None, file).mass_properties.mass)
 
 

@@ -13,6 +13,7 @@ from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.optimization.records import (
     DERIVATIVES,
+    ENDS,
     EVERY_STEP,
     FRAMES,
     METHODS,
@@ -21,8 +22,10 @@ from erls.optimization.records import (
     QUANTITIES,
     TIMES,
     AnyConstraint,
+    BucklingLimit,
     DeflectionLimit,
     EffortLimit,
+    FrequencyLimit,
     Goal,
     ProblemRecord,
     StressLimit,
@@ -40,6 +43,11 @@ from erls.sensitivity.parameters import Parameter, parameters_of
 from fe_import.errors import ReportedError
 from fe_import.files.toml import choose, convert, read_toml
 
+_ABOUT = {
+    StressLimit: "stress is",
+    FrequencyLimit: "a frequency of a link that is pinned or clamped is",
+    BucklingLimit: "buckling is",
+}
 _POWERS = {"diameter": -4, "width": -3, "height": -3}
 
 
@@ -96,7 +104,9 @@ class Problem:
         return [f"{p.key}={float(value)!r}" for p, value in zip(self.parameters, values, strict=True)]
 
     def times(self, constraint: AnyConstraint) -> Array:
-        """(k,) samples of a constraint [s]."""
+        """(k,) samples of a constraint [s]; one of what is the same at all times."""
+        if isinstance(constraint, FrequencyLimit):
+            return np.zeros(1)
         settings = self.scene.record.simulation
         count, fixed = constraint.samples, settings.step is not None and settings.integrator == FIXED_STEP
         if isinstance(count, str):
@@ -151,6 +161,9 @@ def load_problem(path: Path | str, changes: Sequence[str] = ()) -> Problem:
 def _check_tables(record: ProblemRecord, file: str) -> None:
     if not record.variables:
         raise bad(f"{file}: variables", "nothing may change", None, "add [[variables]]")
+    if not record.constraints:
+        message = "nothing must hold, so that the least mass lies at bounds"
+        raise bad(f"{file}: constraints", message, None, "add [[constraints]]")
     for table in ("variables", "constraints"):
         check_names((f"{file}: {table}[{k}].name", one.name) for k, one in enumerate(getattr(record, table)))
 
@@ -248,16 +261,21 @@ def _check_constraint(constraint: AnyConstraint, scene: Scene, place: str) -> No
             wanted = term.components
             if not wanted or set(wanted) - set("xyz") or len(set(wanted)) != len(wanted):
                 raise bad(f"{where}.components", "not components", wanted, "give some of x, y and z")
-    elif isinstance(constraint, StressLimit):
+    elif isinstance(constraint, (StressLimit, FrequencyLimit, BucklingLimit)):
+        if not isinstance(constraint, StressLimit):
+            choose(constraint.ends, ENDS, f"{place}.ends", SceneError)
         names = [link.name for link in record.links]
         for k, name in enumerate(constraint.links):
             choose(name, names, f"{place}.links[{k}]", SceneError)
-        for k in stressed(constraint, scene):
+        for k in links_of(constraint, scene):
             link = record.links[k]
-            if not link.model or link_description(scene, link).description.frame is None:
-                message, remedy = "stress is that of beams", "name links that are made of beams"
+            frame = bool(link.model) and link_description(scene, link).description.frame is not None
+            if isinstance(constraint, FrequencyLimit) and constraint.ends == "cantilever" and link.model:
+                continue
+            if not frame:
+                message, remedy = f"{_ABOUT[type(constraint)]} that of beams", "name links that are made of beams"
                 raise bad(f"{place}.links", message, link.name, remedy)
-        if not stressed(constraint, scene):
+        if not links_of(constraint, scene):
             raise bad(f"{place}.links", "no link deforms", None, "name links that are made of beams")
     else:
         choose(constraint.joint, [joint.name for joint in record.joints], f"{place}.joint", SceneError)
@@ -268,8 +286,8 @@ def terms_of(constraint: DeflectionLimit) -> list[Term]:
     return constraint.terms or [Term(constraint.point)]
 
 
-def stressed(constraint: StressLimit, scene: Scene) -> list[int]:
-    """Numbers of the links that a limit of stress looks at."""
+def links_of(constraint: StressLimit | FrequencyLimit | BucklingLimit, scene: Scene) -> list[int]:
+    """Numbers of the links that a limit of stress, frequency or buckling looks at."""
     links = scene.record.links
     if constraint.links:
         return [k for k, link in enumerate(links) if link.name in constraint.links]

@@ -11,6 +11,7 @@ TIMES = ("all", "active", "aggregate")
 DERIVATIVES = ("components", "aggregates")
 EVERY_STEP = "every-step"
 FRAMES = ("world", "link")
+ENDS = ("cantilever", "clamped", "pinned")
 """Names that fields take."""
 
 
@@ -94,7 +95,8 @@ class Constraint(Record, frozen=True, kw_only=True, tag_field="type"):
     name : str
         What reports call it.
     limit : float, optional
-        The largest value; a constraint without one holds nothing, and lends its value to an objective.
+        The largest value, of a frequency and of a load factor the smallest; a constraint without one holds nothing, and
+        lends its value to an objective.
     samples : int or str
         Times, evenly spaced over the run with both ends, each rounded to a step of a run with fixed steps; or
         ``every-step`` of such a run.
@@ -149,7 +151,43 @@ class EffortLimit(Constraint, frozen=True, kw_only=True, tag="effort"):
     joint: str
 
 
-AnyConstraint = DeflectionLimit | StressLimit | EffortLimit
+class FrequencyLimit(Constraint, frozen=True, kw_only=True, tag="frequency"):
+    """Lowest natural frequency of each link [Hz], held at its ends, payloads on it included: beams, solids and shells.
+
+    Repeated frequencies are told apart by the derivatives of their whole space. It is the same at all times, so that
+    ``samples`` and ``times`` mean nothing.
+
+    Attributes
+    ----------
+    links : list of str
+        Links that are looked at; all flexible ones unless given.
+    ends : str
+        ``cantilever``: held at the inboard interface; ``clamped``: the others neither turn nor move sideways, too;
+        ``pinned``: they may turn, about all axes but the link's. The last two for links made of beams.
+    """
+
+    links: list[str] = []
+    ends: str = "cantilever"
+
+
+class BucklingLimit(Constraint, frozen=True, kw_only=True, tag="buckling"):
+    """By what factor the axial forces in a link would have to grow for it to buckle, each link alone, at every sample.
+
+    The forces are those of the run, of its equivalent static loads with the methods that take these.
+
+    Attributes
+    ----------
+    links : list of str
+        Links made of beams that are looked at; all flexible ones unless given.
+    ends : str
+        ``cantilever``, ``clamped`` or ``pinned``, as of ``frequency``; ends may come nearer to each other.
+    """
+
+    links: list[str] = []
+    ends: str = "cantilever"
+
+
+AnyConstraint = DeflectionLimit | StressLimit | EffortLimit | FrequencyLimit | BucklingLimit
 
 
 class Published(Record, frozen=True):

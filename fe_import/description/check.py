@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from typing import Any
 
-from fe_import.description.records import Damping, Layer, LinkDescription, Material, Shell, ShellRegion
+from fe_import.description.records import Damping, Layer, LinkDescription, Material, Shell, ShellRegion, Stretch
 from fe_import.description.reduction import check_reduction_options
 from fe_import.elements.sections import check_section
 from fe_import.errors import Cause, FEImportError, ReportedError
@@ -28,6 +29,29 @@ _CHOICES = {
     "solid.hex8": ("incompatible-modes", "compatible"),
     "shell.mass": ("consistent", "lumped"),
 }
+
+
+def _check_stretch(stretch: Stretch, place: str) -> None:
+    choose(stretch.axis, "xyz", f"{place}.axis")
+    if not math.isfinite(stretch.about):
+        raise _fail(f"{place}.about", "not a finite number", stretch.about, "give where the plane lies")
+    for j, factor in enumerate(stretch.factors):
+        if not (math.isfinite(factor) and factor > 0):
+            raise _fail(f"{place}.factors[{j}]", "a factor must be positive", factor, "give 1 to keep the mesh")
+    if not stretch.along:
+        if len(stretch.factors) != 1 or stretch.at:
+            remedy = "give along = AXIS and a station for each factor, or one factor alone"
+            raise _fail(f"{place}.along", "factors change along an axis", None, remedy)
+        return
+    choose(stretch.along, "xyz", f"{place}.along")
+    if stretch.along == stretch.axis:
+        raise _fail(f"{place}.along", "it grows in this axis", stretch.along, "name another one")
+    if len(stretch.at) != len(stretch.factors) or len(stretch.at) < 2:
+        counts = f"{len(stretch.at)} stations, {len(stretch.factors)} factors"
+        raise _fail(f"{place}.at", "every factor has a station, and there are at least two", counts, "give as many")
+    rising = all(a < b for a, b in itertools.pairwise(stretch.at))
+    if not rising or not all(math.isfinite(a) for a in stretch.at):
+        raise _fail(f"{place}.at", "stations rise", stretch.at, "sort them, each once")
 
 
 def check_link(link: LinkDescription, file: str) -> None:
@@ -65,6 +89,8 @@ def check_link(link: LinkDescription, file: str) -> None:
     if link.solid is not None and not 0 < link.solid.mesh_error < math.inf:
         message, remedy = "an error must be positive", "give a share, as 0.05 for 5 percent"
         raise _fail(f"{file}: solid.mesh_error", message, link.solid.mesh_error, remedy)
+    for k, stretch in enumerate(link.solid.stretch if link.solid is not None else ()):
+        _check_stretch(stretch, f"{file}: solid.stretch[{k}]")
     if link.shell is not None:
         _check_shell(link, link.shell, f"{file}: shell")
     for name, m in link.materials.items():

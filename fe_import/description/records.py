@@ -141,6 +141,32 @@ class Region(_Record, frozen=True):
     material: str
 
 
+class Stretch(_Record, frozen=True):
+    """Thickness of a mesh: its distances from a plane grow by factors that change along it.
+
+    Named nodes and places of interfaces go with the mesh.
+
+    Attributes
+    ----------
+    axis : str
+        ``x``, ``y`` or ``z``, in which it grows.
+    factors : list of float
+        Of the distance from the plane, at each station; between them linear, beyond them as at the last.
+    along : str
+        Another axis, along which factors change; needed where there is more than one.
+    at : list of float
+        Stations on that axis, rising.
+    about : float
+        Where the plane lies on ``axis``.
+    """
+
+    axis: str
+    factors: list[float]
+    along: str = ""
+    at: list[float] = []
+    about: float = 0.0
+
+
 class Solid(_Record, frozen=True):
     """A link meshed with solid elements.
 
@@ -155,6 +181,8 @@ class Solid(_Record, frozen=True):
         Instead of ``material``: one for each set of elements, ``[[solid.regions]]``.
     nodes : dict of (3,) floats
         Names for the mesh nodes nearest to these positions [m]; scenes may refer to them.
+    stretch : list of Stretch
+        Thicknesses other than those of the mesh file, one after the other, ``[[solid.stretch]]``.
     hex8 : str
         How hexahedra of 8 nodes strain: with ``incompatible-modes``, or ``compatible``, which locks in bending.
     raise_order : bool
@@ -170,6 +198,7 @@ class Solid(_Record, frozen=True):
     material: str = ""
     regions: list[Region] = []
     nodes: dict[str, Vector] = {}
+    stretch: list[Stretch] = []
     hex8: str = "incompatible-modes"
     raise_order: bool = False
     mesh_error: float = 0.05

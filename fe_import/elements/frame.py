@@ -93,6 +93,18 @@ def bending_shapes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:
     return deflection / (1 + phi), slope / (1 + phi)
 
 
+def deflection_slopes(xi: Array, length: float, phi: float) -> Array:
+    """dv/dx of the deflections of `bending_shapes`, (points, 4)."""
+    x2, bubble = xi**2, phi / 2 * (1 - 2 * xi)
+    slopes = [
+        6 * (x2 - xi) - phi,
+        length * (1 - 4 * xi + 3 * x2 + bubble),
+        6 * (xi - x2) + phi,
+        length * (3 * x2 - 2 * xi - bubble),
+    ]
+    return np.stack(slopes, axis=-1) / ((1 + phi) * length)
+
+
 # local dofs of bending in the x-y plane (v, θ_z) and in the x-z plane (w, -θ_y): index and sign
 _PLANES = (
     (np.array([1, 5, 7, 11]), np.array([1.0, 1.0, 1.0, 1.0])),
@@ -123,6 +135,16 @@ def element_stiffness(element: FrameElement, shear: bool) -> dict[str, Array]:
         block *= e * inertia / ((1 + phi) * length**3)
         parts[name][np.ix_(dofs, dofs)] = block * np.outer(signs, signs)
     return parts
+
+
+def element_stretch(element: FrameElement, shear: bool) -> Array:
+    """(12, 12) ∫ (v'² + w'²) dx in local axes: geometric stiffness per axial force."""
+    result = np.zeros((12, 12))
+    for phi, (dofs, signs) in zip(shear_flexibility(element, shear), _PLANES, strict=True):
+        slope = deflection_slopes(_POINTS, element.length, phi)
+        block = element.length * np.einsum("p,pi,pj->ij", _WEIGHTS, slope, slope)
+        result[np.ix_(dofs, dofs)] += block * np.outer(signs, signs)
+    return result
 
 
 def element_mass(element: FrameElement, shear: bool, mass: str, rotary_inertia: bool) -> Array:

@@ -26,6 +26,7 @@ from fe_import.model import Array, FEModel, IntArray, StressSource
 from fe_import.models.attached import AttachedNodes, Entries, add_attached, attached_constraints, attached_nodes
 from fe_import.models.hinges import check_hinges
 from fe_import.models.shell import add_shells, shell_parts
+from fe_import.models.stretch import stretched
 
 
 def meshed_model(link: LinkFile) -> FEModel:
@@ -55,6 +56,7 @@ def meshed_model(link: LinkFile) -> FEModel:
 
 def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEModel:
     """The model of a checked mesh; see `meshed_model`."""
+    mesh, description = stretched(mesh, description)
     solid, shell = description.solid, description.shell
     names = {} if solid is None and shell is None else (solid or shell or Shell()).nodes
     materials: list[SolidMaterial] = []

@@ -303,6 +303,7 @@ FAULTS = [
     (["variables.0.lower=0.03"], Cause.BAD_FIELD, "outside the bounds", "variables[0].start"),
     (["variables.0.power=9"], Cause.BAD_FIELD, "not a power", "variables[0].power"),
     (["variables.0.colour=1"], Cause.UNKNOWN_FIELD, "unknown field", "variables[0].colour"),
+    (["constraints=[]"], Cause.BAD_FIELD, "nothing must hold", "constraints"),
     (["variables=[]"], Cause.BAD_FIELD, "nothing may change", "variables"),
     (["objective=[{quantity=\"price\"}]"], Cause.BAD_REFERENCE, "unknown name", "objective[0].quantity"),
     (["objective=[{quantity=\"effort\", of=\"sag\"}]"], Cause.BAD_REFERENCE, "unknown name", "objective[0].of"),
