@@ -42,6 +42,7 @@ LEVEL = 0.95
 
 _ROUNDS, _SETTLED = 6, 0.01  # of weights, and their change at which they are settled
 _STEPS = 60  # of a fit
+_LEAST = 0.1  # of where a parameter began: the size of one that came below it
 _OPEN = 1.0  # of the size of a parameter: a larger uncertainty is none
 _ROUNDING = 1e-7  # of the largest singular value: gradients are right to 1e-8
 _ALIKE = 0.2  # correlation of successive residuals that white noise has in one record of a thousand with 200 rows
@@ -320,8 +321,9 @@ def _intervals(
 ) -> tuple[dict[str, Fitted], Array, tuple[tuple[str, ...], ...]]:
     """Parameters with their intervals, their covariance, and what is not told."""
     problem.weights = dict(noise)
-    found_values = shares * problem.start
-    jacobian = problem.jacobian(shares) * shares  # by parameters over the sizes that were found
+    sizes = np.maximum(shares, _LEAST)  # a fit may drift to nothing along what is not told
+    found_values = sizes * problem.start
+    jacobian = problem.jacobian(shares) * sizes  # by parameters over the sizes that were found
     _, strength, directions = np.linalg.svd(jacobian, full_matrices=False)
     strength = np.maximum(strength, _ROUNDING * strength[0])
     parts = np.abs(directions) > _OPEN * strength[:, None]  # relative uncertainty by each direction beyond the limit

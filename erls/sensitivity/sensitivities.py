@@ -132,14 +132,14 @@ def sensitivities(
     if method not in get_args(Method):
         message, remedy = "no such method", f"take one of {', '.join(get_args(Method))}"
         raise SceneError(Cause.BAD_FIELD, message, where="method", value=method, remedy=remedy)
+    given: Any = scene.scene if isinstance(scene, Run) else scene
+    loaded = load_chain(given) if isinstance(given, (Path, str)) else chain_alone(given)
     if not outputs:
         message, remedy = "nothing is differentiated", "give one function of a run at least, by a name"
         raise SceneError(Cause.BAD_FIELD, message, where="outputs", value=0, limit=1, remedy=remedy)
     if isinstance(scene, ChainRun):
-        run, keys = scene, parameters_of(scene.scene, parameters)
+        run, keys = scene, parameters_of(loaded, parameters)
     else:
-        given: Any = scene.scene if isinstance(scene, Run) else scene
-        loaded = load_chain(given) if isinstance(given, (Path, str)) else chain_alone(given)
         refuse(loaded, build_mechanism(loaded, tell).mechanism)
         keys = parameters_of(loaded, parameters)
         run = simulate(loaded, tell=tell, verdict=False)
@@ -243,7 +243,9 @@ def _adjoint(
     for one, row in zip(found, through, strict=True):
         for (asking, _), own in zip(askings, columns, strict=True):
             held = own_derivative(asking.output, asking.name, run, one, asking.value)
-            derivatives[asking.name][one.parameter.key] = asking.summed(held) + row[own].reshape(asking.shape)
+            derivatives[asking.name][one.parameter.key] = np.asarray(
+                asking.summed(held) + row[own].reshape(asking.shape)
+            )
     return derivatives
 
 

@@ -286,8 +286,9 @@ def test_what_makes_steps_of_its_own_refuses_it(tmp_path: Path) -> None:
     assert caught.value.where.endswith("friction.law")
     settings = {"formulation": "nodal", "integrator": "generalized_alpha", "step": 1e-3, "duration": 0.1}
     scene = erls.load_scene(arm(tmp_path, (20.0, 5.0), simulation=settings))
-    with pytest.raises(SceneError, match="joints stick are not known yet"):
+    with pytest.raises(SceneError, match="joints stick are not known yet") as refused:
         erls.sensitivities(scene, {"end": lambda run: run.position("end", 0.1)}, ["joints.second.friction.force"])
+    assert refused.value.cause == Cause.NO_DERIVATIVE
 
 
 def _switch_on_and_on(looking: Switching) -> None:
