@@ -162,7 +162,7 @@ class Quadrangle(ShellElement):
         """
         centre = self.surface(corners, directors, np.zeros((1, 2)))
         here = self.surface(corners, directors, points)
-        reference = middle_axis(centre)[:, 0]
+        reference = middle_axis(centre.tangents)[:, 0]
         axes, own, rises = tangent_axes(centre, reference), tangent_axes(here, reference), duals(centre)
         steps = -2 * points  # slopes of the two modes by their own coordinate
         scale = centre.area / here.area  # (e, q)
@@ -219,7 +219,7 @@ class Triangle(ShellElement):
         hump = 27 * r * s * third
         rise = 27 * np.stack([s * third - r * s, r * third - r * s])
         surface = self.surface(corners, directors, points)
-        axes = tangent_axes(surface, middle_axis(surface)[:, 0])
+        axes = tangent_axes(surface, middle_axis(surface.tangents)[:, 0])
         for i in range(2):
             turn = np.cross(axes[:, :, i], surface.director)
             fields.director[..., 18 + i] += hump[:, None] * turn
@@ -252,9 +252,9 @@ def duals(surface: Surface) -> tuple[Array, Array]:
     return np.cross(second, normal) / squared, np.cross(normal, first) / squared
 
 
-def middle_axis(surface: Surface) -> Array:
-    """(e, q, 3) axis between the first tangent and the second turned back by a right angle: that of a square's side."""
-    first, second = (t / np.linalg.norm(t, axis=-1, keepdims=True) for t in surface.tangents)
+def middle_axis(tangents: tuple[Array, Array]) -> Array:
+    """(..., 3) axis between the first tangent and the second turned back by a right angle: that of a square's side."""
+    first, second = (t / np.linalg.norm(t, axis=-1, keepdims=True) for t in tangents)
     normal = np.cross(first, second)
     unit = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     between = first + np.cross(second, unit)

@@ -52,7 +52,8 @@ def shell_points(element: ShellElement, corners: Array, reference: Array | None 
     """
     directors = element.directors(corners)
     if reference is None:
-        reference = middle_axis(element.surface(corners, directors, element.points.mean(axis=0, keepdims=True)))[:, 0]
+        centre = element.surface(corners, directors, element.points.mean(axis=0, keepdims=True))
+        reference = middle_axis(centre.tangents)[:, 0]
     surface = element.surface(corners, directors, element.points)
     axes = tangent_axes(surface, reference)
     rises = np.stack([np.einsum("eqc,eqic->eqi", dual, axes) for dual in duals(surface)], axis=2)

@@ -228,3 +228,20 @@ def test_meshes_are_of_quadrangles_and_sets_are_theirs(tmp_path: Path) -> None:
     path.write_text(text.replace("twisted.inp", "absent.inp"))
     with pytest.raises(SceneError, match="no such mesh file"):
         assemble(erls.load_scene(path))
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("tip = [12.0, 0.0, 0.0]", "tip = [12.0, 0.0, 0.0]\nloose = [1.0, 2.0, 3.0]"), "nodes.loose: no beam ends"),
+        (("[[loads]]", '[[springs]]\ntype = "line"\nnode = "tip"\nto = "blade/999"\n[[loads]]'), "springs\\[0\\].to"),
+        (("[[loads]]", '[[springs]]\ntype = "line"\nnode = "blade:TIP"\nto = "tip"\n[[loads]]'), "springs\\[0\\].node"),
+    ],
+)
+def test_nodes_of_meshes_are_there(tmp_path: Path, change: tuple[str, str], told: str) -> None:
+    """What only the mesh can tell is told with its field."""
+    text = (ROOT / "data/shells/twisted.toml").read_text().replace("meshes/", f"{ROOT}/data/shells/meshes/")
+    path = tmp_path / "scene.toml"
+    path.write_text(text.replace(*change))
+    with pytest.raises((SceneError, FEImportError), match=told):
+        assemble(erls.load_scene(path))

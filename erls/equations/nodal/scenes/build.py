@@ -36,6 +36,7 @@ from erls.scene.bodies.schema import GROUND as GROUND_NAME
 from erls.scene.bodies.schema import Beam as BeamRecord
 from erls.scene.bodies.schema import BodyScene, BodySceneRecord, Connection, Load
 from erls.scene.build_loops import two_axes
+from erls.scene.contacts import WORLD
 from fe_import.elements.sections import section_constants
 from fe_import.files.toml import choose
 from fe_import.models.inertia import inertia_matrix
@@ -100,6 +101,7 @@ def assemble(scene: BodyScene) -> Assembly:
         shell.name: surface(record, shell, numbers, poses, scene.folder, f"{file}: shells[{k}]")
         for k, shell in enumerate(record.shells)
     }
+    _refuse_loose(record, beams, shells, numbers, file)
     record = _without_sets(record, shells, numbers, file)
     gravity, built = np.array(record.gravity), np.array(poses)
     plates = [element for own in shells.values() for element in own.elements]
@@ -133,6 +135,22 @@ def assemble(scene: BodyScene) -> Assembly:
     return Assembly(system, full, left_out, numbers, reported, velocity, beams, shells)
 
 
+def _refuse_loose(
+    record: BodySceneRecord,
+    beams: dict[str, list[Beam]],
+    shells: dict[str, Surface],
+    numbers: dict[str, int],
+    file: str,
+) -> None:
+    """A named node must be an end of a beam or lie on a shell."""
+    used = {node for own in beams.values() for element in own for node in element.nodes}
+    used |= {int(node) for own in shells.values() for node in own.nodes}
+    for name in record.nodes:
+        if numbers[name] not in used:
+            message, remedy = "no beam ends at this node, and it lies on no shell", "move it onto one, or remove it"
+            raise SceneError(Cause.BAD_FIELD, message, where=f"{file}: nodes.{name}", remedy=remedy)
+
+
 def _without_sets(
     record: BodySceneRecord, shells: dict[str, Surface], numbers: dict[str, int], file: str
 ) -> BodySceneRecord:
@@ -162,15 +180,21 @@ def _without_sets(
                 if kind == "connections":
                     own["name"] = f"{item.name}/{names[int(number)]}"
                 elif kind == "masses":
-                    own["mass"] = item.mass * share
+                    own |= {"mass": item.mass * share, "inertia": (share * np.array(item.inertia)).tolist()}
                 else:
                     own |= {part: tuple(share * x for x in getattr(item, part)) for part in ("force", "moment")}
                 changed[kind].append(msgspec.structs.replace(item, **own))
-    for kind in ("springs", "contacts"):
-        for k, item in enumerate(getattr(record, kind)):
-            choose(item.node, list(numbers), f"{file}: {kind}[{k}].node", SceneError)
-    for k, name in enumerate(record.report):
-        choose(name, list(numbers), f"{file}: report[{k}]", SceneError)
+    alone = [
+        *((x.node, f"springs[{k}].node") for k, x in enumerate(record.springs)),
+        *((x.node, f"contacts[{k}].node") for k, x in enumerate(record.contacts)),
+        *((x.plane.on, f"contacts[{k}].plane.on") for k, x in enumerate(record.contacts) if x.plane.on != WORLD),
+        *((x.to, f"{kind}[{k}].to") for kind in ("connections", "springs")
+          for k, x in enumerate(getattr(record, kind)) if x.to != GROUND_NAME),
+        *((name, f"sensors[{k}].point") for k, x in enumerate(record.sensors) if (name := getattr(x, "point", ""))),
+        *((name, f"report[{k}]") for k, name in enumerate(record.report)),
+    ]  # fmt: skip
+    for name, field in alone:
+        choose(name, list(numbers), f"{file}: {field}", SceneError)
     return msgspec.structs.replace(record, **changed)
 
 

@@ -16,6 +16,7 @@ from erls.maths.so3 import Array
 from erls.scene.bodies.check import EDGES
 from erls.scene.bodies.schema import BodySceneRecord, ShellSurface
 from fe_import.elements.laminates import Lamina, Laminate, plane_stress
+from fe_import.elements.shell_elements import middle_axis
 from fe_import.model import IntArray
 
 _SAME = 1e-6  # of the size of a mesh: a named node that lies on one of it
@@ -171,8 +172,7 @@ def corner_frames(places: Array, cells: IntArray, fold_deg: float, where: str) -
     means /= np.linalg.norm(means, axis=-1, keepdims=True)
     one = corners[:, 1] + corners[:, 2] - corners[:, 0] - corners[:, 3]
     two = corners[:, 2] + corners[:, 3] - corners[:, 0] - corners[:, 1]
-    one, two = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (one, two))
-    middle = one + np.cross(two, np.cross(one, two))  # as of `fe_import.elements.shell_elements.middle_axis`
+    middle = middle_axis((one, two))
     x = middle[:, None] - np.einsum("ekc,ec->ek", means, middle)[..., None] * means
     x /= np.linalg.norm(x, axis=-1, keepdims=True)
     return as_poses(np.stack([x, np.cross(means, x), means], axis=-1), corners)
