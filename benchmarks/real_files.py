@@ -155,7 +155,7 @@ free_modes = 3
     with tempfile.TemporaryDirectory() as folder:
         description = Path(folder) / "link.toml"
         description.write_text(text, encoding="utf-8")
-        with patch("fe_import.models.solid.read_mesh", with_face):
+        with patch("fe_import.models.meshed.read_mesh", with_face):
             return reduce_link(load_link(description)), found[0]
 
 

@@ -28,7 +28,7 @@ from typing import Any
 import meshio
 import numpy as np
 
-import fe_import.models.solid
+import fe_import.models.meshed
 import fe_import.reduce
 import fe_import.solver
 import fe_import.solver.sparse
@@ -62,8 +62,8 @@ face = "tip"
 fixed_interface_modes = {modes}
 """
 STAGES = [  # name, module, function; a stage within a stage counts for itself only
-    ("read mesh", fe_import.models.solid, "read_mesh"),
-    ("assembly", fe_import.models.solid, "assemble_solid"),
+    ("read mesh", fe_import.models.meshed, "read_mesh"),
+    ("assembly", fe_import.models.meshed, "assemble_solid"),
     ("order of elimination", fe_import.solver.sparse, "analyse"),
     ("factorization", fixed_interface, "factorize"),
     ("constraint modes", sys.modules["fe_import.reduction.craig_bampton"], "constraint_modes"),

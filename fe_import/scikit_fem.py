@@ -102,7 +102,7 @@ def link_from_skfem(
         data["solid"] = {"mesh": "", "material": "m", **(given if isinstance(given, Mapping) else {})}
         description = _description(data)
         from fe_import.mesh.skfem_meshes import solid_mesh
-        from fe_import.models.solid import mesh_model
+        from fe_import.models.meshed import mesh_model
 
         named = mesh.with_boundaries(facets) if facets else mesh
         model = mesh_model(solid_mesh(named, _WHERE), description, _WHERE)

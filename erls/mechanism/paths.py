@@ -18,7 +18,7 @@ from erls.mechanism.curves import Curve, Piecewise
 from erls.mechanism.motions import rest_to_rest
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import ProfileRecord
-from fe_import.description.records import Vector
+from fe_import.description.base import Vector
 
 _PLANE = 1e-6  # of the radius: how far a first place may lie beside the plane of its circle
 

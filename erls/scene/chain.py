@@ -12,7 +12,7 @@ from erls.scene.links import Link
 from erls.scene.records import Pose, Record, SceneFile, SceneTables
 from erls.scene.servo import Inverse, Servo
 from erls.scene.settings import Simulation
-from fe_import.description.records import Inertia, Vector
+from fe_import.description.base import Inertia, Vector
 
 
 class Base(Pose, frozen=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.scene.records import Record
-from fe_import.description.records import Vector
+from fe_import.description.base import Vector
 
 WORLD = "world"
 """What carries a plane that stands still."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from erls.mechanism.drives import DriveRecord, FreeDrive
 from erls.scene.contacts import Stops
 from erls.scene.records import Pose, Record
-from fe_import.description.records import Inertia, Vector
+from fe_import.description.base import Inertia, Vector
 
 
 class DH(Record, frozen=True):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from erls.scene.records import Pose, Record
-from fe_import.description.records import Damping, Inertia, Vector
+from fe_import.description.base import Inertia, Vector
+from fe_import.description.records import Damping
 
 
 class RigidBody(Record, frozen=True):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from fe_import.description.records import Vector
+from fe_import.description.base import Vector
 
 
 class Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

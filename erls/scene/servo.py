@@ -5,7 +5,7 @@ from __future__ import annotations
 from erls.mechanism.motions import Motion
 from erls.mechanism.paths import Path
 from erls.scene.records import Record
-from fe_import.description.records import Vector
+from fe_import.description.base import Vector
 
 
 class About(Record, frozen=True):

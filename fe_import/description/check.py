@@ -7,7 +7,8 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from fe_import.description.records import Damping, Layer, LinkDescription, Material, Shell, ShellRegion, Stretch
+from fe_import.description.meshes import Layer, Shell, ShellRegion, Stretch
+from fe_import.description.records import Damping, LinkDescription, Material
 from fe_import.description.reduction import check_reduction_options
 from fe_import.elements.sections import check_section
 from fe_import.errors import Cause, FEImportError, ReportedError

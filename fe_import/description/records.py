@@ -9,20 +9,15 @@ from typing import Any
 
 import msgspec
 
+from fe_import.description.base import Inertia, Record, Vector
+from fe_import.description.meshes import Shell, Solid
 from fe_import.description.reduction import Reduction
 from fe_import.elements.sections import Section
-
-Vector = tuple[float, float, float]
-Inertia = tuple[float | Vector, float | Vector, float | Vector]  # [Ixx, Iyy, Izz] or a 3x3 matrix
 
 MOST_PIECES = 1000  # that a link may be split into
 
 
-class _Record(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    pass
-
-
-class Units(_Record, frozen=True):
+class Units(Record, frozen=True):
     """Units of the description and its mesh; converted to SI at the border.
 
     Attributes
@@ -44,7 +39,7 @@ class Units(_Record, frozen=True):
     unusual: bool = False
 
 
-class Material(_Record, frozen=True):
+class Material(Record, frozen=True):
     """Linear elastic material, isotropic unless it has a ``transverse_modulus``, in the stated units.
 
     Attributes
@@ -74,7 +69,7 @@ class Material(_Record, frozen=True):
     transverse_shear_modulus: float | None = None
 
 
-class Member(_Record, frozen=True):
+class Member(Record, frozen=True):
     """A straight member between two named nodes; its inner nodes are named ``FROM-TO/1`` ... in order.
 
     Attributes
@@ -99,7 +94,7 @@ class Member(_Record, frozen=True):
     local_z: Vector | None = None
 
 
-class Frame(_Record, frozen=True):
+class Frame(Record, frozen=True):
     """A link made of beams.
 
     Attributes
@@ -126,174 +121,7 @@ class Frame(_Record, frozen=True):
     torsion: str = "saint-venant"
 
 
-class Region(_Record, frozen=True):
-    """The elements of a named set of the mesh, and their material.
-
-    Attributes
-    ----------
-    set : str
-        Element set of the mesh.
-    material : str
-        A name from ``[materials]``.
-    """
-
-    set: str
-    material: str
-
-
-class Stretch(_Record, frozen=True):
-    """Thickness of a mesh: its distances from a plane grow by factors that change along it.
-
-    Named nodes and places of interfaces go with the mesh.
-
-    Attributes
-    ----------
-    axis : str
-        ``x``, ``y`` or ``z``, in which it grows.
-    factors : list of float
-        Of the distance from the plane, at each station; between them linear, beyond them as at the last.
-    along : str
-        Another axis, along which factors change; needed where there is more than one.
-    at : list of float
-        Stations on that axis, rising.
-    about : float
-        Where the plane lies on ``axis``.
-    """
-
-    axis: str
-    factors: list[float]
-    along: str = ""
-    at: list[float] = []
-    about: float = 0.0
-
-
-class Solid(_Record, frozen=True):
-    """A link meshed with solid elements.
-
-    Attributes
-    ----------
-    mesh : str
-        An input deck, bulk data, or any file that meshio reads, also packed as ``.gz``; the path starts at the
-        description.
-    material : str
-        A name from ``[materials]``, for the whole mesh; without it and ``regions`` an input deck brings its materials.
-    regions : list of Region
-        Instead of ``material``: one for each set of elements, ``[[solid.regions]]``.
-    nodes : dict of (3,) floats
-        Names for the mesh nodes nearest to these positions [m]; scenes may refer to them.
-    stretch : list of Stretch
-        Thicknesses other than those of the mesh file, one after the other, ``[[solid.stretch]]``.
-    hex8 : str
-        How hexahedra of 8 nodes strain: with ``incompatible-modes``, or ``compatible``, which locks in bending.
-    raise_order : bool
-        Linear elements become quadratic ones, with nodes in the middle of their straight edges.
-    mesh_error : float
-        Largest error of the first elastic frequencies by the mesh, estimated, as a share: beyond it the health check
-        fails, and linear elements (tetrahedra, wedges, pyramids, compatible hexahedra) are refused.
-    ignore : list of str
-        Keywords, cards and types of elements of the mesh file that the link is to be without.
-    """
-
-    mesh: str
-    material: str = ""
-    regions: list[Region] = []
-    nodes: dict[str, Vector] = {}
-    stretch: list[Stretch] = []
-    hex8: str = "incompatible-modes"
-    raise_order: bool = False
-    mesh_error: float = 0.05
-    ignore: list[str] = []
-
-
-class Layer(_Record, frozen=True):
-    """A layer of a shell.
-
-    Attributes
-    ----------
-    material : str
-        A name from ``[materials]``.
-    thickness : float
-        [m]
-    angle : float
-        Of its fibres, from ``direction`` about the normal [degrees].
-    """
-
-    material: str
-    thickness: float
-    angle: float = 0.0
-
-
-class ShellRegion(_Record, frozen=True):
-    """The shells of a named set of the mesh, and what they are made of; as in ``[shell]``.
-
-    Attributes
-    ----------
-    set : str
-        Element set of the mesh.
-    material : str
-        A name from ``[materials]``.
-    thickness : float, optional
-        [m]
-    layers : list of Layer
-        Instead of ``material`` and ``thickness``: from the bottom to the top.
-    offset : float
-        Height of the middle of the thickness above the nodes, along the normal [m].
-    """
-
-    set: str
-    material: str = ""
-    thickness: float | None = None
-    layers: list[Layer] = []
-    offset: float = 0.0
-
-
-class Shell(_Record, frozen=True):
-    """A link meshed with shells, triangles and quadrangles of 3 and 4 nodes with six components each.
-
-    Beside ``[solid]`` its mesh is that of the solid, and the sets of ``regions`` are the shells. Without any material,
-    thickness and layers an input deck brings them (``*SHELL SECTION``, ``PSHELL``).
-
-    Attributes
-    ----------
-    mesh : str
-        As in ``[solid]``; every triangle and quadrangle of it is a shell. Left out beside ``[solid]``.
-    material : str
-        A name from ``[materials]``, for the whole mesh.
-    thickness : float, optional
-        [m]; positive.
-    layers : list of Layer
-        Instead of ``material`` and ``thickness``: from the bottom to the top, ``[[shell.layers]]``.
-    offset : float
-        Height of the middle of the thickness above the nodes, along the normal, about which the nodes of an element go
-        anticlockwise [m].
-    regions : list of ShellRegion
-        Instead of these: one for each set of shells, ``[[shell.regions]]``.
-    direction : (3,) floats, optional
-        Whose projection on the surface is the first axis of layers; needed where these are not isotropic.
-    nodes : dict of (3,) floats
-        Names for the mesh nodes nearest to these positions [m]; scenes may refer to them.
-    drilling : float
-        Stiffness by which the surface takes rotations about its normal along, in shares of G times the thickness.
-    mass : str
-        ``consistent`` with the interpolation of the elements, or ``lumped`` at the nodes.
-    ignore : list of str
-        Keywords, cards and types of elements of the mesh file that the link is to be without.
-    """
-
-    mesh: str = ""
-    material: str = ""
-    thickness: float | None = None
-    layers: list[Layer] = []
-    offset: float = 0.0
-    regions: list[ShellRegion] = []
-    direction: Vector | None = None
-    nodes: dict[str, Vector] = {}
-    drilling: float = 0.01
-    mass: str = "consistent"
-    ignore: list[str] = []
-
-
-class Matrices(_Record, frozen=True):
+class Matrices(Record, frozen=True):
     """A link whose mass and stiffness matrices a finite-element program exported.
 
     Attributes
@@ -316,7 +144,7 @@ class Matrices(_Record, frozen=True):
     nodes: dict[str, int | Vector] = {}
 
 
-class PointMass(_Record, frozen=True):
+class PointMass(Record, frozen=True):
     """A rigid mass added to a node.
 
     Attributes
@@ -334,7 +162,7 @@ class PointMass(_Record, frozen=True):
     inertia: Inertia = (0.0, 0.0, 0.0)
 
 
-class Interface(_Record, frozen=True):
+class Interface(Record, frozen=True):
     """A node where a joint sits: a node of a frame or of beams, or one that moves with a face.
 
     Attributes
@@ -363,7 +191,7 @@ class Interface(_Record, frozen=True):
     position: Vector | None = None
 
 
-class Recovery(_Record, frozen=True):
+class Recovery(Record, frozen=True):
     """Where stress (solids, shells) or section forces (frames) can be found from the modal coordinates later.
 
     Attributes
@@ -381,7 +209,7 @@ class Recovery(_Record, frozen=True):
     all: bool = False
 
 
-class Rayleigh(_Record, frozen=True):
+class Rayleigh(Record, frozen=True):
     """Damping matrix ``alpha`` M + ``beta`` K; a mode of the angular frequency ω has the ratio α/2ω + βω/2.
 
     Attributes
@@ -396,7 +224,7 @@ class Rayleigh(_Record, frozen=True):
     beta: float = 0.0
 
 
-class Damping(_Record, frozen=True):
+class Damping(Record, frozen=True):
     """Modal damping, stated in one way; none unless given.
 
     Attributes
@@ -414,7 +242,7 @@ class Damping(_Record, frozen=True):
     rayleigh: Rayleigh | None = None
 
 
-class LinkDescription(_Record, frozen=True):
+class LinkDescription(Record, frozen=True):
     """A link: one of ``frame``, ``solid``, ``shell`` and ``matrices`` (or solid and shell), interfaces, reduction.
 
     Attributes

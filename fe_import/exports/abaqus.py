@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from fe_import.description.records import Vector
+from fe_import.description.base import Vector
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.abaqus_entries import read_entries
 from fe_import.exports.abaqus_substructure import is_substructure, read_substructure

@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.description.records import Vector
+from fe_import.description.base import Vector
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.base import Export, ExportFormat
 from fe_import.exports.nastran_dmig import nastran_points

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fe_import.description.records import Vector
+from fe_import.description.base import Vector
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports.row_files import read_dofs, read_place
 from fe_import.model import Array, IntArray

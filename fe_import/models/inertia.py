@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fe_import.description.records import Inertia
+from fe_import.description.base import Inertia
 from fe_import.errors import Cause, FEImportError, ReportedError
 from fe_import.model import Array
 

@@ -7,8 +7,10 @@ from collections import Counter
 import numpy as np
 import scipy.sparse as sp
 
+from fe_import.description.base import Vector
 from fe_import.description.link import LinkFile
-from fe_import.description.records import Interface, LinkDescription, Shell, Solid, Vector
+from fe_import.description.meshes import Shell, Solid
+from fe_import.description.records import Interface, LinkDescription
 from fe_import.elements.attachments import AttachedBeam, AttachedSpring, needs_rotations
 from fe_import.elements.elasticity import turned_moduli
 from fe_import.elements.mixed_stress import MixedStress

@@ -45,7 +45,7 @@ def build_model(link: LinkFile) -> FEModel:
 
         model = matrices_model(link)
     else:
-        from fe_import.models.solid import meshed_model  # scikit-fem and meshio are heavy
+        from fe_import.models.meshed import meshed_model  # scikit-fem and meshio are heavy
 
         model = meshed_model(link)
     model = add_masses(model, description.masses, where)

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from fe_import.description.records import Layer, LinkDescription, Material, Shell, ShellRegion
+from fe_import.description.meshes import Layer, Shell, ShellRegion
+from fe_import.description.records import LinkDescription, Material
 from fe_import.elements.laminates import Lamina, Laminate, plane_stress
 from fe_import.elements.shell import ShellBlock, element_matrices, lumped
 from fe_import.elements.shell_stress import ShellPart

@@ -8,7 +8,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from fe_import.description.records import Interface, LinkDescription, Stretch
+from fe_import.description.meshes import Stretch
+from fe_import.description.records import Interface, LinkDescription
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.model import Array
 

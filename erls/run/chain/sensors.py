@@ -18,7 +18,8 @@ from erls.run.chain.recovered import maps_of
 from erls.scene.chain import Scene
 from erls.scene.joints import Coordinate
 from fe_import.description.link import load_link
-from fe_import.description.records import Frame, LinkDescription, Solid
+from fe_import.description.meshes import Solid
+from fe_import.description.records import Frame, LinkDescription
 from fe_import.files.toml import choose
 from fe_import.models.frame_parts import frame_parts
 from fe_import.models.model import unit_factors

@@ -15,7 +15,8 @@ from erls.mechanism.sensors.registry import AnySensor
 from erls.scene.bodies.analyses import Analysis
 from erls.scene.contacts import ContactOfBody
 from erls.scene.records import Record, SceneFile, SceneTables
-from fe_import.description.records import Inertia, Material, PointMass, Vector
+from fe_import.description.base import Inertia, Vector
+from fe_import.description.records import Material, PointMass
 from fe_import.elements.sections import Section
 
 GROUND = "ground"
