@@ -99,9 +99,11 @@ def _run(
     def begin(
         steps: Steps, leg: Leg, place: Configuration, rate: Array, stored: tuple[Array, Array] | None = None
     ) -> None:
-        if recorder.switching is not None and len(recorder.switching.system.rubbing.places):  # accelerations jump
+        switching = recorder.switching
+        if switching is not None and (stored is not None or len(switching.system.rubbing.places)):
+            # accelerations jump: of vibrations that steps do not resolve they would start another with each switch
             beta = Formulas.of(Rules(options.spectral_radius, 0.0), step).beta
-            recorder.switching.system.seen_by = beta * (steps.h or step) ** 2
+            switching.system.seen_by = beta * (steps.h or step) ** 2
         start = _start_of_leg(system, leg, place, rate, recorder, stored)
         steps.begin(place, start.v, np.concatenate([start.a, start.multipliers]))
 

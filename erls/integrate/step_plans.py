@@ -22,17 +22,27 @@ class Stretch(NamedTuple):
     end: float
     steps: int
 
+    @property
+    def size(self) -> float:
+        """Of a step [s]."""
+        return (self.end - self.start) / self.steps
+
 
 Plan = tuple[Stretch, ...]
 
 
 def plan_like(t: Array) -> Plan:
     """Equal steps over windows of time as many as a run with knots ``t`` took there, windows that differ by less than
-    half taken together; its legs, at whose ends times stand twice, stay apart.
+    half taken together; its legs, at whose ends times stand twice, stay apart, but for those shorter than a step beside
+    them: what lies between two switches at nearly the same time says nothing of steps.
     """
     found: list[Stretch] = []
     for leg in np.split(t, np.flatnonzero(np.diff(t) == 0) + 1):
-        if len(leg) > 1:
+        if len(leg) < 2:
+            continue
+        if found and leg[-1] - leg[0] < found[-1].size:
+            found[-1] = found[-1]._replace(end=float(leg[-1]))
+        else:
             found += _stretches(leg)
     return tuple(found)
 
@@ -65,5 +75,4 @@ def planned(plan: Plan, leg: Leg) -> list[tuple[Leg, float]]:
     """
     own = [s for s in plan if s.start < leg.end and s.end > leg.start]
     edges = [leg.start, *(s.start for s in own[1:]), leg.end]
-    sizes = [(s.end - s.start) / s.steps for s in own]
-    return [(leg._replace(start=a, end=b), h) for (a, b), h in zip(pairwise(edges), sizes, strict=True)]
+    return [(leg._replace(start=a, end=b), s.size) for (a, b), s in zip(pairwise(edges), own, strict=True)]

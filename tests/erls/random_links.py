@@ -115,6 +115,7 @@ def random_link(
     inner = sum(elements) - len(members) + len(nodes) - len(interfaces)  # nodes
     stuff = {"youngs_modulus": modulus, "poissons_ratio": ratio, "density": density, "thermal_expansion": expansion}
     description: dict[str, Any] = {
+        "units": {"unusual": True},  # from 0.1 mm to 50 m: nothing slipped
         "materials": {material: stuff},
         "sections": {"section": section},
         "frame": {

@@ -142,6 +142,8 @@ def test_plans() -> None:
     plan = plan_like(np.delete(t, 101))  # no jump at 1, one at 2
     assert [s.start for s in plan] == [0.0, 1.0, 2.0]
     assert [s.steps for s in plan] == [100, 800, 32]
+    twice = np.concatenate([t[:901], [2.0 + 1e-11], 1e-11 + t[901:]])  # two switches at nearly the same time
+    assert [s.steps for s in plan_like(np.delete(twice, 101))] == [100, 800, 32]
     assert finer(plan, 2.5)[1] == Stretch(1.0, 2.0, 2000)
     assert step_ratio(np.linspace(0, 1, 401), np.linspace(0, 1, 101)) == pytest.approx(4.0)
     assert step_ratio(np.linspace(0, 1, 401), np.linspace(0, 1, 401)) == pytest.approx(1.2)  # the least

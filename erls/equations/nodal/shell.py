@@ -89,6 +89,8 @@ def slopes(frames: Array) -> Array:
 
     ``frames`` (q, 4, 4, 4) at the corners; see `erls.equations.nodal.shell_forces`.
     """
+    if not len(frames):  # scenes without shells pay nothing for them
+        return np.zeros((0, 4, 2, 6))
     a, b, c, d = (frames[:, k] for k in range(4))
     first, second = motions.log(motions.inverse(a) @ b), motions.log(motions.inverse(d) @ c)
     found = []
@@ -101,7 +103,7 @@ def slopes(frames: Array) -> Array:
             along = motions.adjoint_inverse(motions.exp(s * across)) @ first[..., None]
             along = along + s * motions.tangent(s * across) @ gain
             found.append(np.stack([along[..., 0], across], axis=-2))
-    return np.stack(found, axis=-3) if len(frames) else np.zeros((0, 4, 2, 6))
+    return np.stack(found, axis=-3)
 
 
 def lumped_shells(shells: Sequence[Shell], poses: Array) -> list[RigidBody]:
