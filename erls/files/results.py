@@ -31,6 +31,7 @@ _BEGINS = {
     ".gif": b"GIF8",
     ".mp4": b"",
     ".npz": b"PK",
+    ".fmu": b"PK",
     ".mat": b"MATLAB",
     ".sweep": b"SQLite format 3",
     ".mtx": b"",
