@@ -25,14 +25,15 @@ def export(
 
     Of a modal file: a superelement, six dofs for each interface and modal coordinates (Craig-Bampton). Of a link
     description: mass and stiffness of the full model. SI units; a link description that reads the files is written
-    beside them. Of a scene: a co-simulation unit (FMU).
+    beside them. Of either, for exudyn: a reduced body. Of a scene: a co-simulation unit (FMU).
 
     Parameters
     ----------
     source
         Modal file (.h5), link description or scene (.toml).
     output
-        Main file; its suffix names the format: .op4, .pch (DMIG), .mtx (Matrix Market), .mat; .fmu of a scene.
+        Main file; its suffix names the format: .op4, .pch (DMIG), .mtx (Matrix Market), .mat, .hdf5 (exudyn); .fmu of a
+        scene.
     format
         nastran-op4, nastran-dmig, matrix-market, mat or abaqus, instead of what the suffix says.
     fmi
@@ -58,6 +59,8 @@ def export(
         from erls.cli.reports import bad
 
         raise bad("is for units of scenes", "--set" if set_ else "--fmi", str(output), "end the output in .fmu")
+    if output.suffix.lower() == ".hdf5" and not format:
+        return _body(source, output, force, json)
     form = chosen_format(output, format)
     if source.suffix.lower() == ".toml":
         description = load_link(source)
@@ -100,3 +103,30 @@ def _unit(source: Path, output: Path, version: int, changes: list[str], force: b
     for kind, every in (("inputs", unit.inputs), ("outputs", unit.outputs)):
         print(f"{kind}: " + (", ".join(f"{one.name} [{one.unit}]" for one in every) or "none"))
     print(f"written to {output}")
+
+
+def _body(source: Path, output: Path, force: bool, json: bool) -> None:
+    """A link as a body of exudyn."""
+    from erls.files.results import claim
+    from erls.scene.build import cache_folder
+    from erls.scene.inputs import files_of_link
+    from fe_import.cache import reduce_cached
+    from fe_import.description.link import load_link
+    from fe_import.modal.file import read_modal_file
+    from fe_import.writers.exudyn import write_exudyn
+
+    if source.suffix.lower() == ".toml":
+        description = load_link(source)
+        claim(output, ".hdf5", files_of_link(description), force)
+        model, _ = reduce_cached(description, cache_folder(), tell)
+    else:
+        claim(output, ".hdf5", [source], force)
+        model = read_modal_file(source)
+    content = write_exudyn(output, model)
+    points = {name: [int(n) for n in numbers] for name, numbers in content["interfaces"].items()}
+    if json:
+        count = int(content["infoList"][0])
+        return print_json({"link": model.name, "modes": count, "interfaces": points, "files": [str(output)]})
+    print(f"{model.name}: {content['infoList'][0]} modes, in which {model.interface_nodes[0].name} rests")
+    print("points around interfaces: " + ", ".join(f"{name} {n[0]} to {n[-1]}" for name, n in points.items()))
+    print(f"written: {output}")

@@ -32,6 +32,7 @@ _BEGINS = {
     ".mp4": b"",
     ".npz": b"PK",
     ".fmu": b"PK",
+    ".hdf5": b"\x89HDF",
     ".mat": b"MATLAB",
     ".sweep": b"SQLite format 3",
     ".mtx": b"",
