@@ -31,6 +31,7 @@ from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
 from erls.simulation.simulate import simulate
 from erls.simulation.stepper import Stepper
+from fe_import.files.log import log
 from fe_import.files.versions import package_version
 
 VERSIONS = (3, 2)
@@ -41,7 +42,7 @@ _SHARED = {"Darwin": (".dylib", "darwin", "darwin64"), "Linux": (".so", "linux",
 _MACHINES = {"AMD64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
 
 
-def write_unit(path: Path, scene: Scene, version: int = 3, tell: Message = lambda text: None) -> UnitText:
+def write_unit(path: Path, scene: Scene, version: int = 3, tell: Message = log) -> UnitText:
     """Write a co-simulation unit, completely or not at all.
 
     Parameters

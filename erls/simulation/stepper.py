@@ -36,6 +36,7 @@ from erls.scene.build import Message, build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
 from erls.scene.read import AnyScene, load_chain
+from fe_import.files.log import log
 from fe_import.modal.model import ModalModel
 
 STEP = 1e-3
@@ -116,7 +117,7 @@ class Stepper:
         self,
         scene: AnyScene | Path | str,
         *,
-        tell: Message = lambda text: None,
+        tell: Message = log,
         models: Sequence[ModalModel] | None = None,
     ) -> None:
         path = scene if isinstance(scene, (Path, str)) else scene.path
@@ -323,7 +324,7 @@ def _refuse_sticking(scene: Scene, mechanism: Mechanism) -> None:
 def stepper(
     scene: AnyScene | Path | str,
     *,
-    tell: Message = lambda text: None,
+    tell: Message = log,
     models: Sequence[ModalModel] | None = None,
 ) -> Stepper:
     """A mechanism at its start, which moves on when it is told to (`Stepper`)."""
