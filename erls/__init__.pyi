@@ -9,6 +9,8 @@ from .run.record import Run as Run
 from .run.recovery import section_forces as section_forces
 from .run.recovery import stress as stress
 from .scene.chain import Scene as Scene
+from .scene.made import make_scene as make_scene
+from .scene.made import save_scene as save_scene
 from .scene.read import load_chain as load_chain
 from .scene.read import load_scene as load_scene
 from .sensitivity.sensitivities import sensitivities as sensitivities

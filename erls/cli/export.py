@@ -16,22 +16,30 @@ def export(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     format: str = "",
+    fmi: int = 3,
+    set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Write mass and stiffness matrices of a link for other programs.
+    """Write links and scenes for other programs.
 
     Of a modal file: a superelement, six dofs for each interface and modal coordinates (Craig-Bampton). Of a link
-    description: the full model. SI units; a link description that reads the files is written beside them.
+    description: mass and stiffness of the full model. SI units; a link description that reads the files is written
+    beside them. Of either, for exudyn: a reduced body. Of a scene: a co-simulation unit (FMU).
 
     Parameters
     ----------
     source
-        Modal file (.h5) or link description (.toml).
+        Modal file (.h5), link description or scene (.toml).
     output
-        Main file; its suffix names the format: .op4, .pch (DMIG), .mtx (Matrix Market), .mat.
+        Main file; its suffix names the format: .op4, .pch (DMIG), .mtx (Matrix Market), .mat, .hdf5 (exudyn); .fmu of a
+        scene.
     format
         nastran-op4, nastran-dmig, matrix-market, mat or abaqus, instead of what the suffix says.
+    fmi
+        Version of FMI of a unit: 3 or 2.
+    set_
+        Of a scene: change a field, KEY=VALUE; may be repeated.
     force
         Replace existing files that erls did not write.
     json
@@ -45,6 +53,14 @@ def export(
     from fe_import.writers.links import of_modal_model, of_model
     from fe_import.writers.write import chosen_format, write_link
 
+    if output.suffix.lower() == ".fmu" and not format:
+        return _unit(source, output, fmi, set_ or [], force, json)
+    if set_ or fmi != 3:
+        from erls.cli.reports import bad
+
+        raise bad("is for units of scenes", "--set" if set_ else "--fmi", str(output), "end the output in .fmu")
+    if output.suffix.lower() == ".hdf5" and not format:
+        return _body(source, output, force, json)
     form = chosen_format(output, format)
     if source.suffix.lower() == ".toml":
         description = load_link(source)
@@ -67,3 +83,50 @@ def export(
     print(f"{link.name}: {dofs} dofs, {len(link.labels)} nodes, {link.modal} modal coordinates")
     print("interfaces: " + ", ".join(f"{name} is node {number}" for name, number in interfaces.items()))
     print("written: " + ", ".join(names))
+
+
+def _unit(source: Path, output: Path, version: int, changes: list[str], force: bool, json: bool) -> None:
+    """A scene as a co-simulation unit."""
+    from erls.files.results import claim
+    from erls.fmi.package import write_unit
+    from erls.scene.inputs import files_of
+    from erls.scene.read import load_chain
+
+    scene = load_chain(source, changes)
+    claim(output, ".fmu", files_of(scene), force)
+    unit = write_unit(output, scene, version, tell)
+    if json:
+        names = {"inputs": unit.inputs, "outputs": unit.outputs}
+        variables = {kind: {one.name: one.unit for one in every} for kind, every in names.items()}
+        return print_json({"scene": unit.name, "fmi": version, "step": unit.step, **variables, "output": str(output)})
+    print(f"{unit.name}: FMI {version}.0 co-simulation, steps of {unit.step:g} s within")
+    for kind, every in (("inputs", unit.inputs), ("outputs", unit.outputs)):
+        print(f"{kind}: " + (", ".join(f"{one.name} [{one.unit}]" for one in every) or "none"))
+    print(f"written to {output}")
+
+
+def _body(source: Path, output: Path, force: bool, json: bool) -> None:
+    """A link as a body of exudyn."""
+    from erls.files.results import claim
+    from erls.scene.build import cache_folder
+    from erls.scene.inputs import files_of_link
+    from fe_import.cache import reduce_cached
+    from fe_import.description.link import load_link
+    from fe_import.modal.file import read_modal_file
+    from fe_import.writers.exudyn import write_exudyn
+
+    if source.suffix.lower() == ".toml":
+        description = load_link(source)
+        claim(output, ".hdf5", files_of_link(description), force)
+        model, _ = reduce_cached(description, cache_folder(), tell)
+    else:
+        claim(output, ".hdf5", [source], force)
+        model = read_modal_file(source)
+    content = write_exudyn(output, model)
+    points = {name: [int(n) for n in numbers] for name, numbers in content["interfaces"].items()}
+    if json:
+        count = int(content["infoList"][0])
+        return print_json({"link": model.name, "modes": count, "interfaces": points, "files": [str(output)]})
+    print(f"{model.name}: {content['infoList'][0]} modes, in which {model.interface_nodes[0].name} rests")
+    print("points around interfaces: " + ", ".join(f"{name} {n[0]} to {n[-1]}" for name, n in points.items()))
+    print(f"written: {output}")

@@ -30,7 +30,7 @@ from erls.cli.simulate import simulate
 from erls.cli.starting import examples, new, schema
 from erls.cli.streams import StdoutLost, prepare_streams
 from erls.cli.studies import study
-from erls.cli.terminal import print_json, tell
+from erls.cli.terminal import listen, print_json, tell
 from fe_import.errors import ReportedError
 
 app = App(
@@ -39,7 +39,8 @@ app = App(
     "Reduce the finite-element model of a link to a modal file, put links on Denavit-Hartenberg joints in a scene, "
     "simulate it, look at the result:\n\n"
     "    erls simulate data/l_shape/steel_tall.toml -o l.run.h5\n\n"
-    "    erls view l.run.h5 -o l.png",
+    "    erls view l.run.h5 -o l.png\n\n"
+    "Every command takes --quiet (stderr gets errors and warnings alone) and --verbose (messages with their time).",
     help_format="plaintext",
     version_flags=["--version"],
     default_parameter=Parameter(show_default=False),
@@ -85,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Instead of those of the process.
     """
-    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    tokens = listen(list(sys.argv[1:] if arguments is None else arguments))
     as_json = not {"--json", "--json=true", "--json=yes", "--json=1"}.isdisjoint(tokens)
     if arguments is None:
         prepare_streams()

@@ -20,7 +20,8 @@ def reduce(
 ) -> None:
     """Reduce the finite-element model of a link to a modal file.
 
-    Prints the modes, the mass properties and the health checks.
+    Prints the modes, the mass properties and the health checks. What was reduced before is taken from the cache, which
+    erls simulate uses, too.
 
     Parameters
     ----------
@@ -39,10 +40,12 @@ def reduce(
         Print one JSON object.
     """
     from erls.files.results import MODAL, claim
+    from erls.scene.build import cache_folder
     from erls.scene.inputs import files_of_link
+    from fe_import.cache import reduce_cached
     from fe_import.description.link import load_link
     from fe_import.modal.file import write_modal_file
-    from fe_import.reduce import reduce_link, reduction_summary
+    from fe_import.reduce import reduction_summary
 
     changes = {k: v for k, v in (("method", method), ("elastic_modes", modes)) if v is not None}
     description = load_link(link, changes)
@@ -50,7 +53,9 @@ def reduce(
     claim(target, MODAL, files_of_link(description), force)
     begun = time.perf_counter()
     tell(f"reducing {link}")
-    model = reduce_link(description, tell)
+    model, cached = reduce_cached(description, cache_folder(), tell)
+    if cached:
+        tell(f"the same was reduced before: taken from {cache_folder()}")
     write_modal_file(target, model)
     summary = {
         **reduction_summary(model),

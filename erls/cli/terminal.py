@@ -57,10 +57,26 @@ def peak_memory_mb() -> float | None:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
+class Told:
+    """What stderr gets: with ``--quiet`` errors and warnings alone, with ``--verbose`` also when."""
+
+    quiet, verbose = False, False
+    begun = time.monotonic()
+
+
+def listen(tokens: list[str]) -> list[str]:
+    """Words of a command without ``--quiet`` and ``--verbose``, which all commands take."""
+    Told.quiet, Told.verbose, Told.begun = "--quiet" in tokens, "--verbose" in tokens, time.monotonic()
+    return [token for token in tokens if token not in ("--quiet", "--verbose")]
+
+
 def tell(text: str) -> None:
     """A message on stderr; nobody may be listening any more."""
+    if Told.quiet and not text.startswith(("error: ", "warning: ")):
+        return
+    when = f"{time.monotonic() - Told.begun:8.3f} s  " if Told.verbose else ""
     with contextlib.suppress(OSError):
-        print(text, file=sys.stderr)
+        print(when + text, file=sys.stderr)
 
 
 def print_json(summary: dict[str, Any]) -> None:
@@ -93,7 +109,7 @@ class Progress:
         self.last = 0.0
 
     def __enter__(self) -> Callable[[float, float], None]:
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() and not Told.quiet:
             from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 

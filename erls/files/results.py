@@ -31,6 +31,8 @@ _BEGINS = {
     ".gif": b"GIF8",
     ".mp4": b"",
     ".npz": b"PK",
+    ".fmu": b"PK",
+    ".hdf5": b"\x89HDF",
     ".mat": b"MATLAB",
     ".sweep": b"SQLite format 3",
     ".mtx": b"",

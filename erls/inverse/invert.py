@@ -24,6 +24,7 @@ from erls.maths.so3 import Array
 from erls.scene.build import Message
 from erls.scene.chain import Scene
 from erls.scene.read import AnyScene, chain_alone, load_chain
+from fe_import.files.log import log
 from fe_import.files.toml import choose
 
 METHODS = ("auto", "collocation", "shooting", "forward")
@@ -36,7 +37,7 @@ def invert(
     *,
     method: str = "auto",
     force: bool = False,
-    tell: Message = lambda text: None,
+    tell: Message = log,
     progress: Callable[[int, float], None] = lambda iteration, change: None,
 ) -> Inversion:
     """Find the drives by which a mechanism moves as the tables ``servo`` of its scene demand.

@@ -32,6 +32,7 @@ from erls.scene.chain import Scene
 from erls.scene.read import AnyScene, load_scene
 from erls.simulation.chains import models_of
 from erls.simulation.simulate import simulate
+from fe_import.files.log import log
 
 EQUILIBRIUM = "equilibrium"
 Message = Callable[[str], None]
@@ -43,7 +44,7 @@ def linearize(
     at: float | str = 0.0,
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
-    tell: Message = lambda text: None,
+    tell: Message = log,
 ) -> LinearModel:
     """Small motions of a mechanism about a state, with inputs and outputs.
 
@@ -100,7 +101,7 @@ class StateOf(NamedTuple):
     warnings: tuple[str, ...]
 
 
-def state_of(given: AnyScene | Run | Path | str, at: float | str, tell: Message = lambda text: None) -> StateOf:
+def state_of(given: AnyScene | Run | Path | str, at: float | str, tell: Message = log) -> StateOf:
     """What `linearize` linearizes.
 
     Raises

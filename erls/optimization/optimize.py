@@ -16,13 +16,14 @@ from erls.optimization.memory import Memory
 from erls.optimization.methods import outcome
 from erls.optimization.problem import Problem, load_problem
 from erls.optimization.result import INTERRUPTED, Analysis, Optimization, Outcome
+from fe_import.files.log import log
 
 
 def optimize(
     problem: Problem | Path | str,
     *,
     changes: Sequence[str] = (),
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Callable[[str], None] = log,
     progress: Callable[[str, int, Analysis], None] = lambda method, count, analysis: None,
     state: Path | None = None,
     resume: bool = False,

@@ -6,7 +6,6 @@ Names, types and defaults are those of the records that read the files, descript
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
@@ -27,6 +26,7 @@ from erls.scene.settings import Simulation
 from fe_import.description import records, reduction
 from fe_import.description.check import COUPLINGS, WEIGHTS
 from fe_import.exports import EXPORTS
+from fe_import.files.docstrings import record_texts
 from fe_import.reduction import REDUCTIONS
 
 Record: TypeAlias = type[msgspec.Struct]
@@ -82,7 +82,6 @@ FREE: dict[tuple[Record, str], Callable[[], Iterator[tuple[str, Record]]]] = {
 }
 """Tables without a type of their own: the records that they may hold."""
 
-_ENTRY = re.compile(r"^(\w+(?:, \w+)*) : ")
 _WORDS: dict[Any, str] = {
     schema.FloatType: "number",
     schema.IntType: "whole number",
@@ -147,37 +146,21 @@ def documentation(record: Record) -> tuple[str, list[tuple[list[str], str]]]:
     LookupError
         A field without a description, or a description without its field.
     """
-    told, entries = "", []
-    for base in reversed(record.__mro__):
-        if base is msgspec.Struct or not issubclass(base, msgspec.Struct):
-            continue
-        text, _, listed = inspect.cleandoc(base.__doc__ or "").partition("Attributes\n----------\n")
-        told = text.strip()
-        for line in listed.splitlines():
-            entry = _ENTRY.match(line)
-            if entry:
-                entries.append((entry[1].split(", "), ""))
-            elif line.strip():
-                names, before = entries.pop()
-                entries.append((names, f"{before} {line.strip()}".strip()))
+    told, entries = record_texts(record)
     described = [name for names, text in entries if text for name in names]
     if sorted(described) != sorted(record.__struct_fields__):
         wrong = set(described) ^ set(record.__struct_fields__)
         raise LookupError(f"{record.__module__}.{record.__qualname__}: descriptions do not fit fields: {wrong}")
     # what must be given comes first, as it does in the records
     required = {f.name for f in msgspec.structs.fields(record) if f.required}
-    return _plain(told), sorted(entries, key=lambda entry: entry[0][0] not in required)
+    return told, sorted(entries, key=lambda entry: entry[0][0] not in required)
 
 
 def _described(record: Record, names: list[str], text: str) -> str:
     options = OPTIONS.get((record, names[0]), ())
-    if any(f"``{name}``" not in text for name in options):
-        text += " One of " + ", ".join(f"``{name}``" for name in options) + "."
-    return _plain(text).replace("|", "\\|")
-
-
-def _plain(text: str) -> str:
-    return text.replace("``", "`")
+    if any(f"`{name}`" not in text for name in options):
+        text += " One of " + ", ".join(f"`{name}`" for name in options) + "."
+    return text.replace("|", "\\|")
 
 
 def _kind(record: Record, f: Any, kind: Any, path: str, found: _Found, page: str) -> str:

@@ -30,6 +30,7 @@ from erls.sensitivity.parameters import Parameter, parameters_of
 from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
 from erls.sensitivity.variants import Difference, differences
 from erls.simulation.simulate import simulate
+from fe_import.files.log import log
 from fe_import.files.toml import choose
 
 _ROOM = 50_000_000
@@ -79,7 +80,7 @@ def sensitivities(
     method: Method = "auto",
     *,
     weights: Mapping[str, Array] | None = None,
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Callable[[str], None] = log,
 ) -> Sensitivities:
     """Differentiate what a run gives by numbers of its scene.
 

@@ -16,6 +16,7 @@ from erls.scene.read import AnyScene, load_scene
 from erls.scene.records import SceneFile
 from erls.simulation.asked import Asked
 from erls.simulation.chains import run_chain
+from fe_import.files.log import log
 
 Progress = Callable[[float, float], None]  # (time, duration)
 
@@ -62,7 +63,7 @@ def simulate(
     scene: AnyScene | Path | str,
     *,
     progress: Progress | None = None,
-    tell: Message = lambda text: None,
+    tell: Message = log,
     checkpoint: Path | Checkpoints | None = None,
     strict: bool = False,
     like: ChainRun | None = None,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,9 +36,13 @@ from erls.scene.build import Message, build_mechanism
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
 from erls.scene.read import AnyScene, load_chain
+from fe_import.files.log import log
+from fe_import.modal.model import ModalModel
 
 STEP = 1e-3
 """Of scenes that give none [s]."""
+
+_ALIKE = 1e-12  # of an input: what rounding leaves of a curve at one time, from either side
 
 _SYSTEMS = {
     "nodal": ("formulation", "use erls or ffr"),
@@ -70,6 +74,8 @@ class Stepper:
         runs.
     tell : callable, optional
         Told about each preparation that takes time.
+    models : sequence of ModalModel, optional
+        Of the links, instead of the ones that the scene names (a run file holds its own).
 
     Attributes
     ----------
@@ -107,12 +113,18 @@ class Stepper:
     0.0
     """
 
-    def __init__(self, scene: AnyScene | Path | str, *, tell: Message = lambda text: None) -> None:
+    def __init__(
+        self,
+        scene: AnyScene | Path | str,
+        *,
+        tell: Message = log,
+        models: Sequence[ModalModel] | None = None,
+    ) -> None:
         path = scene if isinstance(scene, (Path, str)) else scene.path
         loaded = scene if isinstance(scene, Scene) else load_chain(path)
         settings = msgspec.structs.replace(loaded.record.simulation, integrator=FIXED_STEP, output_step=None)
         _refuse_auto(loaded)
-        built = build_mechanism(loaded, tell)
+        built = build_mechanism(loaded, tell, models)
         _refuse_system(loaded, system_of(built.mechanism, settings))
         _refuse_sticking(loaded, built.mechanism)
         loaded = with_compliances(loaded, built.mechanism) if loaded.record.sensors else loaded
@@ -146,7 +158,14 @@ class Stepper:
         """(n,) independent coordinates, rates and accelerations: those of a run's solution."""
         return self._steps.state
 
-    def step(self, inputs: Mapping[str, float] | None = None, h: float | None = None) -> dict[str, Any]:
+    def step(
+        self,
+        inputs: Mapping[str, float] | None = None,
+        h: float | None = None,
+        *,
+        held: bool = False,
+        added: bool = False,
+    ) -> dict[str, Any]:
         """Move on by a step.
 
         Parameters
@@ -157,6 +176,11 @@ class Stepper:
         h : float, optional
             Length of the step [s]; ``step`` of the scene, or 1 ms, unless given. Jumps of what the scene prescribes are
             met by shorter ones.
+        held : bool
+            The values act in full all through the step, as those of a controller that holds them from one sample to the
+            next: where they differ from before they jump at its start.
+        added : bool
+            They are added to what the scene says, instead of taking its place.
 
         Returns
         -------
@@ -175,14 +199,18 @@ class Stepper:
         self._check(given, h)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # infinities are found and reported
             origin, width, count = self._clock if self._clock[1] == h else (self.time, h, 0)
-            end, jumps = origin + (count + 1) * width, self._ahead(given, h)
+            end, jumps = origin + (count + 1) * width, self._ahead({} if added else given, h)
             self._clock = self.time, 0.0, 0  # of a step that fails
             for leg in legs(jumps, (self.time, end)):
+                before = self._inputs.values if held else None
+                if before is not None and not self._fresh:
+                    self._set(given, leg.first, False, added)
+                    self._fresh = not np.allclose(self._inputs.values, before, rtol=_ALIKE, atol=0.0)
                 if self._fresh or jumps.at(leg.start):
-                    self._set(given, leg.first, False)
+                    self._set(given, leg.first, False, added)
                     self._steps.begin(leg.first, *self._steps.state[:2], False)
                 last = leg.last if jumps.at(leg.end) else leg.end
-                self._set(given, last, True)
+                self._set(given, last, True, added)
                 self._steps.advance(leg._replace(last=last))
                 self.time, self._fresh = leg.end, False
             self._clock = origin, width, count + 1
@@ -193,9 +221,13 @@ class Stepper:
         """What the sensors read now: numbers, or arrays (c,)."""
         if not self._sensors:
             return {}
-        y, v, a = self.state
-        seen = Instants(self.formulation, np.array([self.time]), y[None], v[None], a[None])
+        seen = self.seen()
         return {sensor.name: shaped(sensor, seen, (1,))[0] for sensor in self._sensors}
+
+    def seen(self) -> Instants:
+        """The mechanism as it stands, for sensors of one's own."""
+        y, v, a = self.state
+        return Instants(self.formulation, np.array([self.time]), y[None], v[None], a[None])
 
     def save(self) -> Saved:
         """The present state, all that later steps depend on."""
@@ -220,10 +252,11 @@ class Stepper:
         last = bisect_left(self._jumps, (self.time + h + _Jumps.NEAR * max(1.0, self.time + h), "\uffff"))
         return _Jumps(tuple(t for t, name in self._jumps[first:last] if name not in given))
 
-    def _set(self, given: Mapping[str, float], t: float, left: bool) -> None:
+    def _set(self, given: Mapping[str, float], t: float, left: bool, added: bool = False) -> None:
         """Inputs at a time; ``left``: before a jump there."""
-        own = (known.at(t, left) if known.name not in given else given[known.name] for known in self._inputs.every)
-        self._inputs.set(np.fromiter(own, float, len(self._inputs.every)))
+        own = np.array([known.at(t, left) if added or known.name not in given else 0.0 for known in self._inputs.every])
+        more = np.array([given.get(known.name, 0.0) for known in self._inputs.every])
+        self._inputs.set(own + more)
 
     def _check(self, given: Mapping[str, float], h: float) -> None:
         for name, value in given.items():
@@ -288,6 +321,11 @@ def _refuse_sticking(scene: Scene, mechanism: Mechanism) -> None:
         raise SceneError(Cause.BAD_FIELD, message, where=where, value="stick", remedy=remedy)
 
 
-def stepper(scene: AnyScene | Path | str, *, tell: Message = lambda text: None) -> Stepper:
+def stepper(
+    scene: AnyScene | Path | str,
+    *,
+    tell: Message = log,
+    models: Sequence[ModalModel] | None = None,
+) -> Stepper:
     """A mechanism at its start, which moves on when it is told to (`Stepper`)."""
-    return Stepper(scene, tell=tell)
+    return Stepper(scene, tell=tell, models=models)

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from fe_import.errors import Cause, FEImportError, ReportedError, shortened
+from fe_import.files.docstrings import field_text
 
 T = TypeVar("T")
 
@@ -29,6 +30,7 @@ _WORDS = {
     "array": "a list in brackets",
 }
 _MAX_BYTES = 50_000_000
+_SLIP = 0.85  # likeness of a slip to a field that is there already: by less, another one may be meant
 _SHOWN_NAMES = 30
 _EVERY = "[...]"  # how msgspec names a key of a table of the user's names
 
@@ -109,12 +111,16 @@ def _explained(text: str, data: Any, kind: Any, where: str, error: type[Reported
     if unknown:
         name = shortened(unknown.group(1))
         place = _place(where, [*steps, name])
-        remedy = _suggest(name, [f.encode_name for c in records for f in c.fields], _further_in(name, records))
-        return error(Cause.UNKNOWN_FIELD, f"unknown field {name!r}", where=place, remedy=remedy)
+        there = _node_at(data, steps) or {}
+        fields = [f.encode_name for c in records for f in c.fields]
+        remedy = _suggest(name, fields, _further_in(name, records), [field for field in fields if field in there])
+        told, more = _of_variant(name, data, steps, kind, records)
+        message, remedy = f"unknown field {name!r}{told}", remedy + more
+        return error(Cause.UNKNOWN_FIELD, message, where=place, remedy=remedy)
     if missing:
         name = missing.group(1)
         tags = _tags(records, name)
-        remedy = f"add {name} = " + (_either(tags) if tags else "...")
+        remedy = f"add {name} = " + (_either(tags) if tags else _meaning(name, records))
         return error(Cause.BAD_FIELD, f"required field {name!r} is missing", where=_place(where, steps), remedy=remedy)
     value, tags = _value_at(data, steps), []
     if steps:
@@ -122,6 +128,27 @@ def _explained(text: str, data: Any, kind: Any, where: str, error: type[Reported
     remedy = f"give {_either(tags)}" if tags else _expected(message)
     message = f"unknown {steps[-1]}" if tags else _lower(message)  # msgspec repeats the value, however long
     return error(Cause.BAD_FIELD, message, where=_place(where, steps), value=value, remedy=remedy)
+
+
+def _meaning(name: str, records: list[Any]) -> str:
+    """What a field is, as documentation says it."""
+    known = ((c.cls, f.name) for c in records for f in c.fields if f.encode_name == name)
+    text = next((found for cls, own in known if (found := field_text(cls, own))), "")
+    return f"... ({text.rstrip('.')})" if text else "..."
+
+
+def _of_variant(name: str, data: Any, steps: Steps, kind: Any, records: list[Any]) -> tuple[str, str]:
+    """Of a table of one of several kinds: which it is, and of a field that others have, how to change the kind."""
+    if not steps or len(records) != 1 or records[0].tag is None:
+        return "", ""
+    own = records[0]
+    others = _types_at(kind, data, steps[:-1])
+    every = [f.type for c in others for f in getattr(c, "fields", ()) if f.encode_name == steps[-1]]
+    kinds = [t for each in every for t in _alternatives(each, None) if isinstance(t, msgspec.inspect.StructType)]
+    having = [str(t.tag) for t in kinds if any(f.encode_name == name for f in t.fields)]
+    tag = f"{own.tag_field} = {str(own.tag)!r}"
+    more = f"; it belongs to {_either(having)}, so give the whole table, {steps[-1]} = {{ {tag} }}" if having else ""
+    return f" where {tag}", more
 
 
 def _lower(text: str) -> str:
@@ -234,11 +261,14 @@ def _further_in(name: str, records: list[Any]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _suggest(name: str, fields: list[str], further_in: list[str]) -> str:
-    """The field that was probably meant, or all there are."""
+def _suggest(name: str, fields: list[str], further_in: list[str], there: list[str]) -> str:
+    """The field that was probably meant, or all there are; where that one is ``there``, the others too."""
     if further_in:
         return "did you mean " + " or ".join(repr(field) for field in further_in) + "?"
     close = difflib.get_close_matches(name[:200], fields, n=1, cutoff=0.6)
+    if close and close[0] in there and not difflib.get_close_matches(name[:200], close, cutoff=_SLIP):
+        others = ", ".join(sorted(set(fields) - set(there)))
+        return f"did you mean {close[0]!r}? It is there already" + (f"; other fields: {others}" if others else "")
     if close:
         return f"did you mean {close[0]!r}?"
     return "known fields: " + ", ".join(sorted(set(fields))) if fields else "remove it"

@@ -15,6 +15,7 @@ import h5py
 import pytest
 import scenes
 
+import erls
 from erls.cli.main import main
 from erls.errors import Cause
 from erls.files.results import claim
@@ -63,7 +64,7 @@ def test_reduce(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert word in out
     assert read_modal_file("link.modal.h5").elastic_modes == 18
     found, err = run_json(capsys, "reduce", "link.toml", "-o", "other.h5")
-    assert err == "reducing link.toml\n"
+    assert err.startswith("reducing link.toml\nthe same was reduced before")
     assert set(found) >= REDUCE
     assert (found["link"], found["method"], found["output"]) == ("link", "craig-bampton", "other.h5")
     assert found["mass"] == pytest.approx(2.34)
@@ -358,7 +359,7 @@ def test_every_command_for_real(folder: Path) -> None:
     assert (found.returncode, found.stderr) == (0, "reducing link.toml\n")
     assert json.loads(found.stdout)["elastic_modes"] == 18
     found = execute("simulate", "scene.toml", "-o", "r.h5", "--json")
-    assert (found.returncode, found.stderr) == (0, "l: reduced (link.toml)\n")
+    assert (found.returncode, found.stderr) == (0, "l: reduction from the cache (link.toml)\n")
     assert json.loads(found.stdout)["steps"] == 10
     found = execute("info", "r.h5")
     assert (found.returncode, found.stderr) == (0, "")
@@ -383,3 +384,20 @@ def test_a_reader_who_has_enough_is_no_error(folder: Path) -> None:
         assert not done.stderr
     os.close(writer)
     assert (folder / "r.h5").exists()
+
+
+def test_how_much_is_told(capsys: pytest.CaptureFixture[str], folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """All, with the time, or errors and warnings alone; and what a command reduced, another one finds."""
+    assert main(["reduce", "link.toml", "--verbose"]) == 0
+    assert re.match(r" +\d\.\d{3} s  reducing link\.toml\n", capsys.readouterr().err)
+    assert main(["simulate", "scene.toml", "--set", "simulation.duration=0.001"]) == 0
+    assert "reduction from the cache" in capsys.readouterr().err
+    assert main(["reduce", "link.toml", "-o", "again.h5"]) == 0
+    assert "reduced before" in capsys.readouterr().err
+    for words, code in ((["simulate", "scene.toml"], 0), (["simulate", "none.toml"], 2)):
+        assert main([*words, "--set", "simulation.duration=0.001", "--quiet"]) == code
+        err = capsys.readouterr().err
+        assert [line.partition(":")[0] for line in err.splitlines()] == (["error"] if code else [])
+    with caplog.at_level("INFO", logger="erls"):
+        erls.simulate(erls.load_scene("scene.toml", ["simulation.duration=0.001"]), verdict=False)
+    assert any("reduction from the cache" in text for text in caplog.messages)

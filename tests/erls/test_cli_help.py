@@ -14,7 +14,7 @@ from erls.cli.main import main
 
 OPTIONS = {
     "reduce": ["--output", "-o", "--method", "--modes", "--force", "--json"],
-    "export": ["--output", "-o", "--format", "--force", "--json"],
+    "export": ["--output", "-o", "--format", "--fmi", "--set", "--force", "--json"],
     "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict",
                  "--resume", "--until", "--report", "--force", "--json"],
     "compare": ["--output", "-o", "--formulations", "--set", "--workers", "--force", "--json"],

@@ -28,9 +28,7 @@ def exported(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> 
     return found.err if code else found.out
 
 
-def test_a_superelement_and_the_full_model(
-    modal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_superelement_and_the_full_model(modal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told = json.loads(exported(capsys, str(modal), "-o", str(tmp_path / "l.mtx"), "--json"))
     assert (told["dofs"], told["nodes"], told["modal_coordinates"]) == (24, 2, 12)
     assert told["interfaces"] == {"root": 1, "tip": 2}
@@ -68,3 +66,14 @@ def test_faults(modal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     ):
         assert message in exported(capsys, *words, code=2)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_body_for_exudyn(modal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a modal file and of the description that it came from, alike; earlier ones are replaced, others are not."""
+    target = tmp_path / "l.hdf5"
+    told = [json.loads(exported(capsys, str(source), "-o", str(target), "--json")) for source in (modal, LINK)]
+    assert told[0] == told[1]
+    assert told[0]["modes"] == 18
+    assert told[0]["interfaces"]["tip"] == list(range(47, 53))
+    shutil.copy(modal, tmp_path / "mine.hdf5")
+    assert "no .hdf5 file that erls wrote" in exported(capsys, str(modal), "-o", str(tmp_path / "mine.hdf5"), code=2)

@@ -130,7 +130,8 @@ FAULTY_SET = [
     ("simulation.step=0", Cause.BAD_FIELD, "two.toml: simulation.step", "above 0"),
     ("links.arm.flexible=0", Cause.BAD_FIELD, "two.toml: links[0].flexible", "true or false"),
     ("joints=5", Cause.BAD_FIELD, "two.toml: joints", "list"),
-    ("joints.shoulder.drive.type=free", Cause.UNKNOWN_FIELD, "joints[0].drive.profiles", "remove it"),
+    ("joints.shoulder.drive.type=free", Cause.UNKNOWN_FIELD, "joints[0].drive.profiles", "drive = { type = 'free' }"),
+    ("joints.shoulder.dh={a=0.5}", Cause.BAD_FIELD, "joints[0].dh", "add convention = ... (`standard`: Rz"),
 ]
 
 

@@ -95,6 +95,8 @@ FAULTS = [
     frame("negative width", {"sections": {"s": {"width": -0.01}}}, BAD, "sections.s.width", "positive"),
     frame("unused bad section", {"sections": {"t": {"shape": "circular", "diameter": 0.0}}}, BAD, "sections.t.diameter",
           "positive"),
+    frame("diameter for a thickness", {"sections": {"s": None, "t": {"shape": "tubular", "outer_diameter": 0.02,
+          "inner_diameter": 0.01}}}, Cause.UNKNOWN_FIELD, "sections.t.inner_diameter", "thickness"),
     frame("thick wall", {"sections": {"s": None, "t": {"shape": "tubular", "outer_diameter": 0.02, "thickness": 0.02}}},
           BAD, "sections.t.thickness", "below half"),
     frame("incompressible", {"materials": {"m": {"poissons_ratio": 0.5}}}, BAD, "materials.m.poissons_ratio", "0.5"),
