@@ -33,6 +33,7 @@ _BEGINS = {
     ".npz": b"PK",
     ".mat": b"MATLAB",
     ".sweep": b"SQLite format 3",
+    ".study": b"SQLite format 3",
     ".mtx": b"",
     ".txt": b"#",
     ".pch": b"$",

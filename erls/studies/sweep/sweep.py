@@ -15,12 +15,13 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.files.optional import optional_package
-from erls.files.output import not_writable
 from erls.files.results import claim
 from erls.maths.so3 import Array
 from erls.run.record import Run
 from erls.scene.inputs import files_of
 from erls.scene.read import load_scene
+from erls.studies.database import refuse_finished
+from erls.studies.kept import content_of
 from erls.studies.pool import each
 from erls.studies.sweep.evaluate import (
     BENDING_EVERY,
@@ -205,7 +206,7 @@ def sweep(
     kept = quantities if callable(quantities) else kept_texts(quantities, verdict)
     task = Task(Path(scene), tuple(overrides), asked.keys, [], kept, verdict)
     check_keys(task, asked.row(0))
-    task = replace(task, content=_content(task))
+    task = replace(task, content=content_of(task.scene, task.overrides))
     about, target = _about(task, asked), None if store is None else Path(store)
     if target is not None:
         claim(target, SUFFIX, files_of(load_scene(task.scene, task.overrides)), force and not resume)
@@ -240,19 +241,8 @@ def _make_room(target: Path, force: bool) -> None:
     """Take away a store that was there, unless it holds what may have taken long."""
     if target.exists() and not force:
         with closing(Store(target)) as base:
-            held = 0 if base.empty else len(list(base.finished()))
-        if held:
-            remedy = "go on with it (--resume), name another, or replace it (--force)"
-            raise not_writable(target, f"it holds {held} finished points", remedy)
+            refuse_finished(target, 0 if base.empty else len(list(base.finished())))
     target.unlink(missing_ok=True)
-
-
-def _content(task: Task) -> str:
-    """Of the files of a scene."""
-    files = hashlib.sha256()
-    for file in files_of(load_scene(task.scene, task.overrides)):
-        files.update(file.read_bytes() if file.is_file() else b"")
-    return files.hexdigest()
 
 
 def _about(task: Task, points: Points) -> dict[str, Any]:
