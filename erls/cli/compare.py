@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from erls.cli.reports import Set, Workers, check_output, dumped, exit_code, tell_written, write
+from erls.cli.reports import (
+    Resume,
+    Set,
+    StateFile,
+    Workers,
+    bad,
+    check_output,
+    dumped,
+    exit_code,
+    kept_in,
+    tell_written,
+    write,
+)
 from erls.cli.terminal import Force, Json, Output, Progress, print_json
 
 
@@ -14,6 +26,8 @@ def compare(
     *more: Path,
     formulations: str = "",
     output: Output = None,
+    state: StateFile = None,
+    resume: Resume = False,
     set_: Set = None,
     workers: Workers = None,
     force: Force = False,
@@ -36,6 +50,10 @@ def compare(
     output
         Report to write: .html a self-contained page with plots, .csv the histories (of several scenes the
         departures), .json the JSON object.
+    state
+        File that keeps runs of one scene as they are finished, RUNS.study.
+    resume
+        Go on with it: what it holds is not computed again.
     set_
         Change a field of the scene, KEY=VALUE; may be repeated.
     workers
@@ -52,9 +70,12 @@ def compare(
     check_output(output, [scene, *more], set_ or [], (".html", ".csv", ".json"), force)
     names = [name.strip() for name in formulations.split(",") if name.strip()]
     if more:
+        if state is not None:
+            raise bad("several scenes keep no runs", "--state", str(state), "compare them one by one")
         return _compare_scenes([scene, *more], names or ["erls", "ffr"], output, set_ or [], workers, json)
     with Progress("comparing") as advance:
-        result = run_comparison(scene, names, overrides=set_ or (), progress=advance, workers=workers)
+        kept = kept_in(state, resume, force)
+        result = run_comparison(scene, names, overrides=set_ or (), progress=advance, workers=workers, state=kept)
     summary = comparison_summary(result)
     if output is not None:
         makers = {".html": comparison_page, ".csv": comparison_csv}

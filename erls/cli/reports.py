@@ -13,9 +13,25 @@ from erls.cli.terminal import tell
 
 if TYPE_CHECKING:
     from erls.errors import SceneError
+    from erls.studies.kept import State
 
 Set = Annotated[list[str] | None, Parameter(name="--set", negative="")]
 Workers = Annotated[int | None, Parameter(name="--workers")]
+StateFile = Annotated[Path | None, Parameter(name="--state")]
+Resume = Annotated[bool, Parameter(name="--resume", negative="")]
+
+
+def kept_in(state: Path | None, resume: bool, force: bool) -> State | None:
+    """Where a study keeps its runs."""
+    from erls.studies.kept import SUFFIX, State
+
+    if state is None:
+        if resume:
+            raise bad("nothing to go on from", "--resume", "no --state", "name the file with --state")
+        return None
+    if state.suffix != SUFFIX:
+        raise bad("the ending of the file says what it is", "--state", state.name, f"end in {SUFFIX}")
+    return State(state, resume, force)
 
 
 def exit_code(complete: bool, failed: list[int]) -> int:

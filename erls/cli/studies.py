@@ -7,7 +7,20 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from erls.cli.reports import Set, Workers, bad, check_output, dumped, exit_code, read_by, tell_written, write
+from erls.cli.reports import (
+    Resume,
+    Set,
+    StateFile,
+    Workers,
+    bad,
+    check_output,
+    dumped,
+    exit_code,
+    kept_in,
+    read_by,
+    tell_written,
+    write,
+)
 from erls.cli.terminal import Force, Json, Output, Progress, print_json, tell
 
 study = App(name="study", help="Run a scene many times and report what changes.", help_format="plaintext")
@@ -25,6 +38,8 @@ def modes(
     load_tolerance: float = 0.02,
     frequency_tolerance: float = 0.01,
     beside: Path | None = None,
+    state: StateFile = None,
+    resume: Resume = False,
     set_: Set = None,
     workers: Workers = None,
     force: Force = False,
@@ -52,6 +67,10 @@ def modes(
         Relative change of spectrum peaks that does not matter.
     beside
         Published table (CSV) to show beside the figures of this study.
+    state
+        File that keeps runs as they are finished, RUNS.study.
+    resume
+        Go on with it: what it holds is not computed again.
     set_
         Change a field of the scene, KEY=VALUE; may be repeated.
     workers
@@ -76,6 +95,7 @@ def modes(
             tolerances=Tolerances(tolerance, load_tolerance, frequency_tolerance),
             progress=advance,
             workers=workers,
+            state=kept_in(state, resume, force),
         )
     summary = study_summary(result)
     if printed is not None:
@@ -107,6 +127,8 @@ def cost(
     reference: str = "",
     budget: float = 240.0,
     apply: Path | None = None,
+    state: StateFile = None,
+    resume: Resume = False,
     set_: Set = None,
     workers: Workers = None,
     force: Force = False,
@@ -147,6 +169,10 @@ def cost(
     apply
         Write a copy of the scene with the recommended setting, beside the scene; what --set changes is for the study
         alone.
+    state
+        File that keeps the reference and settings with all their runs as they are finished, RUNS.study.
+    resume
+        Go on with it: what it holds is not computed again.
     set_
         Change a field of the scene, KEY=VALUE; may be repeated.
     workers
@@ -180,6 +206,7 @@ def cost(
             budget=budget,
             progress=advance,
             workers=workers,
+            state=kept_in(state, resume, force),
         )
     summary = cost_summary(result)
     if output is not None:
@@ -226,7 +253,7 @@ def sweep(
     points: Path | None = None,
     output: Output = None,
     table: Path | None = None,
-    resume: Annotated[bool, Parameter(name="--resume", negative="")] = False,
+    resume: Resume = False,
     retry_failed: Annotated[bool, Parameter(name="--retry-failed", negative="")] = False,
     verdict: Annotated[bool, Parameter(name="--verdict", negative="")] = False,
     scheduler: str = "",

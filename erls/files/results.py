@@ -35,6 +35,7 @@ _BEGINS = {
     ".hdf5": b"\x89HDF",
     ".mat": b"MATLAB",
     ".sweep": b"SQLite format 3",
+    ".study": b"SQLite format 3",
     ".mtx": b"",
     ".txt": b"#",
     ".pch": b"$",

@@ -273,8 +273,9 @@ def hermite(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Array, A
     y, v : (m, n) arrays
         Interpolated positions and velocities (the derivative of the interpolant).
     """
-    position, velocity, _ = hermite_knots(t, y, v, a, at)
-    return position, velocity
+    if len(t) == 1:  # a run that failed at once
+        return np.repeat(y, len(at), axis=0), np.repeat(v, len(at), axis=0)
+    return _quintics(t, y, v, a, at).first_two()
 
 
 def knots_after(t: Array, at: Array) -> IntArray:
@@ -288,6 +289,36 @@ def hermite_knots(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Ar
     """The same with (m, n) accelerations, the second derivative of the interpolant."""
     if len(t) == 1:  # a run that failed at once
         return np.repeat(y, len(at), axis=0), np.repeat(v, len(at), axis=0), np.repeat(a, len(at), axis=0)
+    found = _quintics(t, y, v, a, at)
+    return *found.first_two(), found.acceleration()
+
+
+class _Quintics(NamedTuple):
+    """Polynomials in s, from 0 to 1 along stretches of length h, at each of m times: coefficients (m, n)."""
+
+    s: Array
+    h: Array
+    start: Array
+    rate: Array
+    bend: Array
+    third: Array
+    fourth: Array
+    fifth: Array
+
+    def first_two(self) -> tuple[Array, Array]:
+        """Values, and their rates."""
+        s, h, y0, v0, a0, c3, c4, c5 = self
+        position = y0 + s * (v0 + s * (a0 / 2 + s * (c3 + s * (c4 + s * c5))))
+        return position, (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
+
+    def acceleration(self) -> Array:
+        """The second derivative."""
+        s, h, _, _, a0, c3, c4, c5 = self
+        return np.asarray((a0 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2)
+
+
+def _quintics(t: Array, y: Array, v: Array, a: Array, at: Array) -> _Quintics:
+    """At times between two or more knots."""
     right = knots_after(t, at)
     left = right - 1
     h = (t[right] - t[left])[:, None]
@@ -301,7 +332,4 @@ def hermite_knots(t: Array, y: Array, v: Array, a: Array, at: Array) -> tuple[Ar
     c3 = 10 * dy - 4 * dv + da / 2
     c4 = -15 * dy + 7 * dv - da
     c5 = 6 * dy - 3 * dv + da / 2
-    position = y0 + s * (v0 + s * (a0 / 2 + s * (c3 + s * (c4 + s * c5))))
-    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
-    acceleration = (a0 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2
-    return position, velocity, acceleration
+    return _Quintics(s, h, y0, v0, a0, c3, c4, c5)

@@ -19,7 +19,7 @@ The numbers may be real or complex: a record of complex numbers is read by the s
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
@@ -68,17 +68,27 @@ def _said(kind: Any) -> tuple[tuple[str, ...], ...]:
 
 
 def room(record: type[R], **sizes: int) -> R:
-    """Working memory: a record of zeros whose fields are annotated with their shapes, in these sizes.
+    """Working memory: a record of zeros, to be put into a `Memory`, whose fields are annotated with their shapes, in
+    these sizes.
 
     Whole numbers are given beside the sizes, by the names of their fields.
     """
-    make: Callable[..., R] = record
-    return make(*(sizes[name] if axes is None else _zeros(axes, sizes) for name, axes in _shapes(record)))
+    found: R = _room(record, tuple(sizes.items()))
+    return found
+
+
+@lru_cache(maxsize=512)
+def _room(record: Any, given: tuple[tuple[str, int], ...]) -> Any:
+    """The same; nobody writes into it, so that it serves again."""
+    sizes = dict(given)
+    return record(*(sizes[name] if axes is None else _zeros(axes, sizes) for name, axes in _shapes(record)))
 
 
 def _zeros(axes: tuple[tuple[str, ...], ...], sizes: dict[str, int]) -> Array:
     """Of the shape that axes tell."""
-    return np.zeros([sum(int(part) if part.isdigit() else sizes[part] for part in axis) for axis in axes])
+    found = np.zeros([sum(int(part) if part.isdigit() else sizes[part] for part in axis) for axis in axes])
+    found.flags.writeable = False
+    return found
 
 
 def table_size(record: type[Any]) -> int:

@@ -25,7 +25,10 @@ def cross_all(a: Array, b: Array) -> Array:
     """a × b of (..., 3) arrays that fit beside each other."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     p, q, r = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([y * r - z * q, z * p - x * r, x * q - y * p], axis=-1)
+    first = y * r - z * q
+    result = np.empty((*first.shape, 3), dtype=first.dtype)
+    result[..., 0], result[..., 1], result[..., 2] = first, z * p - x * r, x * q - y * p
+    return result
 
 
 def rotation_z(angle: float) -> Array:

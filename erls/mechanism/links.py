@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.linalg as la
@@ -16,6 +17,9 @@ from fe_import.description.records import LinkDescription
 from fe_import.modal.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.modal.model import FixedInterfaceModes, ModalModel
 from fe_import.model import InterfaceNode
+
+T = TypeVar("T")
+_MOST_KNOWN = 64  # findings that a link remembers: what varies with every variant must not pile up
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,28 @@ class Link:
     def second_order(self) -> LinkSecondOrder | None:
         """Second-order kinematics relative to the inboard interface; None where the modal model holds none."""
         return link_second_order(self)
+
+    def once(self, key: Hashable, find: Callable[[], T]) -> T:
+        """What was found of this link before, of the last few keys: variants of a scene share links.
+
+        Parameters
+        ----------
+        key : hashable
+            Names what is found, and all that it depends on beside the link.
+        find : callable
+            What it gives is not changed by anybody.
+        """
+        known = self._known
+        if key not in known:
+            while len(known) >= _MOST_KNOWN:
+                known.pop(next(iter(known)), None)
+            known[key] = find()
+        found: T = known[key]
+        return found
+
+    @cached_property
+    def _known(self) -> dict[Hashable, Any]:
+        return {}
 
     def interface_shape(self, interface: InterfaceNode, frame: Array) -> Array:
         """(6, m) displacement and rotation of a frame that moves rigidly with an interface, per modal coordinate.

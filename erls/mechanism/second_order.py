@@ -18,6 +18,8 @@ from fe_import.model import IntArray, InterfaceNode
 from fe_import.second_order.composition import composed, composed_rotation, twice_turned
 from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_masses, of_modes, of_moments
 
+_FEW = 3  # nodes whose own quadratic forms are quicker than the field of all
+
 
 class Load(Protocol):
     """A mass on a node of a link, as `erls.mechanism.links.Payload` is one."""
@@ -131,6 +133,8 @@ class LinkSecondOrder:
 
         Nodes without a stored field (inside solids) follow the rigid-body part only.
         """
+        if len(nodes) <= _FEW:
+            return np.stack([_half_form(self.bending(node)[:3], q) for node in nodes.tolist()], axis=-2)
         model, field = self.model, self.field
         start = model.interface_nodes[field.reference].node
         pairs = q[..., 6:][..., self._pairs[0]] * q[..., 6:][..., self._pairs[1]] * self._halves
@@ -148,6 +152,25 @@ class LinkSecondOrder:
             arm = model.nodes[nodes] - model.nodes[self.inboard]
             result -= lift[..., :3] + cross_all(lift[..., 3:], arm)
         return result
+
+    def bound(self, q: Array, moved: Array) -> Array:
+        """(k,) what `displacements` of no node exceed at modal coordinates (k, m), linear displacements against the
+        inboard interface not exceeding ``moved`` (k,) [m].
+        """
+        start = self.model.interface_nodes[self.field.reference].node
+        if self.inboard != start:
+            return np.full(len(q), np.inf)
+        pairs = q[:, 6:][:, self._pairs[0]] * q[:, 6:][:, self._pairs[1]]
+        turned = np.linalg.norm(q @ _rigid_shape(self.model, start)[1].T, axis=1)
+        largest, length = self._largest
+        return np.asarray(np.abs(pairs) @ largest + turned * (moved + turned * length / 2))
+
+    @cached_property
+    def _largest(self) -> tuple[Array, float]:
+        """Most that a pair of coordinates moves a node by, (p,), and how far nodes are from the inboard one [m]."""
+        sizes = np.linalg.norm(self.field.translation, axis=1).max(axis=0, initial=0.0)
+        arms = self.model.nodes - self.model.nodes[self.inboard]
+        return self._halves * sizes, float(np.linalg.norm(arms, axis=1).max())
 
     @cached_property
     def _pairs(self) -> tuple[IntArray, IntArray]:
@@ -191,6 +214,12 @@ def link_second_order(link: Loaded) -> LinkSecondOrder | None:
         own = np.concatenate([u - skew(payload.offset) @ phi, phi])[:, 6:]
         modal = modal + of_modes(own, np.concatenate([masses[0][:3], turning[0][3:]]))
     return LinkSecondOrder(momentum, spin, modal, model, field, link.inboard.node)
+
+
+def _half_form(forms: Array, q: Array) -> Array:
+    """(..., c) ½ qᵀ F q of forms (c, m, m) at (..., m)."""
+    sides = q @ forms.transpose(1, 0, 2).reshape(forms.shape[1], -1)
+    return np.asarray(np.einsum("...cm,...m->...c", sides.reshape(*q.shape[:-1], len(forms), -1), q) / 2)
 
 
 def _rigid_shape(model: ModalModel, node: int) -> tuple[Array, Array]:

@@ -28,6 +28,8 @@ def without(mechanism: Mechanism, off: Set[str]) -> Mechanism:
         Names from `erls.mechanism.effects`. What the equations of motion ask for is taken off the names in
         ``mechanism.effects``; the other effects are taken out of joints, links and gravity as well.
     """
+    if not off:
+        return mechanism
     return replace(
         mechanism,
         joints=tuple(_joint_without(joint, off) for joint in mechanism.joints),

@@ -148,6 +148,8 @@ def self_contained(scene: S) -> S:
             return {**value, "times": times, "values_deg" if degrees else "values": values.tolist()}
         return {k: inline(v) for k, v in value.items()}
 
+    if not isinstance(scene, BodyScene) and b'"table"' not in msgspec.json.encode(scene.record):
+        return scene  # most have none, and variants of a scene come by the thousand
     data = inline(msgspec.to_builtins(scene.record))
     if isinstance(scene, BodyScene):
         for k, shell in enumerate(scene.record.shells):

@@ -49,7 +49,17 @@ def load_scene(path: Path | str, overrides: Iterable[str] = ()) -> AnyScene:
     8
     """
     path = Path(path)
-    data = read_toml(path, SceneError)
+    return scene_with(read_toml(path, SceneError), path, overrides)
+
+
+def scene_with(data: dict[str, Any], path: Path, overrides: Iterable[str] = ()) -> AnyScene:
+    """The scene of parsed tables, which overrides change.
+
+    Raises
+    ------
+    SceneError, FEImportError
+        As `load_scene`.
+    """
     for text in overrides:
         apply_override(data, text)
     return checked(data, path, str(path))

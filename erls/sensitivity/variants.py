@@ -20,7 +20,7 @@ from erls.equations.registry import formulate, system_of
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.links import Link
+from erls.mechanism.shared_links import sharing_links
 from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism, link_model
 from erls.sensitivity.parameters import Parameter, description_with, scene_with
@@ -208,32 +208,7 @@ def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
         if described is not None and descriptions[k] is not None:  # made of beams, as nodes take them
             descriptions[k] = described.description
     built = build_mechanism(scene, lambda text: None, models, descriptions, pieces).mechanism
-    known = run.formulation.mechanism.links
-    return replace(
-        built, links=tuple(old if _same(new, old) else new for new, old in zip(built.links, known, strict=True))
-    )
-
-
-def _same(new: Link, old: Link) -> bool:
-    """Whether a parameter leaves a link alone, so that what is known of it need not be found again."""
-    if new.model is not old.model or new.pieces or len(new.payloads) != len(old.payloads):
-        return False
-    one, other = ((x.stiffness, x.damping, x.invariants.m, x.invariants.X, x.invariants.Z) for x in (new, old))
-    named = new.name == old.name and new.inboard is old.inboard and new.intermediate == old.intermediate
-    loads = zip(new.payloads, old.payloads, strict=True)
-    return (
-        named
-        and new.description is old.description
-        and all(map(np.array_equal, one, other))
-        and all(
-            a.node == b.node
-            and a.mass == b.mass
-            and a.motor == b.motor
-            and np.array_equal(a.offset, b.offset)
-            and np.array_equal(a.inertia, b.inertia)
-            for a, b in loads
-        )
-    )
+    return sharing_links(built, run.formulation.mechanism)
 
 
 def _of_all(base: Any, number: int, turn: Array) -> Array:

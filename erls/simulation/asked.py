@@ -24,6 +24,7 @@ class Asked:
     like: ChainRun | None
     verdict: bool = True
     until: float | None = None
+    bending: bool = True  # whether the run looks at how far off links are that bend (`erls.run.watches`)
 
     def checkpoint(self, scene: SceneFile) -> Checkpoint | None:
         """Of the integration of a scene."""

@@ -16,11 +16,12 @@ from erls.integrate.choice import compile_kernels, compiled_steps, compiling_ste
 from erls.maths.beside import compiling_beside
 from erls.maths.jit import announcing
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.shared_links import sharing_links
 from erls.run.chain.run import ChainRun
 from erls.run.file import self_contained
 from erls.run.watches.base import Begun, Plan
 from erls.run.watches.watching import Warnings, Watching
-from erls.scene.build import build_mechanism
+from erls.scene.build import Built, build_mechanism
 from erls.scene.chain import Scene
 from erls.simulation.asked import Asked
 from erls.simulation.kept import kept_to
@@ -39,7 +40,7 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
 
         refuse_time(settings, asked.until)
     like, tell = asked.like, asked.tell
-    built = build_mechanism(scene, tell) if like is None else build_mechanism(scene, tell, *models_of(like))
+    built = build_mechanism(scene, tell) if like is None else build_like(scene, like, tell)
     if scene.record.sensors:
         from erls.run.chain.sensors import with_compliances  # here: scenes without sensors need none of it
 
@@ -52,6 +53,7 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
     warnings(built.warnings)
     run = partial(run_mechanism, asked=asked, warnings=warnings)
     if settings.effects == "auto":
+        run = partial(run, asked=replace(asked, bending=True))  # its certificate rests on it
         from erls.auto.automatic import automatic  # here: most runs need none of it
 
         found = automatic(scene, built.mechanism, run, tell, asked.strict)
@@ -86,11 +88,19 @@ def models_of(run: ChainRun) -> tuple[list[ModalModel], list[LinkDescription | N
     return [link.model for link in links], [link.description for link in links], pieces
 
 
+def build_like(scene: Scene, like: ChainRun, tell: Callable[[str], None] = lambda text: None) -> Built:
+    """The mechanism of a scene whose links and effects are those of a run: modal models serve again, and with them what
+    was found of links that are the same to the last payload.
+    """
+    built = build_mechanism(scene, tell, *models_of(like))
+    return replace(built, mechanism=sharing_links(built.mechanism, like.formulation.mechanism))
+
+
 def run_mechanism(
     scene: Scene, mechanism: Mechanism, asked: Asked, warnings: Warnings, before: ChainRun | None = None
 ) -> ChainRun:
     """Run a mechanism as the scene says, from the end of a run that was before it, if there is one."""
-    settings, plan, told = scene.record.simulation, Plan(scene, mechanism), warnings.beside()
+    settings, plan, told = scene.record.simulation, Plan(scene, mechanism, asked.bending), warnings.beside()
     checkpoint = asked.checkpoint(scene)
     watching = Watching(plan, told, asked.watches(checkpoint))
     watching.before()

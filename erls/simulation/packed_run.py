@@ -17,7 +17,7 @@ from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
-from erls.simulation.chains import models_of
+from erls.simulation.chains import build_like
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def unpacked(run: PackedRun, like: ChainRun | None) -> ChainRun:
 
 def formulated(scene: Scene, like: ChainRun | None) -> Formulation:
     """The equations of motion of a scene; modal models of a run with the same links serve again."""
-    built = build_mechanism(scene) if like is None else build_mechanism(scene, lambda text: None, *models_of(like))
+    built = build_mechanism(scene) if like is None else build_like(scene, like)
     return formulate(built.mechanism, scene.record.simulation)
 
 

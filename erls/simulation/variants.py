@@ -4,38 +4,63 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from erls.equations.nodal.scenes.build import assemble
 from erls.equations.registry import formulate
+from erls.errors import SceneError
 from erls.integrate.choice import compile_kernels, compiled_steps, compiling_steps
 from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.scene.bodies.schema import BodyScene
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
-from erls.scene.read import AnyScene, load_scene
+from erls.scene.overrides import apply_override
+from erls.scene.read import AnyScene, scene_with
+from erls.simulation.asked import Asked
 from erls.simulation.packed_run import Packed, PackedBodies, unpacked, unpacked_bodies
-from erls.simulation.simulate import Progress, simulate
+from erls.simulation.simulate import RUNS, Progress
 from fe_import.errors import ReportedError
+from fe_import.files.toml import read_toml
 
 _MOST_KEPT = 8  # sets of links
 
 
 class Variants:
-    """Simulates variants of a scene.
+    """Simulates variants of a scene, which is read once.
 
     Parameters
     ----------
     scene : Path or str
+    common : sequence of str
+        ``KEY=VALUE`` of all variants.
     """
 
-    def __init__(self, scene: Path | str) -> None:
-        self.scene = scene
-        self._runs: dict[tuple[bytes, bool], ChainRun] = {}
+    def __init__(self, scene: Path | str, common: Sequence[str] = ()) -> None:
+        self.path, self.common = Path(scene), common
+        self._tables: dict[str, Any] | None = None
+        self._runs: dict[tuple[bytes, bool, Any], ChainRun] = {}
 
-    def run(self, overrides: Sequence[str], progress: Progress, verdict: bool = True) -> Run | ReportedError:
+    def scene(self, overrides: Sequence[str]) -> AnyScene:
+        """A variant.
+
+        Raises
+        ------
+        SceneError, FEImportError
+            As `erls.scene.read.load_scene`.
+        """
+        if self._tables is None:
+            found = read_toml(self.path, SceneError)
+            for text in self.common:
+                apply_override(found, text)
+            self._tables = found
+        return scene_with(_copied(self._tables), self.path, overrides)
+
+    def run(
+        self, overrides: Sequence[str], progress: Progress, verdict: bool = True, bending: bool = True
+    ) -> Run | ReportedError:
         """The run of a variant, or its failure.
 
         Parameters
@@ -45,11 +70,15 @@ class Variants:
             As of `erls.simulation.simulate.simulate`; called once before the start, too.
         verdict : bool
             Whether the run states its error.
+        bending : bool
+            Whether it looks at how far off links are that bend, without a verdict, too.
         """
         try:
             progress(0.0, 0.0)
-            scene = load_scene(self.scene, overrides)
-            run = simulate(scene, progress=progress, like=self._alike(scene), verdict=verdict)
+            scene = self.scene(overrides)
+            like = self._alike(scene)
+            asked = Asked(progress, lambda text: None, None, False, like, verdict, bending=bending or verdict)
+            run: Run = RUNS[type(scene)](scene, asked)
         except ReportedError as problem:
             return problem
         self._know(run)
@@ -57,7 +86,7 @@ class Variants:
 
     def prepare(self, overrides: Sequence[str]) -> None:
         """Read and compile what a variant needs."""
-        scene = load_scene(self.scene, overrides)
+        scene = self.scene(overrides)
         if isinstance(scene, BodyScene):
             assemble(scene)
             return
@@ -79,12 +108,23 @@ class Variants:
 
     def _know(self, run: Run) -> None:
         """Have later runs with the same links share those of this one."""
-        if isinstance(run, ChainRun):
+        if isinstance(run, ChainRun) and run.scene.record.simulation.effects != "auto":  # which may make links rigid
             self._runs.setdefault(_links(run.scene), run)
         if len(self._runs) > _MOST_KEPT:
             self._runs.pop(next(iter(self._runs)))
 
 
-def _links(scene: Scene) -> tuple[bytes, bool]:
-    """What modal models depend on; substructures are left whole in the nodal formulation."""
-    return msgspec.json.encode(scene.record.links), scene.record.simulation.formulation == "nodal"
+def _copied(tables: Any) -> Any:
+    """Parsed tables that may be changed."""
+    if isinstance(tables, dict):
+        return {key: _copied(value) for key, value in tables.items()}
+    return [_copied(value) for value in tables] if isinstance(tables, list) else tables
+
+
+def _links(scene: Scene) -> tuple[bytes, bool, Any]:
+    """What modal models depend on; substructures are left whole in the nodal formulation, and without some effects
+    there are no modes.
+    """
+    simulation = scene.record.simulation
+    effects = simulation.effects if isinstance(simulation.effects, str) else tuple(simulation.effects)
+    return msgspec.json.encode(scene.record.links), simulation.formulation == "nodal", effects

@@ -16,6 +16,7 @@ from erls.scene.chain import Scene
 from erls.scene.read import load_chain
 from erls.simulation.simulate import simulate
 from erls.studies.compare_result import Comparison, pair
+from erls.studies.kept import KeptRuns, State, keeping
 from erls.studies.outputs import Outputs, run_outputs
 from erls.studies.pool import run_all
 from fe_import.files.toml import choose
@@ -58,6 +59,7 @@ def compare(
     overrides: Sequence[str] = (),
     progress: Callable[[float, float], None] = lambda done, total: None,
     workers: int | None = None,
+    state: State | None = None,
 ) -> Comparison:
     """Simulate a scene in several formulations and compare them.
 
@@ -72,6 +74,8 @@ def compare(
         Called with (finished runs, all).
     workers : int, optional
         Processes; as many as cores unless given.
+    state : State, optional
+        File that keeps runs as they are finished.
 
     Raises
     ------
@@ -95,7 +99,9 @@ def compare(
 
     link_models(loaded, lambda text: None)  # reduced once, before the workers would do so at once
     tasks = [(str(path), (*overrides, *COLUMNS[name].overrides), COLUMNS[name].full_model) for name in names]
-    finished, complete = run_all(_run, tasks, progress, workers)
+    with keeping(state, path, overrides) as kept:
+        known = KeptRuns(kept, [("compare", *task[1:]) for task in tasks], Outputs)
+        finished, complete = run_all(_run, tasks, progress, workers, known=known)
     outputs = {names[f.number]: f.result for f in finished if f.error is None}
     errors = {names[f.number]: f.error for f in finished if f.error is not None}
     pairs = tuple(pair(a, outputs[a], b, outputs[b]) for a, b in combinations(outputs, 2))

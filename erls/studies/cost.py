@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from erls.scene.chain import Scene
 from erls.scene.read import load_chain
 from erls.studies.cost_result import CostStudy, cheapest, pareto_front
 from erls.studies.grid import Grid, checked, ladders
+from erls.studies.kept import KeptRuns, State, keeping
 from erls.studies.ladder import CostPoint, Ladder, Norm, climb, failed, overrides_of
 from erls.studies.mode_overrides import available_modes, count_field
 from erls.studies.pool import Finished, run_all
@@ -40,6 +42,7 @@ def study_cost(
     budget: float = 240.0,
     progress: Callable[[float, float], None] = lambda done, total: None,
     workers: int | None = None,
+    state: State | None = None,
 ) -> CostStudy:
     """Run a scene in many settings and weigh error against time.
 
@@ -64,6 +67,9 @@ def study_cost(
         Called with (reference and finished ladders, all).
     workers : int, optional
         Processes; as many as cores unless given.
+    state : State, optional
+        File that keeps the reference, and settings with all their runs, as they are finished; what the budget cut short
+        is not kept.
 
     Raises
     ------
@@ -93,16 +99,18 @@ def study_cost(
     rungs = ladders(loaded, grid, tolerance, min(modes.values(), default=0), knows_second_order(loaded) is True)
     total = 1 + len(rungs)
     progress(0, total)
-    truth = _reference(loaded, reference, chosen, tolerance, budget)
-    progress(1, total)
-    fields = tuple(count_field(loaded, name) for name in modes)
-    until = begun + budget + truth.prepared_s
-    tasks = [
-        Ladder(str(path), tuple(overrides), fields, ladder, chosen, norm, truth, tolerance, budget / 10, until)
-        for ladder in rungs
-    ]
-    advance = partial(_advanced, progress, total)
-    finished, complete = run_all(climb, tasks, advance, workers, longest_last=False)
+    with keeping(state, path, overrides) as kept:
+        asked = "reference", tuple(overrides), reference, chosen, tolerance, budget
+        truth = kept.once(asked, Reference, lambda: _reference(loaded, reference, chosen, tolerance, budget))
+        progress(1, total)
+        fields = tuple(count_field(loaded, name) for name in modes)
+        until = begun + budget + truth.prepared_s
+        tasks = [
+            Ladder(str(path), tuple(overrides), fields, ladder, chosen, norm, truth, tolerance, budget / 10, until)
+            for ladder in rungs
+        ]
+        known = KeptRuns(kept, [replace(task, path="", until=0.0) for task in tasks], list[CostPoint], _whole)
+        finished, complete = run_all(climb, tasks, partial(_advanced, progress, total), workers, False, known)
     runs = tuple(run for one in finished for run in _runs(one, tasks[one.number]))
     best = cheapest(runs, tolerance - truth.error, tolerance)
     how = () if best is None else overrides_of(best.setting, fields)
@@ -118,6 +126,11 @@ def _reference(scene: Scene, kind: str, points: tuple[str, ...], tolerance: floa
         if kind or first == "tight" or isinstance(problem, SimulationError) or problem.cause == Cause.BUDGET:
             raise
         return make_reference(scene, "tight", points, tolerance, budget)
+
+
+def _whole(found: list[CostPoint]) -> bool:
+    """Whether the budget of the study left a ladder alone."""
+    return all(point.failure is None or point.failure.cause != Cause.BUDGET for point in found)
 
 
 def _advanced(progress: Callable[[float, float], None], total: int, done: float, _: float) -> None:

@@ -11,6 +11,7 @@ from erls.errors import Cause, SceneError
 from erls.scene.chain import Scene
 from erls.scene.read import load_chain
 from erls.simulation.simulate import simulate
+from erls.studies.kept import KeptRuns, State, keeping
 from erls.studies.mode_overrides import available_modes, count_field, default_counts
 from erls.studies.mode_result import ModeStudy, Point, Tolerances, changed, converged_at, remaining_kinds
 from erls.studies.outputs import Outputs, run_outputs
@@ -29,6 +30,7 @@ def study_modes(
     tolerances: Tolerances | None = None,
     progress: Callable[[float, float], None] = lambda done, total: None,
     workers: int | None = None,
+    state: State | None = None,
 ) -> ModeStudy:
     """Run a scene with rising numbers of elastic modes.
 
@@ -46,6 +48,8 @@ def study_modes(
         Called with (finished runs, all).
     workers : int, optional
         Processes; as many as cores unless given.
+    state : State, optional
+        File that keeps runs as they are finished.
 
     Returns
     -------
@@ -83,7 +87,9 @@ def study_modes(
             )
     fields = [count_field(loaded, name) for name in limits]
     tasks = [(str(path), (*overrides, *(f"{field}={count}" for field in fields))) for count in chosen]
-    finished, complete = run_all(_run, tasks, progress, workers)
+    with keeping(state, path, overrides) as kept:
+        known = KeptRuns(kept, [("modes", changes) for _, changes in tasks], Outputs)
+        finished, complete = run_all(_run, tasks, progress, workers, known=known)
     limit = tolerances or Tolerances()
     points: list[Point] = []
     for one in finished:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from erls.errors import Cause, SceneError
 from erls.parallel.crew import Crew, reported
@@ -26,12 +26,23 @@ class Finished:
     error: ReportedError | None
 
 
+class Known(Protocol):
+    """Results of tasks that outlast a program."""
+
+    def found(self) -> list[Finished]:
+        """Those from before."""
+
+    def keep(self, one: Finished) -> None:
+        """One of now."""
+
+
 def run_all(
     work: Callable[[A], R],
     tasks: Sequence[A],
     progress: Callable[[float, float], None] = lambda done, total: None,
     workers: int | None = None,
     longest_last: bool = True,
+    known: Known | None = None,
 ) -> tuple[list[Finished], bool]:
     """Results of ``work`` for every task, in the order of the tasks.
 
@@ -46,6 +57,8 @@ def run_all(
         Processes (`erls.parallel.crew`); as many as cores unless given. One runs in this process.
     longest_last : bool
         Whether the last tasks take longest, so that several processes start with them.
+    known : Known, optional
+        Results from before, which are not computed again, and where those of now go.
 
     Returns
     -------
@@ -58,10 +71,14 @@ def run_all(
     SceneError
         ``workers`` is not positive.
     """
-    finished: list[Finished] = []
+    finished = [] if known is None else known.found()
+    there = {one.number for one in finished}
+    left = [number for number in range(len(tasks)) if number not in there]
     try:
-        for one in each(work, tasks, workers, longest_last):
-            finished.append(one)
+        for done in each(work, [tasks[number] for number in left], workers, longest_last):
+            finished.append(one := replace(done, number=left[done.number]))
+            if known is not None:
+                known.keep(one)
             progress(len(finished), len(tasks))
     except KeyboardInterrupt:
         return sorted(finished, key=lambda f: f.number), False

@@ -42,6 +42,27 @@ def test_variants_are_the_runs_one_by_one() -> None:
     assert runs[1].formulation.mechanism.links[0].model is runs[0].formulation.mechanism.links[0].model  # type: ignore[union-attr]
 
 
+def test_a_variant_without_an_effect_leaves_the_links_of_others_alone() -> None:
+    """Without flexibility a link has no modes; the next variant, whose links are told the same, has them again."""
+    short = "simulation.duration=0.002"
+    runs = erls.simulate_many(TALL, [[short, 'simulation.effects=["gravity"]'], [short], [short]], workers=1)
+    modes = [run.formulation.mechanism.links[0].elastic_modes for run in runs]  # type: ignore[union-attr]
+    assert modes == [0, 18, 18]
+    np.testing.assert_array_equal(runs[2].solution.y, runs[1].solution.y)  # type: ignore[union-attr]
+
+
+def test_links_that_are_the_same_are_shared_and_others_are_not() -> None:
+    """Gravity leaves a link what it is, a payload does not; numbers are those without sharing, to the bit."""
+    common = ["simulation.duration=0.02", 'payloads=[{point="tip", mass=0.1}]']
+    changes = [[], ["gravity=[0.0, 0.0, -5.0]"], ["payloads.0.mass=0.2"]]
+    runs = erls.simulate_many(TALL, [common + change for change in changes], workers=1)
+    first, *others = (run.formulation.mechanism.links[0] for run in runs)  # type: ignore[union-attr]
+    assert [other is first for other in others] == [True, False]
+    for run, change in zip(runs, changes, strict=True):
+        alone = erls.simulate(erls.load_scene(TALL, common + change), verdict=False)
+        np.testing.assert_array_equal(run.solution.y, alone.solution.y)  # type: ignore[union-attr]
+
+
 @pytest.mark.parametrize(
     ("scene", "variants"),
     [

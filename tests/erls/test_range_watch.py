@@ -44,12 +44,32 @@ def test_estimate_against_known_errors(monkeypatch: pytest.MonkeyPatch, scene: s
     monkeypatch.setattr("erls.mechanism.links.link_second_order", lambda link: None)
     for link in run.formulation.mechanism.links:
         vars(link).pop("second_order", None)
+        vars(link).pop("_known")
     assert link_errors(run).total == estimate
     monkeypatch.setattr("erls.run.deflection.lines._of_beams", lambda link, nodes: None)
+    for link in run.formulation.mechanism.links:
+        vars(link).pop("_known")
     found = link_errors(run)
     assert all(one.assumed for one in found.links.values())
     assert found.total is not None
     assert estimate / 3 < found.total < 3 * estimate
+
+
+def test_a_bound_spares_looking_at_every_node() -> None:
+    """Second-order displacements, of few nodes by forms of their own, of many by the field, are the same, and no
+    larger than the bound, at coordinates far beyond the range, too.
+    """
+    scene = erls.load_scene(DATA / "l_shape/steel_tall.toml", ["simulation.duration=0.01"])
+    (link,) = erls.simulate(scene, verdict=False).formulation.mechanism.links
+    data, shapes = link.second_order, link.model.translation_shapes
+    assert data is not None
+    q = 0.1 * np.random.default_rng(0).normal(size=(20, link.model.modes))
+    nodes = np.arange(len(link.model.nodes))
+    every = data.displacements(nodes, q)
+    few = data.displacements(nodes[-2:], q)
+    np.testing.assert_allclose(few, every[:, -2:], atol=1e-13 * abs(every).max())
+    moved = np.linalg.norm((q @ (shapes - shapes[link.inboard.node]).swapaxes(1, 2)).swapaxes(0, 1), axis=2).max(axis=1)
+    assert (np.linalg.norm(every, axis=2).max(axis=1) <= data.bound(q, moved)).all()
 
 
 def column(folder: Path, **frame: object) -> Link:

@@ -24,7 +24,7 @@ import erls
 from erls.cli.main import main
 from erls.errors import Cause, SceneError, SimulationError
 from erls.files.results import claim
-from erls.report.sweep_table import write_sweep_table
+from erls.report.sweep_table import sweep_text, write_sweep_table
 from erls.run.record import Run
 from erls.studies.sweep import sweep as engine
 from erls.studies.sweep.points import SAMPLERS, Grid, points_of, sampled
@@ -385,6 +385,36 @@ def test_runs_state_their_error_when_asked() -> None:
     assert isinstance(run, Run)
     assert run.accuracy is not None
     assert stated == run.accuracy.total
+
+
+def test_one_of_many_points_is_looked_at_for_bending() -> None:
+    """By its number, whoever runs it. The link is soft, so that every run is off by millimetres."""
+    soft = ("simulation.duration=0.1", "links.l.model.materials.steel.youngs_modulus=1e9", "effects=linear")
+    scene = SCENE.with_name("steel_flat.toml")
+    grid = {"gravity.2": np.linspace(-9.81, -9.0, 18)}
+    found = erls.sweep(scene, grid, ["knots"], overrides=(*soft, "gravity=[0.0, 0.0, 0.0]"), workers=1)
+    warned = [row.number for row in found.rows if any("expect errors of about" in text for text in row.warnings)]
+    assert warned == [0, 16]
+    assert "one of 16 points" in sweep_text(found)
+
+
+def test_a_scene_that_has_changed_is_read_again(tmp_path: Path) -> None:
+    """Links are shared by what their files hold, not by how they are called."""
+    for folder in ("links", "."):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        for file in (SCENE.parent / folder).glob("steel_tall.toml"):
+            (tmp_path / folder / file.name).write_bytes(file.read_bytes())
+    scene, link = tmp_path / "steel_tall.toml", tmp_path / "links/steel_tall.toml"
+
+    def numbers() -> float:
+        return float(erls.sweep(scene, {ANGLE: (0.0,)}, ["tip.z@end"], overrides=SHORT, workers=1).numbers[0, 0])
+
+    before = numbers()
+    link.write_text(link.read_text(encoding="utf-8").replace("7800.0", "3900.0"), encoding="utf-8")
+    light = numbers()
+    text = scene.read_text(encoding="utf-8") + '\n[[payloads]]\npoint = "tip"\nmass = 1.0\n'
+    scene.write_text(text, encoding="utf-8")
+    assert len({before, light, numbers()}) == 3
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +12,11 @@ from erls.equations.erls import records as own
 from erls.equations.serial import pack, segments
 from erls.equations.serial.condensed import condensed as elimination_memory
 from erls.equations.serial.contacts import put_contacts
-from erls.equations.serial.decoupled_modes import MIXING, decoupled_modes
+from erls.equations.serial.decoupled_modes import MIXING, DecoupledModes, decoupled_modes
 from erls.equations.serial.ends import end_state
 from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
-from erls.equations.serial.modal_inertia_kernels import warp_record, warp_state
+from erls.equations.serial.modal_inertia_kernels import Warp, warp_record, warp_state
 from erls.equations.serial.nodes import RESTING, Node, node_record, node_state
 from erls.equations.serial.records import Serial
 from erls.maths.records import Memory
@@ -71,6 +71,15 @@ class Shapes:
 
 def combined_modes(link: Link, joint: Joint) -> Array:
     """(m, m) the modes [ρ Ψ] of a link over its own, with Ψ leaving its inboard interface where it is."""
+    return link.once(("combined modes", _key(joint.after)), lambda: _combined_modes(link, joint))
+
+
+def _key(*arrays: Array) -> tuple[object, ...]:
+    """What tells arrays apart."""
+    return tuple((each.shape, each.tobytes()) for each in arrays)
+
+
+def _combined_modes(link: Link, joint: Joint) -> Array:
     interface = link.interface_shape(link.inboard, inverse(joint.after))
     stay = -np.linalg.solve(interface[:, :6], interface[:, 6:])
     return np.hstack([link.invariants.rigid, np.vstack([stay, np.eye(link.elastic_modes)])])
@@ -93,6 +102,13 @@ def _link(
 ) -> own.Link:
     """Constants of link ``number``; ``vectors`` are the decoupled coordinates of all."""
     before = vectors[parent] if parent >= 0 else np.zeros((0, 0))
+    given = modes, axes, out, vectors[number], before
+    return link.once(("constants", parent, _key(*given)), lambda: _constants(link, *given, parent))
+
+
+def _constants(
+    link: Link, modes: Array, axes: Array, out: Array, own_vectors: Array, before: Array, parent: int
+) -> own.Link:
     mass = modes.T @ link.invariants.m @ modes
     x = modes.T @ np.einsum("ca,aij->cij", axes, link.invariants.X) @ modes
     z = np.einsum("ca,db,abij->cdij", axes, axes, link.invariants.Z)
@@ -105,7 +121,7 @@ def _link(
         x=x.transpose(0, 2, 1),
         z=np.array([modes.T @ ((z[i, j] + z[j, i]) / 2) @ modes for i, j in pairs]).reshape(len(pairs), n, n),
         out=out.T,
-        rigid_decoupled=mass[:6, 6:] @ vectors[number],
+        rigid_decoupled=mass[:6, 6:] @ own_vectors,
         out_decoupled=(out @ before).T,
     )
 
@@ -117,7 +133,11 @@ def _columns(matrices: Array) -> Array:
 
 
 def _bend(mechanism: Mechanism, k: int, basis: Array, axes: Array) -> own.Bend:
-    link = mechanism.links[k]
+    link, inertia = mechanism.links[k], "modal_inertia" in mechanism.effects
+    return link.once(("bend", inertia, _key(basis, axes)), lambda: _bend_of(link, basis, axes, inertia))
+
+
+def _bend_of(link: Link, basis: Array, axes: Array, inertia: bool) -> own.Bend:
     curved = _curved(link)
     rows, odd, e = np.zeros((6 + 3 * len(axes), 0, 0)), np.zeros((3, 0, 0)), basis.shape[1]
     if curved:
@@ -128,7 +148,7 @@ def _bend(mechanism: Mechanism, k: int, basis: Array, axes: Array) -> own.Bend:
         odd = (momenta - momenta.transpose(0, 2, 1))[3:]
     return own.Bend(
         curved=int(curved),
-        warped=int(curved and "modal_inertia" in mechanism.effects),
+        warped=int(curved and inertia),
         axes=axes,
         rows=_columns(rows),
         odd=_columns(odd),
@@ -158,6 +178,13 @@ def _seat(mechanism: Mechanism, k: int, found: Sequence[Shapes]) -> Node:
     return node_record(joint.parent, link, found[joint.parent].modes[:, 6:], joint.seat.node, _curved(link))
 
 
+def _warp(link: Link, effects: Set[str], basis: Array, bend: own.Bend) -> Warp:
+    def find() -> Warp:
+        return warp_record(modal_inertia(link, effects, basis) if bend.warped else None)
+
+    return link.once(("warp", bend.warped, _key(basis)), find)
+
+
 def _bends(
     mechanism: Mechanism, found: Sequence[Shapes], axes: Sequence[Array], constants: Memory, scratch: Memory
 ) -> dict[str, int]:
@@ -166,10 +193,7 @@ def _bends(
     modes = [link.elastic_modes for link in links]
     bends = [_bend(mechanism, k, found[k].modes[:, 6:], axes[k]) for k in count]
     seats = [_seat(mechanism, k, found) for k in count]
-    warps = [
-        warp_record(modal_inertia(link, mechanism.effects, found[k].modes[:, 6:]) if bends[k].warped else None)
-        for k, link in enumerate(links)
-    ]
+    warps = [_warp(link, mechanism.effects, found[k].modes[:, 6:], bends[k]) for k, link in enumerate(links)]
     places["bends"] = pack.put_all(constants, bends)
     places["seats"] = pack.put_all(constants, seats)
     places["warps"] = pack.put_all(constants, warps)
@@ -182,6 +206,10 @@ def _bends(
     places["warp_states"] = pack.put_all(scratch, [warp_state(modes[k] * bends[k].warped) for k in count])
     places["changes"] = pack.put_all(scratch, [own.change(modes[k]) for k in count])
     return places
+
+
+def _decoupled(link: Link, mass: Array) -> DecoupledModes:
+    return link.once(("decoupled modes", _key(mass)), lambda: decoupled_modes(mass, link.stiffness, link.damping))
 
 
 _UNBENT = dict.fromkeys(("bends", "seats", "warps", "bend_states", "seat_states", "warp_states", "changes"), -1)
@@ -213,9 +241,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     constants, scratch, condensed = Memory(integers), Memory(integers), Memory(integers)
 
     masses = [shape.modes.T @ link.invariants.m @ shape.modes for shape, link in zip(found, links, strict=True)]
-    decoupled = [
-        decoupled_modes(mass[6:, 6:], link.stiffness, link.damping) for mass, link in zip(masses, links, strict=True)
-    ]
+    decoupled = [_decoupled(link, mass[6:, 6:]) for mass, link in zip(masses, links, strict=True)]
     joints = [
         pack.joint_record(
             constants,

@@ -108,6 +108,11 @@ def node_record(k: int, link: Link, basis: Array, node: int, bent: bool) -> Node
     bent : bool
         Whether the link has second-order displacements.
     """
+    key = "node", k, node, bent, basis.shape, basis.tobytes()
+    return link.once(key, lambda: _node_record(k, link, basis, node, bent))
+
+
+def _node_record(k: int, link: Link, basis: Array, node: int, bent: bool) -> Node:
     shapes = np.vstack(node_shape6(link.model, node)) @ basis
     second, e = np.zeros((0, 0)), basis.shape[1]
     if bent:

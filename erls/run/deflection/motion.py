@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -165,9 +166,9 @@ def bending(run: ChainRun, nodes: Sequence[tuple[int, int]]) -> BendingRun:
             asked += [load.node for load in given] + [payload.node for payload in link.payloads]
             asked += [interface.node for interface in link.model.interface_nodes]
             floating = not ends.isdisjoint(mechanism.carried(number)) and freed(mechanism, _whole(mechanism, number))
-            line = lines(link, asked)
+            held = link.once(("held lines", floating, *asked), partial(_held_lines, link, asked, floating))
             frames = seen.poses[number], seen.modal[number]
-            found[number], sums[number] = _bent((link, line, floating), frames, times, differences, seats, given)
+            found[number], sums[number] = _bent((link, held, floating), frames, times, differences, seats, given)
         else:
             sums[number] = _rigid(link, seen.poses[number], differences, seats, given)
     watched = [_watched(mechanism, seen, at, node, step) for at, node in nodes]
@@ -187,31 +188,46 @@ def _whole(mechanism: Mechanism, number: int) -> int:
     return number
 
 
+class _HeldLines(NamedTuple):
+    """Lines of a link, and per elastic coordinate, with the frame of `Bending` at rest: modal coordinates (m, e),
+    displacements and rotations of the stations (s, 3, e), and what of the roots of strain energy turns stations (r, e).
+    """
+
+    lines: Lines
+    modal: Array
+    translation: Array
+    rotation: Array
+    turning: Array
+
+
+def _held_lines(link: Link, asked: Sequence[int], floating: bool) -> _HeldLines:
+    line = lines(link, asked)
+    held = np.vstack([np.zeros((6, link.elastic_modes)), np.eye(link.elastic_modes)]) if floating else tangent(link)
+    rotation = line.rotation @ held
+    return _HeldLines(line, held, line.translation @ held, rotation, _turning(link, rotation))
+
+
 def _bent(
-    what: tuple[Link, Lines, bool],
+    what: tuple[Link, _HeldLines, bool],
     motion: tuple[Array, Array],
     times: Array,
     differences: _Differences,
     seats: list[_Seat],
     given: list[_Given],
 ) -> tuple[Bending, _Sums]:
-    (link, line, floating), (frames, q), (step, gravity) = what, motion, differences
+    (link, held, floating), (frames, q), (step, gravity) = what, motion, differences
+    line = held.lines
     k, elastic = len(frames) // 3, q[:, 6:]
     here = slice(k, 2 * k)
     _, turn = node_shape6(link.model, link.inboard.node)
-    held = np.vstack([np.zeros((6, link.elastic_modes)), np.eye(link.elastic_modes)]) if floating else tangent(link)
-    frame_turn = (q - elastic @ held.T) @ turn.T
+    frame_turn = (q - elastic @ held.modal.T) @ turn.T
     middle = frames[here, :3, :3]
     axes = middle + middle @ np.cross(np.eye(3), frame_turn[here, None])
     spin = _axial(middle, _rate(frames[:, :3, :3], step)) + _rate(frame_turn, step)
     alpha = _axial(middle, _acceleration(frames[:, :3, :3], step)) + _acceleration(frame_turn, step)
-
-    def local(shapes: Array, values: Array) -> Array:
-        return np.asarray(np.tensordot(values, shapes @ held, ([1], [2])))
-
     rate = _rate(elastic, step)
-    moved, rates = local(line.translation, elastic[here]), local(line.translation, rate)
-    places = _world(frames, line.places + np.tensordot(q, line.translation, ([1], [2])))
+    moved, rates = _shaped(elastic[here], held.translation), _shaped(rate, held.translation)
+    places = _world(frames, line.places + _shaped(q, line.translation))
     masses = line.shares * link.model.full_mass_properties.mass
     for payload in link.payloads:
         masses[line.nodes[payload.node]] += payload.mass
@@ -241,14 +257,14 @@ def _bent(
         line,
         times,
         moved,
-        local(line.rotation, elastic[here]),
+        _shaped(elastic[here], held.rotation),
         rates,
-        local(line.rotation, rate),
+        _shaped(rate, held.rotation),
         2 * cross_all(omega, rates) + cross_all(alpha[:, None], moved) + cross_all(omega, cross_all(omega, moved)),
         pulled @ axes,
         moments @ axes,
         masses,
-        _bending_energy(link, line.rotation @ held, elastic[here]),
+        _bending_energy(link, held.turning, elastic[here]),
         axes,
         at,
         carried,
@@ -257,15 +273,23 @@ def _bent(
     return bent, _Sums(force, moment, mass, centre)
 
 
-def _bending_energy(link: Link, rotation: Array, elastic: Array) -> Array:
-    """(k,) twice the least elastic energy with the turns of the stations that elastic coordinates (k, e) make by their
-    rotations (s, 3, e): that of a stretch, which no second order of displacements softens, is not in it.
-    """
-    roots = np.sqrt(link.stiffness)
-    turning = rotation.reshape(-1, link.elastic_modes) / roots
+def _shaped(values: Array, shapes: Array) -> Array:
+    """(k, s, 3) from coordinates (k, e) and shapes (s, 3, e)."""
+    return np.asarray(np.tensordot(values, shapes, ([1], [2])))
+
+
+def _turning(link: Link, rotation: Array) -> Array:
+    """(r, e) orthonormal rows: what of √K q turns stations, whose rotations are (s, 3, e)."""
+    turning = rotation.reshape(-1, link.elastic_modes) / np.sqrt(link.stiffness)
     _, sizes, rows = np.linalg.svd(turning, full_matrices=False)
-    known = rows[sizes > _TURNING * sizes.max(initial=0.0)]
-    return np.asarray(((elastic * roots @ known.T) ** 2).sum(axis=1))
+    return np.asarray(rows[sizes > _TURNING * sizes.max(initial=0.0)])
+
+
+def _bending_energy(link: Link, turning: Array, elastic: Array) -> Array:
+    """(k,) twice the least elastic energy with the turns of the stations that elastic coordinates (k, e) make: that of
+    a stretch, which no second order of displacements softens, is not in it.
+    """
+    return np.asarray(((elastic * np.sqrt(link.stiffness) @ turning.T) ** 2).sum(axis=1))
 
 
 def _rigid(link: Link, frames: Array, differences: _Differences, seats: list[_Seat], given: list[_Given]) -> _Sums:

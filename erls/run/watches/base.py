@@ -78,10 +78,11 @@ NOTHING = Finding()
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be run: a mechanism, as its scene says."""
+    """What is to be run: a mechanism, as its scene says; whether anybody asks how far off links are that bend."""
 
     scene: Scene
     mechanism: Mechanism
+    bending: bool = True
 
     @property
     def settings(self) -> Simulation:

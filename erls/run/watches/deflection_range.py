@@ -9,13 +9,18 @@ import numpy as np
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.errors import link_errors
 from erls.run.deflection.estimate import DeflectionError
-from erls.run.watches.base import NOTHING, Ended, Finding, Watch
+from erls.run.watches.base import NOTHING, Ended, Finding, Plan, Watch
 
 NOTABLE = 2e-3  # of the size of a link: errors above this make a run warn
 
 
 class DeflectionRange(Watch):
     """Looks at the deflection of links."""
+
+    @staticmethod
+    def concerns(plan: Plan) -> bool:
+        """Where somebody asks: it takes a sixth of a short run."""
+        return plan.bending
 
     def after(self, ended: Ended) -> Finding:
         """Errors of all links together, with a warning of those that matter."""

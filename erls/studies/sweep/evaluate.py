@@ -24,6 +24,10 @@ from fe_import.errors import ReportedError
 Reduction = Callable[[Run], Mapping[str, float]]
 """Numbers of a run by name, of one's own; workers import it by its name."""
 
+BENDING_EVERY = 16
+"""Of so many points the first is looked at for how far off links are that bend (`erls.run.watches.deflection_range`),
+where runs do not state their error."""
+
 _known = threading.local()
 
 
@@ -42,6 +46,8 @@ class Task:
     quantities : tuple of str, or callable
     verdict : bool
         Whether runs state their error.
+    content : str
+        What tells the files of the scene from what they were before.
     """
 
     scene: Path
@@ -50,6 +56,7 @@ class Task:
     rows: list[tuple[int, tuple[Any, ...]]]
     quantities: tuple[str, ...] | Reduction
     verdict: bool
+    content: str = ""
 
 
 def check_keys(task: Task, values: Sequence[Any]) -> None:
@@ -67,7 +74,7 @@ def check_keys(task: Task, values: Sequence[Any]) -> None:
         UNKNOWN_FIELD, BAD_REFERENCE: a key misspelt.
     """
     try:
-        scene = load_scene(task.scene, _changes(task, values))
+        scene = load_scene(task.scene, [*task.overrides, *_varied(task, values)])
         for link in scene.record.links if isinstance(scene, Scene) else ():
             if link.model and link.changes:
                 load_link(scene.folder / link.model, changes=link.changes)
@@ -81,18 +88,19 @@ def _last(key: str) -> str:
     return key.rpartition(".")[2]
 
 
-def _changes(task: Task, values: Sequence[Any]) -> list[str]:
-    return [*task.overrides, *(f"{key}={json.dumps(value)}" for key, value in zip(task.keys, values, strict=True))]
+def _varied(task: Task, values: Sequence[Any]) -> list[str]:
+    return [f"{key}={json.dumps(value)}" for key, value in zip(task.keys, values, strict=True)]
 
 
 def evaluate(task: Task) -> list[Row]:
     """Run them; what fails is a row, too."""
-    return [row_of(task, number, values, run_point(task, values)) for number, values in task.rows]
+    return [row_of(task, number, values, run_point(task, number, values)) for number, values in task.rows]
 
 
-def run_point(task: Task, values: Sequence[Any]) -> Run | ReportedError:
+def run_point(task: Task, number: int, values: Sequence[Any]) -> Run | ReportedError:
     """The run of a point, or its failure."""
-    return _variants(task.scene).run(_changes(task, values), lambda t, duration: None, task.verdict)
+    bending = number % BENDING_EVERY == 0
+    return _variants(task).run(_varied(task, values), lambda t, duration: None, task.verdict, bending)
 
 
 def numbers_of(run: Run, quantities: Sequence[str] | Reduction) -> dict[str, float]:
@@ -116,9 +124,10 @@ def row_of(task: Task, number: int, values: Sequence[Any], found: Run | Reported
     return Row(number, parameters, None, str(found.cause), str(found))
 
 
-def _variants(scene: Path) -> Variants:
+def _variants(task: Task) -> Variants:
     """One for each thread, and for the scene at hand."""
-    if getattr(_known, "scene", None) != scene:
-        _known.scene, _known.variants = scene, Variants(scene)
+    of = task.scene, task.overrides, task.content
+    if getattr(_known, "of", None) != of:
+        _known.of, _known.variants = of, Variants(task.scene, task.overrides)
     found: Variants = _known.variants
     return found

@@ -165,10 +165,10 @@ def history(run: Run, name: str, times: ArrayLike) -> Array:
     """
     base, _, part = name.rpartition(".")
     if base in run.point_names and part in ("x", "y", "z", "distance"):
-        places = run.position(base, times)
         if part != "distance":
-            return np.asarray(places[..., "xyz".index(part)])
-        return np.asarray(np.linalg.norm(places - run.position(base, run.start), axis=-1))
+            return np.asarray(run.position(base, times)[..., "xyz".index(part)])
+        places = run.position(base, [run.start, *np.asarray(times, dtype=float).tolist()])
+        return np.asarray(np.linalg.norm(places[1:] - places[0], axis=-1))
     if isinstance(run, ChainRun) and base in run.joint_names and part in _JOINT:
         values = np.asarray(getattr(run, _JOINT[part])(base, times))
         if values.ndim == 1:

@@ -15,14 +15,24 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.files.optional import optional_package
-from erls.files.output import not_writable
 from erls.files.results import claim
 from erls.maths.so3 import Array
 from erls.run.record import Run
 from erls.scene.inputs import files_of
 from erls.scene.read import load_scene
+from erls.studies.database import refuse_finished
+from erls.studies.kept import content_of
 from erls.studies.pool import each
-from erls.studies.sweep.evaluate import Reduction, Task, check_keys, evaluate, numbers_of, row_of, run_point
+from erls.studies.sweep.evaluate import (
+    BENDING_EVERY,
+    Reduction,
+    Task,
+    check_keys,
+    evaluate,
+    numbers_of,
+    row_of,
+    run_point,
+)
 from erls.studies.sweep.executors import evaluated, workers_of
 from erls.studies.sweep.points import Grid, Points, grid_of
 from erls.studies.sweep.quantities import kept_texts, quantity
@@ -57,6 +67,8 @@ class Sweep:
     integration_s, wall_s : float
         Times of all integrations that were run now, and of it all [s].
     interrupted : bool
+    bending_every : int
+        Of so many points one was looked at for how far off links are that bend.
     """
 
     scene: Path
@@ -70,6 +82,7 @@ class Sweep:
     integration_s: float
     wall_s: float
     interrupted: bool
+    bending_every: int
 
     @property
     def numbers(self) -> Array:
@@ -193,6 +206,7 @@ def sweep(
     kept = quantities if callable(quantities) else kept_texts(quantities, verdict)
     task = Task(Path(scene), tuple(overrides), asked.keys, [], kept, verdict)
     check_keys(task, asked.row(0))
+    task = replace(task, content=content_of(task.scene, task.overrides))
     about, target = _about(task, asked), None if store is None else Path(store)
     if target is not None:
         claim(target, SUFFIX, files_of(load_scene(task.scene, task.overrides)), force and not resume)
@@ -219,6 +233,7 @@ def sweep(
         integration_s=engine.integration_s,
         wall_s=time.perf_counter() - begun,
         interrupted=interrupted,
+        bending_every=1 if verdict else BENDING_EVERY,
     )
 
 
@@ -226,24 +241,19 @@ def _make_room(target: Path, force: bool) -> None:
     """Take away a store that was there, unless it holds what may have taken long."""
     if target.exists() and not force:
         with closing(Store(target)) as base:
-            held = 0 if base.empty else len(list(base.finished()))
-        if held:
-            remedy = "go on with it (--resume), name another, or replace it (--force)"
-            raise not_writable(target, f"it holds {held} finished points", remedy)
+            refuse_finished(target, 0 if base.empty else len(list(base.finished())))
     target.unlink(missing_ok=True)
 
 
 def _about(task: Task, points: Points) -> dict[str, Any]:
     """What a store is of."""
-    rows, files = hashlib.sha256(), hashlib.sha256()
+    rows = hashlib.sha256()
     for number in range(len(points)):
         rows.update(json.dumps(points.row(number)).encode())
-    for file in files_of(load_scene(task.scene, task.overrides)):
-        files.update(file.read_bytes() if file.is_file() else b"")
     own = task.quantities
     return {
         "program": package_version("erls"),
-        "scene": files.hexdigest(),
+        "scene": task.content,
         "overrides": list(task.overrides),
         "keys": list(task.keys),
         "points": rows.hexdigest(),
@@ -317,14 +327,14 @@ class _Engine:
         """Run points here until one gives numbers, which tells what there is, and how long a run takes; how many."""
         for count, number in enumerate(todo, 1):
             values = self.points.row(number)
-            run = run_point(self.task, values)
+            run = run_point(self.task, number, values)
             if isinstance(run, Run):
                 found = numbers_of(run, self.task.quantities)  # what does not exist is told before more is done
                 self.base.tell("quantities", list(found))
                 if not callable(self.task.quantities):
                     self.base.tell("units", [quantity(text).unit(run) for text in self.task.quantities])
                 begun = time.perf_counter()
-                run = run_point(self.task, values)  # with all that is compiled
+                run = run_point(self.task, number, values)  # with all that is compiled
                 self.each_s = time.perf_counter() - begun
             self._take([row_of(self.task, number, values, run)])
             if isinstance(run, Run):
