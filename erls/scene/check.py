@@ -163,9 +163,9 @@ def _check_contact(contact: Contact, scene: SceneRecord, place: str) -> None:
 
 
 def _check_feed_forward(acting: Acting, place: str) -> None:
-    if getattr(acting.drive, "feed_forward", False):
+    if getattr(acting.drive, "feed_forward", False) is True:
         message = "the inverse dynamics of the tree does not know its loops"
-        raise bad(f"{place}.drive.feed_forward", message, True, "set it to false")
+        raise bad(f"{place}.drive.feed_forward", message, True, "set it to false or 'elastic'")
 
 
 def _check_place(scene: SceneRecord, k: int, place: str) -> None:

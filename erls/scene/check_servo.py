@@ -30,6 +30,7 @@ def check_servo(scene: SceneRecord, file: str) -> None:
     for k, servo in enumerate(scene.servo):
         _check_one(servo, points, joints, f"{file}: servo[{k}]")
     positive(f"{file}: inverse.bandwidth", scene.inverse.bandwidth)
+    positive(f"{file}: inverse.step", scene.inverse.step)
     for k, name in enumerate(scene.inverse.drives):
         place = f"{file}: inverse.drives[{k}]"
         choose(name, joints, place, SceneError)
