@@ -1,6 +1,7 @@
 """Figures of inverse dynamics: what forward runs miss, order of the step, and cost over steps and modes.
 
-``python benchmarks/inverse.py [figures] [cost] [shooting]``; processor time, so that other work on the machine counts less.
+``python benchmarks/inverse.py [figures] [cost] [shooting]``; processor time, so that other work on the machine counts
+less.
 """
 
 from __future__ import annotations
@@ -67,7 +68,8 @@ def shooting() -> None:
             found[method] = np.stack(list(erls.invert(scene, method=method).efforts.values()))
         apart, size = (float(np.abs(x).max()) for x in (found["shooting"] - found["collocation"], found["collocation"]))
         work = time.process_time() - begun
-        print(f"{name}, {', '.join(changes)}: {apart:.1e} N m of {size:.4g}, {apart / size:.1e}; {work:.0f} s", flush=True)
+        what = f"{name}, {', '.join(changes)}"
+        print(f"{what}: {apart:.1e} N m of {size:.4g}, {apart / size:.1e}; {work:.0f} s", flush=True)
 
 
 def spent(*changes: str) -> tuple[float, int]:
