@@ -1,6 +1,7 @@
 """Figures of inverse dynamics: what forward runs miss, order of the step, and cost over steps and modes.
 
-``python benchmarks/inverse.py [figures] [cost]``; processor time, so that other work on the machine counts less.
+``python benchmarks/inverse.py [figures] [cost] [shooting]``; processor time, so that other work on the machine counts
+less.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import erls
-from erls.inverse.confirm import confirmed
+from erls.tracking.confirm import confirmed
 
 DATA = Path(__file__).parents[1] / "data"
 ARM, PLANAR = (DATA / "inverse" / f"{name}.toml" for name in ("arm", "two_link_planar"))
@@ -51,6 +52,26 @@ def figures() -> None:
             print(f"{name}, {formulation}: {errors}; {peaks}; {found.pre_actuation():.3f}; {spent:.1f}", flush=True)
 
 
+SHOT: dict[str, tuple[str, ...]] = {
+    "passive_arm": (),
+    "arm": ("simulation.step=0.002", "inverse.bandwidth=60.0"),
+    "three_legs": ("simulation.step=0.004",),
+}
+
+
+def shooting() -> None:
+    """Print by how much efforts of multiple shooting differ from those of collocation, in the same steps."""
+    for name, changes in SHOT.items():
+        scene = erls.load_scene(DATA / "inverse" / f"{name}.toml", changes)
+        begun, found = time.process_time(), dict[str, Any]()
+        for method in ("collocation", "shooting"):
+            found[method] = np.stack(list(erls.invert(scene, method=method).efforts.values()))
+        apart, size = (float(np.abs(x).max()) for x in (found["shooting"] - found["collocation"], found["collocation"]))
+        work = time.process_time() - begun
+        what = f"{name}, {', '.join(changes)}"
+        print(f"{what}: {apart:.1e} N m of {size:.4g}, {apart / size:.1e}; {work:.0f} s", flush=True)
+
+
 def spent(*changes: str) -> tuple[float, int]:
     """Processor time of an iteration [s], and coordinates; the second of two inversions."""
     for _ in range(2):
@@ -73,6 +94,6 @@ def cost() -> None:
 
 
 if __name__ == "__main__":
-    chosen = sys.argv[1:] or ["figures", "cost"]
+    chosen = sys.argv[1:] or ["figures", "cost", "shooting"]
     for part in chosen:
-        {"figures": figures, "cost": cost}[part]()
+        {"figures": figures, "cost": cost, "shooting": shooting}[part]()

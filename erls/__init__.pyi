@@ -18,6 +18,7 @@ from .simulation.batch import simulate_many as simulate_many
 from .simulation.simulate import simulate as simulate
 from .simulation.stepper import stepper as stepper
 from .studies.sweep.sweep import sweep as sweep
+from .tracking.plan import plan as plan
 from .view import show as show
 from .view import write_view as write_view
 

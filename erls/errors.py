@@ -41,6 +41,7 @@ class Cause(enum.StrEnum):
     TOO_FEW_DRIVES = "fewer drives than conditions"
     UNSTABLE_INVERSE = "internal dynamics that grow"
     UNDAMPED_INVERSE = "internal dynamics that neither grow nor decay"
+    NO_PLAN = "bounds that no motion keeps"
     BEYOND_TOLERANCE = "estimated error beyond the tolerance"
     INTERRUPTED = "interrupted"
     BUDGET = "time budget used up"
@@ -58,6 +59,7 @@ _NUMERICAL = {
     Cause.RUNAWAY,
     Cause.OUT_OF_REACH,
     Cause.SINGULAR_SERVO,
+    Cause.NO_PLAN,
     Cause.OUT_OF_MEMORY,
     Cause.NO_PICTURE,
 }

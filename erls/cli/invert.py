@@ -14,9 +14,9 @@ from erls.cli.terminal import Force, Json, Output, Progress, print_json, tell
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from erls.inverse.confirm import Confirmation
-    from erls.inverse.correct import Corrected
     from erls.inverse.inversion import Inversion
+    from erls.tracking.confirm import Confirmation
+    from erls.tracking.correct import Corrected
 
 _NONE = "none"
 _FALL = 12.0  # decades by which changes of an iteration fall
@@ -64,10 +64,10 @@ def invert(
     """
     from erls.equations.registry import FORMULATIONS
     from erls.errors import SceneError
-    from erls.inverse.files import summary, write_columns
     from erls.inverse.invert import invert as inverted
     from erls.report.inverse_page import inversion_page, inversion_text
     from erls.scene.read import load_chain
+    from erls.tracking.files import summary, write_columns
     from fe_import.files.toml import choose
 
     check_output(output, [scene], set_ or [], (".csv", ".json", ".html"), force)
@@ -108,7 +108,7 @@ def invert(
 
 def _corrected(found: Inversion, elastic: Confirmation) -> Corrected:
     """Told as it goes."""
-    from erls.inverse.correct import corrected
+    from erls.tracking.correct import corrected
 
     goal = found.problem.scene.record.simulation.tolerance
     tell(f"forward run: misses {max(elastic.error, *elastic.largest):.3g}")
@@ -136,7 +136,7 @@ def _whole(found: Inversion) -> bool:
 
 def _confirmed(found: Inversion, formulation: str) -> tuple[Confirmation, Confirmation]:
     """Forward runs with the drives, and with those of rigid links."""
-    from erls.inverse.confirm import confirmed
+    from erls.tracking.confirm import confirmed
 
     runs = []
     for efforts, start, what in (

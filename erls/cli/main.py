@@ -25,6 +25,7 @@ from erls.cli.importing import import_
 from erls.cli.invert import invert
 from erls.cli.linearize import linearize
 from erls.cli.optimize import optimize
+from erls.cli.plan import plan
 from erls.cli.reduce import reduce
 from erls.cli.simulate import simulate
 from erls.cli.starting import examples, new, schema
@@ -49,7 +50,7 @@ app = App(
 
 _UNLOADED = re.compile("shared object|cannot allocate memory", re.IGNORECASE)
 
-_RUN = (reduce, export, simulate, info, view, compare, effects, linearize, optimize, invert, identify)
+_RUN = (reduce, export, simulate, info, view, compare, effects, linearize, optimize, invert, plan, identify)
 _BEGIN = (new, schema)
 for command in (*_RUN, *_BEGIN):
     app.command(command)

@@ -45,6 +45,7 @@ _BEGINS = {
 _TABLE = re.compile(
     rb'"?(t \[s\]|load \[1\]),.*(energy\.\w+ \[J\]|: energy \[J\])"?\r?\n'  # of a run, or of several
     rb'|t \[s\],"?[^\r\n]*\.inverse_effort \[N( m)?\]'  # of an inversion
+    rb'|t \[s\],"?[^\r\n]*\.planned_effort \[N( m)?\]'  # of a planned motion
     rb'|phase \[1\],(.*\.z \[m\]"?)?\r?\n'  # of a mode
     rb"|formulation,elastic_modes,integrator,effects,"
     rb"|scene,formulation,deflection \[m\],"

@@ -16,9 +16,9 @@ import scipy.linalg as la
 
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.series import mass_series
+from erls.equations.tangents import Knots, Tangents, difference
 from erls.errors import Cause, SimulationError
 from erls.maths.so3 import Array
-from erls.sensitivity.tangents import Knots, Tangents, difference
 from fe_import.model import IntArray
 
 _FOLLOWS = 1e-6  # of the largest: a coordinate that moves conditions by less, beside those before it, does not follow

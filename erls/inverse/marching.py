@@ -23,6 +23,7 @@ _TOLERANCE = 1e-12  # of the scales: change that ends the iterations of a step
 _SLOW = 0.1  # ratio of changes beyond which tangents are made anew
 _SHOTS = 25
 _GROWTH = 30.0  # over a stretch: beyond it, errors of nodes carry stretches out of what is nearly linear
+_LONGEST = 20  # steps of a stretch: those beside each other are taken together, long ones one by one
 _AWAY = 10.0  # of a link: displacement at which nothing is left to integrate
 
 
@@ -196,7 +197,7 @@ def _stretch(tangent: Array, h: float, most: int) -> int:
     """Steps within which nothing grows by more than `_GROWTH`."""
     half = h / 2 * np.linalg.eigvals(tangent)
     growth = float(np.abs((1 + half) / np.where(half == 1, np.inf, 1 - half)).max(initial=1.0))
-    return int(min(max(math.log(_GROWTH) / math.log(max(growth, 1 + 1e-12)), 1.0), most))
+    return int(min(max(math.log(_GROWTH) / math.log(max(growth, 1 + 1e-12)), 1.0), most, _LONGEST))
 
 
 def _flown(internal: Internal, h: float, nodes: Array, guess: Array, starts: IntArray, scales: Array) -> _Flight:

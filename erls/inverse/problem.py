@@ -13,6 +13,7 @@ from erls.errors import Cause, SceneError
 from erls.inverse.closing import Closing
 from erls.inverse.conditions import Conditions, conditions_of
 from erls.inverse.frames import with_ends
+from erls.inverse.opened import opened
 from erls.inverse.servoed import Servoed
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -82,6 +83,7 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     SceneError, FEImportError
         Bad input, or a scene that cannot be inverted; TOO_FEW_DRIVES.
     """
+    scene = opened(scene)
     built = build_mechanism(scene, tell)
     mechanism = built.mechanism
     _refuse(scene, mechanism)
@@ -91,24 +93,30 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     free = _with_drives(mechanism, {k: Drive() for k in drives.tolist()})
     flexible = _servoed(scene, free, conditions, drives)
     stiff = _rigid(scene, with_rigid(free, {link.name for link in mechanism.links}), conditions, drives)
-    settings = scene.record.simulation
-    count = round(settings.duration / (settings.step or STEP))
-    if count < _FEWEST:
-        message, remedy = "too few steps for the duration", f"give {settings.duration / _FEWEST:.6g} s or less"
-        where = f"{scene.path}: simulation.step"
-        raise SceneError(Cause.BAD_FIELD, message, where=where, value=settings.step, remedy=remedy)
-    if count * flexible.tree.size**2 > _MOST:
-        raise SceneError(
-            Cause.BAD_FIELD,
-            f"too many steps for {flexible.tree.size} coordinates",
-            where=f"{scene.path}: simulation.step",
-            value=count,
-            limit=_MOST // flexible.tree.size**2,
-            remedy="give a larger step, a shorter duration, or links with fewer modes (elastic_modes)",
-        )
-    t = np.linspace(0.0, settings.duration, count + 1)
+    t = _knots(scene, flexible.tree.size)
     names = tuple(mechanism.joints[k].name for k in drives.tolist())
     return Problem(scene, mechanism, conditions, names, flexible, stiff, t, built.warnings)
+
+
+def _knots(scene: Scene, size: int) -> Array:
+    """(k,) times of the knots, of as many coordinates.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: too few, or more than there is memory for.
+    """
+    settings, own = scene.record.simulation, scene.record.inverse.step
+    field, step = ("simulation.step", settings.step) if own is None else ("inverse.step", own)
+    count, where = round(settings.duration / (step or STEP)), f"{scene.path}: {field}"
+    if count < _FEWEST:
+        message, remedy = "too few steps for the duration", f"give {settings.duration / _FEWEST:.6g} s or less"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=step, remedy=remedy)
+    if count * size**2 > _MOST:
+        message = f"too many steps for {size} coordinates"
+        remedy = "give a larger step, a shorter duration, or links with fewer modes (elastic_modes)"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=count, limit=_MOST // size**2, remedy=remedy)
+    return np.linspace(0.0, settings.duration, count + 1)
 
 
 def unknown_drives(scene: Scene, mechanism: Mechanism) -> IntArray:

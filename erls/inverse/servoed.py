@@ -8,7 +8,7 @@ which are the elastic coordinates and the joints that nothing drives:
 with R the forces out of balance and u the efforts. All three levels of the conditions hold at every state, so that no
 spurious alternating motion can arise as it does where they are held by their position alone. Places and rates follow
 from z and ż at once; accelerations and efforts are left to whoever solves, with `missing` and its derivatives, those of
-R by `erls.sensitivity.tangents`, those of the kinematics by differences.
+R by `erls.equations.tangents`, those of the kinematics by differences.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
 from erls.equations.serial.formulation import SerialFormulation
 from erls.equations.series import residual_series
 from erls.equations.system import metre_scales
+from erls.equations.tangents import Evaluation, Knots, Tangents, steps_of
 from erls.errors import Cause, SimulationError
 from erls.inverse.closing import Closing, following
 from erls.inverse.conditions import Conditions, Demand, Held, Joints
 from erls.inverse.frames import point_motions
 from erls.maths.so3 import Array
-from erls.sensitivity.tangents import Evaluation, Knots, Tangents, steps_of
 from fe_import.model import IntArray
 
 _ITERATIONS = 40

@@ -24,6 +24,9 @@ from erls.mechanism.motions import Motion
 from erls.mechanism.place import Place
 from erls.mechanism.profiles import Load, build_loads
 
+ELASTIC = "elastic"
+"""Feed-forward by an inversion of the scene."""
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -145,26 +148,42 @@ class PDDrive(_Record, frozen=True, tag="pd"):
 
     Attributes
     ----------
-    motion : Motion
-        Shape of the wanted coordinate.
+    motion : Motion, optional
+        Shape of the wanted coordinate; required unless ``feed_forward`` is ``elastic``, which finds it.
     proportional_gain : float
         Torque per deviation [N m/rad or N/m].
     derivative_gain : float
         Torque per deviation of the rate [N m s/rad or N s/m].
-    feed_forward : bool
-        Add the torque that the rigid chain would need (inverse dynamics).
+    feed_forward : bool or str
+        true: add the torque that the rigid chain would need for the motion. ``elastic``: add the torque that the
+        mechanism with its links as they bend needs for what ``[[servo]]`` demands, and want the coordinate that it
+        has meanwhile; `erls simulate` finds both before it runs.
+    profiles : list of Load
+        Torques over time that are added; they add up.
     torque_limit : float, optional
         Largest total torque either way [N m or N]; none unless given.
     """
 
-    motion: Motion
     proportional_gain: float
     derivative_gain: float
-    feed_forward: bool = False
+    motion: Motion | None = None
+    feed_forward: bool | str = False
+    profiles: tuple[Load, ...] = ()
     torque_limit: float | None = None
+
+    @property
+    def elastic(self) -> bool:
+        """Whether torque and motion are to be found by an inversion of the scene."""
+        return self.feed_forward == ELASTIC
 
     def build(self, place: Place) -> Drive:
         """Check and build."""
+        if isinstance(self.feed_forward, str):
+            place.choice("feed_forward", self.feed_forward, (True, False, ELASTIC))
+            message, remedy = "is found only for joints of a chain that is simulated", "use erls simulate, or true"
+            raise place.error("feed_forward", message, self.feed_forward, remedy=remedy)
+        if self.motion is None:
+            raise place.error("motion", "missing", remedy="say how the joint shall move")
         limit = math.inf if self.torque_limit is None else place.positive("torque_limit", self.torque_limit)
         return Drive(
             "pd",
@@ -173,6 +192,7 @@ class PDDrive(_Record, frozen=True, tag="pd"):
                 place.not_negative("proportional_gain", self.proportional_gain),
                 place.not_negative("derivative_gain", self.derivative_gain),
             ),
+            load=build_loads(self.profiles, place, "profiles") if self.profiles else None,
             feed_forward=self.feed_forward,
             torque_limit=limit,
         )

@@ -20,7 +20,7 @@ from erls.mechanism.place import Place
 from erls.mechanism.profiles import ProfileRecord
 from erls.mechanism.tables import samples
 
-_REST_TO_REST: dict[int, tuple[float, ...]] = {
+REST_TO_REST: dict[int, tuple[float, ...]] = {
     3: (0.0, 0.0, 3.0, -2.0),
     5: (0.0, 0.0, 0.0, 10.0, -15.0, 6.0),
     7: (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0),
@@ -81,7 +81,7 @@ class Waypoints(ProfileRecord, frozen=True, tag="waypoints"):
 
     def build(self, place: Place) -> Curve:
         """Check and build."""
-        degree = place.choice("degree", self.degree, tuple(_REST_TO_REST))
+        degree = place.choice("degree", self.degree, tuple(REST_TO_REST))
         values = place.quantities("values", self.values, self.values_deg)
         return _legs(*samples(place, None, 1, self.times, values, 2), degree)
 
@@ -176,8 +176,8 @@ class SpinUp(ProfileRecord, frozen=True, tag="spin_up"):
             pieces = [[low], [low, 0.0, rate / (2 * span)], [low + rate * span / 2, rate]]
             wave = Harmonic(tuple(knots), swing, omega, math.pi / 2, 0.0, before=swing, after=swing)
             return Sum((piecewise(knots, pieces), wave))
-        degree = place.choice("degree", 7 if self.degree is None else self.degree, tuple(_REST_TO_REST))
-        shape = np.array(_REST_TO_REST[degree])
+        degree = place.choice("degree", 7 if self.degree is None else self.degree, tuple(REST_TO_REST))
+        shape = np.array(REST_TO_REST[degree])
         powers = np.arange(1, len(shape) + 1)
         ramp = np.concatenate([[first], rate * shape / powers / span ** (powers - 1)])
         return piecewise(knots, [[first], ramp, [first + rate * span / 2, rate]])
@@ -233,11 +233,11 @@ def rest_to_rest(place: Place, start: float, duration: float, first: float, last
     """One motion from rest to rest, its fields ``start``, ``duration`` and ``degree`` checked."""
     begun = place.time("start", start)
     times = np.array([begun, begun + place.span("duration", duration)])
-    return _legs(times, np.array([first, last]), place.choice("degree", degree, tuple(_REST_TO_REST)))
+    return _legs(times, np.array([first, last]), place.choice("degree", degree, tuple(REST_TO_REST)))
 
 
 def _legs(times: NDArray[np.float64], values: NDArray[np.float64], degree: int) -> Piecewise:
-    shape = np.array(_REST_TO_REST[degree])
+    shape = np.array(REST_TO_REST[degree])
     pieces: list[ArrayLike] = [values[0]]
     for span, first, last in zip(np.diff(times), values, values[1:], strict=False):
         row = (last - first) * shape / span ** np.arange(len(shape))

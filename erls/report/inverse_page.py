@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from erls.inverse.confirm import Confirmation
 from erls.inverse.inversion import Inversion
 from erls.inverse.nature import shown
 from erls.report.html import Curve, Plot, figure, heading, page, paragraph
 from erls.report.html import table as html_table
 from erls.report.tables import table
+from erls.tracking.confirm import Confirmation
 
 _ZEROS = 6  # shown, of those above the real axis
 _HEAD = ("drive", "peak effort", "of rigid links", "unit")

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace as replaced
 
 from erls.errors import SceneError
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array, fixed_axes
 from erls.mechanism.compound_joints import fixed_joint
 from erls.mechanism.dh import DHRow, split
-from erls.mechanism.drives import build_drive
+from erls.mechanism.drives import PDDrive, build_drive
 from erls.mechanism.joint_types import JOINT_TYPES, Freedom
 from erls.mechanism.joints import FRICTION_LAWS, Joint, JointForces
 from erls.mechanism.place import Place
 from erls.scene.build_contacts import build_stops
 from erls.scene.chain import Scene, SceneRecord
-from erls.scene.joints import Coordinate, Friction, Loop
+from erls.scene.joints import Acting, Coordinate, Friction, Loop
 from erls.scene.joints import Joint as JointRecord
 from erls.scene.records import Pose
 from fe_import.files.toml import choose
@@ -40,6 +42,33 @@ def joint_coordinates(joint: JointRecord) -> dict[str, Freedom]:
     """The coordinates of a joint by the names that reports give them."""
     freedoms = JOINT_TYPES[joint.type].given(joint).freedoms or ()
     return {f"{joint.name}/{freedom.name}" if freedom.name else joint.name: freedom for freedom in freedoms}
+
+
+def with_coordinates(joint: JointRecord, change: Callable[[str, Acting], Acting]) -> JointRecord:
+    """A joint with what acts along each of its coordinates changed, by the names of `joint_coordinates`."""
+    parts = dict(joint.coordinates)
+    for name, freedom in joint_coordinates(joint).items():
+        own: Acting = parts.get(freedom.name, Coordinate()) if freedom.name else joint
+        changed = change(name, own)
+        if isinstance(changed, JointRecord):
+            joint = changed
+        elif isinstance(changed, Coordinate) and changed is not own:
+            parts[freedom.name] = changed
+    return replaced(joint, coordinates=parts)
+
+
+def led_by_inversion(record: SceneRecord) -> tuple[str, ...]:
+    """Coordinates of joints whose feed-forward an inversion finds."""
+    names: list[str] = []
+
+    def look(name: str, acting: Acting) -> Acting:
+        if isinstance(acting.drive, PDDrive) and acting.drive.elastic:
+            names.append(name)
+        return acting
+
+    for joint in record.joints:
+        with_coordinates(joint, look)
+    return tuple(names)
 
 
 def build_joints(scene: Scene) -> list[list[Joint]]:

@@ -9,6 +9,7 @@ from erls.mechanism.sensors.registry import AnySensor
 from erls.scene.contacts import Contact
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
+from erls.scene.plan import Plan
 from erls.scene.records import Pose, Record, SceneFile, SceneTables
 from erls.scene.servo import Inverse, Servo
 from erls.scene.settings import Simulation
@@ -185,6 +186,8 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
         Motions that `erls invert` finds the drives for, ``[[servo]]``.
     inverse : Inverse
         Which drives these are.
+    plan : Plan
+        A motion from rest to rest that `erls plan` finds.
     """
 
     simulation: Simulation
@@ -201,6 +204,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     sensors: list[AnySensor] = []
     servo: list[Servo] = []
     inverse: Inverse = Inverse()
+    plan: Plan = Plan()
 
 
 @dataclass(frozen=True, repr=False)

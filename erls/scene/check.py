@@ -9,7 +9,7 @@ from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, 
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, Load, SceneRecord
 from erls.scene.check_sensors import check_sensors
-from erls.scene.check_servo import check_servo
+from erls.scene.check_servo import check_plan, check_servo
 from erls.scene.check_settings import check_settings
 from erls.scene.check_sticking import check_sticking
 from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
@@ -85,6 +85,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         _check_event(event, scene, f"{file}: events[{k}]")
     _check_sensors(scene, file)
     check_servo(scene, file)
+    check_plan(scene, file)
     if scene.simulation.bandwidth is not None:
         _check_bandwidth(scene, f"{file}: simulation.bandwidth")
     _check_compound(scene, f"{file}: simulation")
@@ -163,9 +164,9 @@ def _check_contact(contact: Contact, scene: SceneRecord, place: str) -> None:
 
 
 def _check_feed_forward(acting: Acting, place: str) -> None:
-    if getattr(acting.drive, "feed_forward", False):
+    if getattr(acting.drive, "feed_forward", False) is True:
         message = "the inverse dynamics of the tree does not know its loops"
-        raise bad(f"{place}.drive.feed_forward", message, True, "set it to false")
+        raise bad(f"{place}.drive.feed_forward", message, True, "set it to false or 'elastic'")
 
 
 def _check_place(scene: SceneRecord, k: int, place: str) -> None:

@@ -1,4 +1,4 @@
-"""The conditions on the tables ``servo`` and ``inverse`` that the types of their records cannot state."""
+"""The conditions on the tables ``servo``, ``inverse`` and ``plan`` that the types of their records cannot state."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from erls.errors import SceneError
 from erls.scene.build_joints import joint_coordinates
 from erls.scene.chain import SceneRecord
 from erls.scene.checks import bad, directed, positive
+from erls.scene.joints import Joint
 from erls.scene.servo import Servo
 from fe_import.files.toml import choose
 
@@ -30,11 +31,26 @@ def check_servo(scene: SceneRecord, file: str) -> None:
     for k, servo in enumerate(scene.servo):
         _check_one(servo, points, joints, f"{file}: servo[{k}]")
     positive(f"{file}: inverse.bandwidth", scene.inverse.bandwidth)
+    positive(f"{file}: inverse.step", scene.inverse.step)
     for k, name in enumerate(scene.inverse.drives):
         place = f"{file}: inverse.drives[{k}]"
         choose(name, joints, place, SceneError)
         if name in scene.inverse.drives[:k]:
             raise bad(place, "named twice", name, "name it once")
+
+
+def check_plan(scene: SceneRecord, file: str) -> None:
+    """The same of the table ``plan``, whose joints have one coordinate; their numbers are checked as it is read."""
+    plan, joints = scene.plan, [joint.name for joint in scene.joints if "" in _parts(joint)]
+    for name in plan.joints:
+        choose(name, joints, f"{file}: plan.joints", SceneError)
+    positive(f"{file}: plan.swing", plan.swing)
+    if not 0.0 <= plan.uncertainty < 0.5:
+        raise bad(f"{file}: plan.uncertainty", "not a share of a frequency", plan.uncertainty, "give 0 to 0.5")
+
+
+def _parts(joint: Joint) -> list[str]:
+    return [freedom.name for freedom in joint_coordinates(joint).values()]
 
 
 def _check_one(servo: Servo, points: Sequence[str], joints: Sequence[str], place: str) -> None:

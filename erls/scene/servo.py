@@ -63,7 +63,10 @@ class Inverse(Record, frozen=True):
     bandwidth : float, optional
         Internal motions faster than this follow [Hz]; 20 times the frequency of what is demanded, that of a sine with
         its range and its largest acceleration, unless given.
+    step : float, optional
+        Distance of the knots [s]; ``simulation.step`` unless given, and 1 ms where that is not either.
     """
 
     drives: tuple[str, ...] = ()
     bandwidth: float | None = None
+    step: float | None = None

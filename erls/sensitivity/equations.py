@@ -20,13 +20,13 @@ from scipy.linalg import lapack
 
 from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
 from erls.equations.system import metre_scales
+from erls.equations.tangents import Evaluation, Knots, Tangents, steps_of
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg, walked
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.forces import force_derivative
 from erls.sensitivity.schemes import Scheme
-from erls.sensitivity.tangents import Evaluation, Knots, Tangents, steps_of
 from erls.sensitivity.variants import Difference
 from fe_import.model import IntArray
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
+from erls.equations.tangents import Evaluation, Knots
 from erls.maths.so3 import Array
-from erls.sensitivity.tangents import Evaluation, Knots
 from erls.sensitivity.variants import Difference, Variant
 from fe_import.derivatives import STENCILS, STEP
 

@@ -18,12 +18,12 @@ import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.system import metre_scales
+from erls.equations.tangents import Knots
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg
 from erls.maths.jit import any_scalar
 from erls.maths.so3 import Array
 from erls.sensitivity.equations import Equations
-from erls.sensitivity.tangents import Knots
 from fe_import.model import IntArray
 
 _SMALL, _SLOW = 1e-7, 1e-7

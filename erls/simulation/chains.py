@@ -22,6 +22,7 @@ from erls.run.file import self_contained
 from erls.run.watches.base import Begun, Plan
 from erls.run.watches.watching import Warnings, Watching
 from erls.scene.build import Built, build_mechanism
+from erls.scene.build_joints import led_by_inversion
 from erls.scene.chain import Scene
 from erls.simulation.asked import Asked
 from erls.simulation.kept import kept_to
@@ -40,6 +41,11 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
 
         refuse_time(settings, asked.until)
     like, tell = asked.like, asked.tell
+    found_before: tuple[str, ...] = ()
+    if led_by_inversion(scene.record):
+        from erls.inverse.feed import fed  # here: few scenes are inverted before they run
+
+        scene, found_before = fed(scene, tell)
     built = build_mechanism(scene, tell) if like is None else build_like(scene, like, tell)
     if scene.record.sensors:
         from erls.run.chain.sensors import with_compliances  # here: scenes without sensors need none of it
@@ -50,7 +56,7 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
         links = built.mechanism.links
         asked.checkpoints.identify(scene, [part.model for link in links for part in (link, *link.pieces)])
     warnings = Warnings(tell)
-    warnings(built.warnings)
+    warnings((*found_before, *built.warnings))
     run = partial(run_mechanism, asked=asked, warnings=warnings)
     if settings.effects == "auto":
         run = partial(run, asked=replace(asked, bending=True))  # its certificate rests on it

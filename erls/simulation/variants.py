@@ -16,6 +16,7 @@ from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.scene.bodies.schema import BodyScene
 from erls.scene.build import build_mechanism
+from erls.scene.build_joints import led_by_inversion
 from erls.scene.chain import Scene
 from erls.scene.overrides import apply_override
 from erls.scene.read import AnyScene, scene_with
@@ -90,6 +91,8 @@ class Variants:
         if isinstance(scene, BodyScene):
             assemble(scene)
             return
+        if led_by_inversion(scene.record):
+            return  # its run inverts it first
         mechanism, settings = build_mechanism(scene).mechanism, scene.record.simulation
         with compiling_steps(compiled_steps(mechanism, settings)):
             compile_kernels(formulate(mechanism, settings), settings)

@@ -29,6 +29,7 @@ OPTIONS = {
     "linearize": ["--output", "-o", "--at", "--equilibrium", "--inputs", "--outputs", "--campbell", "--locus", "--mode",
                   "--set", "--force", "--json"],
     "invert": ["--output", "-o", "--method", "--confirm", "--correct", "--set", "--force", "--json"],
+    "plan": ["--output", "-o", "--method", "--confirm", "--set", "--force", "--json"],
     "optimize": ["--output", "-o", "--scene", "--state", "--resume", "--set", "--force", "--json"],
     "identify": ["--output", "-o", "--measured", "--fit", "--bounds", "--set", "--force", "--json"],
     "import": ["--output", "-o", "--flexible", "--floating", "--hold", "--stops", "--force", "--json"],

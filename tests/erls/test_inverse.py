@@ -12,14 +12,14 @@ from scipy.integrate import solve_bvp
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
-from erls.inverse.confirm import confirmed
-from erls.inverse.correct import corrected
 from erls.inverse.inversion import Inversion
 from erls.inverse.invert import invert, rigid_motion
 from erls.inverse.marching import march
 from erls.inverse.problem import problem_of
 from erls.inverse.two_point import Sweep, collocate, ends_of
 from erls.inverse.work import Work
+from erls.tracking.confirm import confirmed
+from erls.tracking.correct import corrected
 
 INVERSE = scenes.ROOT / "data" / "inverse"
 PASSIVE, ARM, PLANAR = (INVERSE / f"{name}.toml" for name in ("passive_arm", "arm", "two_link_planar"))
@@ -140,6 +140,14 @@ def test_shooting_agrees_with_collocation(passive: Inversion) -> None:
     other = invert(scene(PASSIVE), method="shooting")
     assert other.method == "shooting"
     assert abs(other.states.efforts - passive.states.efforts).max() < 1e-6 * abs(passive.states.efforts).max()
+
+
+def test_shooting_agrees_on_links_that_bend() -> None:
+    """The same of the arm, what is faster than 60 Hz following: two bending motions grow, in stretches of three."""
+    short = ("servo.0.motion.start=0.2", "simulation.duration=1.0", "simulation.step=0.008")
+    loaded = scene(ARM, *short, "inverse.bandwidth=60.0", *FEW)
+    one, other = (invert(loaded, method=name).states for name in ("collocation", "shooting"))
+    assert abs(other.efforts - one.efforts).max() < 1e-6 * abs(one.efforts).max()
 
 
 def test_minimum_phase_is_integrated_forward() -> None:

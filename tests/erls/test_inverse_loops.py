@@ -8,7 +8,7 @@ import pytest
 
 import erls
 from erls.errors import Cause, SimulationError
-from erls.inverse.confirm import confirmed
+from erls.tracking.confirm import confirmed
 
 DATA = Path(__file__).parents[2] / "data"
 LEGS = DATA / "inverse" / "three_legs.toml"

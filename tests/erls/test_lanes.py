@@ -15,8 +15,8 @@ from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
 from erls.equations.series import residual_series
 from erls.equations.side_by_side import WORTH, eightfold_forces, eightfold_kernels, eightfold_tangents
 from erls.equations.system import metre_scales
+from erls.equations.tangents import Evaluation, Knots, steps_of
 from erls.maths.jit import ENABLED
-from erls.sensitivity.tangents import Evaluation, Knots, steps_of
 
 DATA = Path(__file__).parents[2] / "data"
 ROBOT = DATA / "robot" / "two_link.toml"

@@ -25,14 +25,17 @@ SCENES = [p for p in _FILES if "simulation" in tomllib.loads(p.read_text(encodin
 def _changes(path: Path) -> list[str]:
     """Two milliseconds of a motion with all effects, every load step at rest, a thousandth of the load on fine shells:
     what a test can wait for."""
-    settings = tomllib.loads(path.read_text(encoding="utf-8"))["simulation"]
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    settings = tables["simulation"]
     if path.parent.name == "shells" and path.stem in ("annulus", "hemisphere"):
-        loads = tomllib.loads(path.read_text(encoding="utf-8"))["loads"]
-        little = [f"loads.{k}.force={[1e-3 * x for x in load['force']]}" for k, load in enumerate(loads)]
+        loads = enumerate(tables["loads"])
+        little = [f"loads.{k}.force={[1e-3 * x for x in load['force']]}" for k, load in loads]
         return ["simulation.load_steps=1", *little]
     if "duration" not in settings:
         return ["simulation.compare_tangents=false"] if settings.get("compare_tangents") else []
     found = ["simulation.duration=2e-3"]
+    if "step" in tables.get("inverse", {}):
+        found.append("inverse.step=5e-4")
     return found + (["simulation.effects=all"] if settings.get("effects") == "auto" else [])
 
 

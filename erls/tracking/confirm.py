@@ -9,18 +9,18 @@ import msgspec
 import numpy as np
 
 from erls.inverse.conditions import Joints
+from erls.inverse.feed import load_table
 from erls.inverse.frames import PointMotion
 from erls.inverse.inversion import Inversion
 from erls.inverse.problem import Problem
 from erls.maths.so3 import Array
 from erls.mechanism.drives import TorqueDrive
-from erls.mechanism.profiles import LoadTable
 from erls.run.chain.run import ChainRun
 from erls.scene.build import Message
-from erls.scene.build_joints import joint_coordinates
+from erls.scene.build_joints import with_coordinates
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
-from erls.scene.joints import Coordinate, Joint, JointInitial
+from erls.scene.joints import Acting, Joint, JointInitial
 from erls.simulation.simulate import Progress, simulate
 
 FINER = 4
@@ -111,21 +111,16 @@ def driven_scene(
 
 def _driven(joint: Joint, t: Array, efforts: Mapping[str, Array], start: Mapping[str, float]) -> Joint:
     """A joint with efforts over time and initial coordinates, along each of its coordinates."""
-    parts = dict(joint.coordinates)
-    for name, freedom in joint_coordinates(joint).items():
-        own = parts.get(freedom.name, Coordinate()) if freedom.name else joint
+
+    def driven(name: str, own: Acting) -> Acting:
         changes: dict[str, object] = {}
         if name in efforts:
-            times, values = (tuple(x.tolist()) for x in (t, efforts[name]))
-            changes["drive"] = TorqueDrive(profiles=(LoadTable(times=times, values=values, interpolation="cubic"),))
+            changes["drive"] = TorqueDrive(profiles=(load_table(t, efforts[name]),))
         if name in start:
             changes["initial"] = JointInitial(position=start[name])
-        changed = msgspec.structs.replace(own, **changes)
-        if isinstance(changed, Joint):
-            joint = changed
-        else:
-            parts[freedom.name] = changed
-    return msgspec.structs.replace(joint, coordinates=parts)
+        return msgspec.structs.replace(own, **changes)
+
+    return with_coordinates(joint, driven)
 
 
 def missed(problem: Problem, run: ChainRun) -> tuple[Array, Array, Array]:

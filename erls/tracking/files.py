@@ -9,9 +9,9 @@ import numpy as np
 
 from erls.files.csv_table import write_table
 from erls.files.output import replacing
-from erls.inverse.confirm import Confirmation
 from erls.inverse.inversion import Inversion
 from erls.maths.so3 import Array
+from erls.tracking.confirm import Confirmation
 
 
 def columns(inversion: Inversion) -> dict[str, Array]:

@@ -18,12 +18,12 @@ import numpy as np
 
 from erls.errors import SimulationError
 from erls.inverse.conditions import Demand
-from erls.inverse.confirm import Confirmation, confirmed
 from erls.inverse.internal import second_difference
 from erls.inverse.inversion import Inversion
 from erls.inverse.work import Work
 from erls.maths.so3 import Array
 from erls.scene.build import Message
+from erls.tracking.confirm import Confirmation, confirmed
 
 _PASSES = 8
 _WORTH = 0.8  # of what was missed before: less is no progress

@@ -1,0 +1,1 @@
+"""Drives and motions tried out: forward runs of what was found, corrections by them, motions planned with them."""
