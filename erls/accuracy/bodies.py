@@ -17,7 +17,7 @@ from erls.accuracy.integration import SUDDEN
 from erls.accuracy.mesh_of_beams import FINER, SHARE, larger_steps
 from erls.accuracy.verdict import verdict
 from erls.equations.nodal.scenes.build import assemble
-from erls.equations.nodal.statics import solve_statics
+from erls.equations.nodal.scenes.equilibria import equilibria
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import hermite
 from erls.integrate.choice import body_options
@@ -27,7 +27,7 @@ from erls.run.accuracy import Accuracy
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest
 from erls.run.bodies.run import BodyRun
-from erls.scene.bodies.analyses import Buckling, Dynamics, Frequencies
+from erls.scene.bodies.analyses import Dynamics
 from erls.scene.bodies.schema import BodyScene, BodySceneRecord
 
 _LOOKS = 101
@@ -138,8 +138,7 @@ def _both(run: BodyRun, scene: BodyScene) -> tuple[Array, Array]:
     if isinstance(run, BodyRest):
         analysis = run.scene.record.simulation
         assert not isinstance(analysis, Dynamics)
-        end = analysis.load if isinstance(analysis, (Buckling, Frequencies)) else 1.0
-        statics = solve_statics(finer.system, finer.system.start, analysis.load_steps, analysis.tangent, end=end)
+        statics = equilibria(finer.system, analysis)
         if statics.failure is not None:
             raise statics.failure
         here, there = run.statics.path[-1].q.poses, statics.path[-1].q.poses

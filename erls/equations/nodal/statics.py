@@ -33,24 +33,43 @@ SMALLEST_STEP = 1e-4  # of the load parameter
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """One configuration at rest: load parameter, multipliers (m,) of the joints, iterations since the one before."""
+    """One configuration at rest: load parameter, multipliers (m,) of the joints, iterations since the one before.
+
+    Of a path that `erls.equations.nodal.path` followed, also its length up to here, and the number of ways in which
+    the equilibrium is unstable.
+    """
 
     t: float
     q: Nodes
     multipliers: Array
     iterations: int
+    arc: float = 0.0
+    unstable: int = 0
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Where a path changes its stability: a ``limit`` of the load parameter or a ``bifurcation``, how far along the
+    path, and in how many ways at once.
+    """
+
+    kind: str
+    t: float
+    arc: float
+    ways: int
 
 
 @dataclass(frozen=True)
 class Statics:
     """Equilibria in the order of load parameters, what they took, and why there are no more; ``cut_steps`` counts load
-    steps that had to be halved.
+    steps that had to be halved, ``turns`` are those of a path.
     """
 
     path: tuple[Equilibrium, ...]
     factorizations: int
     cut_steps: int
     failure: SimulationError | None = None
+    turns: tuple[Turn, ...] = ()
 
 
 def solve_statics(
