@@ -118,7 +118,7 @@ class Bordered:
     """
 
     def __init__(self, system: NodalSystem, at: Point, along: Step, measure: Measure, material: bool = False) -> None:
-        stiffness, rows = stiffness_and_rows(system, at, material)
+        self.stiffness, self.rows = stiffness, rows = stiffness_and_rows(system, at, material)
         force, gap = load_rate(system, at)
         reach = measure.size / measure.end  # metres per load parameter
         unit = float((abs(stiffness).diagonal() / measure.metres**2).max(initial=0.0)) or 1.0

@@ -26,11 +26,10 @@ from erls.equations.nodal.bordered import (
     Step,
     imbalance,
     lowest_way,
-    stiffness_and_rows,
     unstable_ways,
 )
 from erls.equations.nodal.nodes import Nodes
-from erls.equations.nodal.statics import MAX_ITERATIONS, SHRINK, Equilibrium, LoadSteps, Statics, Turn
+from erls.equations.nodal.statics import MAX_ITERATIONS, SHRINK, Equilibrium, LoadSteps, Statics, Turn, turned_too_far
 from erls.errors import Cause, SimulationError
 
 WANTED = 10  # iterations of a step: with more the next one is shorter, with less longer
@@ -177,10 +176,10 @@ class _Walk:
     def _known(self, point: Point, before: Step, iterations: int) -> _Known:
         """With its tangent, which goes on in the direction of another one."""
         border = Bordered(self.system, point, before, self.measure)
-        self.factorizations += 2
+        self.factorizations += 2  # with that of the count
         none = np.zeros(self.system.size), np.zeros(self.system.constraints)
         tangent = self.measure.unit(border.solve(*none, self.measure.length(before))[0])
-        unstable = unstable_ways(*stiffness_and_rows(self.system, point), self.measure.metres)
+        unstable = unstable_ways(border.stiffness, border.rows, self.measure.metres)
         return _Known(point, tangent, unstable, iterations)
 
     def _turns(self, here: _Known, there: _Known, step: float) -> _Known | None:
@@ -264,7 +263,7 @@ class _Walk:
         self.found.append(Equilibrium(p.t, p.q, p.multipliers, known.iterations, self.arc, known.unstable))
 
     def _failure(self, here: _Known) -> SimulationError:
-        return SimulationError(
+        return turned_too_far(self.system, here.point.q, here.point.t) or SimulationError(
             Cause.NO_EQUILIBRIUM,
             f"the path of equilibria cannot be followed beyond load parameter {here.point.t:.6g}, arc {self.arc:.4g}",
             where=f"load parameter {here.point.t:.9g}",

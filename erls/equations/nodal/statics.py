@@ -20,6 +20,7 @@ import numpy as np
 
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.nodes import Nodes
+from erls.equations.nodal.shell_turns import widest_turn
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError, SimulationError
 from erls.maths.saddle import Saddle, Scales
@@ -29,6 +30,7 @@ from erls.scene.bodies.analyses import TANGENTS
 MAX_ITERATIONS = 60
 SHRINK = 0.5  # of a correction: what the next one may be for the exact tangent to be trusted
 SMALLEST_STEP = 1e-4  # of the load parameter
+WIDE = np.radians(175.0)  # a turn from corner to corner of a shell that explains why nothing is found beyond
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,7 @@ class LoadSteps:
         self.rest = np.zeros(system.size)
         self.iterations = self.factorizations = self.cuts = 0
         self.size = 0.0
+        self.reached = system.start
 
     def balance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Nodes, Array] | None:
         """Equilibrium at ``t``, or None."""
@@ -179,6 +182,7 @@ class LoadSteps:
             q, multipliers = self.system.compose(q, -move), multipliers - change
             right = self.imbalance(t, q, multipliers)
             if float(np.abs(correction[: self.system.size]).max(initial=0.0)) <= self.goal:
+                self.reached = q
                 return q, multipliers
             if self.tangent == "full":
                 left = float(np.linalg.norm(saddle.solve(saddle.scaled(*right)))) / self.size
@@ -199,7 +203,7 @@ class LoadSteps:
 
     def failure(self, t: float) -> SimulationError:
         """Small load steps failed too."""
-        return SimulationError(
+        return turned_too_far(self.system, self.reached, t) or SimulationError(
             Cause.NO_EQUILIBRIUM,
             f"no equilibrium beyond load parameter {t:.4g}: corrections of {self.size:.3g} m do not shrink",
             where=f"load parameter {t:.9g}",
@@ -207,3 +211,20 @@ class LoadSteps:
             limit=f"{MAX_ITERATIONS} iterations",
             remedy="check the supports; look for buckling there; or let the motion be computed in time",
         )
+
+
+def turned_too_far(system: NodalSystem, q: Nodes, t: float) -> SimulationError | None:
+    """Why nothing is found beyond a configuration whose shells have turned as far as they can; None otherwise."""
+    shells = system.kinds.shells
+    angle, element = widest_turn(shells, q.poses)
+    if angle < WIDE:
+        return None
+    middle = system.start.poses[shells.corners[element], :3, 3].mean(axis=0)
+    return SimulationError(
+        Cause.NO_EQUILIBRIUM,
+        "an element of a shell turns by half a circle from one of its corners to the next, and follows no farther",
+        where=f"load parameter {t:.9g}, the element built about {np.round(middle, 6).tolist()}",
+        value=f"{np.degrees(angle):.2f} deg",
+        limit="180 deg",
+        remedy="more elements there, so that each turns less",
+    )
