@@ -1,7 +1,7 @@
-"""What a run of bodies and beams states about its error: of the integration of motions, and of the mesh of beams.
+"""What a run of bodies and beams states about its error: of the integration of motions, and of the mesh.
 
 Beams are geometrically exact and nothing is left out, so that ``links`` and ``effects`` are zero. Their mesh is judged
-by a finer one, as that of chains is (`erls.accuracy.mesh_of_beams`).
+by one of twice the elements along beams and both ways of shells, as that of chains is (`erls.accuracy.mesh_of_beams`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from erls.accuracy.integration import SUDDEN
 from erls.accuracy.mesh_of_beams import FINER, SHARE, larger_steps
 from erls.accuracy.verdict import verdict
 from erls.equations.nodal.scenes.build import assemble
-from erls.equations.nodal.statics import solve_statics
+from erls.equations.nodal.scenes.equilibria import equilibria
+from erls.equations.nodal.scenes.shell_refined import refined_mesh
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import hermite
 from erls.integrate.choice import body_options
@@ -27,13 +28,13 @@ from erls.run.accuracy import Accuracy
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest
 from erls.run.bodies.run import BodyRun
-from erls.scene.bodies.analyses import Buckling, Dynamics, Frequencies
-from erls.scene.bodies.schema import BodyScene, BodySceneRecord
+from erls.scene.bodies.analyses import Dynamics
+from erls.scene.bodies.schema import BodyScene, BodySceneRecord, ShellSurface
 
 _LOOKS = 101
 _REMEDIES = {
     "integration": "a smaller simulation.tolerance, or a smaller step",
-    "modes": "more elements per beam (this part is their mesh)",
+    "modes": "more elements per beam or shell (this part is their mesh)",
 }
 
 
@@ -71,8 +72,6 @@ def stated_bodies(run: BodyMotion | BodyRest) -> BodyMotion | BodyRest:
 def mesh_error(run: BodyRun) -> tuple[float | None, str]:
     """Of the reported nodes [m], from a mesh of twice the elements; None, and why, where that has no solution."""
     scene = run.scene
-    if not all(shell.corners for shell in scene.record.shells):
-        return None, "the mesh of a shell from a file cannot be refined here"
     if not (scene.record.beams or scene.record.shells):
         return 0.0, ""
     try:
@@ -102,10 +101,7 @@ def _refined(scene: BodyScene) -> BodyScene:
     finer = msgspec.structs.replace(
         record,
         beams=[msgspec.structs.replace(beam, elements=FINER * beam.elements) for beam in record.beams],
-        shells=[
-            msgspec.structs.replace(shell, elements=(FINER * shell.elements[0], FINER * shell.elements[1]))
-            for shell in record.shells
-        ],
+        shells=[_finer(shell, scene, f"shells[{k}]") for k, shell in enumerate(record.shells)],
         masses=[moved(x) for x in record.masses],
         connections=[moved(x) for x in record.connections],
         springs=[moved(x) for x in record.springs],
@@ -116,10 +112,16 @@ def _refined(scene: BodyScene) -> BodyScene:
     return replace(scene, record=finer)
 
 
+def _finer(shell: ShellSurface, scene: BodyScene, place: str) -> ShellSurface:
+    if shell.corners is None:
+        return refined_mesh(shell, scene.folder, place)
+    return msgspec.structs.replace(shell, elements=(FINER * shell.elements[0], FINER * shell.elements[1]))
+
+
 def _renamed(name: str, record: BodySceneRecord) -> str:
     """A node of a beam or shell in a mesh of `FINER` times the elements."""
     part, *places = name.split("/")
-    names = {beam.name for beam in record.beams} | {shell.name for shell in record.shells}
+    names = {beam.name for beam in record.beams} | {shell.name for shell in record.shells if shell.corners}
     inner = part in names and all(map(str.isdigit, places))
     return "/".join([part, *(str(FINER * int(k)) for k in places)]) if inner else name
 
@@ -138,8 +140,7 @@ def _both(run: BodyRun, scene: BodyScene) -> tuple[Array, Array]:
     if isinstance(run, BodyRest):
         analysis = run.scene.record.simulation
         assert not isinstance(analysis, Dynamics)
-        end = analysis.load if isinstance(analysis, (Buckling, Frequencies)) else 1.0
-        statics = solve_statics(finer.system, finer.system.start, analysis.load_steps, analysis.tangent, end=end)
+        statics = equilibria(finer.system, analysis)
         if statics.failure is not None:
             raise statics.failure
         here, there = run.statics.path[-1].q.poses, statics.path[-1].q.poses

@@ -43,7 +43,10 @@ def body_report(run: BodyRun, times: Sequence[float] = ()) -> str:
             for k, m in enumerate(s["modes"], start=1)
         ]
         parts.append(table(("mode", "load parameter" if "load" in s["modes"][0] else "frequency [Hz]"), rows))
-    head = "t [s]" if dynamic else "load parameter"
+    if s.get("turns"):
+        rows = [(x["kind"], f"{x['load']:.9g}", f"{x['arc']:.6g}", str(x["ways"])) for x in s["turns"]]
+        parts.append(table(("point of the path", "load parameter", "arc", "ways"), rows))
+    head = "t [s]" if dynamic else run.axis.name
     places = [
         (f"{x['t']:g}", name, *(f"{c:.6f}" for c in place)) for x in s["samples"] for name, place in x["points"].items()
     ]

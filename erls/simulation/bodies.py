@@ -8,6 +8,7 @@ from typing import Any
 
 from erls.equations.nodal.redundant import refuse_open
 from erls.equations.nodal.scenes.build import Assembly, assemble
+from erls.equations.nodal.scenes.equilibria import equilibria
 from erls.equations.nodal.spectrum import buckling_loads, natural_frequencies
 from erls.equations.nodal.statics import Statics, solve_statics
 from erls.errors import Cause, SceneError
@@ -16,12 +17,12 @@ from erls.integrate.constrained import ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.jit import announcing
 from erls.run.bodies.motion import BodyMotion
-from erls.run.bodies.rest import BodyRest, Modes, work
+from erls.run.bodies.rest import BodyPath, BodyRest, Modes, work
 from erls.run.bodies.sensors import body_sensors
 from erls.run.file import self_contained
 from erls.run.watches.base import BodyPlan, Started
 from erls.run.watches.watching import Warnings, Watching
-from erls.scene.bodies.analyses import TANGENTS, AtRest, Buckling, Dynamics, Frequencies, StaticSteps
+from erls.scene.bodies.analyses import TANGENTS, AtRest, Buckling, Continuation, Dynamics, Frequencies, StaticSteps
 from erls.scene.bodies.schema import BodyScene
 from erls.simulation.asked import Asked
 from erls.simulation.statements import with_statement
@@ -94,8 +95,7 @@ def _rest(scene: BodyScene, assembly: Assembly, analysis: AtRest) -> BodyRest:
     system = assembly.system
     tangents: dict[str, dict[str, Any]] = {}
     begun = time.perf_counter()
-    end = analysis.load if isinstance(analysis, (Buckling, Frequencies)) else 1.0
-    found = solve_statics(system, system.start, analysis.load_steps, analysis.tangent, end=end)
+    found = equilibria(system, analysis)
     modes = _modes(assembly, analysis, found) if found.failure is None else None
     wall = time.perf_counter() - begun
     if isinstance(analysis, StaticSteps) and analysis.compare_tangents:
@@ -104,7 +104,25 @@ def _rest(scene: BodyScene, assembly: Assembly, analysis: AtRest) -> BodyRest:
             tangents[name] = work(found if own else solve_statics(system, system.start, analysis.load_steps, name))
     for e in found.path if assembly.left_out else ():
         refuse_open(assembly.full, e.t, e.q, assembly.left_out)
-    return BodyRest(scene, assembly, wall, _redundancy(assembly), found, modes, tangents)
+    warnings = _redundancy(assembly)
+    if isinstance(analysis, Continuation):
+        return BodyPath(scene, assembly, wall, warnings + _unfinished(analysis, found), found)
+    return BodyRest(scene, assembly, wall, warnings, found, modes, tangents)
+
+
+def _unfinished(analysis: Continuation, found: Statics) -> tuple[str, ...]:
+    """A warning where the path did not get as far as it should."""
+    known, bifurcations = found.path, sum(turn.kind == "bifurcation" for turn in found.turns)
+    told = []
+    if found.failure is None and known[-1].t < analysis.load * (1 - 1e-9):
+        told.append(
+            f"the path ends after {analysis.most_steps} steps at load parameter {known[-1].t:.6g}, before "
+            f"{analysis.load:g}: set simulation.most_steps for more"
+        )
+    if bifurcations < abs(analysis.branch):
+        told.append(f"the path has {bifurcations} bifurcations, and leaves for no branch: simulation.branch = "
+                    f"{analysis.branch}")  # fmt: skip
+    return tuple(told)
 
 
 def _redundancy(assembly: Assembly) -> tuple[str, ...]:

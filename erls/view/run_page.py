@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -20,6 +21,9 @@ from erls.studies.outputs import run_outputs
 from erls.studies.spectrum import amplitude_spectrum, peaks
 from erls.view.figures import figure_of
 from fe_import.files.versions import package_version
+
+if TYPE_CHECKING:  # it imports nodal elements, which chains do not need
+    from erls.run.bodies.rest import BodyPath
 
 _TIMES = 1001
 _PROGRAMS = ("erls", "numpy", "scipy", "numba", "h5py")
@@ -50,7 +54,12 @@ def run_page(run: Run, repeat: Sequence[str] = ()) -> str:
     times = run.spread(_TIMES)
     (axis, along), *found = quantities(run.columns(times))
     x = f"{axis} [{along.unit}]"
-    parts = [*_verdict(run), *_moving(run), *_histories(x, along.values, found)]
+    parts = [*_verdict(run), *_moving(run)]
+    if not isinstance(run, ChainRun):
+        from erls.run.bodies.rest import BodyPath
+
+        parts += _path(run) if isinstance(run, BodyPath) else ()
+    parts += _histories(x, along.values, found)
     if isinstance(run, ChainRun) and len(times) > 2:
         parts += _modes(run, times)
     parts += _solver(run, repeat)
@@ -101,6 +110,24 @@ def _moving(run: Run) -> Iterator[str]:
     yield heading("Motion" if run.axis.unit == "s" else "Path")
     title = "Turn it by dragging; colours show how far links are bent"
     yield view(title, run.axis.symbol, run.axis.unit, times, shapes)
+
+
+def _path(run: BodyPath) -> Iterator[str]:
+    """Load over displacement, with what is unstable and where that changes."""
+    loads, places = run.loads(run.times), run.displacements()
+    unstable = np.array([e.unstable > 0 for e in run.statics.path])
+    kinds = dict.fromkeys(turn.kind for turn in run.statics.turns)
+    yield heading("Load and displacement")
+    for name, moved in places.items():
+        curves = [Curve("equilibria", moved, loads, marked=True)]
+        if unstable.any():
+            curves.append(Curve("unstable ones", moved[unstable], loads[unstable], points=True))
+        for kind in kinds:
+            at = [turn for turn in run.statics.turns if turn.kind == kind]
+            x = np.interp([turn.arc for turn in at], run.times, moved)
+            words = "limit points" if kind == "limit" else "bifurcations"
+            curves.append(Curve(words, x, np.array([turn.t for turn in at]), points=True))
+        yield figure(Plot(name, "displacement [m]", "load parameter", curves, note="from where it is built"))
 
 
 def _cells(

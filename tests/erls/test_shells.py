@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -15,9 +16,10 @@ from scipy.spatial.transform import Rotation
 import erls
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.scenes.build import assemble
-from erls.equations.nodal.scenes.shell_mesh import corner_frames
+from erls.equations.nodal.scenes.shell_mesh import corner_frames, mesh_of
+from erls.equations.nodal.scenes.shell_refined import refined_mesh
 from erls.equations.nodal.shell import Shell, Shells, lumped_shells
-from erls.errors import SceneError
+from erls.errors import Cause, SceneError, SimulationError
 from erls.run.bodies.rest import BodyRest
 from fe_import.errors import FEImportError
 
@@ -118,6 +120,17 @@ def test_roll_up(tangent: str, most: int, elements: int) -> None:
     assert run.trust.verdict == "good"
 
 
+def test_half_a_turn_within_an_element_is_named() -> None:
+    """Two elements at 360° stand on the cut of the logarithm and are right; beyond, the cause is told."""
+    path = ROOT / "data/shells/roll_up.toml"
+    changes = ["shells.strip.elements=[2,1]", "simulation.load_steps=4"]
+    run = erls.simulate(erls.load_scene(path, changes), verdict=False)
+    assert np.abs(run.position("b", 1.0)).max() < 1e-9
+    with pytest.raises(SimulationError, match=r"turns by half a circle.*179.9.*more elements") as found:
+        erls.simulate(erls.load_scene(path, [*changes, "loads.0.moment=[0.0,-0.06,0.0]"]), verdict=False)
+    assert found.value.cause == Cause.NO_EQUILIBRIUM
+
+
 def test_twisted_beam() -> None:
     """Published figures to 1 % (thick) and 2 % (thin), in plane and out of plane; drilling moves the thick one."""
     path = ROOT / "data/shells/twisted.toml"
@@ -131,6 +144,40 @@ def test_twisted_beam() -> None:
         assert found == pytest.approx([inside, outside], rel=0.01 if thickness > 0.1 else 0.02)
     soft = erls.simulate(erls.load_scene(path, ["shells.blade.drilling=0.01"]), verdict=False)
     assert float(soft.position("tip", 1.0)[2]) / TWISTED[0.32][0] == pytest.approx(1.0037, abs=1e-3)
+
+
+def test_a_refined_mesh_keeps_its_numbers_and_its_surface() -> None:
+    """And its sets; new nodes of the blade lie on its helicoid to 1e-4."""
+    path = ROOT / "data/shells/twisted.toml"
+    scene = erls.load_scene(path)
+    shell = scene.record.shells[0]
+    places, cells, _ = mesh_of(shell, scene.folder, "")
+    finer = refined_mesh(shell, scene.folder, "")
+    assert len(finer.cells) == 4 * len(cells)
+    np.testing.assert_array_equal(np.array(finer.places)[: len(places)], places)
+    assert [len(finer.sets[name]) for name in ("ROOT", "TIP")] == [9, 9]
+    assert len(finer.sets["SURFACE"]) == len(finer.places)
+    width = np.array(finer.places)  # x turns the width by 90 degrees over the length of 12: on the helicoid to 1e-4
+    angle = np.pi / 2 * width[:, 0] / 12
+    assert np.abs(width[:, 1] * np.sin(angle) - width[:, 2] * np.cos(angle)).max() < 1e-4
+
+
+def test_a_mesh_from_a_file_is_judged_as_a_patch_is(tmp_path: Path) -> None:
+    """The same elements either way: the same error stated, of the size of what finer ones move."""
+    text = (ROOT / "data/shells/roll_up.toml").read_text().replace("follower = true", "follower = false")
+    text = text.replace("elements = [4, 1]", "elements = [3, 1]")
+    text = text.replace("moment = [0.0, -0.05235987755982988, 0.0]", "force = [0.0, 0.0, 1e-3]")
+    write_deck(tmp_path / "strip.inp", shell_grid(3, 1, lambda a, b: (12 * a, b, 0.0), "quad4"))
+    patch, mesh = tmp_path / "patch.toml", tmp_path / "mesh.toml"
+    patch.write_text(text)
+    text = re.sub(r"corners = .*\nelements = .*", 'mesh = "strip.inp"', text)
+    mesh.write_text(text.replace("strip:start", "strip:ROOT").replace("strip:end", "strip:TIP"))
+    found = [erls.simulate(path) for path in (patch, mesh)]
+    stated = [run.accuracy.total for run in found if run.accuracy is not None and run.accuracy.total is not None]
+    assert stated[1] == pytest.approx(stated[0], rel=1e-6)
+    finer = erls.simulate(erls.load_scene(patch, ["shells.strip.elements=[24,1]"]), verdict=False)
+    off = float(np.linalg.norm(found[1].position("b", 1.0) - finer.position("b", 1.0)))
+    assert off < stated[1] < 4 * off
 
 
 def strip_scene(folder: Path, kind: str, more: str, clamped: bool = False) -> Path:

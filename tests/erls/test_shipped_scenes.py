@@ -31,6 +31,8 @@ def _changes(path: Path) -> list[str]:
         loads = enumerate(tables["loads"])
         little = [f"loads.{k}.force={[1e-3 * x for x in load['force']]}" for k, load in loads]
         return ["simulation.load_steps=1", *little]
+    if settings.get("type") == "path":
+        return ["simulation.most_steps=2"]
     if "duration" not in settings:
         return ["simulation.compare_tangents=false"] if settings.get("compare_tangents") else []
     found = ["simulation.duration=2e-3"]

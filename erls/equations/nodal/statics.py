@@ -20,6 +20,7 @@ import numpy as np
 
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.nodes import Nodes
+from erls.equations.nodal.shell_turns import widest_turn
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError, SimulationError
 from erls.maths.saddle import Saddle, Scales
@@ -29,28 +30,48 @@ from erls.scene.bodies.analyses import TANGENTS
 MAX_ITERATIONS = 60
 SHRINK = 0.5  # of a correction: what the next one may be for the exact tangent to be trusted
 SMALLEST_STEP = 1e-4  # of the load parameter
+WIDE = np.radians(175.0)  # a turn from corner to corner of a shell that explains why nothing is found beyond
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """One configuration at rest: load parameter, multipliers (m,) of the joints, iterations since the one before."""
+    """One configuration at rest: load parameter, multipliers (m,) of the joints, iterations since the one before.
+
+    Of a path that `erls.equations.nodal.path` followed, also its length up to here, and the number of ways in which
+    the equilibrium is unstable.
+    """
 
     t: float
     q: Nodes
     multipliers: Array
     iterations: int
+    arc: float = 0.0
+    unstable: int = 0
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Where a path changes its stability: a ``limit`` of the load parameter or a ``bifurcation``, how far along the
+    path, and in how many ways at once.
+    """
+
+    kind: str
+    t: float
+    arc: float
+    ways: int
 
 
 @dataclass(frozen=True)
 class Statics:
     """Equilibria in the order of load parameters, what they took, and why there are no more; ``cut_steps`` counts load
-    steps that had to be halved.
+    steps that had to be halved, ``turns`` are those of a path.
     """
 
     path: tuple[Equilibrium, ...]
     factorizations: int
     cut_steps: int
     failure: SimulationError | None = None
+    turns: tuple[Turn, ...] = ()
 
 
 def solve_statics(
@@ -139,6 +160,7 @@ class LoadSteps:
         self.rest = np.zeros(system.size)
         self.iterations = self.factorizations = self.cuts = 0
         self.size = 0.0
+        self.reached = system.start
 
     def balance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Nodes, Array] | None:
         """Equilibrium at ``t``, or None."""
@@ -160,6 +182,7 @@ class LoadSteps:
             q, multipliers = self.system.compose(q, -move), multipliers - change
             right = self.imbalance(t, q, multipliers)
             if float(np.abs(correction[: self.system.size]).max(initial=0.0)) <= self.goal:
+                self.reached = q
                 return q, multipliers
             if self.tangent == "full":
                 left = float(np.linalg.norm(saddle.solve(saddle.scaled(*right)))) / self.size
@@ -180,7 +203,7 @@ class LoadSteps:
 
     def failure(self, t: float) -> SimulationError:
         """Small load steps failed too."""
-        return SimulationError(
+        return turned_too_far(self.system, self.reached, t) or SimulationError(
             Cause.NO_EQUILIBRIUM,
             f"no equilibrium beyond load parameter {t:.4g}: corrections of {self.size:.3g} m do not shrink",
             where=f"load parameter {t:.9g}",
@@ -188,3 +211,20 @@ class LoadSteps:
             limit=f"{MAX_ITERATIONS} iterations",
             remedy="check the supports; look for buckling there; or let the motion be computed in time",
         )
+
+
+def turned_too_far(system: NodalSystem, q: Nodes, t: float) -> SimulationError | None:
+    """Why nothing is found beyond a configuration whose shells have turned as far as they can; None otherwise."""
+    shells = system.kinds.shells
+    angle, element = widest_turn(shells, q.poses)
+    if angle < WIDE:
+        return None
+    middle = system.start.poses[shells.corners[element], :3, 3].mean(axis=0)
+    return SimulationError(
+        Cause.NO_EQUILIBRIUM,
+        "an element of a shell turns by half a circle from one of its corners to the next, and follows no farther",
+        where=f"load parameter {t:.9g}, the element built about {np.round(middle, 6).tolist()}",
+        value=f"{np.degrees(angle):.2f} deg",
+        limit="180 deg",
+        remedy="more elements there, so that each turns less",
+    )

@@ -84,7 +84,7 @@ class BodyRest(BodyRun):
         if bad.any():
             raise SceneError(
                 Cause.TIME_OUT_OF_RANGE,
-                "no equilibrium was computed at this load parameter",
+                f"no equilibrium was computed at this {self.axis.name}",
                 where="t",
                 value=float(flat[bad][0]),
                 limit=", ".join(f"{x:g}" for x in self.spread(9)) or "none was",
@@ -133,6 +133,53 @@ class BodyRest(BodyRun):
     def _steps(self, t: ArrayLike) -> list[int]:
         """Load steps at load parameters."""
         found: list[int] = np.searchsorted(self.times, self.within(t)).tolist()
+        return found
+
+
+@dataclass(frozen=True, repr=False)
+class BodyPath(BodyRest):
+    """Equilibria along their path, known at its steps; it goes along its length.
+
+    Lengths are those of `erls.equations.nodal.bordered.Measure`: places by their root mean square over the nodes in
+    sizes of the mechanism, the load parameter in shares of where the path ends.
+    """
+
+    axis: ClassVar[Axis] = Axis("arc length", "arc", "")
+
+    @property
+    def times(self) -> Array:
+        """(k,) lengths of the path up to its equilibria."""
+        return np.array([e.arc for e in self.statics.path])
+
+    def loads(self, t: Array) -> Array:
+        """(k,) load parameters."""
+        return np.array([self.statics.path[k].t for k in self._steps(t)])
+
+    def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
+        """As of all runs, with the load parameter and the number of ways in which the equilibrium is unstable."""
+        path, steps = self.statics.path, self._steps(times)
+        return [
+            {**sample, "load": path[k].t, "unstable": path[k].unstable}
+            for k, sample in zip(steps, super().samples(times), strict=True)
+        ]
+
+    def columns(self, times: Array) -> dict[str, Array]:
+        """As of all runs, with the load parameter."""
+        (axis, along), *rest = super().columns(times).items()
+        return {axis: along, "load [1]": self.loads(times), **dict(rest)}
+
+    def summary(self, times: Sequence[float] = ()) -> dict[str, Any]:
+        """With the limit points and bifurcations of the path."""
+        turns = [{"kind": x.kind, "load": x.t, "arc": x.arc, "ways": x.ways} for x in self.statics.turns]
+        return {**super().summary(times), "turns": turns}
+
+    def displacements(self) -> dict[str, Array]:
+        """(k,) how far each reported node is from where it is built [m], at all steps."""
+        built = self.origin.poses
+        found = {}
+        for name in self.point_names:
+            at = built[self.assembly.numbers[name], :3, 3]
+            found[name] = np.linalg.norm(self.position(name, self.times) - at, axis=-1)
         return found
 
 

@@ -57,6 +57,10 @@ class BodyRun(Run):
     def multipliers(self, t: Array) -> Array:
         """(k, m) of the conditions of connections."""
 
+    def loads(self, t: Array) -> Array:
+        """(k,) what loads and prescribed motions read as the time."""
+        return t
+
     @property
     def origin(self) -> Nodes:
         """What displacements count from: where all is built."""
@@ -125,7 +129,8 @@ class BodyRun(Run):
         """(...) kinetic and potential energy [J]."""
         flat = self.within(t)
         nodes, velocities = self.configurations(flat), self.velocities(flat)
-        pairs = [self.assembly.system.energy(*at) for at in zip(flat.tolist(), nodes, velocities, strict=True)]
+        loads = self.loads(flat).tolist()
+        pairs = [self.assembly.system.energy(*at) for at in zip(loads, nodes, velocities, strict=True)]
         both = np.array(pairs).reshape(-1, 2).T
         return both[0].reshape(np.shape(t)), both[1].reshape(np.shape(t))
 
@@ -151,9 +156,10 @@ class BodyRun(Run):
         """
         at = np.asarray(times, dtype=float)
         angles = {name: self.joint_angle(name, at) for name in self.joints}
+        loads = self.loads(at).tolist()
         result = []
         for k, (poses, multipliers) in enumerate(zip(self.poses(at), self.multipliers(at), strict=True)):
-            forces = connection_forces(self.assembly, float(at[k]), poses, multipliers)
+            forces = connection_forces(self.assembly, loads[k], poses, multipliers)
             result.append(
                 {
                     "t": float(at[k]),

@@ -1,4 +1,4 @@
-"""What is to be found of a scene of bodies: its motion, equilibria, buckling loads or natural frequencies.
+"""What is to be found of a scene of bodies: its motion, equilibria, their path, buckling loads, natural frequencies.
 
 Each analysis is one record, which a scene selects by ``type = "..."`` in its table ``simulation``.
 """
@@ -52,7 +52,7 @@ class _AtRest(Record, frozen=True, kw_only=True, tag_field="type"):
     formulation : str
         ``nodal``.
     load_steps : int
-        Equal steps of the load parameter.
+        Equal steps of the load parameter; of a path the first one, further ones along it are as long at most.
     tangent : str
         ``full``, ``material`` or ``frozen``, see `erls.equations.nodal.statics`.
     tolerance : float
@@ -75,6 +75,26 @@ class StaticSteps(_AtRest, frozen=True, tag="statics"):
     """
 
     compare_tangents: bool = False
+
+
+class Continuation(_AtRest, frozen=True, tag="path"):
+    """Equilibria along their path by arc length: past limit points of the load, and onto branches at bifurcations.
+
+    Attributes
+    ----------
+    load : float
+        Load parameter at which the path ends, however it goes up and down before.
+    most_steps : int
+        The path ends after so many steps, too.
+    branch : int
+        Bifurcation, from 1, at which the path leaves for the branch; negative: for its other half. 0: it goes straight
+        on.
+    """
+
+    load_steps: int = 20
+    load: float = 1.0
+    most_steps: int = 200
+    branch: int = 0
 
 
 class Buckling(_AtRest, frozen=True, tag="buckling"):
@@ -109,5 +129,5 @@ class Frequencies(_AtRest, frozen=True, tag="frequencies"):
     load: float = 1.0
 
 
-AtRest = StaticSteps | Buckling | Frequencies
-Analysis = Dynamics | StaticSteps | Buckling | Frequencies
+AtRest = StaticSteps | Continuation | Buckling | Frequencies
+Analysis = Dynamics | StaticSteps | Continuation | Buckling | Frequencies

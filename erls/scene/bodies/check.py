@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from erls.errors import SceneError
 from erls.mechanism.joint_types import DRIVEN_TYPES, HOLDING_TYPES, JOINT_TYPES
-from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Dynamics, Frequencies
+from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Continuation, Dynamics, Frequencies
 from erls.scene.bodies.schema import (
     GROUND,
     Beam,
@@ -106,6 +106,12 @@ def _check_simulation(s: Analysis, place: str) -> None:
     choose(s.tangent, TANGENTS, f"{place}.tangent", SceneError)
     if not 1 <= s.load_steps <= 10_000:
         raise bad(f"{place}.load_steps", "no such number of load steps", s.load_steps, "give 1 to 10000")
+    if isinstance(s, Continuation):
+        positive(f"{place}.load", s.load)
+        if s.tangent != "full":
+            raise bad(f"{place}.tangent", "paths need the full tangent", s.tangent, 'give "full", or leave it out')
+        if not 1 <= s.most_steps <= 10_000:
+            raise bad(f"{place}.most_steps", "no such number of steps", s.most_steps, "give 1 to 10000")
     if isinstance(s, (Buckling, Frequencies)):
         if s.count < 1:
             raise bad(f"{place}.count", "a count must be positive", s.count, "give 1 or more")
