@@ -39,7 +39,7 @@ FORMULATION = {  # relative: where ccx integrates mass or stiffness otherwise, c
     "tet4": 0.05, "wedge6": 0.1, "hex8": 0.1,
 }
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
-_KEPT = re.compile(r"NODE|ELEMENT|NSET|ELSET|SURFACE|MASS|SPRING|EQUATION|RIGIDBODY|SOLIDSECTION|MPC|ROTARYINERTIA")
+_KEPT = re.compile(r"NODE|ELEMENT|NSET|ELSET|SURFACE|MASS|SPRING|EQUATION|RIGIDBODY|SOLIDSECTION|MPC|TIE|ROTARYINERTIA")
 _LONG = re.compile(r"[+-]?\d\.\d{14,}[Ee][+-]\d+")  # ccx reads twenty characters
 WHAT = {"program": "Ansys", **{name: f"ccx, {name}" for name in ("deck", "twin", "mesh")}}
 _DECK_TYPES = {
@@ -118,8 +118,8 @@ def link_of(path: Path, case: Case) -> tuple[Any, SolidMesh]:
     """The free link of a file, with one interface that moves as the corner face of an element does on average."""
     found: list[SolidMesh] = []
 
-    def with_face(mesh: Path, ignore: Any) -> SolidMesh:
-        read = read_mesh(mesh, ignore)
+    def with_face(mesh: Path, *how: Any) -> SolidMesh:
+        read = read_mesh(mesh, *how)
         found.append(read)
         block = read.blocks[0]
         nodes = np.unique(block.elements[0][block.element.faces[0]])

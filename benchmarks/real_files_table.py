@@ -66,12 +66,11 @@ def _decks(names: str, refused: str = "", ignore: tuple[str, ...] = _SUPPORTS) -
 
 CASES = [
     *_decks("beamp beamb beam8b beam8p beam10p achtelc segment1 capacitor c3d15 rotor aniso beamdy1"),
-    *_decks("beamrb beamprb mpcforce beampdepmpc"),
+    *_decks("beamrb beamprb mpcforce beampdepmpc beamptied1"),
     *_decks("beamnlmpc", "resist rigid-body motion"),
     *_decks("achtel2", "pairs of nodes coincide"),
     *_decks("cube2", "no element face joins", ()),
     *_decks("contact1", "contact: 1 CONTACT PAIR"),
-    *_decks("beamptied1", "1 TIE"),
     *_decks("cou2d", "fluid", ()),
     *_decks("shell1", "1 SHELL SECTION"),
     Case("abaqusreader", "test/test_parse_mesh/beam.inp", "Abaqus deck"),

@@ -6,20 +6,15 @@ in it, and differences of fourth order right to about 1e-9. The number of modes 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import numpy as np
 
-from fe_import.description.check import check_link
-from fe_import.description.link import LinkFile, load_link
-from fe_import.description.records import LinkDescription
+from fe_import.description.link import LinkFile, load_link, with_numbers
+from fe_import.description.numbers import number_in, tables_of
 from fe_import.errors import Cause, FEImportError
-from fe_import.files.toml import convert, place_of
 from fe_import.modal.equal_frequencies import KEPT_WHOLE
 from fe_import.modal.held_shapes import arrays_in, nearest_shapes
 from fe_import.modal.model import ModalModel
@@ -99,7 +94,7 @@ def modal_derivatives(link: LinkFile | Path | str, key: str, size: float | None 
     problems = []
     for stencil in STENCILS:
         try:
-            models = [reduce_link(with_number(given, key, value + at * step)) if at else model for at, _ in stencil]
+            models = [reduce_link(with_numbers(given, {key: value + at * step})) if at else model for at, _ in stencil]
         except FEImportError as problem:
             problems.append(problem)
             continue
@@ -175,52 +170,3 @@ def number_at(link: LinkFile, key: str) -> float:
         message = f"nothing can be differentiated by a field of reduction: {_CHOOSES}"
         raise FEImportError(Cause.BAD_FIELD, message, where=where, value=key, remedy="name another field")
     return number_in(tables_of(link.description), key, where, FEImportError)
-
-
-def with_number(link: LinkFile, key: str, value: float) -> LinkFile:
-    """The description with another value.
-
-    Raises
-    ------
-    FEImportError
-        It is refused.
-    """
-    data = tables_of(link.description)
-    table, place = place_of(data, key, f"{link.path}: {key}")
-    table[place] = value
-    description = convert(data, LinkDescription, str(link.path))
-    check_link(description, str(link.path))
-    return replace(link, description=description)
-
-
-def number_in(data: dict[str, Any], key: str, where: str, error: type[Any]) -> float:
-    """The number in tables that a dotted key names.
-
-    Raises
-    ------
-    ReportedError
-        Of class ``error``: there is none.
-    """
-    if not all(key.split(".")):
-        raise error(Cause.BAD_FIELD, "not a dotted key", where=where, value=key, remedy="e.g. sections.bar.width")
-    table, place = place_of(data, key, where, error)
-    value = table[place] if isinstance(table, list) else table.get(place)
-    if value is None:
-        message, remedy = "this field is not given, or there is none of that name", "give it a value in the file"
-        raise error(Cause.BAD_REFERENCE, message, where=where, value=place, remedy=remedy)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        message, remedy = "not a number", "name a field that holds a number; members of lists go by number"
-        raise error(Cause.BAD_FIELD, message, where=where, value=value, remedy=remedy)
-    return float(value)
-
-
-def tables_of(record: msgspec.Struct) -> dict[str, Any]:
-    """A record as parsed TOML would be: tables and lists whose members can be set."""
-
-    def opened(value: Any) -> Any:
-        if isinstance(value, (list, tuple)):
-            return [opened(member) for member in value]
-        return {key: opened(member) for key, member in value.items()} if isinstance(value, dict) else value
-
-    found: dict[str, Any] = opened(msgspec.to_builtins(record))
-    return found

@@ -17,7 +17,7 @@ from erls.errors import SceneError
 from erls.files.output import check_writable, not_writable
 
 MARK = "written by erls"
-RUN, MODAL = "erls run", "erls modal model"  # schemas of HDF5 files
+RUN, MODAL, FAMILY = "erls run", "erls modal model", "erls parametric model"  # schemas of HDF5 files
 
 _MARKED = re.compile(rb"written[ _]by\W{1,8}erls\b")
 _BEGINS = {
@@ -61,7 +61,7 @@ def claim(path: Path, kind: str, inputs: Iterable[Path], force: bool = False) ->
     ----------
     path : Path
     kind : str
-        `RUN`, `MODAL`, or the ending of the name, which says what is written.
+        `RUN`, `MODAL`, `FAMILY`, or the ending of the name, which says what is written.
     inputs : iterable of Path
         Files that the command reads.
     force : bool
@@ -77,7 +77,7 @@ def claim(path: Path, kind: str, inputs: Iterable[Path], force: bool = False) ->
         if _same(target, each):
             raise _replaces(path, f"it is a file that is read: {each}", "give the output another name")
     if not force and target.exists() and not _is_earlier(target, kind):
-        what = {RUN: "run file", MODAL: "modal file"}.get(kind, f"{kind} file")
+        what = {RUN: "run file", MODAL: "modal file", FAMILY: "file of a family of links"}.get(kind, f"{kind} file")
         message = f"there is a file of that name, which is no {what} that erls wrote"
         raise _replaces(path, message, "give another name, move it away, or replace it with --force")
 
@@ -97,7 +97,7 @@ def _same(target: Path, other: Path) -> bool:
 def _is_earlier(target: Path, kind: str) -> bool:
     """Whether a file is a result of this kind."""
     with contextlib.suppress(OSError):
-        if kind in (RUN, MODAL):
+        if kind in (RUN, MODAL, FAMILY):
             return schema_of(target) == kind
         with target.open("rb") as file:
             begin = file.read(_END)

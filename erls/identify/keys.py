@@ -8,7 +8,7 @@ from typing import Any
 
 from erls.errors import Cause, SceneError
 from erls.scene.chain import Scene
-from fe_import.derivatives import tables_of
+from fe_import.description.numbers import tables_of
 
 
 def fitted_keys(scene: Scene, asked: Sequence[str]) -> list[str]:

@@ -16,7 +16,7 @@ from erls.scene.build import build_mechanism, link_description, link_model
 from erls.scene.chain import Scene
 from erls.scene.overrides import apply_override
 from erls.scene.read import checked
-from fe_import.derivatives import tables_of
+from fe_import.description.numbers import tables_of
 from fe_import.description.records import LinkDescription
 from fe_import.modal.model import ModalModel
 

@@ -8,9 +8,9 @@ from typing import Any, TypeVar
 from erls.maths.so3 import Array
 from erls.optimization.problem import Problem
 from erls.scene.build import link_description
-from fe_import.derivatives import tables_of
 from fe_import.description.check import check_link
 from fe_import.description.link import LinkFile
+from fe_import.description.numbers import tables_of
 from fe_import.description.records import LinkDescription
 from fe_import.files.toml import convert, place_of
 

@@ -11,8 +11,9 @@ from typing import Any
 import msgspec
 
 from erls.errors import Cause, SceneError
+from erls.files.results import FAMILY
 from erls.report.runs import run_report
-from erls.report.tables import modal_report, table
+from erls.report.tables import family_report, modal_report, table
 from erls.run.file import EARLIER, load_run
 from erls.run.file import SCHEMA as RUN_SCHEMA
 from erls.scene.bodies.schema import BodyScene
@@ -51,6 +52,11 @@ def file_info(path: Path) -> tuple[dict[str, Any], str]:
             failure = None if run.failure is None else run.failure.as_dict()
             text = "\n".join([run_report(run), *(f"warning: {w}" for w in run.warnings)])
             return {"file": "run", **run.summary(), "failure": failure}, text
+        if schema == FAMILY:
+            from fe_import.parametric.file import read_parametric_file
+
+            summary = read_parametric_file(path).summary()
+            return {"file": "family of links", **summary}, family_report(summary)
         if schema != MODAL_SCHEMA:
             raise SceneError(
                 Cause.NOT_READABLE,

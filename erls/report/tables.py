@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import getitem
 from typing import Any
@@ -41,7 +41,7 @@ def modal_report(model: ModalModel) -> str:
     parts = [head]
     if model.form == "orthonormal":
         modes = [
-            (str(k - 5), f"{f:.3f}", model.kinds[k], _percent(model, k), f"{model.residuals[k]:.1e}")
+            (str(k - 5), f"{f:.3f}", model.kinds[k], _percent(model, k), _residual(model, k))
             for k, f in enumerate(model.frequencies_hz[6:], start=6)
         ][:_SHOWN_MODES]
         header = ("mode", "frequency [Hz]", "kind", "damping", "residual")
@@ -55,6 +55,28 @@ def modal_report(model: ModalModel) -> str:
     if rows:
         parts[-1] += "\n" + table(("check", "value", "limit", ""), rows)
     return "\n\n".join(parts)
+
+
+def family_report(summary: Mapping[str, Any]) -> str:
+    """Parameters and bounds of a family of links, from its summary."""
+    rows = [(name, f"{low:.6g}", f"{high:.6g}") for name, (low, high) in summary["parameters"].items()]
+    bound, first = summary["bound"], ", ".join(f"{f:.6g}" for f in summary["frequencies_hz"])
+    said = [
+        f"{summary['link']}: a family on {summary['fields']} elastic fields, from {summary['samples']} samples",
+        table(("parameter", "from", "to"), rows),
+        f"Frequencies in the middle, inboard interface held [Hz]: {first}",
+        f"In the whole range within {100 * bound['frequencies']:.2g} % (frequencies) and "
+        f"{100 * bound['flexibility']:.2g} % (static flexibility): twice what was found at {summary['places']} places "
+        "that gave nothing to it, and the corners",
+    ]
+    if not summary["healthy"]:
+        said.append("Health in the middle: checks FAILED; reduce the description alone to see them")
+    return "\n\n".join(said)
+
+
+def _residual(model: ModalModel, mode: int) -> str:
+    """Those of members of families are not known."""
+    return "-" if "residuals" in model.provenance else f"{model.residuals[mode]:.1e}"
 
 
 def _percent(model: ModalModel, mode: int) -> str:

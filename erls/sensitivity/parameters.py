@@ -14,8 +14,9 @@ from erls.errors import Cause, SceneError
 from erls.scene.build import link_description
 from erls.scene.chain import Scene
 from erls.scene.read import checked
-from fe_import.derivatives import number_at, number_in, tables_of, with_number
-from fe_import.description.link import LinkFile
+from fe_import.derivatives import number_at
+from fe_import.description.link import LinkFile, with_numbers
+from fe_import.description.numbers import number_in, tables_of
 from fe_import.files.toml import place_of
 
 _NOT_SMOOTH = {
@@ -98,7 +99,7 @@ def description_with(scene: Scene, parameter: Parameter, value: float) -> LinkFi
         The value is refused.
     """
     assert parameter.link is not None
-    return with_number(link_description(scene, scene.record.links[parameter.link]), parameter.within, value)
+    return with_numbers(link_description(scene, scene.record.links[parameter.link]), {parameter.within: value})
 
 
 def _parameter(scene: Scene, key: str, size: float | None) -> Parameter:

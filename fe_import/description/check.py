@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from fe_import.description.meshes import Layer, Shell, ShellRegion, Stretch
+from fe_import.description.numbers import tables_of
+from fe_import.description.parameters import check_parameters
 from fe_import.description.records import Damping, LinkDescription, Material
 from fe_import.description.reduction import check_reduction_options
 from fe_import.elements.sections import check_section
@@ -145,6 +147,8 @@ def check_link(link: LinkDescription, file: str) -> None:
     if link.temperature_change is not None:
         _check_temperature(link, link.temperature_change, file)
     check_damping(link.damping, f"{file}: damping")
+    if link.parameters:
+        check_parameters(link.parameters, tables_of(link), file)
 
 
 _NOT_OF_THICKNESS = ("mesh", "direction", "nodes", "drilling", "mass", "ignore")

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from fe_import.description.check import check_link
+from fe_import.description.numbers import tables_of
 from fe_import.description.records import LinkDescription
 from fe_import.description.reduction import Reduction
 from fe_import.files.includes import with_included
@@ -97,3 +98,20 @@ def load_link(
         description = msgspec.structs.replace(description, name=path.name.removesuffix(".toml"))
     check_link(description, str(path))
     return LinkFile(path, description)
+
+
+def with_numbers(link: LinkFile, values: Mapping[str, float]) -> LinkFile:
+    """The description with other values of numbers, by dotted keys.
+
+    Raises
+    ------
+    FEImportError
+        They are refused.
+    """
+    data = tables_of(link.description)
+    for key, value in values.items():
+        table, place = place_of(data, key, f"{link.path}: {key}")
+        table[place] = value
+    description = convert(data, LinkDescription, str(link.path))
+    check_link(description, str(link.path))
+    return replace(link, description=description)

@@ -11,6 +11,7 @@ import msgspec
 
 from fe_import.description.base import Inertia, Record, Vector
 from fe_import.description.meshes import Shell, Solid
+from fe_import.description.parameters import Parameter
 from fe_import.description.reduction import Reduction
 from fe_import.elements.sections import Section
 
@@ -276,6 +277,8 @@ class LinkDescription(Record, frozen=True):
     temperature_change : float, optional
         Of the whole link, made of beams, from the temperature at which it has its stated shape without stress [K].
         0 prepares the modal file for one.
+    parameters : dict of Parameter
+        Numbers that a family of links may have otherwise, ``[parameters.NAME]``.
     """
 
     interfaces: list[Interface]
@@ -292,6 +295,7 @@ class LinkDescription(Record, frozen=True):
     damping: Damping = Damping()
     recovery: Recovery | None = None
     temperature_change: float | None = None
+    parameters: dict[str, Parameter] = {}
 
     def files(self) -> list[str]:
         """The files that it names, as they stand there."""

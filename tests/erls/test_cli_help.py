@@ -13,7 +13,7 @@ import pytest
 from erls.cli.main import main
 
 OPTIONS = {
-    "reduce": ["--output", "-o", "--method", "--modes", "--force", "--json"],
+    "reduce": ["--output", "-o", "--method", "--modes", "--parametric", "--set", "--force", "--json"],
     "export": ["--output", "-o", "--format", "--fmi", "--set", "--force", "--json"],
     "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict",
                  "--resume", "--until", "--report", "--force", "--json"],

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from fe_import.derivatives import modal_derivatives, with_number
-from fe_import.description.link import LinkFile, load_link
+from fe_import.derivatives import modal_derivatives
+from fe_import.description.link import LinkFile, load_link, with_numbers
 from fe_import.errors import Cause, FEImportError
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
@@ -50,7 +50,7 @@ def test_space_of_modes_in_closed_form(key: str) -> None:
     link = _free_modes(4)
     found = modal_derivatives(link, key)
     value = found.value
-    models = [build_model(with_number(link, key, value * (1 + at * 2e-3))) for at, _ in RICHARDSON]
+    models = [build_model(with_numbers(link, {key: value * (1 + at * 2e-3)})) for at, _ in RICHARDSON]
     mass_slope, stiffness_slope = (_slope(models, of, 2e-3 * value) for of in ("mass", "stiffness"))
     model = build_model(link)
     mass, stiffness = model.mass.toarray(), model.stiffness.toarray()
