@@ -1,7 +1,7 @@
 """Loops over states in eightfold numbers (`erls.maths.lanes`), to be compiled with the equations of a formulation.
 
 Each has a module of its own for them, whose source, with all that it imports, tells compiled code on disk apart:
-``forces, tangents = lane_kernels(__name__, residual)``.
+``forces, tangents, masses = lane_kernels(__name__, residual, mass_matrix)``.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ from erls.maths.lanes import as_duals, as_lanes
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
-residual: Any = None  # that of a formulation takes its place
-_STACK = types.float64[:, :, ::1]
+residual: Any = None  # those of a formulation take their places
+mass_matrix: Any = None
+_STACK, _PILE = types.float64[:, :, ::1], types.float64[:, :, :, ::1]
 _CONSTANTS = REALS, INTEGERS, MATRIX
 _KINDS = {
     "_forces": types.void(*_CONSTANTS, MATRIX, _STACK, _STACK, _STACK, _STACK, INTEGERS),
+    "_masses": types.void(*_CONSTANTS, MATRIX, _STACK, _PILE, INTEGERS),
     "_tangents": types.void(*_CONSTANTS, _STACK, MATRIX, REALS, MATRIX, MATRIX, MATRIX, _STACK, _STACK),
 }
 
@@ -35,6 +37,16 @@ def _forces(
     places, rates, accelerations = as_lanes(y), as_lanes(v), as_lanes(a)
     for k in range(done[0], len(times)):
         residual(reals, integers, work, times[k], places[k], rates[k], accelerations[k], forces[k])
+        done[0] = k + 1
+
+
+def _masses(
+    reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, out: Array, done: IntArray
+) -> None:  # fmt: skip
+    """Mass matrices ``out`` (j, n, n, 8) at 8 j places; ``done`` as of forces."""
+    work, times, places, matrices = as_lanes(scratch), as_lanes(t), as_lanes(y), as_lanes(out)
+    for k in range(done[0], len(times)):
+        mass_matrix(reals, integers, work, times[k], places[k], matrices[k])
         done[0] = k + 1
 
 
@@ -64,12 +76,15 @@ def _tangents(
                     found[i, j % n] = own[3, i, 1 + j - first]
 
 
-def lane_kernels(module: str, own: Any) -> tuple[Callable[..., None], Callable[..., None]]:
-    """``forces`` and ``tangents`` of a formulation, for its module of that name; ``own`` is its residual."""
-    names = {**globals(), "__name__": module, "residual": any_scalar(own)}
+def lane_kernels(module: str, own: Any, own_mass: Any) -> tuple[Callable[..., None], ...]:
+    """``forces``, ``tangents`` and ``masses`` of a formulation, for its module of that name; ``own`` is its residual,
+    ``own_mass`` its mass matrix.
+    """
+    kinds = {"residual": any_scalar(own), "mass_matrix": any_scalar(own_mass)}
+    names = {**globals(), "__name__": module, **kinds}
 
     def made(function: Any) -> Callable[..., None]:
         name = function.__name__
         return kernel(_KINDS[name], counted=False)(FunctionType(function.__code__, names, name))
 
-    return made(_forces), made(_tangents)
+    return made(_forces), made(_tangents), made(_masses)

@@ -1,18 +1,19 @@
-"""Forces and tangents at many states by eightfold numbers (`erls.maths.lanes`): eight states, or seven directions, for
-about what one takes.
+"""Forces, mass matrices and tangents at many states by eightfold numbers (`erls.maths.lanes`): eight states, or seven
+directions, for about what one takes.
 
 Compiling that takes some ten seconds, once on a machine; for few states `erls.equations.series` is the way.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.series import residual_series
+from erls.equations.series import mass_series, residual_series
 from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
 
@@ -39,29 +40,42 @@ def eightfold_kernels(system: CompiledSystem, evaluations: int) -> Any:
 
 def eightfold_forces(kernels: Any, system: CompiledSystem, t: Array, y: Array, v: Array, a: Array) -> Array:
     """(k, n) forces out of balance at states, as `erls.equations.series.residual_series`."""
+    return _in_eights(kernels.forces, residual_series, system, (system.size,), t, y, v, a)
+
+
+def eightfold_masses(kernels: Any, system: CompiledSystem, t: Array, y: Array) -> Array:
+    """(k, n, n) mass matrices at places, as `erls.equations.series.mass_series`."""
+    return _in_eights(kernels.masses, mass_series, system, (system.size, system.size), t, y)
+
+
+def _in_eights(
+    together: Any, one_by_one: Callable[..., Array], system: CompiledSystem, shape: tuple[int, ...], *states: Array
+) -> Array:
+    """(k, ...) what a kernel gives of k states; ``one_by_one`` of those that go different ways."""
     from erls.maths.lanes import WIDTH, Apart, eightfold
 
-    count = -(-len(t) // WIDTH)
-    rows = np.minimum(np.arange(count * WIDTH), len(t) - 1)  # the last one fills the last eight
+    number = len(states[0])
+    count = -(-number // WIDTH)
+    rows = np.minimum(np.arange(count * WIDTH), number - 1)  # the last one fills the last eight
 
     def beside(x: Array) -> Array:
         found: Array = eightfold(count, *x.shape[1:])
         found[...] = np.moveaxis(x[rows].reshape(count, WIDTH, *x.shape[1:]), 1, -1)
         return found
 
-    out, done = eightfold(count, system.size), np.zeros(1, dtype=np.int64)
-    states = [beside(x) for x in (t, y, v, a)]
+    out, done = eightfold(count, *shape), np.zeros(1, dtype=np.int64)
+    given = [beside(x) for x in states]
     apart: list[int] = []
     while done[0] < count:
         try:
-            kernels.forces(system.reals, system.integers, _scratch(system, WIDTH), *states, out, done)
+            together(system.reals, system.integers, _scratch(system, WIDTH), *given, out, done)
         except Apart:
             apart.append(int(done[0]))
             done += 1
-    result = np.moveaxis(out, -1, 1).reshape(count * WIDTH, system.size)[: len(t)]
+    result = np.moveaxis(out, -1, 1).reshape(count * WIDTH, *shape)[:number]
     if apart:
-        some = np.flatnonzero(np.isin(np.arange(len(t)) // WIDTH, apart))
-        result[some] = residual_series(system, *(x[some] for x in (t, y, v, a)))
+        some = np.flatnonzero(np.isin(np.arange(number) // WIDTH, apart))
+        result[some] = one_by_one(system, *(x[some] for x in states))
     return np.asarray(result)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.linearization import difference_steps
 from erls.equations.series import mass_series, residual_series
-from erls.equations.side_by_side import eightfold_forces, eightfold_kernels, eightfold_tangents
+from erls.equations.side_by_side import eightfold_forces, eightfold_kernels, eightfold_masses, eightfold_tangents
 from erls.maths.so3 import Array
 
 _ROUGHER = 5.0
@@ -70,9 +70,10 @@ class Evaluation:
     def tangents(self, system: CompiledSystem, knots: Knots) -> Tangents:
         """At all knots."""
         t, y, v, a = knots
-        mass = mass_series(system, t, y)
         if self.kernels is not None:
+            mass = eightfold_masses(self.kernels, system, t, y)
             return Tangents(mass, *eightfold_tangents(self.kernels, system, *knots))
+        mass = mass_series(system, t, y)
         n = y.shape[1]
         damping, stiffness = np.empty((2, len(t), n, n))
         for j in range(n):

@@ -12,8 +12,14 @@ import erls
 from erls.equations import side_by_side
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
-from erls.equations.series import residual_series
-from erls.equations.side_by_side import WORTH, eightfold_forces, eightfold_kernels, eightfold_tangents
+from erls.equations.series import mass_series, residual_series
+from erls.equations.side_by_side import (
+    WORTH,
+    eightfold_forces,
+    eightfold_kernels,
+    eightfold_masses,
+    eightfold_tangents,
+)
 from erls.equations.system import metre_scales
 from erls.equations.tangents import Evaluation, Knots, steps_of
 from erls.maths.jit import ENABLED
@@ -107,12 +113,16 @@ def _steps(chain: Any) -> np.ndarray:
 @compiled_only
 @pytest.mark.parametrize("form", FORMS)
 def test_equations(form: str) -> None:
-    """Forces to rounding, tangents to what differences leave: 1e-10 of the largest, and of forces over their steps."""
+    """Forces and masses to rounding, tangents to what differences leave: 1e-10 of the largest, and of forces over their
+    steps.
+    """
     chain, system, knots = _case(form)
     kernels = eightfold_kernels(system, WORTH)
     expected = residual_series(system, *knots)
     forces = eightfold_forces(kernels, system, *knots)
     assert np.abs(forces - expected).max() <= 1e-13 * np.abs(expected).max()
+    masses, alone = eightfold_masses(kernels, system, *knots[:2]), mass_series(system, *knots[:2])
+    assert np.abs(masses - alone).max() <= 1e-13 * np.abs(alone).max()
     steps = _steps(chain)
     differences = Evaluation(steps).tangents(system, knots)
     rounding = 1e-15 * np.abs(expected).max() / steps

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, function_in
 from erls.equations.erls import records as own
 from erls.equations.serial import pack, segments
+from erls.equations.serial.condensed import Condensed
 from erls.equations.serial.condensed import condensed as elimination_memory
 from erls.equations.serial.contacts import put_contacts
 from erls.equations.serial.decoupled_modes import MIXING, DecoupledModes, decoupled_modes
 from erls.equations.serial.ends import end_state
+from erls.equations.serial.kept import kept
 from erls.equations.serial.loads import put_loads
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.modal_inertia_kernels import Warp, warp_record, warp_state
@@ -29,6 +32,8 @@ from erls.mechanism.loops import loop_ends
 
 _PARALLEL = 1e-13  # sine of the angle between axes that count as one
 DENSE = 40  # coordinates up to which dense factors cost less than elimination link by link
+_bend_state, _change, _link_state = cache(own.bend_state), cache(own.change), cache(own.link_state)
+"""Of zeros, which are shared and copied where they go."""
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of axes
 
 
@@ -71,16 +76,11 @@ class Shapes:
 
 def combined_modes(link: Link, joint: Joint) -> Array:
     """(m, m) the modes [ρ Ψ] of a link over its own, with Ψ leaving its inboard interface where it is."""
-    return link.once(("combined modes", _key(joint.after)), lambda: _combined_modes(link, joint))
+    return _combined_modes(link, joint.after)
 
 
-def _key(*arrays: Array) -> tuple[object, ...]:
-    """What tells arrays apart."""
-    return tuple((each.shape, each.tobytes()) for each in arrays)
-
-
-def _combined_modes(link: Link, joint: Joint) -> Array:
-    interface = link.interface_shape(link.inboard, inverse(joint.after))
+def _combined_modes(link: Link, after: Array) -> Array:
+    interface = link.interface_shape(link.inboard, inverse(after))
     stay = -np.linalg.solve(interface[:, :6], interface[:, 6:])
     return np.hstack([link.invariants.rigid, np.vstack([stay, np.eye(link.elastic_modes)])])
 
@@ -93,22 +93,14 @@ def shapes(mechanism: Mechanism) -> list[Shapes]:
         if joint.seat is not None:
             moved_frame = mechanism.links[joint.parent].interface_shape(joint.seat, joint.before)
             out = twist_transform(inverse(joint.before)) @ moved_frame @ result[joint.parent].modes[:, 6:]
-        result.append(Shapes(combined_modes(link, joint), out))
+        result.append(Shapes(kept(_combined_modes, link, joint.after), out))
     return result
 
 
 def _link(
-    link: Link, modes: Array, axes: Array, out: Array, vectors: Sequence[Array], number: int, parent: int
+    link: Link, modes: Array, axes: Array, out: Array, vectors: Array, before: Array, parent: int
 ) -> own.Link:
-    """Constants of link ``number``; ``vectors`` are the decoupled coordinates of all."""
-    before = vectors[parent] if parent >= 0 else np.zeros((0, 0))
-    given = modes, axes, out, vectors[number], before
-    return link.once(("constants", parent, _key(*given)), lambda: _constants(link, *given, parent))
-
-
-def _constants(
-    link: Link, modes: Array, axes: Array, out: Array, own_vectors: Array, before: Array, parent: int
-) -> own.Link:
+    """Constants of a link; ``vectors`` are its decoupled coordinates, ``before`` those of its parent."""
     mass = modes.T @ link.invariants.m @ modes
     x = modes.T @ np.einsum("ca,aij->cij", axes, link.invariants.X) @ modes
     z = np.einsum("ca,db,abij->cdij", axes, axes, link.invariants.Z)
@@ -121,7 +113,7 @@ def _constants(
         x=x.transpose(0, 2, 1),
         z=np.array([modes.T @ ((z[i, j] + z[j, i]) / 2) @ modes for i, j in pairs]).reshape(len(pairs), n, n),
         out=out.T,
-        rigid_decoupled=mass[:6, 6:] @ own_vectors,
+        rigid_decoupled=mass[:6, 6:] @ vectors,
         out_decoupled=(out @ before).T,
     )
 
@@ -132,12 +124,7 @@ def _columns(matrices: Array) -> Array:
     return np.ascontiguousarray(matrices.transpose(2, 0, 1)).reshape(columns, count * rows)
 
 
-def _bend(mechanism: Mechanism, k: int, basis: Array, axes: Array) -> own.Bend:
-    link, inertia = mechanism.links[k], "modal_inertia" in mechanism.effects
-    return link.once(("bend", inertia, _key(basis, axes)), lambda: _bend_of(link, basis, axes, inertia))
-
-
-def _bend_of(link: Link, basis: Array, axes: Array, inertia: bool) -> own.Bend:
+def _bend(link: Link, basis: Array, axes: Array, warps: bool) -> own.Bend:
     curved = _curved(link)
     rows, odd, e = np.zeros((6 + 3 * len(axes), 0, 0)), np.zeros((3, 0, 0)), basis.shape[1]
     if curved:
@@ -148,7 +135,7 @@ def _bend_of(link: Link, basis: Array, axes: Array, inertia: bool) -> own.Bend:
         odd = (momenta - momenta.transpose(0, 2, 1))[3:]
     return own.Bend(
         curved=int(curved),
-        warped=int(curved and inertia),
+        warped=int(curved and warps),
         axes=axes,
         rows=_columns(rows),
         odd=_columns(odd),
@@ -178,11 +165,16 @@ def _seat(mechanism: Mechanism, k: int, found: Sequence[Shapes]) -> Node:
     return node_record(joint.parent, link, found[joint.parent].modes[:, 6:], joint.seat.node, _curved(link))
 
 
-def _warp(link: Link, effects: Set[str], basis: Array, bend: own.Bend) -> Warp:
-    def find() -> Warp:
-        return warp_record(modal_inertia(link, effects, basis) if bend.warped else None)
+def _warp(link: Link, basis: Array) -> Warp:
+    return warp_record(modal_inertia(link, {"modal_inertia"}, basis))
 
-    return link.once(("warp", bend.warped, _key(basis)), find)
+
+def _mass(link: Link, modes: Array) -> Array:
+    return np.asarray(modes.T @ link.invariants.m @ modes)
+
+
+def _decoupled(link: Link, mass: Array) -> DecoupledModes:
+    return decoupled_modes(mass, link.stiffness, link.damping)
 
 
 def _bends(
@@ -191,25 +183,45 @@ def _bends(
     """Places of what chains with second-order displacements have, by the names of fields of `Chain`."""
     links, count, places = mechanism.links, range(len(mechanism.links)), {}
     modes = [link.elastic_modes for link in links]
-    bends = [_bend(mechanism, k, found[k].modes[:, 6:], axes[k]) for k in count]
+    inertial = "modal_inertia" in mechanism.effects
+    bends = [kept(_bend, links[k], found[k].modes[:, 6:], axes[k], inertial) for k in count]
     seats = [_seat(mechanism, k, found) for k in count]
-    warps = [_warp(link, mechanism.effects, found[k].modes[:, 6:], bends[k]) for k, link in enumerate(links)]
+    warps = [
+        kept(_warp, link, found[k].modes[:, 6:]) if bends[k].warped else warp_record(None)
+        for k, link in enumerate(links)
+    ]
     places["bends"] = pack.put_all(constants, bends)
     places["seats"] = pack.put_all(constants, seats)
     places["warps"] = pack.put_all(constants, warps)
     before = [modes[parent] if parent >= 0 else 0 for parent in mechanism.parents]
-    states = [own.bend_state(modes[k], before[k], len(axes[k])) for k in count]
+    states = [_bend_state(modes[k], before[k], len(axes[k])) for k in count]
     places["bend_states"] = pack.put_all(scratch, states)
     places["seat_states"] = pack.put_all(
         scratch, [node_state(seat.shapes.shape[1], len(seat.second_order) > 0) for seat in seats]
     )
     places["warp_states"] = pack.put_all(scratch, [warp_state(modes[k] * bends[k].warped) for k in count])
-    places["changes"] = pack.put_all(scratch, [own.change(modes[k]) for k in count])
+    places["changes"] = pack.put_all(scratch, [_change(modes[k]) for k in count])
     return places
 
 
-def _decoupled(link: Link, mass: Array) -> DecoupledModes:
-    return link.once(("decoupled modes", _key(mass)), lambda: decoupled_modes(mass, link.stiffness, link.damping))
+@cache
+def _segments(
+    parents: tuple[int, ...], sizes: tuple[int, ...], modes: tuple[int, ...], curved: tuple[int, ...]
+) -> tuple[list[segments.Segment], list[Condensed]]:
+    """Memory for elimination, by what a link moves, its elastic coordinates, and what its curvature adds to rows."""
+    rooms = [
+        segments.segment(
+            parent,
+            sizes[k],
+            modes[k],
+            sizes[parent] if parent >= 0 else 0,
+            modes[parent] if parent >= 0 else 0,
+            6 if parent >= 0 and modes[parent] else 0,
+            curved[k],
+        )
+        for k, parent in enumerate(parents)
+    ]
+    return rooms, elimination_memory(rooms)
 
 
 _UNBENT = dict.fromkeys(("bends", "seats", "warps", "bend_states", "seat_states", "warp_states", "changes"), -1)
@@ -240,8 +252,8 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     integers: list[int] = [0]
     constants, scratch, condensed = Memory(integers), Memory(integers), Memory(integers)
 
-    masses = [shape.modes.T @ link.invariants.m @ shape.modes for shape, link in zip(found, links, strict=True)]
-    decoupled = [_decoupled(link, mass[6:, 6:]) for mass, link in zip(masses, links, strict=True)]
+    masses = [kept(_mass, link, shape.modes) for shape, link in zip(found, links, strict=True)]
+    decoupled = [kept(_decoupled, link, mass[6:, 6:]) for mass, link in zip(masses, links, strict=True)]
     joints = [
         pack.joint_record(
             constants,
@@ -257,35 +269,26 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     axes = [np.eye(3) if bends and parent >= 0 else each for each, parent in zip(axes, parents, strict=True)]
     inertial = [np.eye(3) if curved[k] else axes[k] for k in range(count)]
     vectors = [each.vectors for each in decoupled]
+    vectors_before = [vectors[parent] if parent >= 0 else np.zeros((0, 0)) for parent in parents]
     # on the ground a link moves along its joint alone
     sizes = [
         6 + (0 if bends else len(axes[k])) if parent >= 0 or curved[k] else 1 for k, parent in enumerate(parents)
     ]
     warped = bends and "modal_inertia" in mechanism.effects
-    rooms = [
-        segments.segment(
-            parent,
-            sizes[k],
-            modes[k],
-            sizes[parent] if parent >= 0 else 0,
-            modes[parent] if parent >= 0 else 0,
-            6 if parent >= 0 and modes[parent] else 0,
-            6 + warped * modes[k] if curved[k] else 0,
-        )
-        for k, parent in enumerate(parents)
-    ]
+    curved_rows = [6 + warped * modes[k] if curved[k] else 0 for k in range(count)]
+    rooms, elimination = _segments(tuple(parents), tuple(sizes), tuple(modes), tuple(curved_rows))
     chain = own.Chain(
         links=pack.put_all(
             constants,
             [
-                _link(links[k], found[k].modes, inertial[k], found[k].out, vectors, k, parent)
-                for k, parent in enumerate(parents)
+                kept(_link, links[k], found[k].modes, inertial[k], found[k].out, vectors[k], before, parent)
+                for k, (parent, before) in enumerate(zip(parents, vectors_before, strict=True))
             ],
         ),
-        states=pack.put_all(scratch, [own.link_state(modes[k], len(inertial[k])) for k in range(count)]),
+        states=pack.put_all(scratch, [_link_state(modes[k], len(inertial[k])) for k in range(count)]),
         **(_bends(mechanism, found, axes, constants, scratch) if bends else _UNBENT),
         segments=pack.put_all(scratch, rooms),
-        condensed=pack.put_all(condensed, elimination_memory(rooms)),
+        condensed=pack.put_all(condensed, elimination),
         factors=0,
         left=0,
         **pack.effect_flags(mechanism.effects),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from erls.equations.erls.stiffened_mass_matrix import mass_matrix
 from erls.equations.erls.stiffened_residual import residual
 from erls.equations.lane_kernels import lane_kernels
 
-forces, tangents = lane_kernels(__name__, residual)
+forces, tangents, masses = lane_kernels(__name__, residual, mass_matrix)

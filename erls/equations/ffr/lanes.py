@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from erls.equations.ffr.mass import mass_matrix
 from erls.equations.ffr.residual import residual
 from erls.equations.lane_kernels import lane_kernels
 
-forces, tangents = lane_kernels(__name__, residual)
+forces, tangents, masses = lane_kernels(__name__, residual, mass_matrix)

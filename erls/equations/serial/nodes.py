@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from erls.equations.serial.kept import kept
 from erls.maths.jit import part
 from erls.maths.products import add_columns, add_rows, clear
 from erls.maths.records import Matrix, Vector, reader, table_size
@@ -108,11 +109,10 @@ def node_record(k: int, link: Link, basis: Array, node: int, bent: bool) -> Node
     bent : bool
         Whether the link has second-order displacements.
     """
-    key = "node", k, node, bent, basis.shape, basis.tobytes()
-    return link.once(key, lambda: _node_record(k, link, basis, node, bent))
+    return kept(_node_record, link, k, basis, node, bent)
 
 
-def _node_record(k: int, link: Link, basis: Array, node: int, bent: bool) -> Node:
+def _node_record(link: Link, k: int, basis: Array, node: int, bent: bool) -> Node:
     shapes = np.vstack(node_shape6(link.model, node)) @ basis
     second, e = np.zeros((0, 0)), basis.shape[1]
     if bent:
