@@ -128,12 +128,15 @@ class Options:
 class Companion(NamedTuple):
     """Knots of a run of the same with larger steps, whose distance tells the error of a `Solution`
     (`erls.integrate.step_distance`).
+
+    ``falls``: whether distances of such runs fall as smaller steps have it; where rounding decides, they do not.
     """
 
     t: Array
     y: Array
     v: Array
     a: Array
+    falls: bool = True
 
 
 class Halved(NamedTuple):
