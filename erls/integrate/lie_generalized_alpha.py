@@ -99,7 +99,7 @@ def _run(
     def begin(
         steps: Steps, leg: Leg, place: Configuration, rate: Array, stored: tuple[Array, Array] | None = None
     ) -> None:
-        if recorder.switching is not None and len(recorder.switching.system.rubbing.places):  # accelerations jump
+        if recorder.switching is not None and recorder.switching.system.jumps:
             beta = Formulas.of(Rules(options.spectral_radius, 0.0), step).beta
             recorder.switching.system.seen_by = beta * (steps.h or step) ** 2
         start = _start_of_leg(system, leg, place, rate, recorder, stored)
