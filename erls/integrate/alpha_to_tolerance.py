@@ -35,7 +35,8 @@ _MOST_UNSEEN = 200_000  # steps of a forerunner, which nobody can watch
 _MOST = 16.0  # times as many steps as those of the last forerunner
 _LATER = 2.0  # times as late that points part with four times as many steps, where their distance grows as by drift
 _TIGHT = 1e-3  # local error of a run whose forerunners failed, of the tolerance
-_PROPORTION = 4.0  # times as far apart as in proportion: rounding decides
+_PROPORTION = 0.2  # more apart than foretold, at the least, where rounding decides
+_DOUBT = 3.0  # times what was foretold of the runs before was off by
 _POINTS = 12  # that move most
 
 
@@ -110,8 +111,8 @@ def to_tolerance(
         found = attempt(plain, observer, finer(plan, density))
     partner = _below(rungs, density)
     coarser = [rung.run for rung in reversed(rungs) if rung.density <= partner.density]
-    falls = _falls(system, [found, *coarser], options)
-    companion = Companion(partner.run.t, partner.run.y, partner.run.v, partner.run.a, falls)
+    beyond = _beyond(system, [found, *coarser], options)
+    companion = Companion(partner.run.t, partner.run.y, partner.run.v, partner.run.a, beyond)
     return replace(_with_work(found, made), companion=companion)
 
 
@@ -120,13 +121,18 @@ def _below(rungs: list[_Rung], density: float) -> _Rung:
     return [rung for rung in rungs if rung.density * _APART <= density][-1]
 
 
-def _falls(system: ConstrainedSystem, runs: list[ConstrainedSolution], options: ConstrainedOptions) -> bool:
-    """Whether a run and the one before it, first of a list, are as near as that and the one before it have it."""
-    if len(runs) < 3 or any(run.failure is not None for run in runs[:3]):
-        return True
-    near, far = (_distance(system, fine, coarse, options.spectral_radius) for fine, coarse in pairwise(runs[:3]))
-    expected = far.slow.max(initial=0.0) * (1 - near.ratio**-2) / (far.ratio**2 - 1)
-    return bool(near.slow.max(initial=0.0) <= _PROPORTION * expected)
+def _beyond(system: ConstrainedSystem, runs: list[ConstrainedSolution], options: ConstrainedOptions) -> float:
+    """What a run and the one before it, first of a list, are more apart than those before foretell [m]; or 0."""
+    if any(run.failure is not None for run in runs):
+        return 0.0
+    bands = [_distance(system, fine, coarse, options.spectral_radius) for fine, coarse in pairwise(runs[:4])]
+    apart = [float(found.slow.max(initial=0.0)) for found in bands]
+    pairs = zip(pairwise(bands), apart[1:], strict=True)
+    foretold = [size * (1 - near.ratio**-2) / (far.ratio**2 - 1) for (near, far), size in pairs]
+    if len(foretold) < 2 or not foretold[1] > 0.0:
+        return 0.0
+    doubt = max(_PROPORTION, _DOUBT * abs(apart[1] / foretold[1] - 1))
+    return apart[0] - foretold[0] if apart[0] > (1 + doubt) * foretold[0] else 0.0
 
 
 def _distance(

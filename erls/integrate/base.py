@@ -129,14 +129,14 @@ class Companion(NamedTuple):
     """Knots of a run of the same with larger steps, whose distance tells the error of a `Solution`
     (`erls.integrate.step_distance`).
 
-    ``falls``: whether distances of such runs fall as smaller steps have it; where rounding decides, they do not.
+    ``beyond``: what that is more than smaller steps have it, where rounding decides [m].
     """
 
     t: Array
     y: Array
     v: Array
     a: Array
-    falls: bool = True
+    beyond: float = 0.0
 
 
 class Halved(NamedTuple):

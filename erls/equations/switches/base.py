@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.equations.switches.grips import NO_GRIPS, Grips
+from erls.equations.switches.grips import NO_GRIPS, Accelerate, Grips
 from erls.equations.switches.law import DryFriction, Freely, Settled
 from erls.equations.switches.shares import Shares, following, independent, shared
 from erls.maths.so3 import Array
@@ -227,8 +227,13 @@ class Switches:
         if len(self.motors.limits):
             parts.append(self.motors.left(self.modes[self._rubs :], self.asked(t, y, v)))
         if self.grips.names:
-            parts.append(self.grips.left(t, y, v))
+            parts.append(self.grips.left(t, y, v, self._exactly))
         return np.concatenate(parts, axis=1)
+
+    @property
+    def _exactly(self) -> Accelerate | None:
+        """What tells the friction of points that stick, where steps do not."""
+        return None if self.sees else self.acceleration
 
     def after(self, t: float, y: Array, v: Array, a: Array, ended: IntArray) -> Array:
         """(m + c,) what is decided by modes that have ended at a state, see `settle` and `left`; those of contacts are
@@ -236,7 +241,7 @@ class Switches:
         """
         decided = self.undecided
         for k in ended[ended >= len(self.modes)].tolist():
-            self.grips.end(k - len(self.modes), t, y, v)
+            self.grips.end(k - len(self.modes), t, y, v, self._exactly)
         ended = ended[ended < len(self.modes)]
         sticks = ended[(ended < self._rubs) & (self.modes[ended] == 0.0)]
         if len(sticks):

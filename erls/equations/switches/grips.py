@@ -24,6 +24,7 @@ _TURNED = 0.5  # cosine of the angle by which a point may turn from the way that
 _SLOW = 0.5  # of d / τ: as slow as that a point rests
 _JUST = 1e-9  # of what holds a point, that is left where it just does
 _ALIKE = 1e-9  # of the largest answer to friction: points whose answers are more alike share it
+_NEAR = 0.5  # of what holds a point, that is left where it is looked at more closely
 _APART = 1e-6  # s, of states whose difference is an acceleration
 
 Accelerate = Callable[[float, Array, Array], Array]
@@ -133,29 +134,52 @@ class Grips:
         if speed > 0.0:
             law[AHEAD : AHEAD + 2] = touch.slip[k] / speed
 
-    def end(self, k: int, t: float, y: Array, v: Array) -> None:
-        """Set the mode that follows where that of a contact has ended."""
+    def end(self, k: int, t: float, y: Array, v: Array, accelerate: Accelerate | None) -> None:
+        """Set the mode that follows where that of a contact has ended; see `left`."""
         law, touch = self.laws[k], self.at(t, y, v)
         if law[MODE] == STICKS and touch.gap[k] < 0.0:  # it goes the way that it is pushed
-            pushed = touch.place[k] - law[ANCHOR : ANCHOR + 2] + law[SETTLING] * touch.slip[k]
+            pushed = self._pushed(k, touch.place[k], touch.slip[k])
+            if accelerate is not None:
+                pushed = self._holding(t, y, v, accelerate)[self.sticking == k][0]
             law[MODE], law[AHEAD : AHEAD + 2] = SLIDES, pushed / np.linalg.norm(pushed)
             return
         self._decide(k, touch)
 
-    def left(self, t: Array, y: Array, v: Array) -> Array:
-        """(k, q) of states of a motion: a mode ends where this falls below zero."""
+    def _pushed(self, k: int, place: Array, slip: Array) -> Array:
+        """(..., 2) how far a point is pushed that sticks, of what acts while it slides."""
+        law = self.laws[k]
+        return np.asarray((place - law[ANCHOR : ANCHOR + 2] + law[SETTLING] * slip) / law[GIVE])
+
+    def left(self, t: Array, y: Array, v: Array, accelerate: Accelerate | None) -> Array:
+        """(k, q) of states of a motion: a mode ends where this falls below zero.
+
+        ``accelerate`` gives accelerations (n,) with the modes as they are: what holds points is found from it where
+        little is left, as steps need not be as exact as the way that points give. None where they are.
+        """
         touch, result = self.look(t, y, v), np.ones((len(t), len(self.laws)))
-        presses = touch.gap < 0.0
+        presses, near = touch.gap < 0.0, np.zeros(len(t), dtype=bool)
         for k, law in enumerate(self.laws):
             slip = touch.slip[:, k]
             if law[MODE] == STICKS:
-                moved = touch.place[:, k] - law[ANCHOR : ANCHOR + 2] + law[SETTLING] * slip
-                room = self._most[k] - np.linalg.norm(moved, axis=1) / law[GIVE]
+                room = self._most[k] - np.linalg.norm(self._pushed(k, touch.place[:, k], slip), axis=1)
                 result[:, k] = np.where(presses[:, k], room, -1.0)
+                near |= presses[:, k] & (room < _NEAR * self._most[k])
             else:
                 ahead = slip @ law[AHEAD : AHEAD + 2] - _TURNED * np.linalg.norm(slip, axis=1)
                 result[presses[:, k], k] = ahead[presses[:, k]]
+        sticking = self.sticking
+        for i in np.flatnonzero(near).tolist() if accelerate is not None else ():
+            room = self._most[sticking] - np.linalg.norm(self._holding(t[i], y[i], v[i], accelerate), axis=1)
+            result[i, sticking] = np.where(presses[i, sticking], room, -1.0)
         return result
+
+    def _holding(self, t: float, y: Array, v: Array, accelerate: Accelerate) -> Array:
+        """(s, 2) the same of all that stick, of what must push them back at a state."""
+        kept = self.kept
+        try:
+            return self._needed(float(t), y, v, accelerate, self.sticking.tolist())
+        finally:
+            self.restore(kept)
 
     def grasp(self, t: float, y: Array, v: Array, accelerate: Accelerate) -> None:
         """Let those that have just come to rest be held by what leaves them at rest; those that this is too much for
