@@ -124,7 +124,8 @@ def constrained_integration_error(run: ChainRun | BodyMotion) -> ConstrainedErro
         share = 1.0 if touches and ratio >= _TOO_LIKE else STATED / (1 - SMALLER**2)
         return ConstrainedError(names, t, share * apart, evaluations, *forces)
     bands = distance_bands(t, places, other, s.work.steps, ratio, radius)
-    return ConstrainedError(names, bands.t, STATED * errors_over_time(bands), evaluations, *forces)
+    errors = STATED * errors_over_time(bands, beyond=companion.beyond)
+    return ConstrainedError(names, bands.t, errors, evaluations, *forces)
 
 
 def _ratio(s: Solution, companion: Companion) -> float:

@@ -5,17 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
+from erls.maths.address_space import address_space
+
 LEAST = 3 * 2**28  # bytes; equations are compiled in 0.7 GB, and read from disk in 0.55 GB
-
-
-def address_space() -> int | None:
-    """Bytes that the user limits this process to; None without a limit."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    soft = resource.getrlimit(resource.RLIMIT_AS)[0]
-    return None if soft == resource.RLIM_INFINITY else soft
 
 
 def require_address_space(tokens: Sequence[str]) -> None:

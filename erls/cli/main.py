@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError, Parameter
 
-from erls.cli.address_space import address_space, require_address_space
+from erls.cli.address_space import require_address_space
 from erls.cli.compare import compare
 from erls.cli.effects import effects
 from erls.cli.export import export
@@ -32,6 +32,7 @@ from erls.cli.starting import examples, new, schema
 from erls.cli.streams import StdoutLost, prepare_streams
 from erls.cli.studies import study
 from erls.cli.terminal import listen, print_json, tell
+from erls.maths.address_space import address_space
 from fe_import.errors import ReportedError
 
 app = App(

@@ -1,4 +1,4 @@
-"""Systems with modes (`erls.equations.switches`), of what acts in the joints of a formulation."""
+"""Systems with modes (`erls.equations.switches`), of what acts in the joints and contacts of a formulation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def switched(system: Any) -> Any:
     tree = system.bare if isinstance(system, ClosedChain) else system
     if not getattr(tree, "along_coordinates", False) or not tree.size:
         return system
-    if tree.dry is None and not tree.mechanism.limited:
+    if not tree.mechanism.switches:
         return system
     if isinstance(system, ClosedChain):
         from erls.equations.loops.switched import SwitchedChain  # here: it imports the compiler

@@ -13,7 +13,7 @@ import numpy as np
 from erls.equations.ffr.constrained import ConstrainedFfr
 from erls.equations.ffr.formulation import Ffr
 from erls.equations.system import SecondOrderSystem
-from erls.integrate.base import Companion, Observer, Options, Solution
+from erls.integrate.base import Observer, Options, Solution
 from erls.integrate.constrained import ConstrainedOptions
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.maths.so3 import Array
@@ -52,7 +52,7 @@ def absolute_generalized_alpha(
     def independent(found: Solution) -> Solution:
         y, v, a = (np.ascontiguousarray(x[:, kept]) for x in (found.y, found.v, found.a))
         other = found.companion
-        companion = other and Companion(other.t, other.y[:, kept], other.v[:, kept], other.a[:, kept])
+        companion = other and other._replace(y=other.y[:, kept], v=other.v[:, kept], a=other.a[:, kept])
         known = found.work, found.failure, found.warnings
         return Solution(found.t, y, v, a, *known, companion=companion, halved=found.halved)
 

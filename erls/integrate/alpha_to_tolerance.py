@@ -10,6 +10,7 @@ one of its forerunners, whose distance tells its own error.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -34,6 +35,8 @@ _MOST_UNSEEN = 200_000  # steps of a forerunner, which nobody can watch
 _MOST = 16.0  # times as many steps as those of the last forerunner
 _LATER = 2.0  # times as late that points part with four times as many steps, where their distance grows as by drift
 _TIGHT = 1e-3  # local error of a run whose forerunners failed, of the tolerance
+_PROPORTION = 0.2  # more apart than foretold, at the least, where rounding decides
+_DOUBT = 3.0  # times what was foretold of the runs before was off by
 _POINTS = 12  # that move most
 
 
@@ -86,7 +89,7 @@ def to_tolerance(
         rungs.append(_Rung(attempt(cheap, plan=finer(plan, density)), density))
         made.append(rungs[-1].run)
         if len(rungs) > 1 and made[-1].failure is None:
-            bands = _distance(system, made[-1], _below(rungs, density), options.spectral_radius)
+            bands = _distance(system, made[-1], _below(rungs, density).run, options.spectral_radius)
             before, parted = parted, parted_at(bands) - first.t[0]
             if parted < _LATER * before < np.inf:  # disturbances grow: smaller steps put it off, no more
                 factor = factor_needed(bands, options.tolerance, FINER, first.t[0] + parted)
@@ -107,13 +110,29 @@ def to_tolerance(
         density *= factor
         found = attempt(plain, observer, finer(plan, density))
     partner = _below(rungs, density)
-    companion = Companion(partner.t, partner.y, partner.v, partner.a)
+    coarser = [rung.run for rung in reversed(rungs) if rung.density <= partner.density]
+    beyond = _beyond(system, [found, *coarser], options)
+    companion = Companion(partner.run.t, partner.run.y, partner.run.v, partner.run.a, beyond)
     return replace(_with_work(found, made), companion=companion)
 
 
-def _below(rungs: list[_Rung], density: float) -> ConstrainedSolution:
+def _below(rungs: list[_Rung], density: float) -> _Rung:
     """The last run that has few enough steps to be compared with one of a density."""
-    return [rung.run for rung in rungs if rung.density * _APART <= density][-1]
+    return [rung for rung in rungs if rung.density * _APART <= density][-1]
+
+
+def _beyond(system: ConstrainedSystem, runs: list[ConstrainedSolution], options: ConstrainedOptions) -> float:
+    """What a run and the one before it, first of a list, are more apart than those before foretell [m]; or 0."""
+    if any(run.failure is not None for run in runs):
+        return 0.0
+    bands = [_distance(system, fine, coarse, options.spectral_radius) for fine, coarse in pairwise(runs[:4])]
+    apart = [float(found.slow.max(initial=0.0)) for found in bands]
+    pairs = zip(pairwise(bands), apart[1:], strict=True)
+    foretold = [size * (1 - near.ratio**-2) / (far.ratio**2 - 1) for (near, far), size in pairs]
+    if len(foretold) < 2 or not foretold[1] > 0.0:
+        return 0.0
+    doubt = max(_PROPORTION, _DOUBT * abs(apart[1] / foretold[1] - 1))
+    return apart[0] - foretold[0] if apart[0] > (1 + doubt) * foretold[0] else 0.0
 
 
 def _distance(

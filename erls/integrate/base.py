@@ -128,12 +128,15 @@ class Options:
 class Companion(NamedTuple):
     """Knots of a run of the same with larger steps, whose distance tells the error of a `Solution`
     (`erls.integrate.step_distance`).
+
+    ``beyond``: what that is more than smaller steps have it, where rounding decides [m].
     """
 
     t: Array
     y: Array
     v: Array
     a: Array
+    beyond: float = 0.0
 
 
 class Halved(NamedTuple):

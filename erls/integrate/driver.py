@@ -16,6 +16,7 @@ from erls.integrate.base import Halved, Leg, Observer, Options, Solution, StopRu
 from erls.integrate.memory import Keeper, Keeping, Memory, Method, taken, unfit
 from erls.integrate.switching import Switch, Switching, switching_of
 from erls.integrate.thinning import thinned
+from erls.maths.address_space import take_buffers
 from erls.maths.so3 import Array
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts
@@ -60,6 +61,7 @@ class Recorder:
         self.switching, self._told = switching, 0.0
         self._t, self._rows = np.empty(capacity), np.empty((capacity, 3 * size + beside))
         self._begun = 0.0
+        take_buffers()
         self._reserve: Array | None = np.empty(_RESERVE)  # address space only, as nobody writes to it
         self._offer: Callable[[], None] = lambda: None
         # how many knots are kept, accepted steps, and, where knots are dropped, the last one that was looked at and

@@ -78,7 +78,7 @@ class _Equal:
     def begin(self, leg: Leg, y: Array, v: Array, a: Array) -> None:
         """Stand at the start of a leg."""
         switching = self._recorder.switching
-        jumps = switching is not None and len(switching.system.rubbing.places) > 0
+        jumps = switching is not None and switching.system.jumps
         self._steps.begin(y, v, self._seen(leg, y, v, a) if jumps else a)
 
     def _seen(self, leg: Leg, y: Array, v: Array, a: Array) -> Array:

@@ -100,7 +100,7 @@ def _run(
         steps: Steps, leg: Leg, place: Configuration, rate: Array, stored: tuple[Array, Array] | None = None
     ) -> None:
         switching = recorder.switching
-        if switching is not None and (stored is not None or len(switching.system.rubbing.places)):
+        if switching is not None and (stored is not None or switching.system.jumps):
             # accelerations jump: of vibrations that steps do not resolve they would start another with each switch
             beta = Formulas.of(Rules(options.spectral_radius, 0.0), step).beta
             switching.system.seen_by = beta * (steps.h or step) ** 2

@@ -1,14 +1,16 @@
 """Error of steps of generalized-α over a whole run, from the distance to a run of the same with larger steps.
 
 With steps in one proportion r everywhere, errors over the whole run, phase and drift included, are in the proportion r²
-as long as they are small, so that the error of the finer run is their distance over r² − 1 (L. F. Richardson). Two
-things break that, and both would make the distance say too little:
+as long as they are small, so that the error of the finer run is their distance over r² − 1 (L. F. Richardson). Three
+things break that, and all would make the distance say too little:
 
 - vibrations whose phase the coarser run has lost, or that it has damped away, are as far apart as they are large. What
   a step makes of a vibration is known (`erls.integrate.alpha_spectrum`), so the distance is taken apart by frequency,
   and each band counts by what the two runs have made of it: min(|z_f|, 1.5) / min(|z_c − z_f|, 1), with z the logarithm
   of the error so far as a factor. For well resolved bands that is 1/(r² − 1). Beyond that an error is not more than
   what the finer run itself does there times min(|z_f|, 1.5): the coarser one may vibrate where nothing does.
+- rounding, which smaller steps make larger: each position that a condition is off by is an acceleration over h². What
+  two runs are more apart than distances before have foretold adds to the error.
 - points that are apart by a good part of their own motion (disturbances that grow, phases of turning bodies) have no
   proportion any more: there the distance itself is the error.
 """
@@ -160,8 +162,11 @@ def _phase(band: Array) -> float:
     return float(np.arccos(1 - min(share, 4.0) / 2))
 
 
-def errors_over_time(bands: Bands, finer: float = 1.0) -> Array:
-    """(k, p) errors up to each time [m], of the finer run or, as foretold, of one with steps as many times finer."""
+def errors_over_time(bands: Bands, finer: float = 1.0, beyond: float = 0.0) -> Array:
+    """(k, p) errors up to each time [m], of the finer run or, as foretold, of one with steps as many times finer.
+
+    ``beyond``: see `erls.integrate.base.Companion`.
+    """
     resolved = 1 / (bands.ratio**2 - 1) / finer**2
     own = bands.errors
     if finer != 1:
@@ -171,7 +176,8 @@ def errors_over_time(bands: Bands, finer: float = 1.0) -> Array:
     by_motion = lost[:, :, None] * bands.vibrations + resolved * bands.fast
     fast = np.sqrt(np.sum(np.minimum(by_distance, by_motion) ** 2, axis=0))
     slow, share = bands.slow, _parted(bands)
-    return np.asarray(np.maximum.accumulate(slow * (resolved * (1 - share) + share) + fast, axis=0))
+    rounding = beyond * slow / max(float(slow.max(initial=0.0)), 1e-300)
+    return np.asarray(np.maximum.accumulate(slow * (resolved * (1 - share) + share) + fast + rounding, axis=0))
 
 
 def parted_at(bands: Bands) -> float:

@@ -174,6 +174,7 @@ class Switching:
         return {
             "switching.modes": self.system.modes.copy(),
             "switching.fixed": self.system.fixed.copy(),
+            "switching.grips": self.system.grips.kept,
             "switching.leg": np.array(self.leg),
             "switching.t": np.array([self._t, self.system.seen_by]),
             "switching.knot": self._knot,
@@ -184,6 +185,7 @@ class Switching:
         """As another run left it."""
         modes = taken(memory, "switching.modes", self.system.modes)
         self._knot = taken(memory, "switching.knot", self._knot).copy()
+        self.system.grips.restore(taken(memory, "switching.grips", self.system.grips.kept))
         self.system.set(modes, taken(memory, "switching.fixed", self.system.fixed, axis=0), self._knot[0])
         self.leg = Leg(*taken(memory, "switching.leg", np.zeros(4)).tolist())
         self._t, self.system.seen_by = taken(memory, "switching.t", np.zeros(2)).tolist()

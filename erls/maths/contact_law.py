@@ -16,7 +16,11 @@ g being 1 + d and 1 - d but for speeds below w, d = (1 - e²) / (1 + e²) makes 
 (w / v₀)²; with e = 0 it leaves with less than w. At rest damping is linear in the speed, c = 15 d k δⁿ / (8 w), so that
 bodies come to rest after some rebounds. The energy k δⁿ⁺¹ / (n + 1) is elastic; the rest is lost.
 
-Friction is Coulomb's, made smooth: µ F tanh(|s| / r) against the speed s along the plane.
+Friction is Coulomb's. Made smooth it is µ F tanh(|s| / r) against the velocity s along the plane. With exact sticking
+it has modes that are constant until they are set anew (`erls.equations.switches.grips`): while a point slides µ F s/|s|
+stands against it; through s = 0 it goes on with |s · e| in place of s · e along the direction e that the point began
+with, so that nothing jumps within a step. A point that sticks is held where it came to rest, by µ F (x + τ s) / d at a
+displacement x from there, with d so small against the mechanism that nobody sees it.
 """
 
 from __future__ import annotations
@@ -25,11 +29,23 @@ from typing import Any
 
 import numpy as np
 
+from erls.maths.contact_places import (
+    AHEAD,
+    ANCHOR,
+    COEFFICIENT,
+    EXPONENT,
+    GIVE,
+    LOSS,
+    MODE,
+    RATE,
+    SETTLING,
+    SLIDES,
+    STICKS,
+    STIFFNESS,
+    TRANSITION,
+)
 from erls.maths.jit import part
 from erls.maths.so3 import Array
-
-STIFFNESS, EXPONENT, LOSS, TRANSITION = range(4)
-"""Places of k, n, d and w among the numbers of a law."""
 
 
 @part
@@ -87,6 +103,43 @@ def friction_factor(slide: Any) -> tuple[Any, Any]:
         return 1.0 / x, -1.0 / (x * slide)
     level = np.tanh(x)
     return level / x, ((1.0 - level * level) - level / x) / slide
+
+
+@part
+def friction_force(law: Array, push: Any, along: Any, across: Any, first: Any, second: Any) -> tuple[Any, Any]:
+    """Friction along two axes of the plane, by what presses, velocities and places along these axes."""
+    strength = law[COEFFICIENT] * push
+    if law[MODE] == STICKS:
+        hold = strength / law[GIVE]
+        x, y = first - law[ANCHOR], second - law[ANCHOR + 1]
+        return -hold * (x + law[SETTLING] * along), -hold * (y + law[SETTLING] * across)
+    slide = along * along + across * across
+    if law[MODE] == SLIDES:
+        if slide.real == 0.0:
+            return -strength * law[AHEAD], -strength * law[AHEAD + 1]
+        ahead = along * law[AHEAD] + across * law[AHEAD + 1]
+        turned = -2.0 * ahead if ahead.real < 0.0 else 0.0 * ahead
+        strength = strength / np.sqrt(slide)
+        return -strength * (along + turned * law[AHEAD]), -strength * (across + turned * law[AHEAD + 1])
+    strength = strength / law[RATE] * friction_factor(slide / (law[RATE] * law[RATE]))[0]
+    return -strength * along, -strength * across
+
+
+@part
+def friction_gains(law: Array, push: Any, along: Any, across: Any) -> tuple[Any, Any, Any]:
+    """Friction per velocity along the motion, and across it; per displacement, whatever its direction."""
+    strength, slide = law[COEFFICIENT] * push, along * along + across * across
+    none = 0.0 * slide * push
+    if law[MODE] == STICKS:
+        hold = strength / law[GIVE]
+        return hold * law[SETTLING], hold * law[SETTLING], hold
+    if law[MODE] == SLIDES:
+        if slide.real == 0.0 or (along * law[AHEAD] + across * law[AHEAD + 1]).real <= 0.0:
+            return none, none, none
+        return none, strength / np.sqrt(slide), none
+    rate = law[RATE]
+    factor, slope = friction_factor(slide / (rate * rate))
+    return strength / rate * (factor + slope * slide / (rate * rate)), strength / rate * factor, none
 
 
 @part

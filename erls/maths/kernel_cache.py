@@ -22,6 +22,8 @@ from numba.core.caching import (
     UserProvidedCacheLocator,
 )
 
+from erls.maths.address_space import TO_COMPILE, TO_LOAD, require_room
+
 FORMAT = 1  # of the files; a number for the name of their folder
 _SEAL = 4  # bytes of a check sum
 
@@ -123,7 +125,20 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         self._folder, self._tell = folder.parent, tell
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Compiled code of a signature; None where there is none, or none that can be used."""
+        """Compiled code of a signature; None where there is none, or none that can be used: it is compiled then.
+
+        Raises
+        ------
+        MemoryError
+            Where loading or compiling would end the process.
+        """
+        require_room(TO_LOAD)
+        found = self._loaded(sig, target_context)
+        if found is None:
+            require_room(TO_COMPILE)
+        return found
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
         try:
             return super().load_overload(sig, target_context)
         except MemoryError:

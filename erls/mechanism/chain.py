@@ -140,8 +140,13 @@ class Mechanism:
 
     @property
     def switches(self) -> bool:
-        """Whether what acts in joints has modes (`erls.equations.switches`)."""
-        return self.sticks or self.limited
+        """Whether what acts in joints and contacts has modes (`erls.equations.switches`)."""
+        return self.sticks or self.limited or self.grips
+
+    @property
+    def grips(self) -> bool:
+        """Whether friction holds any point of a contact where it rests."""
+        return any(contact.sticks for contact in self.contacts)
 
     @property
     def reach(self) -> float:

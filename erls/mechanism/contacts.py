@@ -10,6 +10,8 @@ import numpy as np
 from erls.maths.so3 import Array
 
 _FAR = 1e300
+_GIVE = 1e-9  # of the size of a mechanism: how far a point that sticks is moved by all that friction holds
+_SETTLING = 1e-4  # s, in which it comes to rest there
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,8 @@ class PointContact:
         Coefficient µ.
     friction_rate : float
         Speed along the plane at which friction reaches 76 % of µ F [m/s].
+    static_friction : float
+        Coefficient of what holds a point that sticks, not less than µ; 0 where none does.
     """
 
     name: str
@@ -111,6 +115,20 @@ class PointContact:
     law: ContactLaw
     friction: float = 0.0
     friction_rate: float = 0.01
+    static_friction: float = 0.0
+
+    @property
+    def sticks(self) -> bool:
+        """Whether friction holds the point where it rests."""
+        return self.static_friction > 0.0
+
+    def sliding(self, reach: float) -> Array:
+        """(9,) friction as in `erls.maths.contact_law`, of a mechanism of that size [m]; until modes are set
+        smooth at speeds that count as rest, where the point may stick.
+        """
+        give = _GIVE * reach
+        rate = give / _SETTLING if self.sticks else self.friction_rate
+        return np.array([self.friction, rate, 0.0, 1.0, 0.0, 0.0, 0.0, give, _SETTLING])
 
     @property
     def axes(self) -> Array:

@@ -13,6 +13,7 @@ from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.contacts import ContactLaw, PointContact, Stops
 from erls.mechanism.place import Place
+from erls.scene.build_friction import build_friction
 from erls.scene.chain import Scene
 from erls.scene.contacts import WORLD, AgainstPlane, Plane, PlaneOfBody
 from erls.scene.contacts import Stops as StopsRecord
@@ -134,7 +135,11 @@ def against_plane(record: AgainstPlane, place: Place) -> PointContact:
     SceneError
         BAD_FIELD.
     """
-    friction, sliding, none = record.friction, place.at("friction"), np.zeros(3)
+    none = np.zeros(3)
+    rubs: dict[str, float] = {}
+    if record.friction:
+        found = build_friction(record.friction, place.at("friction"), "coefficient", "static_coefficient")
+        rubs = {"friction": found.sliding, "friction_rate": found.rate, "static_friction": found.static}
     return PointContact(
         name=record.name,
         link=-1,
@@ -143,6 +148,5 @@ def against_plane(record: AgainstPlane, place: Place) -> PointContact:
         position=none,
         normal=none,
         law=contact_law(record, place),
-        friction=sliding.not_negative("coefficient", friction.coefficient) if friction else 0.0,
-        friction_rate=sliding.positive("transition_rate", friction.transition_rate) if friction else 1.0,
+        **rubs,
     )

@@ -11,21 +11,20 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace as replaced
 
-from erls.errors import SceneError
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array, fixed_axes
 from erls.mechanism.compound_joints import fixed_joint
 from erls.mechanism.dh import DHRow, split
 from erls.mechanism.drives import PDDrive, build_drive
 from erls.mechanism.joint_types import JOINT_TYPES, Freedom
-from erls.mechanism.joints import FRICTION_LAWS, Joint, JointForces
+from erls.mechanism.joints import Joint, JointForces
 from erls.mechanism.place import Place
 from erls.scene.build_contacts import build_stops
+from erls.scene.build_friction import build_friction
 from erls.scene.chain import Scene, SceneRecord
 from erls.scene.joints import Acting, Coordinate, Friction, Loop
 from erls.scene.joints import Joint as JointRecord
 from erls.scene.records import Pose
-from fe_import.files.toml import choose
 
 GROUND = "ground"
 
@@ -188,21 +187,8 @@ def joint_forces(record: JointRecord | Coordinate | Loop, place: Place) -> Joint
 
 def _friction(record: Friction, within: Place) -> dict[str, Any]:
     """Fields of `JointForces`."""
-    choose(record.law, FRICTION_LAWS, within.field("law"), SceneError)
-    force = within.not_negative("force", record.force)
-    other = {"smooth": "static_force", "stick": "transition_rate"}[record.law]
-    if getattr(record, other) is not None:
-        message = f"friction.law = {record.law!r} does not know it"
-        laws = [law for law in FRICTION_LAWS if law != record.law]
-        raise within.error(other, message, getattr(record, other), remedy=f"remove it, or use law = {laws[0]!r}")
-    if record.law == "smooth":
-        slow = 0.01 if record.transition_rate is None else record.transition_rate
-        return {"friction": force, "transition_rate": within.positive("transition_rate", slow)}
-    static = force if record.static_force is None else within.number("static_force", record.static_force)
-    if static < force:
-        message = "a joint that rests holds at least what it holds while it slides"
-        raise within.error("static_force", message, static, remedy=f"give at least force = {force:g}, or remove it")
-    return {"friction": force, "law": record.law, "static": static}
+    found = build_friction(record, within, "force", "static_force")
+    return {"friction": found.sliding, "law": found.law, "transition_rate": found.rate, "static": found.static}
 
 
 def reflected_inertia(record: JointRecord | Coordinate | Loop, place: Place) -> float:

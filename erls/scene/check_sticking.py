@@ -1,5 +1,5 @@
-"""What friction that sticks does not go with: more than the equations of trees in independent coordinates, whose joints
-loops may tie.
+"""What friction that sticks does not go with: more than the equations of trees in independent coordinates, which loops
+may tie, and nodal ones.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ def check_sticking(scene: SceneRecord, file: str) -> None:
     if closing and scene.simulation.formulation != "nodal":
         remedy = "close the loop by another joint, and list this one under [[joints]]; or use law = 'smooth'"
         raise refused(closing[0], "a joint of [[loops]] but in simulation.formulation = 'nodal'", remedy)
-    places, s = _sticking("joints", scene.joints), scene.simulation
+    touching = [f"contacts[{k}]" for k, x in enumerate(scene.contacts) if x.friction and x.friction.law == "stick"]
+    places, s = [*_sticking("joints", scene.joints), *touching], scene.simulation
     for found, what in (
         (s.coordinates == "absolute", "simulation.coordinates = 'absolute'"),
         (s.gauge == "minimum-norm", "simulation.gauge = 'minimum-norm'"),

@@ -76,18 +76,27 @@ class PlaneOfBody(Record, frozen=True, kw_only=True):
 
 
 class ContactFriction(Record, frozen=True):
-    """Coulomb friction along the plane, smooth around zero: ``coefficient`` · F · tanh(speed / ``transition_rate``).
+    """Coulomb friction along the plane: smooth around zero, ``coefficient`` · F · tanh(speed / ``transition_rate``), or
+    with exact sticking.
 
     Attributes
     ----------
     coefficient : float
         Of the normal force F.
-    transition_rate : float
-        Speed at which it reaches 76 % of that [m/s].
+    law : str
+        ``smooth``; or ``stick``: ``coefficient`` · F against the motion while the point slides, and whatever holds it
+        where it rests, up to ``static_coefficient`` · F. When it comes to rest and when it breaks away is located in
+        time.
+    transition_rate : float, optional
+        Speed at which smooth friction reaches 76 % of ``coefficient`` · F [m/s]; 0.01 unless given.
+    static_coefficient : float, optional
+        Of a point that sticks; ``coefficient`` unless given, and not less.
     """
 
     coefficient: float
-    transition_rate: float = 0.01
+    law: str = "smooth"
+    transition_rate: float | None = None
+    static_coefficient: float | None = None
 
 
 class AgainstPlane(Record, frozen=True, kw_only=True):

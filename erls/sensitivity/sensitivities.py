@@ -326,6 +326,9 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
         remedy = "use friction.law = 'smooth'"
         what = "loops or nodal runs whose joints stick" if kind != "tree" else "joints that stick beside limited motors"
         raise _refusal(what, f"{scene.path}: friction.law", remedy)
+    if mechanism.grips:
+        remedy = "use friction.law = 'smooth'"
+        raise _refusal("contacts whose points stick", f"{scene.path}: contacts.friction.law", remedy)
     if mechanism.rotation_vectors and kind != "nodal":
         raise _refusal("coordinates that are rotation vectors", f"{scene.path}: joints", "use universal joints")
     if kind == "nodal" and mechanism.touches:

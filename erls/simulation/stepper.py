@@ -315,9 +315,9 @@ def _refuse_system(scene: Scene, kind: str) -> None:
 
 
 def _refuse_sticking(scene: Scene, mechanism: Mechanism) -> None:
-    if mechanism.sticks:
+    if mechanism.sticks or mechanism.grips:
         where, remedy = f"{scene.path}: friction.law", "use law = 'smooth'"
-        message = "a stepper makes the steps that it is asked for, and none to where a joint sticks"
+        message = "a stepper makes the steps that it is asked for, and none to where something sticks"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value="stick", remedy=remedy)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import scenes
 
 import erls
@@ -39,6 +40,36 @@ def ball(restitution: float, position: float, rate: float, gravity: float, **mor
 def falling(folder: Path, restitution: float, position: float, rate: float, gravity: float, **more: Any) -> Path:
     """A file of it."""
     return scenes.write_toml(folder / "ball.toml", ball(restitution, position, rate, gravity, **more))
+
+
+def on_a_slope(degrees: float, speed: float, friction: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """A block that moves down a slope at some speed, at the depth that bears it."""
+    slope = np.radians(degrees)
+    normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
+    start = -((MASS * G * np.cos(slope) / STIFFNESS) ** (1 / 1.5)) * normal
+    rate = speed * np.array([np.cos(slope), 0.0, -np.sin(slope)])
+    begins = (("x", float(start[0]), float(rate[0])), ("y", float(start[2]), float(rate[2])))
+    coordinates = {name: {"initial": {"position": place, "rate": rate}} for name, place, rate in begins}
+    law = {"stiffness": STIFFNESS, "restitution": 0.5, "friction": friction}
+    data = {
+        "gravity": [0.0, 0.0, -G],
+        "simulation": {"duration": 0.5},
+        "base": {"rotation_deg": [90.0, 0.0, 0.0]},
+        "joints": [{"name": "free", "type": "planar", "dh": {"convention": "standard"}, "coordinates": coordinates}],
+        "links": [{"name": "block", "rigid": BALL}],
+        "points": [{"name": "centre", "link": "block", "node": "centre"}],
+        "contacts": [{"name": "slope", "point": "centre", "plane": {"normal": normal.tolist()}, **law}],
+    }
+    return scenes.merged(data, changes)
+
+
+def down_the_slope(degrees: float, speed: float, mu: float, t: Any) -> Any:
+    """Way down of one that is pushed up, with Coulomb friction: it stays where it rests, unless tan α exceeds µ."""
+    slope = np.radians(degrees)
+    up, down = (G * (np.sin(slope) + sign * mu * np.cos(slope)) for sign in (1.0, -1.0))
+    rests = -speed / up
+    later = np.maximum(t - rests, 0.0)
+    return np.where(t < rests, speed * t + up * t**2 / 2, speed * rests / 2 + max(down, 0.0) * later**2 / 2)
 
 
 def two_bodies(folder: Path, **more: Any) -> Path:

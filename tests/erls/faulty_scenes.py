@@ -25,6 +25,7 @@ SECOND_JOINT = ("joints.1", {"name": "j", "dh": {"convention": "standard"}})
 SECOND_LINK = ("links.1", {"name": "m", "model": "link.toml"})
 LOAD = ("loads", [{"point": "tip", "force": [0.0, 0.0, 1.0]}])
 PLANE = {"normal": [0.0, 0.0, 1.0]}
+STICKS = {"coefficient": 0.1, "law": "stick"}
 CONTACT = ("contacts", [{"name": "c", "point": "tip", "plane": PLANE, "stiffness": 1e6, "restitution": 0.5}])
 STOPS = ("joints.0.stops", {"lower_deg": -10.0, "upper_deg": 10.0, "stiffness": 1e3, "restitution": 0.5})
 PAYLOAD = ("payloads", [{"point": "tip", "mass": 1.0}])
@@ -283,6 +284,36 @@ FAULTS: dict[str, tuple[list[tuple[str, Any]], str, str]] = {
         [CONTACT, ("contacts.0.friction", {"coefficient": -0.1})],
         "contacts[0].friction.coefficient",
         "negative",
+    ),
+    "contact that knows no law": (
+        [CONTACT, ("contacts.0.friction", {"coefficient": 0.1, "law": "sticky"})],
+        "contacts[0].friction.law",
+        "smooth, stick",
+    ),
+    "contact that sticks slowly": (
+        [CONTACT, ("contacts.0.friction", {**STICKS, "transition_rate": 0.1})],
+        "contacts[0].friction.transition_rate",
+        "smooth",
+    ),
+    "contact that sticks less": (
+        [CONTACT, ("contacts.0.friction", {**STICKS, "static_coefficient": 0.05})],
+        "contacts[0].friction.static_coefficient",
+        "at least coefficient",
+    ),
+    "contact that sticks in absolute coordinates": (
+        [
+            CONTACT,
+            ("contacts.0.friction", STICKS),
+            ("simulation.formulation", "ffr"),
+            ("simulation.coordinates", "absolute"),
+        ],
+        "contacts[0].friction.law",
+        "smooth",
+    ),
+    "contact that sticks in the minimum-norm gauge": (
+        [CONTACT, ("contacts.0.friction", STICKS), ("simulation.gauge", "minimum-norm")],
+        "contacts[0].friction.law",
+        "smooth",
     ),
     "plane without direction": ([CONTACT, ("contacts.0.plane.normal", [0, 0, 0])], "plane.normal", "direction"),
     "plane at infinity": ([CONTACT, ("contacts.0.plane.position", [0, 0, INF])], "plane.position", "finite"),

@@ -209,6 +209,7 @@ def test_steps_that_pass_over_a_contact_are_told(tmp_path: Path) -> None:
         ({"node": "c"}, "node"),
         ({"plane": {"on": "bob", "normal": [0.0, 0.0, 1.0]}}, "plane.on"),
         ({"restitution": 2.0}, "restitution"),
+        ({"friction": {"coefficient": 0.1, "law": "stick"}}, "friction.law"),
     ],
 )
 def test_faulty_contacts_of_bodies(tmp_path: Path, change: dict[str, Any], field: str) -> None:

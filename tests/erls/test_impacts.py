@@ -8,7 +8,7 @@ import loop_scenes
 import numpy as np
 import pytest
 import scenes
-from contact_scenes import BALL, MASS, STIFFNESS, G, falling, flexible, pendulum, simulated, two_bodies
+from contact_scenes import MASS, STIFFNESS, G, falling, flexible, on_a_slope, pendulum, simulated, two_bodies
 
 import erls
 from erls.accuracy.audits import audits
@@ -107,26 +107,9 @@ def test_two_bodies_keep_their_momentum(tmp_path: Path, formulation: str) -> Non
 def test_a_block_slides_down(tmp_path: Path, formulation: str) -> None:
     """By v₀ t + (sin α - µ cos α) g t² / 2 of a slope of 30 degrees, on the depth that bears it; to 1e-5."""
     slope, mu, speed = np.radians(30.0), 0.3, 1.0
-    normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
-    depth = (MASS * G * np.cos(slope) / STIFFNESS) ** (1 / 1.5)
-    start, rate = -depth * normal, speed * np.array([np.cos(slope), 0.0, -np.sin(slope)])
-    begins = (("x", float(start[0]), float(rate[0])), ("y", float(start[2]), float(rate[2])))
-    coordinates = {name: {"initial": {"position": place, "rate": speed}} for name, place, speed in begins}
-    free = {"name": "free", "type": "planar", "dh": {"convention": "standard"}, "coordinates": coordinates}
-    law = {"stiffness": STIFFNESS, "restitution": 0.5, "friction": {"coefficient": mu, "transition_rate": 1e-3}}
-    path = scenes.write_toml(
-        tmp_path / "slope.toml",
-        {
-            "gravity": [0.0, 0.0, -G],
-            "simulation": {"duration": 0.5, "formulation": formulation},
-            "base": {"rotation_deg": [90.0, 0.0, 0.0]},
-            "joints": [free],
-            "links": [{"name": "block", "rigid": BALL}],
-            "points": [{"name": "centre", "link": "block", "node": "centre"}],
-            "contacts": [{"name": "slope", "point": "centre", "plane": {"normal": normal.tolist()}, **law}],
-        },
-    )
-    run = simulated(path, *(["simulation.step=1e-3"] if formulation == "nodal" else []))
+    data = on_a_slope(30.0, speed, {"coefficient": mu, "transition_rate": 1e-3})
+    changes = [f"simulation.formulation={formulation}", *(["simulation.step=1e-3"] if formulation == "nodal" else [])]
+    run = simulated(scenes.write_toml(tmp_path / "slope.toml", data), *changes)
     slid = float(np.linalg.norm(np.diff(run.position("centre", [0.0, 0.5]), axis=0)))
     expected = speed * 0.5 + (np.sin(slope) - mu * np.cos(slope)) * G * 0.5**2 / 2
     assert slid == pytest.approx(expected, rel=1e-5)

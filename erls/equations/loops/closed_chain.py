@@ -10,7 +10,8 @@ asks for a state gets the nearest one that closes the loops.
 
 from __future__ import annotations
 
-from functools import cached_property
+from contextlib import nullcontext
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from erls.equations.formulation import ContactSeries, Energy, LoopForce, Reactio
 from erls.equations.linearization import Linearization
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.friction import forced, freely
+from erls.equations.loops.gripped import by_states, gripped, loop_grips
 from erls.equations.loops.neighbours import LoopNeighbours
 from erls.equations.loops.rows import Closure, applied
 from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity, stays_open
@@ -39,6 +41,7 @@ from erls.equations.serial.state_series import (
     state_series,
 )
 from erls.equations.stability import Bearing, Stability, stability_of, tumbling
+from erls.equations.switches.grips import Grips
 from erls.equations.switches.law import DryFriction, Freely, settled
 from erls.errors import SimulationError
 from erls.maths.so3 import Array, cross_all
@@ -159,9 +162,14 @@ class ClosedChain(Tied):
         """
         out = np.empty(self.size)
         places = np.array(y, dtype=float), np.array(v, dtype=float)
-        if system.acceleration(system.reals, system.integers, system.scratch, t, *places, out) > 0:
-            return self.bare.acceleration(t, y, v)  # which names it
-        return out
+        with gripped(self, t, y, v) if system is self.exact else nullcontext():
+            status = system.acceleration(system.reals, system.integers, system.scratch, t, *places, out)
+        return self.bare.acceleration(t, y, v) if status > 0 else out  # the former names it
+
+    @cached_property
+    def exact_grips(self) -> Grips:
+        """Modes of contacts whose points may stick, which are not known but meanwhile."""
+        return loop_grips(self, self.exact)
 
     def accelerations(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Closure]:
         """Accelerations (n,), multipliers of all rows (m,) and the conditions at a closed state.
@@ -333,7 +341,7 @@ class ClosedChain(Tied):
 
     def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
         """That of the tree."""
-        return self.bare.contact_series(t, y, v)
+        return by_states(self, self.bare.contact_series, t, y, v)
 
     def load_power(self, t: Array, y: Array, v: Array) -> Array:
         """(k,) that of the tree."""
@@ -389,7 +397,8 @@ class ClosedChain(Tied):
             wrenches = self._wrenches(found[i], multipliers, closure)
             given.append([applied(outer, wrench) for outer, wrench in zip(closure.outer, wrenches, strict=True)])
             loads[i] = -(np.concatenate(closure.moves).T @ np.concatenate(wrenches))[: len(links)]
-        result, states = reaction_series(self.bare, t, y, v, found), state_series(self.bare, t, y, v)
+        result = by_states(self, partial(reaction_series, self.bare), t, y, v, found)
+        states = state_series(self.bare, t, y, v)
         for number, loop in enumerate(loops):
             force, moment, place = (
                 np.array([getattr(every[number], what) for every in given]).reshape(-1, 3)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg as la
 
+from erls.equations.loops.gripped import gripped
 from erls.equations.switches.law import Freely, settled
 from erls.maths.so3 import Array
 
@@ -48,8 +49,9 @@ def forced(chain: ClosedChain, t: float, y: Array, v: Array) -> tuple[Array, Arr
     if chain.dry is None:
         a = chain.accelerate(chain.exact, t, y, v)
         return a, chain.exact.room.multipliers, chain.exact.room.gradient
-    found = settled(chain, t, y, v)
-    force = -chain.exact.forces(t, y, v, found.accelerations)
+    with gripped(chain, t, y, v):
+        found = settled(chain, t, y, v)
+        force = -chain.exact.forces(t, y, v, found.accelerations)
     force[chain.dry.places] += found.given
     gradient, metres = chain.exact.room.gradient.copy(), chain.metres
     multipliers = np.linalg.lstsq((gradient / metres).T, force / metres, rcond=None)[0]

@@ -10,8 +10,10 @@ import numpy as np
 
 from erls.equations.loops import actuated
 from erls.equations.loops.closed_chain import ClosedChain
+from erls.equations.loops.gripped import loop_grips
 from erls.equations.switches.base import NO_FRICTION, Switches
-from erls.equations.switches.law import Settled, settled
+from erls.equations.switches.gripped import lent
+from erls.equations.switches.law import Freely, Settled, settled
 from erls.equations.switches.motors import Acting, Asked, acting_in, motors_among, put_friction
 from erls.maths.so3 import Array
 
@@ -37,6 +39,7 @@ class SwitchedChain(ClosedChain, Switches):
         names = [*(joint.name for joint in joints), *(loop.name for loop in closing)]
         motors = motors_among(drives, names, acting)
         Switches.__init__(self, self.dry or NO_FRICTION, motors, self.size)
+        self.grips = loop_grips(self, self.loops)
         self._joints = tree.joints[self.bare.free_joints[self.rubbing.places]]
         self._asked = Asked(motors, self.exact, actuated.forces)
 
@@ -61,7 +64,13 @@ class SwitchedChain(ClosedChain, Switches):
 
     def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
         """See `Switches`."""
-        return settled(self, t, y, v, released)
+        with lent(self.grips, self.mechanism, self.exact):
+            return settled(self, t, y, v, released)
+
+    def freely(self, t: float, y: Array, v: Array) -> Freely:
+        """See `Switches`."""
+        with lent(self.grips, self.mechanism, self.exact):
+            return ClosedChain.freely(self, t, y, v)
 
     def asked(self, t: Array, y: Array, v: Array) -> Array:
         """See `Switches`."""

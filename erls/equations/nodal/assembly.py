@@ -258,8 +258,8 @@ class NodalSystem:
         return out
 
     def in_contacts(self, q: Nodes, v: Array) -> Array:
-        """(c, 11) as of `erls.equations.nodal.contact_forces.in_contacts`."""
-        out = np.zeros((len(self.model.contacts), 11))
+        """(c, 15) as of `erls.equations.nodal.contact_forces.in_contacts`."""
+        out = np.zeros((len(self.model.contacts), 15))
         if len(out):
             from erls.equations.nodal.contact_forces import in_contacts  # here: it is compiled
 

@@ -154,7 +154,8 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
     if mechanism.loads:
         passive.append(NodalLoads([x for load in mechanism.loads for x in _loads(mechanism, links, ends, load)]))
     if mechanism.contacts:
-        passive.append(Contacts([_contact(mechanism, links, ends, contact) for contact in mechanism.contacts]))
+        touching = [_contact(mechanism, links, ends, contact) for contact in mechanism.contacts]
+        passive.append(Contacts(touching, mechanism.reach))
     seats = _seats(mechanism, links, ends)
     closing = tuple(_closing(mechanism, links, ends, loop) for loop in mechanism.loops)
     acting = _actuators(mechanism, seats, positions)

@@ -23,7 +23,14 @@ from erls.equations.nodal.contract import (
 )
 from erls.equations.nodal.motion import set_twists
 from erls.equations.nodal.rows import push, rate_along
-from erls.maths.contact_law import contact_energy, contact_force, contact_gains, elastic_force, friction_factor
+from erls.maths.contact_law import (
+    contact_energy,
+    contact_force,
+    contact_gains,
+    elastic_force,
+    friction_force,
+    friction_gains,
+)
 from erls.maths.jit import kernel, part
 from erls.maths.vectors import (
     Rotation,
@@ -42,7 +49,7 @@ from erls.maths.vectors import (
     vector,
 )
 
-_LAW, _FRICTION, _FRICTION_RATE = 15, 19, 20  # places in a row of `Model.contacts`
+_LAW, _FRICTION = 15, 19  # places in a row of `Model.contacts`
 
 
 @part
@@ -79,16 +86,6 @@ def _rate(model: Model, twist: Array, k: int, rows: tuple[Twist, Twist]) -> floa
 
 
 @part
-def _slip(model: Model, k: int, along: float, across: float, force: float) -> tuple[float, float]:
-    """Friction over velocity along the plane, and how it changes along the motion."""
-    rate = model.contacts[k, _FRICTION_RATE]
-    slide = (along * along + across * across) / (rate * rate)
-    factor, slope = friction_factor(slide)
-    strength = model.contacts[k, _FRICTION] * force / rate
-    return strength * factor, strength * (factor + slope * slide)
-
-
-@part
 def _known(model: Model, work: Work, k: int) -> tuple[float, float, float, float, float]:
     """Gap and its rate, normal force, and velocities along the two axes of the plane, of contact k."""
     _, local, gap, turn = _placed(model, work.poses, k)
@@ -103,10 +100,12 @@ def _known(model: Model, work: Work, k: int) -> tuple[float, float, float, float
 def _strengths(model: Model, work: Work, k: int) -> Vector:
     """Force on the point along the three axes of the plane."""
     _, _, force, along, across = _known(model, work, k)
-    slip = 0.0 * force
-    if model.contacts[k, _FRICTION] != 0.0 and force.real > 0.0:
-        slip = _slip(model, k, along, across, force)[0]
-    return force, -slip * along, -slip * across
+    if model.contacts[k, _FRICTION] == 0.0 or force.real <= 0.0:
+        return force, 0.0 * force, 0.0 * force
+    local = _placed(model, work.poses, k)[1]
+    first, second = dot(vector(model.contacts, k, 9), local), dot(vector(model.contacts, k, 12), local)
+    rub = friction_force(model.contacts[k, _FRICTION:], force, along, across, first, second)
+    return force, rub[0], rub[1]
 
 
 @kernel(FORCES, counted=False)
@@ -151,15 +150,14 @@ def _derivatives(model: Model, work: Work, k: int, block: Array) -> None:
     _add_square(block, work.rows[0], _row(model, work.poses, k, local, turn, normal), stiffness, damping)
     if model.contacts[k, _FRICTION] == 0.0:
         return
-    slip, along_it = _slip(model, k, along, across, force)
+    along_it, slip, hold = friction_gains(model.contacts[k, _FRICTION:], force, along, across)
     speed = np.sqrt(along * along + across * across)
     ahead = first
     if speed.real > 0.0:
         ahead = plus(scaled(along / speed, first), scaled(across / speed, second))
     aside = cross(normal, ahead)
-    none = 0.0 * stiffness
-    _add_square(block, work.rows[0], _row(model, work.poses, k, local, turn, ahead), none, along_it)
-    _add_square(block, work.rows[0], _row(model, work.poses, k, local, turn, aside), none, slip)
+    _add_square(block, work.rows[0], _row(model, work.poses, k, local, turn, ahead), hold, along_it)
+    _add_square(block, work.rows[0], _row(model, work.poses, k, local, turn, aside), hold, slip)
 
 
 @kernel(BLOCKS, counted=False)
@@ -183,14 +181,14 @@ def contact_energies(reals: Array, integers: IntArray, scratch: Array, out: Arra
 
 @kernel(ACTING, counted=False)
 def in_contacts(reals: Array, integers: IntArray, scratch: Array, out: Array) -> None:
-    """(c, 11) of each contact: gap and its rate, normal force, force on the point and its place in the world, elastic
-    energy, and the power that is not elastic.
+    """(c, 15) of each contact: gap and its rate, normal force, force on the point and its place in the world, elastic
+    energy, the power that is not elastic; velocity along the two axes of the plane, and place there.
     """
     known = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, known.model), read_work(scratch, integers, known.work)
     set_twists(model, work)
     for k in range(len(model.contact_nodes)):
-        place, _, gap, turn = _placed(model, work.poses, k)
+        place, local, gap, turn = _placed(model, work.poses, k)
         _, rate, force, along, across = _known(model, work, k)
         strengths, law = _strengths(model, work, k), model.contacts[k, _LAW:]
         out[k, 0], out[k, 1], out[k, 2] = gap, rate, force
@@ -200,3 +198,5 @@ def in_contacts(reals: Array, integers: IntArray, scratch: Array, out: Array) ->
         put(out[k], 6, place)
         out[k, 9] = contact_energy(law, -gap)
         out[k, 10] = (force - elastic_force(law, -gap)) * rate + strengths[1] * along + strengths[2] * across
+        out[k, 11], out[k, 12] = along, across
+        out[k, 13], out[k, 14] = dot(vector(model.contacts, k, 9), local), dot(vector(model.contacts, k, 12), local)

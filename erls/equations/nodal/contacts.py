@@ -33,13 +33,14 @@ class NodalContact:
 
 
 class Contacts:
-    """All contacts of a system as arrays, for `erls.equations.nodal.contact_forces`."""
+    """All contacts of a system of some size [m] as arrays, for `erls.equations.nodal.contact_forces`."""
 
     breakpoints: tuple[float, ...] = ()
 
-    def __init__(self, contacts: Sequence[NodalContact]) -> None:
+    def __init__(self, contacts: Sequence[NodalContact], reach: float = 1.0) -> None:
+        self.contacts = tuple(c.contact for c in contacts)
         self.nodes: IntArray = with_ground([c.nodes for c in contacts])
         laws = []
         for arm, c in ((x.arm, x.contact) for x in contacts):
-            laws.append([*arm, *c.position, *c.axes, *c.law.numbers, c.friction, c.friction_rate])
-        self.laws = np.array(laws, dtype=float).reshape(-1, 21)
+            laws.append([*arm, *c.position, *c.axes, *c.law.numbers, *c.sliding(reach)])
+        self.laws = np.array(laws, dtype=float).reshape(-1, 28)

@@ -47,8 +47,8 @@ class Model(NamedTuple):
         rate, proportional and derivative gain, what the motor gives at least and at most, friction of a joint that is
         said to slide (as of `erls.equations.serial.records.Joint`), stops.
     contact_nodes, contacts : arrays
-        (c, 2) what carries the plane, and the node, and (c, 21): the point in its node; in what carries the plane, a
-        point of that and its three axes; the law, friction and its rate.
+        (c, 2) what carries the plane, and the node, and (c, 28): the point in its node; in what carries the plane, a
+        point of that and its three axes; the law and friction as of `erls.maths.contact_law`.
     shell_nodes, shell_frames, shell_built, shell_rises, shell_areas, shell_stiffness : arrays
         (q, 4) corners; (q, 48) frames of the surface at them, in their nodes; at each point of the quadrature (q, 48)
         slopes of the surface along both reference coordinates as built, (q, 16) of these coordinates along its local

@@ -21,6 +21,7 @@ from erls.equations.loops.failures import warnings_of
 from erls.equations.neighbours import small_motions
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain, build_chain
+from erls.equations.nodal.grips import nodal_grips
 from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.locks import LockedSystem, dry_joints
 from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
@@ -35,6 +36,7 @@ from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
 from erls.equations.serial.state_series import StateSeries
 from erls.equations.stability import LARGEST, Stability, stability_of
+from erls.equations.switches.grips import Grips
 from erls.equations.switches.law import DryFriction
 from erls.maths import rotation_maps as rotations
 from erls.maths.saddle import Matrix
@@ -126,7 +128,7 @@ class Nodal:
     @cached_property
     def locked(self) -> LockedSystem | None:
         """What is integrated, with modes of what acts in joints; None where nothing has any."""
-        switches = len(self.dry.places) or self.mechanism.limited
+        switches = len(self.dry.places) or self.mechanism.limited or self.mechanism.grips
         return LockedSystem(self.system) if switches else None
 
     def configuration(self, y: Array, v: Array) -> tuple[Nodes, Array]:
@@ -275,10 +277,21 @@ class Nodal:
 
     def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
         """Contacts at times (k,)."""
-        known = np.zeros((len(t), len(self.mechanism.contacts), 11))
-        for k in range(len(t) if self.mechanism.contacts else 0):
-            known[k] = self.system.in_contacts(*self.configuration(y[k], v[k]))
+        known = np.zeros((len(t), len(self.mechanism.contacts), 15))
+        for k, at in enumerate(t.tolist() if self.mechanism.contacts else ()):
+            with self._grips.settled(at, y[k, : self._kept], v[k, : self._kept], self._grip_acceleration):
+                known[k] = self.system.in_contacts(*self.configuration(y[k], v[k]))
         return ContactSeries.of(known)
+
+    @cached_property
+    def _grips(self) -> Grips:
+        """Modes of contacts whose points may stick, which are not known but meanwhile."""
+        return nodal_grips(self.system)
+
+    def _grip_acceleration(self, t: float, y: Array, v: Array) -> Array:
+        """ÿ of what is stored of knots, with the modes as they are."""
+        q, velocity = self.system.from_stored(y, v)
+        return self.system.stored(t, q, velocity, consistent_acceleration(self.system, t, q, velocity)[0])[2]
 
     def acceleration(self, t: float, y: Array, v: Array) -> Array:
         """(n,) ÿ of frames and joint coordinates; 0 for the rest."""

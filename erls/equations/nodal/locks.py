@@ -14,6 +14,7 @@ import numpy as np
 from erls.equations.consistency import consistent_position, consistent_velocity
 from erls.equations.nodal.actuators import Actuators
 from erls.equations.nodal.chain import ChainSystem
+from erls.equations.nodal.grips import contacts_of, nodal_grips
 from erls.equations.nodal.joints import Joint, Motion
 from erls.equations.nodal.nodes import Nodes
 from erls.equations.switches.base import Switches
@@ -166,6 +167,7 @@ class NodalSwitches(Switches):
         motors = motors_among([j.drive for j in joints], [j.name for j in joints], Acting(own, own))
         stored = 12 * system.count + len(joints)
         super().__init__(dry_joints(system), motors, stored)
+        self.grips = nodal_grips(system)
         self._first = 3 * len(system.rows.joints) + len(system.kinds.loads.loads)  # of the samples of actuators
 
     def asked(self, t: Array, y: Array, v: Array) -> Array:
@@ -191,7 +193,8 @@ class NodalSwitches(Switches):
 
     def freely(self, t: float, y: Array, v: Array) -> Freely:
         """See `Switches`: accelerations are those of the nodes' twists (n,), then multipliers."""
-        return self._freely(t, *self._free.from_stored(y, v))
+        with contacts_of(self._free, self._system):
+            return self._freely(t, *self._free.from_stored(y, v))
 
     def _freely(self, t: float, q: Nodes, v: Array) -> Freely:
         """Of (M + β h² K) a + Bᵀ λ = f: as steps see it. What vibrates faster is left as it is."""
@@ -250,7 +253,8 @@ class NodalSwitches(Switches):
 
     def driven(self, t: float, q: Nodes, v: Array) -> tuple[Array, Array]:
         """Accelerations (n,) and all multipliers; those out of use tell the friction of joints that slide, too."""
-        found, given = self._present(self._freely(t, q, v))
+        with contacts_of(self._free, self._system):
+            found, given = self._present(self._freely(t, q, v))
         n = self._free.size
         return found[:n], np.concatenate([found[n:], self._system.friction_of(given)])
 

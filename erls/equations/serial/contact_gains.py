@@ -15,7 +15,6 @@ from erls.equations.serial.contacts import CONTACT_STATE, GAP, read_contact_room
 from erls.equations.serial.records import Serial, read_serial
 from erls.maths.jit import kernel, part
 from erls.maths.so3 import Array
-from erls.maths.spatial import dot3
 from fe_import.model import IntArray
 
 
@@ -38,14 +37,14 @@ def _add_gains(
     state = read_contact_state(scratch, integers, serial.contact_states + number * CONTACT_STATE)
     room = read_contact_room(scratch, integers, serial.contact_room)
     row, n, gains = room.row, len(v), state.gains
-    along, across = dot3(state.axes[3:6], state.twist), dot3(state.axes[6:], state.twist)
+    along, across = state.slip[0], state.slip[1]
     speed = np.sqrt(along * along + across * across)
     if speed > 0.0:
         along, across = along / speed, across / speed
     else:
         along, across = 1.0, 0.0
     for direction in range(3):
-        stiffness, damping = gains[0] if direction == 0 else 0.0, gains[1 + direction]
+        stiffness, damping = gains[0] if direction == 0 else gains[4], gains[1 + direction]
         if stiffness == 0.0 and damping == 0.0:
             continue
         if direction == 0:

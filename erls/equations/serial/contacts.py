@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple, Protocol
 
+import numpy as np
+
 from erls.equations import compiled_system as contract
 from erls.equations.serial.loads import call_touch
 from erls.equations.serial.records import Serial, call_contact_gains
 from erls.maths.calls import address_for, address_of
-from erls.maths.records import Memory, Vector, python_reader, reader, room, table_size
+from erls.maths.records import Memory, Vector, place_of, python_reader, reader, room, table_size
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from fe_import.model import IntArray
@@ -23,17 +25,14 @@ class Contact(NamedTuple):
         A point of the plane, in the axes of the node that carries it, or in the world [m].
     axes : (9,) array
         Unit vectors there: the normal, and two along the plane.
-    law : (4,) array
+    law, friction : (4,), (9,) arrays
         Of `erls.maths.contact_law`.
-    friction, friction_rate : float
-        Of `erls.mechanism.contacts.PointContact`.
     """
 
     place: Vector
     axes: Vector
     law: Vector
-    friction: float
-    friction_rate: float
+    friction: Vector
 
 
 class ContactState(NamedTuple):
@@ -59,8 +58,11 @@ class ContactState(NamedTuple):
         Gap [m] and its rate, normal force [N], friction along the two axes, elastic energy [J].
     lost : (1,) array
         Power that goes into heat, negative [W].
-    gains : (4,) array
-        Normal force per depth and per rate of depth; friction per velocity along the motion, and across it.
+    slip : (4,) array
+        Velocity of the node along the two axes of the plane, and its place along them from what carries the plane.
+    gains : (5,) array
+        Normal force per depth and per rate of depth; friction per velocity along the motion, and across it, and per
+        displacement.
     """
 
     point: Annotated[Array, "12"]
@@ -72,7 +74,8 @@ class ContactState(NamedTuple):
     asked: Annotated[Array, "4"]
     known: Annotated[Array, "6"]
     lost: Annotated[Array, "1"]
-    gains: Annotated[Array, "4"]
+    slip: Annotated[Array, "4"]
+    gains: Annotated[Array, "5"]
 
 
 class ContactRoom(NamedTuple):
@@ -100,6 +103,7 @@ class Flat(Protocol):
 
 _see_serial = python_reader(Serial)
 read_contact, read_contact_state, _see_state = reader(Contact), reader(ContactState), python_reader(ContactState)
+_see_contact = python_reader(Contact)
 read_contact_room = reader(ContactRoom)
 CONTACT, CONTACT_STATE = table_size(Contact), table_size(ContactState)
 GAP, GAP_RATE, NORMAL_FORCE, FRICTION, ENERGY = 0, 1, 2, 3, 5
@@ -120,7 +124,7 @@ def put_contacts(
     constants, scratch : Memory
     """
     own = mechanism.contacts
-    records = [Contact(c.position, c.axes, c.law.numbers, c.friction, c.friction_rate) for c in own]
+    records = [Contact(c.position, c.axes, c.law.numbers, c.sliding(mechanism.reach)) for c in own]
     kept = [constants.put(record) for record in records], [scratch.put(room(ContactState)) for _ in own]
     return {
         "touch": address_for(call_touch, bool(own)),
@@ -131,6 +135,24 @@ def put_contacts(
         "contact_states": kept[1][0] if own else -1,
         "contact_room": scratch.put(room(ContactRoom, n=size)) if own else -1,
     }
+
+
+def friction_laws(system: Flat) -> list[Array]:
+    """Views (9,) of the friction of every contact among the constants."""
+    serial = _see_serial(system.reals, system.integers, int(system.integers[0]))
+    places = (serial.contacts + k * CONTACT for k in range(serial.contact_count))
+    return [_see_contact(system.reals, system.integers, at).friction for at in places]
+
+
+def seen_places(system: Flat) -> IntArray:
+    """(q, 5) places in the working memory where a residual leaves the gap of every contact, and its slip."""
+    serial = _see_serial(system.reals, system.integers, int(system.integers[0]))
+    found = []
+    for k in range(serial.contact_count):
+        at = serial.contact_states + k * CONTACT_STATE
+        known, slip = (place_of(ContactState, name, system.integers, at) for name in ("known", "slip"))
+        found.append([known + GAP, *range(slip, slip + 4)])
+    return np.array(found, dtype=np.int64).reshape(-1, 5)
 
 
 def contact_states(system: Flat) -> list[ContactState]:

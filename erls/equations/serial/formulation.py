@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -27,6 +28,8 @@ from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
 from erls.equations.series import mass_series, residual_series
 from erls.equations.stability import Bearing, Stability, stability_of, tumbling
+from erls.equations.switches.gripped import grips_in, lent
+from erls.equations.switches.grips import NO_GRIPS, Grips
 from erls.equations.switches.law import DryFriction, Freely, dry_friction, settled
 from erls.equations.system import metre_scales
 from erls.maths.records import python_reader
@@ -117,9 +120,19 @@ class SerialFormulation(TreeFormulation):
         SimulationError
             The mass matrix is not positive definite; names the coordinate.
         """
-        if self.dry is not None:
-            return settled(self, t, y, v).accelerations
-        return self._solver(t, y)(-self.residual(t, y, v, np.zeros(0)))
+        with self.gripped(t, y, v):
+            if self.dry is not None:
+                return settled(self, t, y, v).accelerations
+            return self._solver(t, y)(-self.residual(t, y, v, np.zeros(0)))
+
+    @cached_property
+    def grips(self) -> Grips:
+        """Modes of contacts whose points may stick, which are not known but meanwhile."""
+        return grips_in(self.mechanism, self.compiled, self.compiled.residual) if self.mechanism.grips else NO_GRIPS
+
+    def gripped(self, t: float, y: Array, v: Array) -> AbstractContextManager[None]:
+        """Meanwhile contacts have the modes that follow from a state."""
+        return self.grips.settled(t, y, v, self.acceleration)
 
     def freely(self, t: float, y: Array, v: Array) -> Freely:
         """A state without friction that sticks; see `erls.equations.switches.law`.
@@ -155,10 +168,11 @@ class SerialFormulation(TreeFormulation):
         SimulationError
             As `acceleration`.
         """
+        switches = self.dry is not None or self.mechanism.grips
         forces = residual_series(self.compiled, t, y, v, np.zeros((len(t), 0)))
         masses = mass_series(self.compiled, t, y)
         try:
-            lower = None if self.dry is not None else np.linalg.cholesky(masses)
+            lower = None if switches else np.linalg.cholesky(masses)
         except np.linalg.LinAlgError:  # one of them: the method for one names what is wrong with it
             lower = None
         if lower is None:
@@ -183,7 +197,8 @@ class SerialFormulation(TreeFormulation):
         if known.size:
             states = contact_states(system)
             for k, at in enumerate(t.tolist()):
-                residual(system, at, y[k], v[k], np.zeros(0))
+                with self.gripped(at, y[k], v[k]):
+                    residual(system, at, y[k], v[k], np.zeros(0))
                 known[k] = [[*x.known[:3], *x.force, *x.point[9:], x.known[ENERGY]] for x in states]
         return ContactSeries.of(known)
 
@@ -294,7 +309,8 @@ class SerialFormulation(TreeFormulation):
         """(k, ...) what residuals of `complete` at times (k,) leave in each of some views of its working memory."""
         result = [np.empty((len(t), *view.shape)) for view in views]
         for i, at in enumerate(t.tolist()):
-            residual(self.complete, at, y[i], v[i], a[i])
+            with self.gripped(at, y[i], v[i]), lent(self.grips, self.mechanism, self.complete):
+                residual(self.complete, at, y[i], v[i], a[i])
             for found, view in zip(result, views, strict=True):
                 found[i] = view
         return result

@@ -23,7 +23,15 @@ from erls.equations.serial.contacts import (
 from erls.equations.serial.loads import LOAD, LOAD_STATE, TOUCH, Load, LoadState, read_load, read_load_state
 from erls.equations.serial.nodes import NODE_STATE, NodeState, read_node_state
 from erls.equations.serial.records import read_serial
-from erls.maths.contact_law import contact_energy, contact_force, contact_gains, elastic_force, friction_factor
+from erls.maths.contact_law import (
+    contact_energy,
+    contact_force,
+    contact_gains,
+    elastic_force,
+    friction_force,
+    friction_gains,
+)
+from erls.maths.contact_places import COEFFICIENT
 from erls.maths.jit import kernel, part
 from erls.maths.products import clear, copy
 from erls.maths.so3 import Array
@@ -56,27 +64,26 @@ def _meet(contact: Contact, state: ContactState, load: Load, work: LoadState, ow
     for i in range(3):
         gap += normal[i] * (arm[i] - state.force[i])
     state.known[GAP], state.known[GAP_RATE] = gap, dot3(normal, velocity)
+    for k in range(2):
+        axis = state.axes[3 * k + 3 : 3 * k + 6]
+        state.slip[k], state.slip[2 + k] = dot3(axis, velocity), dot3(axis, arm)
 
 
 @part
 def _press(contact: Contact, state: ContactState) -> None:
     """Force of the law, energy, loss and gains."""
-    known, gains, velocity = state.known, state.gains, state.twist[:3]
+    known, gains, law = state.known, state.gains, contact.friction
     depth, speed = -known[GAP], -known[GAP_RATE]
     push = contact_force(contact.law, depth, speed)
-    along, across = dot3(state.axes[3:6], velocity), dot3(state.axes[6:], velocity)
+    along, across = state.slip[0], state.slip[1]
     known[NORMAL_FORCE], known[ENERGY] = push, contact_energy(contact.law, depth)
     known[FRICTION] = known[FRICTION + 1] = 0.0 * push
     gains[0], gains[1] = contact_gains(contact.law, depth, speed)
-    gains[2] = gains[3] = 0.0 * push
+    gains[2] = gains[3] = gains[4] = 0.0 * push
     state.lost[0] = (elastic_force(contact.law, depth) - push) * speed
-    if contact.friction != 0.0:
-        rate = contact.friction_rate
-        factor, slope = friction_factor((along * along + across * across) / (rate * rate))
-        strength = contact.friction * push / rate
-        known[FRICTION], known[FRICTION + 1] = -strength * factor * along, -strength * factor * across
-        gains[2] = strength * (factor + slope * (along * along + across * across) / (rate * rate))
-        gains[3] = strength * factor
+    if law[COEFFICIENT] != 0.0 and depth.real > 0.0:
+        known[FRICTION], known[FRICTION + 1] = friction_force(law, push, along, across, state.slip[2], state.slip[3])
+        gains[2], gains[3], gains[4] = friction_gains(law, push, along, across)
         state.lost[0] += known[FRICTION] * along + known[FRICTION + 1] * across
 
 

@@ -2,9 +2,10 @@
 
 Modes are constant until they are set anew: of each joint with dry friction whether it slides on (1) or back (-1) or
 sticks (0), then of each motor with a limit whether it follows what it is asked for (0) or gives its limit either way
-(1, -1). Whoever integrates asks for `Switches.left` along the motion; where it falls below zero a joint comes to rest
-or breaks away, or a motor comes to its limit or leaves it, and `Switches.settle` sets the modes that follow
-(`erls.equations.switches.law`). In between the equations are smooth.
+(1, -1). Those of contacts whose points may stick come after them, and are kept elsewhere
+(`erls.equations.switches.grips`). Whoever integrates asks for `Switches.left` along the motion; where it falls below
+zero a joint comes to rest or breaks away, or a motor comes to its limit or leaves it, and `Switches.settle` sets the
+modes that follow (`erls.equations.switches.law`). In between the equations are smooth.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from erls.equations.switches.grips import NO_GRIPS, Accelerate, Grips
 from erls.equations.switches.law import DryFriction, Freely, Settled
 from erls.equations.switches.shares import Shares, following, independent, shared
 from erls.maths.so3 import Array
@@ -38,6 +40,8 @@ class Switches:
     motors : Motors
     size : int
         Number of coordinates n.
+    grips : Grips, optional
+        Of q contacts; none unless given.
 
     Attributes
     ----------
@@ -54,8 +58,8 @@ class Switches:
 
     sees = False
 
-    def __init__(self, rubbing: DryFriction, motors: Motors, size: int) -> None:
-        self.rubbing, self.motors = rubbing, motors
+    def __init__(self, rubbing: DryFriction, motors: Motors, size: int, grips: Grips = NO_GRIPS) -> None:
+        self.rubbing, self.motors, self.grips = rubbing, motors, grips
         self.modes = np.zeros(len(rubbing.places) + len(motors.limits))
         self._rubs = len(rubbing.places)
         self.seen_by = 0.0
@@ -65,18 +69,30 @@ class Switches:
     def names(self) -> tuple[str, ...]:
         """What switches, for messages."""
         rub = (f"friction of joint {name!r} switches between sticking and sliding" for name in self.rubbing.names)
-        return (*rub, *(f"the motor of joint {name!r} comes to its limit and leaves it" for name in self.motors.names))
+        limits = (f"the motor of joint {name!r} comes to its limit and leaves it" for name in self.motors.names)
+        grips = (f"the point of contact {name!r} comes to rest and slides" for name in self.grips.names)
+        return (*rub, *limits, *grips)
+
+    @property
+    def count(self) -> int:
+        """Modes: m + c + q."""
+        return len(self.modes) + len(self.grips.names)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether accelerations jump where modes end."""
+        return bool(len(self.rubbing.places) or self.grips.names)
 
     @property
     def slides(self) -> Array:
-        """(m + c,) which modes are those of a joint that slides."""
-        result = self.modes != 0.0
-        result[self._rubs :] = False
-        return np.asarray(result)
+        """(m + c + q,) which modes are those of a joint that slides."""
+        result = np.zeros(self.count, dtype=bool)
+        result[: self._rubs] = self.modes[: self._rubs] != 0.0
+        return result
 
     @property
     def begins_at_zero(self) -> Array:
-        """(m + c,) which modes begin where they end: of joints that slide from rest, and of motors."""
+        """(m + c + q,) which modes begin where they end: of joints that slide from rest, of motors, of contacts."""
         result = self.slides
         result[self._rubs :] = True
         return result
@@ -142,6 +158,7 @@ class Switches:
             of others. What moves at all is not asked.
         """
         rubs, given = decided[: self._rubs], decided[self._rubs :]
+        self.grips.begin(t, y, v)
         motors = self.motors.by_value(self.asked(np.array([t]), y[None], v[None])[0])
         motors = np.where(np.isnan(given), motors, given)
         if not self._rubs:
@@ -149,6 +166,7 @@ class Switches:
         else:
             found = self.settled(t, y, v, np.where(np.isnan(rubs), 0.0, rubs))
             self.set(np.concatenate([found.modes, motors]), self.rubbing.places[found.held], y)
+        self.grips.grasp(t, y, v, self.acceleration)
         return self.acceleration(t, y, v)
 
     def holding_at(self, t: float, y: Array, v: Array, a: Array) -> Shares:
@@ -197,22 +215,34 @@ class Switches:
         return knot
 
     def left(self, t: Array, y: Array, v: Array, a: Array) -> Array:
-        """(k, m + c) of states of a motion with these modes: rate in the direction of a joint that slides, static force
-        less friction of one that sticks; of a motor how far it is from its limit, or beyond. A mode ends where it falls
-        below zero.
+        """(k, m + c + q) of states of a motion with these modes: rate in the direction of a joint that slides, static
+        force less friction of one that sticks; of a motor how far it is from its limit, or beyond; of contacts see
+        `Grips.left`. A mode ends where it falls below zero.
         """
         modes = self.modes[: self._rubs]
         result = modes * v[:, self.rubbing.places]
         if not modes.all():
             result = np.where(modes == 0.0, self.rubbing.static - np.abs(self.holding(t, y, v, a)), result)
-        if not len(self.motors.limits):
-            return np.asarray(result)
-        asked = self.motors.left(self.modes[self._rubs :], self.asked(t, y, v))
-        return np.concatenate([result, asked], axis=1)
+        parts = [result]
+        if len(self.motors.limits):
+            parts.append(self.motors.left(self.modes[self._rubs :], self.asked(t, y, v)))
+        if self.grips.names:
+            parts.append(self.grips.left(t, y, v, self._exactly))
+        return np.concatenate(parts, axis=1)
+
+    @property
+    def _exactly(self) -> Accelerate | None:
+        """What tells the friction of points that stick, where steps do not."""
+        return None if self.sees else self.acceleration
 
     def after(self, t: float, y: Array, v: Array, a: Array, ended: IntArray) -> Array:
-        """(m + c,) what is decided by modes that have ended at a state, see `settle` and `left`."""
+        """(m + c,) what is decided by modes that have ended at a state, see `settle` and `left`; those of contacts are
+        set.
+        """
         decided = self.undecided
+        for k in ended[ended >= len(self.modes)].tolist():
+            self.grips.end(k - len(self.modes), t, y, v, self._exactly)
+        ended = ended[ended < len(self.modes)]
         sticks = ended[(ended < self._rubs) & (self.modes[ended] == 0.0)]
         if len(sticks):
             motion = self._begun(self.holding_at(t, y, v, a), sticks)

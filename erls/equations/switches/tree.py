@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,8 @@ class SwitchedTree(Switches):
     """
 
     def __init__(self, system: SerialFormulation) -> None:
-        from erls.equations.switches.motors import Asked, acting_in, motors_among  # here: they import the compiler
+        from erls.equations.switches.gripped import grips_in  # here, as below: they import the compiler
+        from erls.equations.switches.motors import Asked, acting_in, motors_among
 
         self._system, self._bare = system, system.compiled
         self.size, self.length_scales, self.breakpoints = system.size, system.length_scales, system.breakpoints
@@ -34,6 +36,7 @@ class SwitchedTree(Switches):
         joints = system.mechanism.joints
         motors = motors_among([joint.drive for joint in joints], [joint.name for joint in joints], acting)
         super().__init__(system.dry or NO_FRICTION, motors, system.size)
+        self.grips = grips_in(system.mechanism, self.compiled, self._bare.residual)
         self._asked = Asked(motors, self._bare, self._bare.residual)
 
     @cached_property
@@ -92,11 +95,18 @@ class SwitchedTree(Switches):
 
     def freely(self, t: float, y: Array, v: Array) -> Freely:
         """See `Switches`."""
-        return self._system.freely(t, y, v)
+        with self._lent():
+            return self._system.freely(t, y, v)
 
     def settled(self, t: float, y: Array, v: Array, released: Array) -> Settled:
         """See `Switches`."""
-        return settled(self._system, t, y, v, released)
+        with self._lent():
+            return settled(self._system, t, y, v, released)
+
+    def _lent(self) -> AbstractContextManager[None]:
+        from erls.equations.switches.gripped import lent  # here: it imports the compiler
+
+        return lent(self.grips, self._system.mechanism, self._bare)
 
     def asked(self, t: Array, y: Array, v: Array) -> Array:
         """See `Switches`."""

@@ -241,6 +241,9 @@ def _check_contact(contact: ContactOfBody, nodes: list[str], place: str) -> None
     if contact.plane.on == contact.node:
         remedy = "name another node, or the world"
         raise bad(f"{place}.plane.on", "the node that the plane is to keep off", contact.plane.on, remedy)
+    if contact.friction is not None and contact.friction.law == "stick":
+        message, remedy = "no exact sticking of bodies", "use law = 'smooth', or a scene of links"
+        raise bad(f"{place}.friction.law", message, "stick", remedy)
 
 
 def _check_load(load: Load, nodes: list[str], place: str) -> None:

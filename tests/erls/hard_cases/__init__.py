@@ -14,8 +14,3 @@ CASES: tuple[Case, ...] = (
     *invariance.CASES,
 )
 ROWS = tuple((case, formulation) for case in CASES for formulation in FORMULATIONS)
-
-FALLS_SHORT = frozenset({("parallelogram through its change point, adaptive", "nodal")})
-"""Rows known to fall short, which the table shows as failures: of the energy wanted at a hundredth of the usual
-tolerance; what they state holds.
-"""

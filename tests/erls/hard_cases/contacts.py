@@ -89,6 +89,20 @@ def _at_a_stop(name: str, restitution: float, **more: Any) -> Case:
     return Case(name, contact_scenes.arm(joint={"stops": stops}), truth, **more)
 
 
+def _on_a_slope(name: str, degrees: float, **more: Any) -> Case:
+    mu, speed = 0.3, -1.0
+    slope = np.radians(degrees)
+    scene = contact_scenes.on_a_slope(degrees, speed, {"law": "stick", "coefficient": mu})
+    depth = (_MASS * _G * np.cos(slope) / contact_scenes.STIFFNESS) ** (1 / 1.5)
+
+    def places(t: Array) -> Array:
+        way = contact_scenes.down_the_slope(degrees, speed, mu, t)
+        x, z = way * np.cos(slope) - depth * np.sin(slope), -way * np.sin(slope) - depth * np.cos(slope)
+        return np.stack([x, 0 * x, z], axis=1)[:, None]
+
+    return Case(name, scene, closed(places, "closed form", 1e-9), **more)
+
+
 _KEPT = contact_scenes.ball(1.0, _DROP, 0.0, _G, stiffness=_SPRING, exponent=1.0)
 CASES = of_subject(
     "contacts",
@@ -107,6 +121,8 @@ CASES = of_subject(
         ),
         _on_a_plane("an arm that meets a plane, e = 0.5", 0.5, fast=("ffr",)),
         _on_a_plane("an arm that meets a plane, e = 0", 0.0),
+        _on_a_slope("a block pushed up a slope that holds it", 10.0, fast=("erls",)),
+        _on_a_slope("a block pushed up a slope, which slides back", 25.0),
         _at_a_stop("a joint that meets its stop, e = 0.9", 0.9, fast=("erls",)),
         Case(
             "a flexible arm that falls onto a plane",
