@@ -74,7 +74,7 @@ class Planned:
     @property
     def t(self) -> Array:
         """(k,) knots in the scene's time [s]."""
-        return self.law.t + self.goal.scene.record.plan.start
+        return np.asarray(self.law.t + self.goal.scene.record.plan.start)
 
     @property
     def rates(self) -> Array:
