@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import re
 import shutil
@@ -22,6 +23,7 @@ from erls.scene.build import cache_folder
 from erls.scene.inputs import files_of
 from erls.scene.links import Link
 from erls.scene.read import AnyScene, checked
+from erls.scene.sampled import sampled_load, sampled_motion
 from fe_import.files.docstrings import record_texts
 from fe_import.modal.file import write_modal_file
 from fe_import.modal.model import ModalModel
@@ -41,7 +43,9 @@ def make_scene(*, folder: Path | str = ".", **tables: Any) -> AnyScene:
     **tables
         ``simulation``, ``joints``, ``links`` and the others, as mappings, lists of them, or records of another scene;
         arrays may stand for lists of numbers. The ``model`` of a link may be a `fe_import.ModalModel`, as
-        `fe_import.reduce_link` and `fe_import.link_from_skfem` give it, instead of a path.
+        `fe_import.reduce_link` and `fe_import.link_from_skfem` give it, instead of a path. A ``motion``, and profiles
+        of drives and factors of loads, may be smooth functions of time, which are sampled over the duration, and 1 %
+        beyond, until cubic splines are they to 1e-9 of their range.
 
     Returns
     -------
@@ -69,6 +73,9 @@ def make_scene(*, folder: Path | str = ".", **tables: Any) -> AnyScene:
     True
     """
     data = {name: _plain(value) for name, value in tables.items()}
+    duration = data.get("simulation", {}).get("duration") if isinstance(data.get("simulation"), dict) else None
+    if isinstance(duration, (int, float)) and 0 < duration < math.inf:  # others are refused below
+        data = {name: _sampled(value, float(duration), f"{_WHERE}: {name}") for name, value in data.items()}
     path = Path(folder) / f"{re.sub(r'[^A-Za-z0-9_-]+', '_', str(data.get('name') or 'scene'))}.toml"
     return checked(data, path, _WHERE)
 
@@ -145,6 +152,23 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     return str(value) if isinstance(value, Path) else value
+
+
+def _sampled(value: Any, duration: float, where: str) -> Any:
+    """With tables in place of functions of time."""
+    if isinstance(value, dict):
+        return {
+            k: sampled_motion(v, duration, f"{where}.{k}")
+            if k == "motion" and callable(v)
+            else _sampled(v, duration, f"{where}.{k}")
+            for k, v in value.items()
+        }
+    if isinstance(value, list):
+        return [
+            sampled_load(one, duration, f"{where}[{k}]") if callable(one) else _sampled(one, duration, f"{where}[{k}]")
+            for k, one in enumerate(value)
+        ]
+    return value
 
 
 def _as_file(model: ModalModel) -> Path:

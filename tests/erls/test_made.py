@@ -81,6 +81,34 @@ def test_records_of_another_scene_serve() -> None:
     assert scene.record.simulation.duration == 0.5
 
 
+def test_functions_of_time_drive(tmp_path: Path) -> None:
+    """A motion as the shape that is the same function, a torque as the effort that it is; and as a file they stay."""
+    rate, hip = 2 * np.pi * 3.0, TABLES["joints"][0]
+    rigid = {"mass": 1.0, "inertia": [0.1] * 3, "points": {"root": [0.0, 0.0, 0.0], "tip": [0.5, 0.0, 0.0]}}
+    links = [{"name": "arm", "rigid": rigid, "mesh_pose": {"frame": "joint"}}]
+
+    def made(drive: dict[str, Any]) -> Any:
+        return erls.make_scene(**{**TABLES, "simulation": {"duration": 0.3}, "joints": [{**hip, "drive": drive}]},
+                               links=links)  # fmt: skip
+
+    times = np.linspace(0.0, 0.3, 40)
+    shape = {"shape": "sine", "amplitude": 0.4, "frequency_hz": 3.0}
+    scene = made({"type": "motion", "motion": lambda t: 0.4 * np.sin(rate * t)})
+    own, same = (erls.simulate(s, verdict=False) for s in (scene, made({"type": "motion", "motion": shape})))
+    np.testing.assert_allclose(own.joint_angle("hip", times), same.joint_angle("hip", times), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(own.joint_rate("hip", times), same.joint_rate("hip", times), rtol=0, atol=1e-6)
+    pushed = made({"type": "torque", "profiles": [lambda t: np.exp(-5 * t), {"shape": "constant", "value": 1.0}]})
+    erls.save_scene(tmp_path / "pushed.toml", pushed)
+    for each in (pushed, tmp_path / "pushed.toml"):
+        run = erls.simulate(each, verdict=False)
+        effort = run.joint_effort("hip", times) + hip["damping"] * run.joint_rate("hip", times)
+        np.testing.assert_allclose(effort, 1 + np.exp(-5 * times), rtol=0, atol=1e-8)
+    for fault, words in ((lambda t: float(t > 0.1), "not smooth"), (lambda t: None, "no number"),
+                         (lambda t: np.nan, "no finite number")):  # fmt: skip
+        with pytest.raises(SceneError, match=rf"make_scene: joints\[0\].drive.motion.*{words}"):
+            made({"type": "motion", "motion": fault})
+
+
 def test_faults_name_the_field(tmp_path: Path) -> None:
     """And a file of somebody else stays."""
     with pytest.raises(SceneError, match=r"make_scene: joints\[0\].dampng.*did you mean 'damping'"):

@@ -237,3 +237,27 @@ def test_rotation_vectors_turn_on(tmp_path: Path) -> None:
     assert stepper.time * 30.0 > 1.25 * np.pi > np.linalg.norm(y)
     np.testing.assert_allclose(y, run.solution.y[-1], rtol=0, atol=1e-9)  # type: ignore[attr-defined]
     np.testing.assert_allclose(v, run.solution.v[-1], rtol=0, atol=1e-7)  # type: ignore[attr-defined]
+
+
+def test_a_sampled_controller_with_a_delay() -> None:
+    """A rigid arm without gravity under a PD controller that reads every fourth step and acts a sample later: the
+    recursion x' = A x + B u of its exact discrete model, to rounding.
+    """
+    inertia, sample, gains = 0.05 + 0.5**2, 4 * STEP, np.array([2.0, 0.4])
+    arm = {"mass": 1.0, "inertia": [0.0, 0.0, 0.05], "points": {"root": [-0.5, 0.0, 0.0], "tip": [0.0, 0.0, 0.0]}}
+    scene = erls.make_scene(
+        gravity=[0.0, 0.0, 0.0],
+        simulation={"duration": 1.0, "step": STEP},
+        joints=[{"name": "hip", "dh": {"convention": "standard", "a": 0.5}, "initial": {"position": 0.3}}],
+        links=[{"name": "arm", "rigid": arm}],
+    )
+    stepper = erls.stepper(scene)
+    moved, pushed = np.array([[1.0, sample], [0.0, 1.0]]), np.array([sample**2 / 2, sample]) / inertia
+    x, torque = np.array([0.3, 0.0]), 0.0
+    for _ in range(60):
+        y, v, _ = stepper.state
+        asked = -float(gains @ [y[0], v[0]])
+        for _ in range(4):
+            stepper.step({"hip": torque}, held=True)
+        x, torque = moved @ x + pushed * torque, asked
+    np.testing.assert_allclose([stepper.state[0][0], stepper.state[1][0]], x, rtol=0, atol=1e-11)
