@@ -1,7 +1,7 @@
 """Figures of inverse dynamics: what forward runs miss, order of the step, and cost over steps and modes.
 
-``python benchmarks/inverse.py [figures] [cost] [shooting]``; processor time, so that other work on the machine counts
-less.
+``python benchmarks/inverse.py [figures] [cost] [shooting] [zeros]``; processor time, so that other work on the machine
+counts less.
 """
 
 from __future__ import annotations
@@ -72,6 +72,17 @@ def shooting() -> None:
         print(f"{what}: {apart:.1e} N m of {size:.4g}, {apart / size:.1e}; {work:.0f} s", flush=True)
 
 
+def zeros() -> None:
+    """Print the first zero of the parallel robot by each formulation, over elements of the nodal one."""
+    legs = DATA / "inverse" / "three_legs.toml"
+    inputs = [f"joint.motor_{k}.effort" for k in (1, 2, 3)]
+    outputs = ["point.middle.x", "point.middle.y", "point.first.x"]
+    nodal = [("simulation.formulation=nodal", f"simulation.elements_per_member={n}") for n in (2, 4, 8)]
+    for changes in (("simulation.formulation=erls",), (FFR,), *nodal):
+        model = erls.linearize(erls.load_scene(legs, changes), at=0.0, inputs=inputs, outputs=outputs)
+        print(f"{', '.join(changes)}: {np.abs(model.zeros()).min() / (2 * np.pi):.3f} Hz", flush=True)
+
+
 def spent(*changes: str) -> tuple[float, int]:
     """Processor time of an iteration [s], and coordinates; the second of two inversions."""
     for _ in range(2):
@@ -94,6 +105,6 @@ def cost() -> None:
 
 
 if __name__ == "__main__":
-    chosen = sys.argv[1:] or ["figures", "cost", "shooting"]
+    chosen = sys.argv[1:] or ["figures", "cost", "shooting", "zeros"]
     for part in chosen:
-        {"figures": figures, "cost": cost, "shooting": shooting}[part]()
+        {"figures": figures, "cost": cost, "shooting": shooting, "zeros": zeros}[part]()

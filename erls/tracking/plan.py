@@ -79,7 +79,7 @@ class Planned:
     @property
     def rates(self) -> Array:
         """(j,) largest rates."""
-        return np.abs(self.law.rate).max() * np.abs(self.goal.moved)
+        return np.asarray(np.abs(self.law.rate).max() * np.abs(self.goal.moved))
 
     @property
     def kept(self) -> bool:
