@@ -1,12 +1,15 @@
 """Shells beside published figures, and a bracket beside solids and CalculiX.
 
-    python benchmarks/shells.py [--json FILE]
+    python benchmarks/shells.py [--scenes | --roll-up] [--json FILE]
 
 The standard set on three meshes, quadrangles and triangles of links and geometrically exact shells (`exact`, of small
 displacements), and the pre-twisted cantilever, thick and thin, with the drilling factors stated: ours / published.
 Then the first six free frequencies of a folded bracket (0.2 and 0.15 m by 0.1 m, 5 mm of aluminium, a twentieth of the
 width): shells of two meshes, hexahedra of 20 nodes about the same middle surface, CalculiX's S8R on the mesh of the
 shells where `ccx` is there.
+
+With `--scenes` instead the shipped scenes of large displacements, paths included (minutes); with `--roll-up` the three
+numerical models of the slides for the strip rolled up by 360 degrees, and what else the tangents take there.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import json
 import shutil
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +32,15 @@ from shell_benchmarks import PUBLISHED, TWISTED, twisted
 from shell_brackets import calculix_bracket, shell_bracket, solid_bracket
 from shell_meshes import ShellGrid
 
+import erls
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.scenes.shell_mesh import corner_frames
 from erls.equations.nodal.shell import Shell, Shells
+from erls.errors import SimulationError
+from erls.run.bodies.rest import BodyRest, work
 from fe_import.elements.laminates import Laminate
 
+DATA = Path(__file__).parents[1] / "data"
 MESHES = {"standard": (8, 16, 32), "twisted": ((12, 2), (24, 4), (48, 8))}
 
 
@@ -50,11 +58,79 @@ def exact_stiffness(grid: ShellGrid, make: Laminate, drilling: float) -> sp.csc_
     return sp.csc_array(system.stiffness_and_damping(0.0, system.start, rest, rest, None, material=True)[0])
 
 
+def _last(run: BodyRest, point: str, axis: int) -> float:
+    built = run.origin.poses[run.assembly.numbers[point], axis, 3]
+    return abs(float(run.position(point, run.end)[axis] - built))
+
+
+def _fold(run: BodyRest) -> float:
+    """Moment of the whole width [N m]."""
+    moment = run.samples([run.end])[0]["connections"]["turn"]["moment"]
+    return 2 * abs(float(moment[1]))
+
+
+_OTHER = [f"connections.0.motion.{key}" for key in ("values_deg=[-45,0,45,90]", "rates_deg=[45,45]")]
+SCENES: tuple[tuple[str, str, list[str], Callable[[BodyRest], float], float], ...] = (
+    ("two bars, first limit", "statics/two_bars", [], lambda run: run.statics.turns[0].t, 0.370064700095),
+    ("Lee's frame, first limit [kN]", "statics/lee_frame", [], lambda run: 30 * run.statics.turns[0].t, 18.55),
+    ("hemisphere, pulled", "shells/hemisphere", [], lambda run: _last(run, "pulled", 0), 4.067),
+    ("hemisphere, pushed", "shells/hemisphere", [], lambda run: _last(run, "pushed", 1), 8.178),
+    ("annulus, inner", "shells/annulus", [], lambda run: _last(run, "inner", 2), 13.891),
+    ("annulus, outer", "shells/annulus", [], lambda run: _last(run, "outer", 2), 17.528),
+    ("tape spring, opposite sense", "shells/tape_spring", [], _fold, 0.0393),
+    ("tape spring, equal sense", "shells/tape_spring", _OTHER, _fold, 0.0211),
+)
+ROLL_UP = ((2, "full", 1), (2, "frozen", 2), (4, "frozen", 1), (4, "full", 1), (4, "material", 1))
+"""The models of the slides, then ours: elements, tangent, load steps."""
+
+
+def scenes() -> dict[str, Any]:
+    """Shipped scenes beside what is published."""
+    found: dict[str, Any] = {}
+    print(f"{'scene':<32}{'ours':>12}{'published':>12}{'apart':>9}{'time [s]':>10}")
+    for name, file, changes, quantity, published in SCENES:
+        run = erls.simulate(erls.load_scene(DATA / f"{file}.toml", changes), verdict=False)
+        assert isinstance(run, BodyRest)
+        ours = quantity(run)
+        found[name] = {"ours": ours, "published": published, "wall_s": run.wall_s}
+        apart = f"{100 * (ours / published - 1):8.2f}%"
+        print(f"{name:<32}{ours:12.6g}{published:12.6g}{apart}{run.wall_s:10.1f}", flush=True)
+    return found
+
+
+def roll_up() -> dict[str, Any]:
+    """Iterations of the strip, how often load steps are halved, and how far its end is from its start."""
+    found: dict[str, Any] = {}
+    print(f"{'roll-up by 360 degrees':<44}{'iterations':>11}{'factored':>10}{'halved':>8}{'off [m]':>10}")
+    for elements, tangent, steps in ROLL_UP:
+        name = f"{elements} elements, {tangent} tangent, load steps: {steps}"
+        changes = [f"shells.strip.elements=[{elements},1]", f"simulation.tangent={tangent}"]
+        scene = erls.load_scene(DATA / "shells/roll_up.toml", [*changes, f"simulation.load_steps={steps}"])
+        try:
+            run = erls.simulate(scene, verdict=False)
+        except SimulationError as problem:
+            found[name] = str(problem)
+            print(f"{name:<44}  {problem}", flush=True)
+            continue
+        assert isinstance(run, BodyRest)
+        took, off = work(run.statics), float(np.abs(run.position("b", 1.0)).max())
+        found[name] = {**took, "off_m": off}
+        counts = f"{took['iterations']:11d}{took['factorizations']:10d}{took['cut_steps']:8d}"
+        print(f"{name:<44}{counts}{off:10.1e}", flush=True)
+    return found
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="write the figures to a file, too")
+    kinds = parser.add_mutually_exclusive_group()
+    kinds.add_argument("--scenes", action="store_true", help="shipped scenes of large displacements")
+    kinds.add_argument("--roll-up", action="store_true", help="tangents of the strip rolled up by 360 degrees")
     asked = parser.parse_args()
+    if asked.scenes or asked.roll_up:
+        _write(asked.json, scenes() if asked.scenes else roll_up())
+        return
     shell_meshes.EXACT.append(exact_stiffness)
     found: dict[str, Any] = {}
     print(f"{'standard set':<34}" + "".join(f"{f'{n} x {n}':>10}" for n in MESHES["standard"]))
@@ -86,8 +162,12 @@ def main() -> None:
         values = judges[name]
         off = np.abs(shells["shells, 2"] / values - 1).max()
         print(f"finer shells against {name}: {100 * off:.2f} % at most")
-    if asked.json:
-        asked.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
+    _write(asked.json, found)
+
+
+def _write(path: Path | None, found: dict[str, Any]) -> None:
+    if path:
+        path.write_text(json.dumps(found, indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":

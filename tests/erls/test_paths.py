@@ -16,7 +16,7 @@ from test_nodal_scenes_spectrum import EULER, LENGTH, _column
 import erls
 from erls.errors import SceneError
 from erls.maths.so3 import Array
-from erls.run.bodies.rest import BodyPath
+from erls.run.bodies.rest import BodyPath, BodyRest
 from erls.view.run_page import run_page
 
 TWO_BARS = ROOT / "data" / "statics" / "two_bars.toml"
@@ -118,6 +118,21 @@ def test_a_strip_of_shells_buckles_as_one_of_beams(tmp_path: Path) -> None:
     tips = [np.abs(run.position("b", run.end)) for run in (beams, shells)]
     np.testing.assert_allclose(tips[1], tips[0], atol=2e-3 * LENGTH)
     assert tips[0][2] > 0.5 * LENGTH
+
+
+def test_line_search_passes_load_steps_that_were_halved() -> None:
+    """Two turns of beams in one load step: the same place in fewer iterations, and nothing halved."""
+    file = ROOT / "data" / "statics" / "roll_up.toml"
+    changes = ["simulation.load_steps=1", 'simulation.tangent="full"']
+    plain, searched = (
+        erls.simulate(erls.load_scene(file, [*changes, f"simulation.line_search={word}"]), verdict=False)
+        for word in ("false", "true")
+    )
+    assert isinstance(plain, BodyRest)
+    assert isinstance(searched, BodyRest)
+    assert (plain.statics.cut_steps, searched.statics.cut_steps) == (1, 0)
+    assert searched.statics.path[0].iterations < 0.7 * plain.statics.path[0].iterations
+    np.testing.assert_allclose(searched.position("tip", 1.0), plain.position("tip", 1.0), atol=1e-9)
 
 
 @pytest.mark.parametrize(

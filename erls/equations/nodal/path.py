@@ -37,6 +37,7 @@ SHARPEST = 0.5  # cosine between the tangents of both ends of a step
 SMALLEST = 1e-5  # of the first step
 RESOLVED = 1 / 64  # of the first step: shorter ones are taken however sharply the path turns
 _LOCATED = 1e-9  # of a step: how closely points are found along it
+_HALVED = 6  # times, where a step has no end
 _LOOKS = 40  # along a step for one of them
 _VANISHED = 1e-3  # of the eigenvalue at the ends of a step: zero, at a bifurcation
 
@@ -125,7 +126,10 @@ class _Walk:
                     failure = self._failure(here)
                     break
                 continue
-            left = self._turns(here, there, step)
+            whole, left = self._turns(here, there, step)
+            if not whole and step > RESOLVED * self.longest:
+                step, self.cuts = step / 2, self.cuts + 1
+                continue
             if left is not None:
                 here = left
             elif there.point.t >= self.options.end * (1 - 1e-9):
@@ -182,15 +186,19 @@ class _Walk:
         unstable = unstable_ways(border.stiffness, border.rows, self.measure.metres)
         return _Known(point, tangent, unstable, iterations)
 
-    def _turns(self, here: _Known, there: _Known, step: float) -> _Known | None:
-        """Look for limit points and bifurcations between; where the path leaves here, the first point of the branch."""
+    def _turns(self, here: _Known, there: _Known, step: float) -> tuple[bool, _Known | None]:
+        """Look for limit points and bifurcations between. False where the step went over to another path, on which more
+        or less is unstable; and where the path leaves here, the first point of the branch.
+        """
         turned = here.tangent.load * there.tangent.load < 0
         more = there.unstable - here.unstable
+        limits: list[Turn] = []
         if turned:
             s, at = self._located(here, step, lambda k: k.tangent.load, (here.tangent.load, there.tangent.load))
-            self.turns.append(Turn("limit", at.point.t, self.arc + s, abs(more)))
+            limits = [Turn("limit", at.point.t, self.arc + s, abs(more))]
         if more == 0 or (turned and abs(more) == 1):
-            return None
+            self.turns += limits
+            return True, None
         ends = tuple(lowest_way(self.system, k.point, self.measure)[0] for k in (here, there))
         sign = {here.unstable: 1.0, there.unstable: -1.0}
 
@@ -202,10 +210,10 @@ class _Walk:
         s, at = self._located(here, step, passed, (abs(ends[0]), -abs(ends[1])))
         value, way = lowest_way(self.system, at.point, self.measure)
         if abs(value) > _VANISHED * max(map(abs, ends)):
-            return None
-        self.turns.append(Turn("bifurcation", at.point.t, self.arc + s, abs(more) - int(turned)))
+            return False, None
+        self.turns += [*limits, Turn("bifurcation", at.point.t, self.arc + s, abs(more) - int(turned))]
         number = sum(turn.kind == "bifurcation" for turn in self.turns)
-        return self._left(at, way, s, step) if number == abs(self.options.branch) else None
+        return True, self._left(at, way, s, step) if number == abs(self.options.branch) else None
 
     def _located(
         self, here: _Known, step: float, of: Callable[[_Known], float], ends: tuple[float, float]
@@ -213,17 +221,24 @@ class _Walk:
         """Where along a step a function is zero, by regula falsi (Illinois), and the point there."""
         (low, high), (below, above) = (0.0, step), ends
         found, s, before = here, 0.0, 0
+        base, passed = here, 0.0
         for _ in range(_LOOKS):
             s = (low * above - high * below) / (above - below)
             margin = 0.1 * _LOCATED * step
             s = float(np.clip(s, low + margin, high - margin))
-            taken = self._advance(here.point, here.tangent, s)
+            taken = self._advance(base.point, base.tangent, s - passed)
+            for _ in range(_HALVED):
+                if taken is not None:
+                    break
+                s = passed + (s - passed) / 2
+                taken = self._advance(base.point, base.tangent, s - passed)
             if taken is None:
                 break
-            found = self._known(taken[0], here.tangent, taken[1])
+            found = self._known(taken[0], base.tangent, taken[1])
             value = of(found)
             side = 1 if value * ends[0] > 0 else -1
-            if side == 1:
+            if side == 1:  # on from here, which is nearer
+                base, passed = found, s
                 low, below, above = s, value, above / 2 if before == side else above
             else:
                 high, above, below = s, value, below / 2 if before == side else below

@@ -29,6 +29,7 @@ from erls.scene.bodies.analyses import TANGENTS
 
 MAX_ITERATIONS = 60
 SHRINK = 0.5  # of a correction: what the next one may be for the exact tangent to be trusted
+SHARES = (1.0, 0.5, 0.25, 0.125)  # of a correction, in a line search
 SMALLEST_STEP = 1e-4  # of the load parameter
 WIDE = np.radians(175.0)  # a turn from corner to corner of a shell that explains why nothing is found beyond
 
@@ -81,6 +82,7 @@ def solve_statics(
     tangent: str = "full",
     tolerance: float = 1e-12,
     end: float = 1.0,
+    line_search: bool = False,
 ) -> Statics:
     """Equilibria at load parameters from ``end / steps`` to ``end`` in equal steps.
 
@@ -98,6 +100,8 @@ def solve_statics(
         Last correction, of the size of the mechanism.
     end : float
         Last load parameter; 0 for the equilibrium without loads that grow.
+    line_search : bool
+        Shorten corrections until the next one with the same matrix is shorter, too.
 
     Returns
     -------
@@ -112,7 +116,7 @@ def solve_statics(
     if tangent not in TANGENTS:
         remedy = f"must be one of {', '.join(TANGENTS)}"
         raise SceneError(Cause.BAD_FIELD, "there is no such tangent", where="tangent", value=tangent, remedy=remedy)
-    solver = LoadSteps(system, tangent, tolerance)
+    solver = LoadSteps(system, tangent, tolerance, line_search)
     at, q, multipliers = 0.0, start, np.zeros(system.constraints)
     found: list[Equilibrium] = []
     step, used = end / steps, 0
@@ -148,11 +152,12 @@ class LoadSteps:
 
     Parameters
     ----------
-    system, tangent, tolerance
+    system, tangent, tolerance, line_search
         As of `solve_statics`.
     """
 
-    def __init__(self, system: NodalSystem, tangent: str, tolerance: float) -> None:
+    def __init__(self, system: NodalSystem, tangent: str, tolerance: float, line_search: bool = False) -> None:
+        self.line_search = line_search
         self.system, self.tangent, self.metres = system, tangent, metre_scales(system)
         extent = float(np.linalg.norm(np.ptp(system.start.poses[:, :3, 3], axis=0)))
         levers = self.metres.reshape(-1, 6)[:, 3:]
@@ -179,14 +184,21 @@ class LoadSteps:
             if not np.isfinite(self.size):
                 return None
             move, change = saddle.unscaled(correction)
-            q, multipliers = self.system.compose(q, -move), multipliers - change
-            right = self.imbalance(t, q, multipliers)
-            if float(np.abs(correction[: self.system.size]).max(initial=0.0)) <= self.goal:
+            small = float(np.abs(correction[: self.system.size]).max(initial=0.0)) <= self.goal
+            for share in SHARES if self.line_search and not small else SHARES[:1]:
+                ahead = self.system.compose(q, -share * move), multipliers - share * change
+                right = self.imbalance(t, *ahead)
+                if small or (self.tangent != "full" and not self.line_search):
+                    break
+                left = float(np.linalg.norm(saddle.solve(saddle.scaled(*right)))) / self.size
+                if left <= 1 - share / 4:
+                    break
+            q, multipliers = ahead
+            if small:
                 self.reached = q
                 return q, multipliers
-            if self.tangent == "full":
-                left = float(np.linalg.norm(saddle.solve(saddle.scaled(*right)))) / self.size
-                exact = left <= (SHRINK if exact else 1.0)
+            if self.tangent == "full":  # and a correction that was not small: ``left`` is its own
+                exact = left <= (SHRINK if exact and share == 1.0 else 1.0)
         return None
 
     def imbalance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Array, Array]:

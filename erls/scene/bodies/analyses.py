@@ -72,9 +72,13 @@ class StaticSteps(_AtRest, frozen=True, tag="statics"):
     ----------
     compare_tangents : bool
         Report what each of the tangents takes.
+    line_search : bool
+        Shorten corrections by halves until the next one with the same matrix is shorter, too: for load steps that are
+        halved otherwise; others take more iterations.
     """
 
     compare_tangents: bool = False
+    line_search: bool = False
 
 
 class Continuation(_AtRest, frozen=True, tag="path"):
