@@ -70,6 +70,7 @@ STAGES = [  # name, module, function; a stage within a stage counts for itself o
     ("eigenmodes", fe_import.solver.sparse, "lowest_eigenpairs"),
     ("inertia counts", fe_import.solver.sparse, "negative_pivots"),
     ("invariants", fe_import.reduce, "inertia_invariants"),
+    ("second order", fe_import.reduce, "second_order"),
     ("health checks", fe_import.reduce, "check_model"),
     ("health checks", fe_import.reduce, "check_basis"),
     ("health checks", fe_import.reduce, "check_reduction"),
@@ -87,7 +88,7 @@ def l_mesh(dofs: int) -> SolidMesh:
     cells = np.stack([g.ravel() for g in grid], axis=1)
     cells = cells[(cells[:, 0] >= along) | (cells[:, 1] < across)]
     element = SOLID_ELEMENTS["hex20"]
-    corners = 2 * (cells[:, None, :] + np.array(element.corner_coordinates))
+    corners = 2 * (cells[:, None, :] + np.array(element.cell.corners))
     places = [corners[:, k] for k in range(8)]
     places += [corners[:, list(between)].sum(axis=1) // len(between) for between in element.midpoints]
     base = 2 * max(along + across, up) + 1

@@ -128,7 +128,7 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
         omega = modes.omega
         reduced_stiffness = np.diag(omega**2)
         damping = damping_ratios(link.description.damping, omega, where)
-        field, statement = second_order(model, shapes, inboard)
+        field, statement = second_order(model, shapes, inboard, basis.held)
     rigid = model.rigid_body_modes()
     turning = np.flatnonzero(model.dof_map[:, 3] >= 0)
     return ModalModel(

@@ -26,6 +26,9 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.modal.model import FixedInterfaceModes
 from fe_import.model import Array, FEModel, IntArray
 
+HeldSolution = Callable[[Array, int], Array]
+"""Static displacements (f, k) for loads (f, k) on the independent dofs, an interface of this number held at rest."""
+
 
 @dataclass(frozen=True)
 class Basis:
@@ -48,6 +51,8 @@ class Basis:
         lacks it.
     thermal : (k,) array or None
         Generalized force of thermal expansion per kelvin.
+    held : HeldSolution or None
+        By the factors that the basis was made with; they stay in memory as long as it.
     """
 
     vectors: Array
@@ -57,6 +62,7 @@ class Basis:
     selection: dict[str, Any] = field(default_factory=dict)
     flexibility: Array | None = None
     thermal: Array | None = None
+    held: HeldSolution | None = None
 
 
 ReductionMethod = Callable[[FEModel, Reduction, str], Basis]

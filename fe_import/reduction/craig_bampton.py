@@ -46,7 +46,8 @@ def craig_bampton(model: FEModel, options: Reduction, where: str) -> Basis:
     count = len(parts.boundary)
     rigid = np.zeros((vectors.shape[1], 6))
     rigid[:count] = model.rigid_body_modes()[model.interface_dofs]
-    return Basis(expanded(model, vectors), count, rigid, fixed_interface_table(parts, omega, modes), selection)
+    table, held = fixed_interface_table(parts, omega, modes), parts.held(constraint) if len(parts.inner) else None
+    return Basis(expanded(model, vectors), count, rigid, table, selection, held=held)
 
 
 def _fixed_interface_modes(

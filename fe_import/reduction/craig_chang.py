@@ -34,4 +34,4 @@ def craig_chang(model: FEModel, options: Reduction, where: str) -> Basis:
     omega, modes, selection = choose_free_modes(body, options, where)
     attachment = body.elastic(residual_vectors(static, loads, omega, modes, body.stiffness))
     fields, rigid = with_rigid_modes(body, np.hstack([modes, attachment]))
-    return Basis(expanded(model, fields), 0, rigid, no_fixed_interface_modes(), selection)
+    return Basis(expanded(model, fields), 0, rigid, no_fixed_interface_modes(), selection, held=body.held)

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from fe_import.modal.inertia import mass_properties
 from fe_import.model import Array, FEModel, IntArray
-from fe_import.reduction.base import interface_places
+from fe_import.reduction.base import HeldSolution, expanded, interface_places
 from fe_import.solver.sparse import Factorization, factorize
 
 
@@ -75,6 +75,23 @@ class Partition:
         """Of K_ii."""
         positions = self.model.dof_positions()[self.inner]
         return factorize(self.inner_stiffness, "stiffness of the inner nodes", positions)
+
+    def held(self, constraint: Array) -> HeldSolution:
+        """Static answers by the factors of K_ii and constraint modes Ψ.
+
+        With f_c = Ψᵀ f at the interfaces that are free, u = Ψ (Ψᵀ K Ψ)⁻¹ f_c + K_ii⁻¹ f_i.
+        """
+        model, solve = self.model, self.solve
+        fields = expanded(model, constraint)
+        stiffness = fields.T @ (model.stiffness @ fields)
+
+        def solution(loads: Array, reference: int) -> Array:
+            free = np.delete(np.arange(len(stiffness)), np.s_[6 * reference : 6 * reference + 6])
+            found = constraint[:, free] @ np.linalg.solve(stiffness[np.ix_(free, free)], constraint[:, free].T @ loads)
+            found[self.inner] += solve(np.ascontiguousarray(loads[self.inner]))
+            return np.asarray(found)
+
+        return solution
 
     def clamped_field(self, inner: Array) -> Array:
         """(f, k) fields with the interfaces at rest."""

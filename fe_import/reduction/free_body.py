@@ -121,6 +121,18 @@ class FreeBody:
             found[self._rest] += self._solve(right - self._supported @ found[self._rest])
         return self.elastic(found)
 
+    def held(self, loads: Array, reference: int) -> Array:
+        """(f, k) static answer to loads (f, k) with an interface held, by the factors of the support at the first one:
+        what that interface bears holds the loads in balance, so that either support does.
+        """
+        places = self.interfaces[6 * reference : 6 * reference + 6]
+        right = loads.copy()
+        right[places] -= np.linalg.solve(self.rigid[places].T, self.rigid.T @ loads)
+        found = np.zeros_like(loads)
+        if len(self._rest):
+            found[self._rest] = self._solve(np.ascontiguousarray(right[self._rest]))
+        return np.asarray(found - self.rigid @ np.linalg.solve(self.rigid[places], found[places]))
+
     def modes(self, count: int) -> tuple[Array, Array]:
         """Lowest elastic modes.
 

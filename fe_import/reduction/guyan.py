@@ -29,6 +29,8 @@ def guyan(model: FEModel, options: Reduction, where: str) -> Basis:
         The inner stiffness is singular, or options that mean nothing here.
     """
     refuse_fields(options, where, _REFUSED, dict.fromkeys(("frequency", "effective-mass", "ranking"), _NO_MODES))
-    vectors = constraint_modes(partition(model))
+    parts = partition(model)
+    vectors = constraint_modes(parts)
     rigid = model.rigid_body_modes()[model.interface_dofs]
-    return Basis(expanded(model, vectors), vectors.shape[1], rigid, no_fixed_interface_modes())
+    held = parts.held(vectors) if len(parts.inner) else None
+    return Basis(expanded(model, vectors), vectors.shape[1], rigid, no_fixed_interface_modes(), held=held)

@@ -33,4 +33,4 @@ def mode_displacement(model: FEModel, options: Reduction, where: str) -> Basis:
     _, modes, selection = choose_free_modes(body, options, where)
     fields, rigid = with_rigid_modes(body, modes)
     flexibility = static[body.interfaces]
-    return Basis(expanded(model, fields), 0, rigid, no_fixed_interface_modes(), selection, flexibility)
+    return Basis(expanded(model, fields), 0, rigid, no_fixed_interface_modes(), selection, flexibility, held=body.held)

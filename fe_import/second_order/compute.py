@@ -8,15 +8,17 @@ import numpy as np
 
 from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, FEModel, IntArray
+from fe_import.reduction.base import HeldSolution
 from fe_import.second_order.frame import frame_second_order
 
 MOST_MODES = 64  # elastic; the field has as many columns as pairs of them
-MOST_MODES_OF_SOLIDS = 24  # 300 systems of equations
-MOST_DOFS_OF_SOLIDS = 60_000  # beyond, one more factorization is a long computation that few links are reduced for
+MOST_MODES_OF_SOLIDS = 24  # 300 pairs, at every point of every element
 _STORED_VALUES = 1_000_000  # of the fields of nodes: 8 MB
 
 
-def second_order(model: FEModel, shapes: Array, reference: int) -> tuple[SecondOrder | None, str]:
+def second_order(
+    model: FEModel, shapes: Array, reference: int, held: HeldSolution | None = None
+) -> tuple[SecondOrder | None, str]:
     """Second-order field, and what the provenance says about it.
 
     Parameters
@@ -27,6 +29,8 @@ def second_order(model: FEModel, shapes: Array, reference: int) -> tuple[SecondO
         Mass-orthonormal modes over all nodal components, six rigid-body ones first.
     reference : int
         Interface that counts as inboard; fields relative to another follow from it.
+    held : HeldSolution, optional
+        Where there are factors already.
     """
     count = shapes.shape[1] - 6
     if count > MOST_MODES:
@@ -39,23 +43,18 @@ def second_order(model: FEModel, shapes: Array, reference: int) -> tuple[SecondO
                 f"not available: more than {MOST_MODES_OF_SOLIDS} elastic modes of a meshed link; keep fewer "
                 "(reduction.elastic_modes)"
             )
-        if len(model.independent) > MOST_DOFS_OF_SOLIDS:
-            return None, (
-                f"not available: a meshed link of more than {MOST_DOFS_OF_SOLIDS} dofs; mesh it more coarsely, "
-                "or split the link into substructures"
-            )
         from fe_import.elements.shell_stress import ShellStress  # heavy
         from fe_import.elements.solid_stress import SolidStress
-        from fe_import.second_order.element_forces import shell_forces, solid_forces
+        from fe_import.second_order.element_forces import shell_work, solid_work
         from fe_import.second_order.elements import elements_second_order
 
         source = model.stress
         if isinstance(source, ShellStress):
-            forces, made = partial(shell_forces, source, model.dof_map), "from its shells"
+            work, made = partial(shell_work, source, model.dof_map), "from its shells"
         else:
             assert isinstance(source, SolidStress)
-            forces, made = partial(solid_forces, source, model.dof_map), "from its solid elements"
-        return elements_second_order(model, forces, shapes, reference, _named_nodes(model)), made
+            work, made = partial(solid_work, source, model.dof_map), "from its solid elements"
+        return elements_second_order(model, work, shapes, reference, _named_nodes(model), held), made
     if model.beams is not None:
         if not model.beams.is_tree:
             return None, (

@@ -12,33 +12,37 @@ Nodes that follow an interface are turned finitely with it: ½ (θ_a × (θ_b ×
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
 from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, FEModel, IntArray
-from fe_import.reduction.base import expanded
+from fe_import.reduction.base import HeldSolution, expanded, interface_places
 from fe_import.second_order.composition import composed_rotation, twice_turned
 from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_modes, of_moments
 from fe_import.solver.sparse import factorize
 
-_BLOCK_VALUES = 20_000_000  # entries of second-order fields held at a time
+_BLOCK_VALUES = 20_000_000  # of test fields held at a time
 
 
-Forces = Callable[[Array, IntArray, IntArray], Array]  # of fields (d, n) and pairs of them, (d, pairs)
+Work = Callable[[Array, Array, IntArray, IntArray], Array]  # of tests (d, p), fields (d, n) and pairs, (p, pairs)
 
 
 def elements_second_order(
-    model: FEModel, forces: Forces, shapes: Array, reference: int, nodes: IntArray
+    model: FEModel, work: Work, shapes: Array, reference: int, nodes: IntArray, held: HeldSolution | None = None
 ) -> SecondOrder:
-    """Solve for all pairs of elastic modes, a few at a time.
+    """Solve for what is asked of the fields of all pairs of elastic modes.
+
+    That are few numbers of each field: its momenta, its work on modes and its values at some nodes, each a product
+    with a vector l. With K y = l the product lᵀΨ is that of y with the forces, so that as many systems are solved as
+    numbers are asked for, whatever the number of pairs, and no field is made.
 
     Parameters
     ----------
     model : FEModel
         In SI.
-    forces : callable
+    work : callable
         ∫ ε(δ) : C : sym(∇φ_aᵀ ∇φ_b) dV of its elements, see `fe_import.second_order.element_forces`.
     shapes : (d, m) array
         Modes, the six rigid-body ones first.
@@ -46,6 +50,8 @@ def elements_second_order(
         Interface.
     nodes : (k,) int array
         Rising; whose fields are stored.
+    held : HeldSolution, optional
+        Where there are factors already.
 
     Raises
     ------
@@ -63,14 +69,17 @@ def elements_second_order(
     weights, moving = _weights(model), np.asarray(model.mass @ shapes[:, 6:])[places]
     linear, moment, modal = np.zeros((3, m, m)), np.zeros((3, 3, m, m)), np.zeros((n, m, m))
     turned = model.dof_map[nodes][:, 3] >= 0
-    for some, fields in _solved(model, forces, relative, rows, first, second):
-        stored[0][:, :, some] = fields[model.dof_map[nodes, :3]]
-        stored[1][turned, :, some] = fields[model.dof_map[nodes[turned], 3:]]
-        found = weights.T @ fields  # S, then ∫ρ x ⊗ Ψ
-        for a, b in ((first[some], second[some]), (second[some], first[some])):
-            linear[:, 6 + a, 6 + b] = found[:3]
-            moment[:, :, 6 + a, 6 + b] = found[3:].reshape(3, 3, -1)
-            modal[:, 6 + a, 6 + b] = moving.T @ fields[places]
+    kept = np.concatenate([model.dof_map[nodes, :3].ravel(), model.dof_map[nodes[turned], 3:].ravel()])
+    asked = np.zeros((len(relative), 12 + n))
+    asked[:, :12] = weights
+    asked[places, 12:] = moving
+    found = _asked(model, work, relative, held or _held(model), reference, (first, second), asked, kept)
+    stored[0] = found[12 + n : 12 + n + 3 * len(nodes)].reshape(len(nodes), 3, -1)
+    stored[1][turned] = found[12 + n + 3 * len(nodes) :].reshape(-1, 3, len(first))
+    for a, b in ((first, second), (second, first)):  # S, then ∫ρ x ⊗ Ψ, then the modes
+        linear[:, 6 + a, 6 + b] = found[:3]
+        moment[:, :, 6 + a, 6 + b] = found[3:12].reshape(3, 3, -1)
+        modal[:, 6 + a, 6 + b] = found[12 : 12 + n]
     phi = shapes[rows[3:]]
     _add_rigid(model, relative, phi, start, weights, linear, moment)
     modal += _modal_rigid(relative[places], phi, model.nodes - model.nodes[start], moving)
@@ -87,37 +96,66 @@ def elements_second_order(
     return SecondOrder(reference, momentum, spin, modal, nodes, stored[0], stored[1])
 
 
-def _solved(
-    model: FEModel, forces: Forces, relative: Array, clamped: IntArray, first: IntArray, second: IntArray
-) -> Iterator[tuple[slice, Array]]:
-    """Fields (d, some) of consecutive pairs."""
-    _, stiffness = model.reduced_matrices()
-    independent = np.arange(len(relative)) if model.coupling is None else model.independent
-    free = np.flatnonzero(~np.isin(independent, clamped))
-    solve = factorize(
-        stiffness[free][:, free].tocsc(), "stiffness of the link held at its inboard interface",
-        model.dof_positions()[free],
-    )  # fmt: skip
-    step = max(1, _BLOCK_VALUES // len(relative))
-    for begin in range(0, len(first), step):
-        some = slice(begin, begin + step)
-        given = _followed(model, relative, first[some], second[some])
-        force = -forces(relative, first[some], second[some]) - model.stiffness @ given
-        reduced = force if model.coupling is None else model.coupling.T @ force
-        fields = np.zeros((len(independent), force.shape[1]))
-        fields[free] = solve(np.ascontiguousarray(reduced[free]))
-        yield slice(begin, begin + force.shape[1]), expanded(model, fields) + given
+def _asked(
+    model: FEModel,
+    work: Work,
+    relative: Array,
+    held: HeldSolution,
+    reference: int,
+    pairs: tuple[IntArray, IntArray],
+    asked: Array,
+    kept: IntArray,
+) -> Array:
+    """(p + k, pairs) products of the fields with ``asked`` (d, p), then their components ``kept`` (k,)."""
+    given = _followed(model, relative, *pairs)
+    count, step = asked.shape[1] + len(kept), max(1, _BLOCK_VALUES // len(relative))
+    result = np.empty((count, len(pairs[0])))
+    for begin in range(0, count, step):
+        some = slice(begin, min(begin + step, count))
+        loads = np.zeros((len(relative), some.stop - begin))
+        own = asked[:, some]
+        loads[:, : own.shape[1]] = own
+        single = np.arange(max(begin, asked.shape[1]), some.stop)
+        loads[kept[single - asked.shape[1]], single - begin] = 1.0
+        reduced = loads if model.coupling is None else model.coupling.T @ loads
+        tests = expanded(model, held(reduced, reference))
+        result[some] = -work(tests, relative, *pairs)
+        left = loads - model.stiffness @ tests  # what follows an interface moves as given, and strains the rest
+        for rows, moved in given:
+            result[some] += left[rows].T @ moved
+    return result
 
 
-def _followed(model: FEModel, relative: Array, first: IntArray, second: IntArray) -> Array:
-    """(d, pairs) finite turning of the nodes that follow an interface."""
-    result = np.zeros((len(relative), len(first)))
+def _held(model: FEModel) -> HeldSolution:
+    """By factors of its own."""
+
+    def solution(loads: Array, reference: int) -> Array:
+        _, stiffness = model.reduced_matrices()
+        places = interface_places(model)[6 * reference : 6 * reference + 6]
+        free = np.setdiff1d(np.arange(stiffness.shape[0]), places)
+        solve = factorize(
+            stiffness[free][:, free].tocsc(), "stiffness of the link held at its inboard interface",
+            model.dof_positions()[free],
+        )  # fmt: skip
+        answers = np.zeros_like(loads)
+        answers[free] = solve(np.ascontiguousarray(loads[free]))
+        return answers
+
+    return solution
+
+
+def _followed(
+    model: FEModel, relative: Array, first: IntArray, second: IntArray
+) -> list[tuple[IntArray, Array]]:
+    """Rows of nodes that follow an interface, and their finite turning (rows, pairs), one interface after the other."""
+    result = []
     for interface in model.interface_nodes:
         others = interface.coupled_nodes[interface.coupled_nodes != interface.node]
         theta = relative[model.dof_map[interface.node, 3:]]
-        for node in others:
-            arm = model.nodes[node] - interface.position
-            result[model.dof_map[node, :3]] += twice_turned(theta, arm)[:, first, second]
+        arms = model.nodes[others] - interface.position
+        moved = [twice_turned(theta, arm)[:, first, second] for arm in arms]
+        if moved:
+            result.append((model.dof_map[others, :3].ravel(), np.concatenate(moved)))
     return result
 
 

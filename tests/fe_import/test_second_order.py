@@ -15,6 +15,7 @@ from modal_models import same
 from scipy.spatial.transform import Rotation
 
 from fe_import.description.link import LinkFile
+from fe_import.description.reduction import Reduction
 from fe_import.elements.solid_stress import SolidStress
 from fe_import.errors import Cause, FEImportError
 from fe_import.modal.check import validate
@@ -24,10 +25,11 @@ from fe_import.modal.second_order import SecondOrder, pair_numbers
 from fe_import.model import FEModel
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
+from fe_import.reduction import REDUCTIONS
 from fe_import.second_order.beams import POINTS, line_fields
 from fe_import.second_order.composition import twice_turned
-from fe_import.second_order.compute import MOST_DOFS_OF_SOLIDS, MOST_MODES, MOST_MODES_OF_SOLIDS, second_order
-from fe_import.second_order.element_forces import solid_forces
+from fe_import.second_order.compute import MOST_MODES, MOST_MODES_OF_SOLIDS, second_order
+from fe_import.second_order.element_forces import solid_work
 from fe_import.second_order.elements import elements_second_order
 from fe_import.second_order.frame import frame_second_order
 from fe_import.second_order.moments import of_inertia, of_masses
@@ -172,7 +174,7 @@ def test_modal_terms_are_the_mass_between_modes_and_field(tmp_path: Path, kind: 
     shapes, every = orthonormal(model, 3), np.arange(len(model.nodes))
     if kind == "solid":
         assert isinstance(model.stress, SolidStress)
-        found = elements_second_order(model, partial(solid_forces, model.stress, model.dof_map), shapes, 0, every)
+        found = elements_second_order(model, partial(solid_work, model.stress, model.dof_map), shapes, 0, every)
     else:
         assert model.beams is not None
         found = frame_second_order(model, model.beams, shapes, 0, every)
@@ -241,7 +243,7 @@ def test_energy_of_solids_stays_quadratic_to_third_order(tmp_path: Path, couplin
     solid = model.stress
     assert isinstance(solid, SolidStress)
     found = elements_second_order(
-        model, partial(solid_forces, solid, model.dof_map), shapes, 0, np.arange(len(model.nodes))
+        model, partial(solid_work, solid, model.dof_map), shapes, 0, np.arange(len(model.nodes))
     )
     motions, rows = model.rigid_body_modes(), model.dof_map[model.interface_nodes[0].node]
     relative = shapes - motions @ np.linalg.solve(motions[rows], shapes[rows])
@@ -355,14 +357,13 @@ def test_what_has_no_field_says_so(tmp_path: Path, make: Callable[[Path], LinkFi
 
 
 def test_matrices_and_many_modes_have_no_field(tmp_path: Path) -> None:
-    """Bare matrices have no elements; too many modes have too many pairs; large solids take too long."""
+    """Bare matrices have no elements; too many modes have too many pairs."""
     model = build_model(frame_link(tmp_path))
     shapes = orthonormal(model, MOST_MODES + 1)
     for bare, count, reason in (
         (replace(model, beams=None, kind="matrices"), 2, "no elements"),
         (model, MOST_MODES + 1, "keep fewer"),
         (replace(model, kind="solid"), MOST_MODES_OF_SOLIDS + 1, "modes of a meshed link"),
-        (replace(model, kind="solid", independent=np.arange(MOST_DOFS_OF_SOLIDS + 1)), 2, "mesh it more coarsely"),
     ):
         field, statement = second_order(bare, shapes[:, : 6 + count], 0)
         assert field is None
@@ -390,3 +391,20 @@ def test_a_rigid_turn_has_the_inertia_of_the_turned_body() -> None:
     points = sum(0.5 * m * v @ v for m, v in zip(masses, moved, strict=True))
     spin_rate = phi @ qd + np.cross(omega, phi @ q)
     assert energy(momentum, spin, points) == pytest.approx(energy(*turning, 0.5 * spin_rate @ inertia @ spin_rate))
+
+
+@pytest.mark.parametrize("method", ["craig-bampton", "guyan", "craig-chang", "mode-displacement"])
+@pytest.mark.parametrize("reference", [0, 1])
+def test_factors_of_the_reduction_serve_for_the_field(tmp_path: Path, method: str, reference: int) -> None:
+    """Held at either interface: with factors of clamped interfaces, or of the support at the first, as with its own."""
+    link = solid_link(tmp_path)
+    model = build_model(link)
+    basis = REDUCTIONS[method](model, Reduction(method=method), "link")
+    shapes, solid = orthonormal(model, 2), model.stress
+    assert isinstance(solid, SolidStress)
+    assert basis.held is not None
+    work, nodes = partial(solid_work, solid, model.dof_map), np.arange(0, len(model.nodes), 7)
+    own, shared = (elements_second_order(model, work, shapes, reference, nodes, held) for held in (None, basis.held))
+    for name in ("momentum", "spin", "modal", "translation", "rotation"):
+        expected = getattr(own, name)
+        np.testing.assert_allclose(getattr(shared, name), expected, atol=1e-7 * np.abs(expected).max())
