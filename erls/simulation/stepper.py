@@ -317,7 +317,8 @@ def _refuse_system(scene: Scene, kind: str) -> None:
 def _refuse_sticking(scene: Scene, mechanism: Mechanism) -> None:
     if mechanism.sticks or mechanism.grips:
         where, remedy = f"{scene.path}: friction.law", "use law = 'smooth'"
-        message = "a stepper makes the steps that it is asked for, and none to where something sticks"
+        what = "a joint" if mechanism.sticks else "a point"
+        message = f"a stepper makes the steps that it is asked for, and none to where {what} sticks"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value="stick", remedy=remedy)
 
 

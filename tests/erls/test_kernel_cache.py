@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from erls.maths import jit, kernel_cache
+from erls.maths import address_space, jit, kernel_cache
 
 pytestmark = pytest.mark.skipif(not jit.ENABLED, reason="nothing is compiled with ERLS_JIT=0")
 
@@ -66,6 +66,26 @@ def test_damaged_code_is_compiled_anew(
     assert told == [f"compiled code in {tmp_path} is damaged: compiled anew"]
     assert sum(_compiled(monkeypatch, tmp_path).stats.cache_hits.values()) == 1
     assert len(told) == 1
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="nobody knows how much is taken")
+@pytest.mark.parametrize("left", [2**22, 2**25])
+def test_little_room(left: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: list[str]) -> None:
+    """LLVM would end the process: with 32 MB code is read, and nothing compiled; damage is not suspected."""
+    first = left < address_space.TO_LOAD
+    if not first:
+        _compiled(monkeypatch, tmp_path)
+    taken = int(Path("/proc/self/statm").read_bytes().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    monkeypatch.setattr(address_space, "address_space", lambda: taken + left)
+    if not first:
+        assert _compiled(monkeypatch, tmp_path)(3.0) == 6.0
+        for file in tmp_path.rglob("*.nb?"):
+            file.unlink()
+    with pytest.raises(MemoryError, match="MB of address space are left"):
+        _compiled(monkeypatch, tmp_path)
+    monkeypatch.setattr(address_space, "address_space", lambda: None)
+    assert _compiled(monkeypatch, tmp_path)(3.0) == 6.0
+    assert told == []
 
 
 def test_a_folder_that_cannot_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: list[str]) -> None:

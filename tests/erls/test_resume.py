@@ -16,6 +16,7 @@ import pytest
 import scenes
 from body_scenes_data import PENDULUM, body_scene
 from checkpoint_times import at_every_look
+from contact_scenes import on_a_slope
 from loop_scenes import parallelogram
 from resumed_runs import chunks_of, equal, l_scene, refused
 from test_limited_motors import DRIVE
@@ -65,6 +66,7 @@ LINKAGE: dict[str, Any] = {  # three joints that come to rest together, and for 
     **four_bar({"stiffness": 40.0, "rest": LEVEL, **RUBS}, RUBS, {}, LEVEL + 0.07),
     "simulation": {"duration": 1.0},
 }
+SLOPE = on_a_slope(25.0, -1.0, {"coefficient": 0.3, "law": "stick"})
 LIMITED: dict[str, Any] = {**STICKS, "joints": [{**PIN, "drive": DRIVE}]}
 CASES: dict[str, tuple[Path | dict[str, Any], list[str]]] = {
     "lobatto": (L, ["duration=0.3"]),
@@ -84,6 +86,8 @@ CASES: dict[str, tuple[Path | dict[str, Any], list[str]]] = {
     "sticking, loop, equal steps": (LINKAGE, ["integrator=generalized_alpha", "step=5e-3"]),
     "limits": (LIMITED, ["integrator=lobatto"]),
     "limits, nodal": (LIMITED, ["formulation=nodal", "integrator=generalized_alpha", "step=5e-3"]),
+    "points that stick": (SLOPE, ["duration=0.3"]),
+    "points that stick, nodal": (SLOPE, ["duration=0.3", "formulation=nodal", "step=5e-3"]),
     "sticking, dop853": (STICKS, ["integrator=dop853", "output_step=0.01"]),
     "dop853": (TOP, ["integrator=dop853", "rtol=1e-9", "atol=1e-10"]),
     "nodal": (L, ["duration=0.02", "step=1e-3", "formulation=nodal"]),

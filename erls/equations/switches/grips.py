@@ -167,8 +167,10 @@ class Grips:
             else:
                 ahead = slip @ law[AHEAD : AHEAD + 2] - _TURNED * np.linalg.norm(slip, axis=1)
                 result[presses[:, k], k] = ahead[presses[:, k]]
+        if accelerate is None:
+            return result
         sticking = self.sticking
-        for i in np.flatnonzero(near).tolist() if accelerate is not None else ():
+        for i in np.flatnonzero(near).tolist():
             room = self._most[sticking] - np.linalg.norm(self._holding(t[i], y[i], v[i], accelerate), axis=1)
             result[i, sticking] = np.where(presses[i, sticking], room, -1.0)
         return result

@@ -148,7 +148,7 @@ class BodyRun(Run):
         """All of them at times (k,)."""
         system, velocities = self.assembly.system, self.velocities(t)
         found = [system.in_contacts(q, v) for q, v in zip(self.configurations(t), velocities, strict=True)]
-        return ContactSeries.of(np.array(found).reshape(len(t), len(self.contact_names), 11))
+        return ContactSeries.of(np.array(found).reshape(len(t), len(self.contact_names), -1))
 
     def samples(self, times: Sequence[float]) -> list[dict[str, Any]]:
         """Nodes and connections at given times: places [m], coordinates, and what each connection does to its node
