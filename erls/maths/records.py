@@ -68,27 +68,25 @@ def _said(kind: Any) -> tuple[tuple[str, ...], ...]:
 
 
 def room(record: type[R], **sizes: int) -> R:
-    """Working memory: a record of zeros, to be put into a `Memory`, whose fields are annotated with their shapes, in
-    these sizes.
+    """Working memory: a record of zeros whose fields are annotated with their shapes, in these sizes.
 
     Whole numbers are given beside the sizes, by the names of their fields.
     """
-    found: R = _room(record, tuple(sizes.items()))
-    return found
+    make: Callable[..., R] = record
+    given = tuple(sizes.items())
+    return make(*(each if isinstance(each, int) else np.zeros(each) for each in _sized(record, given)))
 
 
-@lru_cache(maxsize=512)
-def _room(record: Any, given: tuple[tuple[str, int], ...]) -> Any:
-    """The same; nobody writes into it, so that it serves again."""
+@lru_cache(maxsize=4096)
+def _sized(record: Any, given: tuple[tuple[str, int], ...]) -> tuple[int | tuple[int, ...], ...]:
+    """Whole numbers and shapes of arrays."""
     sizes = dict(given)
-    return record(*(sizes[name] if axes is None else _zeros(axes, sizes) for name, axes in _shapes(record)))
+    return tuple(sizes[name] if axes is None else _shape(axes, sizes) for name, axes in _shapes(record))
 
 
-def _zeros(axes: tuple[tuple[str, ...], ...], sizes: dict[str, int]) -> Array:
-    """Of the shape that axes tell."""
-    found = np.zeros([sum(int(part) if part.isdigit() else sizes[part] for part in axis) for axis in axes])
-    found.flags.writeable = False
-    return found
+def _shape(axes: tuple[tuple[str, ...], ...], sizes: dict[str, int]) -> tuple[int, ...]:
+    """That axes tell."""
+    return tuple(sum(int(part) if part.isdigit() else sizes[part] for part in axis) for axis in axes)
 
 
 def table_size(record: type[Any]) -> int:

@@ -25,11 +25,12 @@ from fe_import.errors import FEImportError, ReportedError
 
 SCENE = ROOT / "data/l_shape/steel_tall.toml"
 SHORT = ["--set", "simulation.duration=0.01"]
+COARSE = [*SHORT, "--tolerance", "1e-3"]
 STUDIES: dict[str, tuple[Any, str, int, list[str]]] = {
     "modes": (mode_count, "_run", 3, ["study", "modes", str(SCENE), "--counts", "2,6,8", *SHORT]),
     "compare": (compare, "_run", 2, ["compare", str(SCENE), "--formulations", "erls,ffr", *SHORT]),
     "cost": (cost, "climb", 3, ["study", "cost", str(SCENE), "--formulations", "erls", "--integrators", "lobatto",
-                             "--effects", "all", "--modes", "2,6,8", "--reference", "tight", *SHORT]),
+                             "--effects", "all", "--modes", "2,6,8", "--reference", "tight", *COARSE]),
 }  # fmt: skip
 
 _KILLED = """
