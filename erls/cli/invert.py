@@ -64,10 +64,11 @@ def invert(
     """
     from erls.equations.registry import FORMULATIONS
     from erls.errors import SceneError
+    from erls.files.csv_table import write_columns
     from erls.inverse.invert import invert as inverted
     from erls.report.inverse_page import inversion_page, inversion_text
     from erls.scene.read import load_chain
-    from erls.tracking.files import summary, write_columns
+    from erls.tracking.files import columns, summary
     from fe_import.files.toml import choose
 
     check_output(output, [scene], set_ or [], (".csv", ".json", ".html"), force)
@@ -95,7 +96,7 @@ def invert(
     told = {**summary(found, elastic, rigid), "corrections": corrections, "output": output and str(output)}
     if output is not None:
         if output.suffix == ".csv":
-            write_columns(output, found)
+            write_columns(output, {name: x.tolist() for name, x in columns(found).items()})
         else:
             write(output, dumped(told) if output.suffix == ".json" else inversion_page(found, elastic, rigid))
     if json:

@@ -49,10 +49,11 @@ def plan(
     """
     from erls.equations.registry import FORMULATIONS
     from erls.errors import SceneError
+    from erls.files.csv_table import write_columns
     from erls.report.plan_text import plan_text
     from erls.scene.read import load_chain
     from erls.tracking.plan import plan as planned
-    from erls.tracking.plan_files import summary, write_columns
+    from erls.tracking.plan_files import columns, summary
     from fe_import.files.toml import choose
 
     check_output(output, [scene], set_ or [], (".csv", ".json"), force)
@@ -64,7 +65,7 @@ def plan(
     told = {**summary(found), "output": output and str(output)}
     if output is not None:
         if output.suffix == ".csv":
-            write_columns(output, found)
+            write_columns(output, {name: x.tolist() for name, x in columns(found).items()})
         else:
             write(output, dumped(told))
     if json:

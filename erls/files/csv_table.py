@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
 from erls.errors import Cause, SceneError
 from erls.files.input import text_of
+from erls.files.output import replacing
 
 _MOST_BYTES = 500_000_000
 
@@ -25,6 +26,18 @@ def write_table(file: IO[str], head: Iterable[str], rows: Iterable[Iterable[Any]
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow([_harmless(cell) for cell in head])
     writer.writerows([_harmless(cell) for cell in row] for row in rows)
+
+
+def write_columns(path: Path, columns: Mapping[str, Sequence[float]]) -> None:
+    """Write columns of numbers by their heads, completely or not at all.
+
+    Raises
+    ------
+    SceneError
+        NOT_WRITABLE.
+    """
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        write_table(file, columns, zip(*columns.values(), strict=True))
 
 
 def _harmless(cell: Any) -> Any:

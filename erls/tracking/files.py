@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from erls.files.csv_table import write_table
-from erls.files.output import replacing
 from erls.inverse.inversion import Inversion
 from erls.maths.so3 import Array
 from erls.tracking.confirm import Confirmation
@@ -31,19 +28,6 @@ def columns(inversion: Inversion) -> dict[str, Array]:
 
 def _cut(inversion: Inversion) -> dict[str, Array]:
     return {name: x[: len(inversion.t)] for name, x in inversion.rigid_efforts.items()}
-
-
-def write_columns(path: Path, inversion: Inversion) -> None:
-    """Write the table, completely or not at all.
-
-    Raises
-    ------
-    SceneError
-        NOT_WRITABLE.
-    """
-    found = columns(inversion)
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        write_table(file, found, np.column_stack(list(found.values())).tolist())
 
 
 def summary(inversion: Inversion, elastic: Confirmation | None, rigid: Confirmation | None) -> dict[str, Any]:

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from erls.files.csv_table import write_table
-from erls.files.output import replacing
 from erls.maths.so3 import Array
 from erls.tracking.plan import Planned
 
@@ -24,19 +22,6 @@ def columns(planned: Planned) -> dict[str, Array]:
     for name, unit, rate, effort in zip(goal.names, units, rates.T, planned.efforts.T, strict=True):
         found |= {f"{name}.rate [{unit[0]}/s]": rate, f"{name}.planned_effort [{unit[1]}]": effort}
     return found
-
-
-def write_columns(path: Path, planned: Planned) -> None:
-    """Write the table, completely or not at all.
-
-    Raises
-    ------
-    SceneError
-        NOT_WRITABLE.
-    """
-    found = columns(planned)
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        write_table(file, found, np.column_stack(list(found.values())).tolist())
 
 
 def drive_lines(planned: Planned, table_file: Path) -> list[str]:

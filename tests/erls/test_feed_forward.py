@@ -19,7 +19,7 @@ from erls.scene.chain import Scene
 from erls.tracking.confirm import confirmed, missed
 
 LED = scenes.ROOT / "data" / "inverse" / "led_arm.toml"
-MOTION = 'motion={shape="polynomial", from_deg=0.0, to_deg=60.0, start=0.8, duration=0.6, degree=9}'
+MOTION = 'motion={shape="polynomial", from_deg=0.0, to_deg=60.0, start=0.3, duration=0.6, degree=9}'
 RIGID = 'joints.0.drive={type="pd", proportional_gain=%g, derivative_gain=%g, feed_forward=true, ' + MOTION + "}"
 
 
