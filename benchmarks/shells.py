@@ -63,13 +63,17 @@ def _last(run: BodyRest, point: str, axis: int) -> float:
     return abs(float(run.position(point, run.end)[axis] - built))
 
 
-def _fold(run: BodyRest) -> float:
-    """Moment of the whole width [N m]."""
-    moment = run.samples([run.end])[0]["connections"]["turn"]["moment"]
-    return 2 * abs(float(moment[1]))
+def _fold(run: BodyRest, first: float) -> float:
+    """Moment of the whole width [N m]: work per rotation from a share of the load parameter on."""
+    loads = run.loads(run.times)
+    begin = int(np.flatnonzero(loads < first).max()) + 1
+    samples = run.samples(run.times[begin:].tolist())
+    moments = [sample["connections"]["turn"]["moment"][1] for sample in samples]
+    return 2 * abs(float(np.trapezoid(moments, loads[begin:]) / (loads[-1] - loads[begin])))
 
 
-_OTHER = [f"connections.0.motion.{key}" for key in ("values_deg=[-45,0,45,90]", "rates_deg=[45,45]")]
+_MOTION = [f"connections.0.motion.{key}" for key in ("values_deg=[-75,0,75,150]", "rates_deg=[75,75]")]
+_EQUAL = [*_MOTION, "shells.0.mesh=meshes/tape_coarse.inp", "simulation.load_steps=60"]
 SCENES: tuple[tuple[str, str, list[str], Callable[[BodyRest], float], float], ...] = (
     ("two bars, first limit", "statics/two_bars", [], lambda run: run.statics.turns[0].t, 0.370064700095),
     ("Lee's frame, first limit [kN]", "statics/lee_frame", [], lambda run: 30 * run.statics.turns[0].t, 18.55),
@@ -77,8 +81,8 @@ SCENES: tuple[tuple[str, str, list[str], Callable[[BodyRest], float], float], ..
     ("hemisphere, pushed", "shells/hemisphere", [], lambda run: _last(run, "pushed", 1), 8.178),
     ("annulus, inner", "shells/annulus", [], lambda run: _last(run, "inner", 2), 13.891),
     ("annulus, outer", "shells/annulus", [], lambda run: _last(run, "outer", 2), 17.528),
-    ("tape spring, opposite sense", "shells/tape_spring", [], _fold, 0.0393),
-    ("tape spring, equal sense", "shells/tape_spring", _OTHER, _fold, 0.0211),
+    ("tape spring, opposite sense", "shells/tape_spring", [], lambda run: _fold(run, 30 / 90), 0.0393),
+    ("tape spring, equal sense", "shells/tape_spring", _EQUAL, lambda run: _fold(run, 95 / 150), 0.0211),
 )
 ROLL_UP = ((2, "full", 1), (2, "frozen", 2), (4, "frozen", 1), (4, "full", 1), (4, "material", 1))
 """The models of the slides, then ours: elements, tangent, load steps."""

@@ -32,7 +32,8 @@ def _changes(path: Path) -> list[str]:
         little = [f"loads.{k}.force={[1e-3 * x for x in load['force']]}" for k, load in loads]
         return ["simulation.load_steps=1", *little]
     if settings.get("type") == "path":
-        return ["simulation.most_steps=2"]
+        coarse = ["shells.0.mesh=meshes/tape_coarse.inp"] if path.stem == "tape_spring" else []
+        return ["simulation.most_steps=2", *coarse]
     if "duration" not in settings:
         return ["simulation.compare_tangents=false"] if settings.get("compare_tangents") else []
     found = ["simulation.duration=2e-3"]
@@ -53,7 +54,8 @@ def test_one_front_end(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     told, text = file_info(path)
     assert (told["file"], told["scene"]) == ("scene", scene.name)
     assert scene.name in text
-    run = erls.simulate(scene)
+    fine = path.parent.name == "shells" and path.stem != "roll_up"  # whose meshes are judged by four times the elements
+    run = erls.simulate(scene, verdict=not fine)
     assert isinstance(run, Run)
     summary = _plain(run.summary([run.end]))
     assert {"scene", "formulation", "wall_s", "samples", "warnings"} <= set(summary)

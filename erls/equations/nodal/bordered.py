@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.nodes import Nodes
+from erls.equations.nodal.statics import imbalance
 from erls.equations.system import metre_scales
 from erls.maths.saddle import Matrix, Saddle, Scales
 from erls.maths.so3 import Array
@@ -83,17 +84,10 @@ class Measure:
         return a.scaled(1 / self.length(a))
 
 
-def imbalance(system: NodalSystem, at: Point) -> tuple[Array, Array]:
-    """Forces (n,) and joints (m,) out of balance."""
-    rest = np.zeros(system.size)
-    forces = system.residual(at.t, at.q, rest, rest)
-    return forces + system.constraint_matrix(at.t, at.q).T @ at.multipliers, system.constraint(at.t, at.q)
-
-
 def load_rate(system: NodalSystem, at: Point) -> tuple[Array, Array]:
     """What a unit of the load parameter adds to the imbalance: forces (n,) and joints (m,)."""
     h = _DIFFERENCE * max(1.0, abs(at.t))
-    back, ahead = (imbalance(system, Point(t, at.q, at.multipliers)) for t in (at.t - h, at.t + h))
+    back, ahead = (imbalance(system, t, at.q, at.multipliers) for t in (at.t - h, at.t + h))
     return (ahead[0] - back[0]) / (2 * h), (ahead[1] - back[1]) / (2 * h)
 
 

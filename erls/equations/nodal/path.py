@@ -24,12 +24,20 @@ from erls.equations.nodal.bordered import (
     Measure,
     Point,
     Step,
-    imbalance,
     lowest_way,
     unstable_ways,
 )
 from erls.equations.nodal.nodes import Nodes
-from erls.equations.nodal.statics import MAX_ITERATIONS, SHRINK, Equilibrium, LoadSteps, Statics, Turn, turned_too_far
+from erls.equations.nodal.statics import (
+    MAX_ITERATIONS,
+    SHRINK,
+    Equilibrium,
+    LoadSteps,
+    Statics,
+    Turn,
+    imbalance,
+    turned_too_far,
+)
 from erls.errors import Cause, SimulationError
 
 WANTED = 10  # iterations of a step: with more the next one is shorter, with less longer
@@ -159,7 +167,7 @@ class _Walk:
     def _advance(self, start: Point, along: Step, step: float) -> tuple[Point, int] | None:
         """Newton's method from a step along a direction, and across it; iterations."""
         at, exact = _moved(self.system, start, along.scaled(step)), False
-        right, last = imbalance(self.system, at), np.inf
+        right, last = imbalance(self.system, at.t, at.q, at.multipliers), np.inf
         for iteration in range(1, MAX_ITERATIONS + 1):
             border = Bordered(self.system, at, along, self.measure, material=not exact)
             self.factorizations += 1
@@ -170,7 +178,7 @@ class _Walk:
             if not np.isfinite(whole) or whole > 10 * step or (iteration > 8 and whole > last):
                 return None
             at, last = _moved(self.system, at, correction.scaled(-1.0)), whole
-            right = imbalance(self.system, at)
+            right = imbalance(self.system, at.t, at.q, at.multipliers)
             if size <= self.newton.goal and abs(correction.load) <= 1e-10 * self.options.end:
                 return at, iteration
             left = self.measure.length(border.solve(*right, 0.0)[0]) / whole

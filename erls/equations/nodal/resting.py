@@ -20,7 +20,7 @@ from erls.equations.linearization import stiffness_left, ways_left
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain
 from erls.equations.nodal.nodes import Nodes
-from erls.equations.nodal.statics import LoadSteps, Statics, solve_statics
+from erls.equations.nodal.statics import LoadSteps, Statics, imbalance, solve_statics
 from erls.equations.serial.equilibrium import size_of
 from erls.equations.stability import Bearing, unstable
 from erls.equations.system import metre_scales
@@ -168,7 +168,7 @@ def _near(newton: LoadSteps, t: float, q: Nodes, multipliers: Array) -> tuple[No
         saddle = newton.factor(t, q, multipliers, True)
         if saddle.singular is not None:
             return None
-        correction = saddle.solve(saddle.scaled(*newton.imbalance(t, q, multipliers)))
+        correction = saddle.solve(saddle.scaled(*imbalance(newton.system, t, q, multipliers)))
         size = float(np.abs(correction[: newton.system.size]).max(initial=0.0))
         if not size < _DIVERGED * before:
             return None

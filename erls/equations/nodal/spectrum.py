@@ -19,6 +19,7 @@ import scipy.linalg as la
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from erls.equations.nodal.assembly import NodalSystem
+from erls.equations.nodal.bordered import Point, load_rate
 from erls.equations.nodal.statics import Equilibrium
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SimulationError
@@ -113,9 +114,7 @@ def _stiffness(system: NodalSystem, t: float, q: object, multipliers: Array) -> 
 
 def _path(system: NodalSystem, at: Equilibrium, saddle: Saddle) -> tuple[Array, Array]:
     """Increment (n,) and multipliers (m,) per unit of the load parameter."""
-    rest, h = np.zeros(system.size), 1e-6 * max(1.0, abs(at.t))
-    ends = [(system.residual(t, at.q, rest, rest), system.constraint(t, at.q)) for t in (at.t - h, at.t + h)]
-    force, gap = ((b - a) / (2 * h) for a, b in zip(*ends, strict=True))
+    force, gap = load_rate(system, Point(at.t, at.q, at.multipliers))
     move, change = saddle.unscaled(saddle.solve(saddle.scaled(force, gap)))
     return -move, -change
 

@@ -147,6 +147,13 @@ def solve_statics(
     return Statics(tuple(found), solver.factorizations, solver.cuts, failure)
 
 
+def imbalance(system: NodalSystem, t: float, q: Nodes, multipliers: Array) -> tuple[Array, Array]:
+    """Forces (n,) and joints (m,) out of balance."""
+    rest = np.zeros(system.size)
+    forces = system.residual(t, q, rest, rest)
+    return forces + system.constraint_matrix(t, q).T @ multipliers, system.constraint(t, q)
+
+
 class LoadSteps:
     """Newton's method at one load parameter after another.
 
@@ -172,7 +179,7 @@ class LoadSteps:
         saddle: Saddle | None = None
         self.iterations = 0
         exact = self.tangent == "full"
-        right = self.imbalance(t, q, multipliers)
+        right = imbalance(self.system, t, q, multipliers)
         while self.iterations < MAX_ITERATIONS:
             if saddle is None or self.tangent != "frozen":
                 saddle = self.factor(t, q, multipliers, exact)
@@ -187,7 +194,7 @@ class LoadSteps:
             small = float(np.abs(correction[: self.system.size]).max(initial=0.0)) <= self.goal
             for share in SHARES if self.line_search and not small else SHARES[:1]:
                 ahead = self.system.compose(q, -share * move), multipliers - share * change
-                right = self.imbalance(t, *ahead)
+                right = imbalance(self.system, t, *ahead)
                 if small or (self.tangent != "full" and not self.line_search):
                     break
                 left = float(np.linalg.norm(saddle.solve(saddle.scaled(*right)))) / self.size
@@ -200,11 +207,6 @@ class LoadSteps:
             if self.tangent == "full":  # and a correction that was not small: ``left`` is its own
                 exact = left <= (SHRINK if exact and share == 1.0 else 1.0)
         return None
-
-    def imbalance(self, t: float, q: Nodes, multipliers: Array) -> tuple[Array, Array]:
-        """Forces (n,) and joints (m,) out of balance."""
-        forces = self.system.residual(t, q, self.rest, self.rest)
-        return forces + self.system.constraint_matrix(t, q).T @ multipliers, self.system.constraint(t, q)
 
     def factor(self, t: float, q: Nodes, multipliers: Array, exact: bool) -> Saddle:
         """The exact or the material tangent, in metres and units of its own stiffness."""
