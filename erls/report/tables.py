@@ -66,8 +66,8 @@ def family_report(summary: Mapping[str, Any]) -> str:
         table(("parameter", "from", "to"), rows),
         f"Frequencies in the middle, inboard interface held [Hz]: {first}",
         f"In the whole range within {100 * bound['frequencies']:.2g} % (frequencies) and "
-        f"{100 * bound['flexibility']:.2g} % (static flexibility): twice what was found at {summary['places']} places "
-        "that gave nothing to it, and the corners",
+        f"{100 * bound['flexibility']:.2g} % (static flexibility): three times what was found at {summary['places']} "
+        "places that gave nothing to it, and the corners",
     ]
     if not summary["healthy"]:
         said.append("Health in the middle: checks FAILED; reduce the description alone to see them")

@@ -31,7 +31,7 @@ _FOR_FIGURES = {"stiffness", "mass", "nodes", "moving"}
 
 @dataclass(frozen=True)
 class Bound:
-    """Largest errors of a family in its whole range, as shares: twice those found.
+    """Largest errors of a family in its whole range, as shares: three times those found.
 
     Attributes
     ----------

@@ -21,14 +21,17 @@ from fe_import.reduce import reduce_link
 from fe_import.reduction.base import expanded
 from fe_import.solver.watch import say, telling
 
-_SURPLUS = ACCURACY / 5  # of squared frequencies, of what the next samples may change
+_SURPLUS = ACCURACY / 50  # of squared frequencies, of what the next samples may change
 _BASIS = ACCURACY / 10  # of figures, of what the basis may leave at its training places
 _MOST_TERMS = 600
-_PLACES = 24  # at which the family is looked at besides
 _ROUNDS = 4
+_MARGIN = 3.0  # of the bound, over the largest error that is found
+_LEAST = 2 * (_BASIS + _SURPLUS)  # of the bound: what the basis and its matrices may leave is no less promised
 
 
-def reduce_parametric(link: LinkFile | Path | str, tell: Callable[[str], None] | None = None) -> ParametricModel:
+def reduce_parametric(
+    link: LinkFile | Path | str, tell: Callable[[str], None] | None = None, places: int = 64
+) -> ParametricModel:
     """Reduce a family of links on one basis, for all values of the parameters of its description.
 
     Parameters
@@ -37,6 +40,8 @@ def reduce_parametric(link: LinkFile | Path | str, tell: Callable[[str], None] |
         A description with ``[parameters]``.
     tell : callable, optional
         Gets messages on the way.
+    places : int
+        At how many that gave nothing to it the family is set beside the whole model, besides the corners.
 
     Raises
     ------
@@ -47,7 +52,7 @@ def reduce_parametric(link: LinkFile | Path | str, tell: Callable[[str], None] |
     given = link if isinstance(link, LinkFile) else load_link(link)
     _refuse(given)
     with telling(tell):
-        return _family(given)
+        return _family(given, places)
 
 
 def _refuse(link: LinkFile) -> None:
@@ -69,7 +74,7 @@ def _refuse(link: LinkFile) -> None:
             raise FEImportError(Cause.BAD_FIELD, message, where=f"{where}: {field}", remedy=remedy)
 
 
-def _family(link: LinkFile) -> ParametricModel:
+def _family(link: LinkFile, count: int) -> ParametricModel:
     samples = Samples(link)
     lower, upper = samples.bounds
     middle = reduce_link(samples.described((lower + upper) / 2))
@@ -87,13 +92,13 @@ def _family(link: LinkFile) -> ParametricModel:
         family = ParametricModel(
             link, middle, translation, rotation, _rows(samples.middle, moving), grid, Bound(0.0, 0.0, 0)
         )
-        fresh = rng.uniform(lower, upper, (_PLACES, len(lower)))
+        fresh = rng.uniform(lower, upper, (count, len(lower)))
         errors = np.array([_errors(family, basis, place) for place in np.concatenate([fresh, places])])
         error = float(errors.max())
         say(f"family of {elastic.shape[1]} fields, {grid.count} samples: off by {error:.1e} at most")
-        if 2 * error <= ACCURACY:
-            frequencies, flexibility = (2 * errors.max(axis=0)).tolist()
-            bound = Bound(frequencies, flexibility, _PLACES)
+        if _MARGIN * error <= ACCURACY:
+            frequencies, flexibility = np.maximum(_MARGIN * errors.max(axis=0), _LEAST).tolist()
+            bound = Bound(frequencies, flexibility, count)
             return ParametricModel(link, middle, translation, rotation, family.moving, grid, bound)
         places = np.concatenate([places, fresh])
     raise FEImportError(
@@ -101,7 +106,7 @@ def _family(link: LinkFile) -> ParametricModel:
         "no family of links is within its accuracy in these ranges",
         where=f"{link.path}: parameters",
         value=error,
-        limit=ACCURACY / 2,
+        limit=ACCURACY / _MARGIN,
         remedy="narrow the ranges",
     )
 

@@ -71,7 +71,7 @@ class Samples:
                     "a family of links keeps its dofs, and the weights of its averaged interfaces",
                     where=f"{self.link.path}: parameters",
                     value=dict(zip(self.link.description.parameters, place.tolist(), strict=True)),
-                    remedy='choose parameters that leave the mesh as it is, or weights = "uniform"',
+                    remedy='leave averaged faces and the numbers of nodes as they are, or use coupling = "rigid"',
                 )
             while self._kept and sum(m.stiffness.nnz + m.mass.nnz for m in self._kept.values()) > _KEPT_ENTRIES:
                 del self._kept[next(iter(self._kept))]
