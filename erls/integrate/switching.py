@@ -62,6 +62,8 @@ class Switching:
         """Set the modes at the start of a leg; rates and accelerations (n,)."""
         if self._begun:  # who rests because others do keeps no rounding
             v = np.where(self.system.still, 0.0, v)
+        else:
+            self.system.grips.forget()  # another run of the same system may have left some
         self._begun = True
         a = self.system.settle(leg.first, y, v, self._decided)
         self._decided = self.system.undecided

@@ -42,6 +42,15 @@ def sliding(folder: Path, degrees: float, speed: float, *changes: str, **more: A
     return simulated(scenes.write_toml(folder / "slope.toml", on_a_slope(degrees, speed, FRICTION, **more)), *changes)
 
 
+def test_runs_of_one_system_forget_each_other(tmp_path: Path) -> None:
+    """The run with larger steps that tells the error begins as the run did, and comes to rest there."""
+    data = on_a_slope(10.0, -1.0, FRICTION, simulation={"duration": 0.3, "step": 2e-3, "formulation": "nodal"})
+    run = run_scene(tmp_path, data)
+    assert run.accuracy is not None
+    assert run.accuracy.integration is not None
+    assert run.accuracy.integration < 1e-6
+
+
 @pytest.mark.parametrize("name", FORMULATIONS)
 def test_a_block_stays_where_it_came_to_rest(name: str, tmp_path: Path) -> None:
     """Uphill it comes to rest after v / (g (sin α + µ cos α)), and stays; where tan α is more than µ it goes back.

@@ -101,6 +101,11 @@ class Grips:
         speed = np.linalg.norm(touch.slip, axis=-1)
         return np.asarray((touch.gap < 0.0) & (speed <= _SLOW * rates))
 
+    def forget(self) -> None:
+        """Nothing is known of any."""
+        for law in self.laws:
+            law[MODE] = SMOOTH
+
     def begin(self, t: float, y: Array, v: Array) -> list[int]:
         """Say of those of which nothing is known whether they stick; their numbers."""
         new = [k for k, law in enumerate(self.laws) if law[MODE] == SMOOTH]
