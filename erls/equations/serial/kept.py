@@ -21,8 +21,8 @@ def kept(make: Callable[..., T], link: Link, *given: Any) -> T:
     """
     values: dict[Any, T] = link.__dict__.setdefault("kept", {}).setdefault(make.__qualname__, {})
     key = tuple((x.shape, x.tobytes()) if isinstance(x, np.ndarray) else x for x in given)
-    if key not in values:
-        while len(values) >= _ROOM:
-            values.pop(next(iter(values)), None)
-        values[key] = make(link, *given)
-    return values[key]
+    if (found := values.get(key)) is not None:
+        return found
+    while len(values) >= _ROOM:
+        values.pop(next(iter(values)), None)
+    return values.setdefault(key, make(link, *given))
