@@ -94,12 +94,12 @@ class Link:
             What it gives is not changed by anybody.
         """
         known = self._known
-        if key not in known:
-            while len(known) >= _MOST_KNOWN:
-                known.pop(next(iter(known)), None)
-            known[key] = find()
-        found: T = known[key]
-        return found
+        if (before := known.get(key)) is not None:  # threads share links, and may remove it
+            found: T = before
+            return found
+        while len(known) >= _MOST_KNOWN:
+            known.pop(next(iter(known)), None)
+        return known.setdefault(key, find())  # type: ignore[no-any-return]
 
     @cached_property
     def _known(self) -> dict[Hashable, Any]:

@@ -295,3 +295,15 @@ def test_faulty_descriptions_are_refused() -> None:
     scene: Any = erls.load_scene(L, ["simulation.duration=1e-3"])
     with pytest.raises((SceneError, FEImportError), match="nothing"):
         erls.sensitivities(scene, {"tip": lambda run: 0.0}, ["links.l.model.sections.leg.nothing"])
+
+
+def test_links_that_are_kept() -> None:
+    """Constants of equations whose links are shared with others are those of equations with links of their own."""
+    run = _run(ROBOT, ["simulation.duration=0.002", 'payloads=[{point="end2", mass=0.2}]'])
+    keys = ["gravity.2", "joints.0.dh.a", "joints.0.dh.alpha_deg", "payloads.0.mass"]
+    for parameter in parameters_of(run.scene, keys):
+        for shared in (variant.formulation for variant in differences(run, [parameter])[0].variants):
+            links = tuple(replace(link) for link in shared.mechanism.links)
+            alone = type(shared)(replace(shared.mechanism, links=links))
+            for name in ("reals", "integers"):
+                np.testing.assert_array_equal(getattr(shared.compiled, name), getattr(alone.compiled, name))
