@@ -19,6 +19,7 @@ from erls.report.fields import PAGES as FILES
 from erls.report.fields import documentation
 
 REGENERATE = "python -m erls.report.documentation docs"
+GALLERY = "python benchmarks/gallery.py"
 RECORDS = dict(FILES.values())
 
 
@@ -177,6 +178,22 @@ def test_links_lead_somewhere(page: str) -> None:
         assert path.exists(), target
         if anchor:
             assert anchor in _anchors(path.read_text(encoding="utf-8")), target
+
+
+def test_the_gallery_shows_every_scene() -> None:
+    """By its name, with a picture of its own, or as not drawn yet; no other pictures, and all of them small. Others
+    files of ``data/`` are descriptions of links, and problems.
+    """
+    page = PAGES["docs/gallery.md"]
+    for path in sorted((ROOT / "data").glob("*/*.toml")):
+        name = path.relative_to(ROOT / "data").with_suffix("").as_posix()
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        scene = "simulation" in tables or not {"beams", "bodies", "shells"}.isdisjoint(tables)
+        drawn = f"| ![{name}](gallery/{name.replace('/', '-')}.jpg) |" in page
+        assert drawn or f"`data/{name}.toml`" in page if scene else not drawn, f"{GALLERY} {name}"
+    pictures = list((ROOT / "docs/gallery").iterdir())
+    assert {f"gallery/{picture.name}" for picture in pictures} == set(re.findall(r"gallery/[^)]+\.jpg", page))
+    assert sum(picture.stat().st_size for picture in pictures) < 1.5e6
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -31,6 +31,11 @@ RUNS: dict[type[SceneFile], Callable[[Any, Asked], Run]] = {Scene: run_chain, Bo
 """What runs a kind of scene: one line each."""
 
 
+def run_as_asked(scene: AnyScene, asked: Asked) -> Run:
+    """The run of a scene of any kind; see `simulate`."""
+    return RUNS[type(scene)](scene, asked)
+
+
 @overload
 def simulate(
     scene: Scene,
@@ -122,4 +127,4 @@ def simulate(
     """
     loaded = load_scene(scene) if isinstance(scene, (Path, str)) else scene
     saving = Checkpoints(checkpoint) if isinstance(checkpoint, Path) else checkpoint
-    return RUNS[type(loaded)](loaded, Asked(progress, tell, saving, strict, like, verdict, until))
+    return run_as_asked(loaded, Asked(progress, tell, saving, strict, like, verdict, until))

@@ -22,7 +22,7 @@ from erls.scene.overrides import apply_override
 from erls.scene.read import AnyScene, scene_with
 from erls.simulation.asked import Asked
 from erls.simulation.packed_run import Packed, PackedBodies, unpacked, unpacked_bodies
-from erls.simulation.simulate import RUNS, Progress
+from erls.simulation.simulate import Progress, run_as_asked
 from fe_import.errors import ReportedError
 from fe_import.files.toml import read_toml
 
@@ -79,7 +79,7 @@ class Variants:
             scene = self.scene(overrides)
             like = self._alike(scene)
             asked = Asked(progress, lambda text: None, None, False, like, verdict, bending=bending or verdict)
-            run: Run = RUNS[type(scene)](scene, asked)
+            run = run_as_asked(scene, asked)
         except ReportedError as problem:
             return problem
         self._know(run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,9 @@ import erls
 from erls.errors import Cause, SceneError
 from erls.run.bodies.run import BodyRun
 from erls.run.chain.run import ChainRun
+from erls.simulation.asked import Asked
 from erls.simulation.packed_run import PackedBodies, packed, unpacked_bodies
+from erls.simulation.simulate import run_as_asked
 from fe_import.errors import ReportedError
 
 TALL = scenes.ROOT / "data/l_shape/steel_tall.toml"
@@ -99,17 +101,17 @@ def test_a_faulty_variant_spoils_no_other() -> None:
 
 def test_an_interrupt_keeps_what_was_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C during a long run: the short one is there, the long one says where it stopped, the next has none."""
-    simulate = erls.simulate
 
-    def interrupted(scene: Any, *, progress: Callable[[float, float], None], **given: Any) -> Any:
+    def interrupted(scene: Any, asked: Asked) -> Any:
         def look(t: float, duration: float) -> None:
-            progress(t, duration)
+            assert asked.progress is not None
+            asked.progress(t, duration)
             if t > 0.01:
                 os.kill(os.getpid(), signal.SIGINT)
 
-        return simulate(scene, progress=look, **given)
+        return run_as_asked(scene, replace(asked, progress=look))
 
-    monkeypatch.setattr("erls.simulation.variants.simulate", interrupted)
+    monkeypatch.setattr("erls.simulation.variants.run_as_asked", interrupted)
     long = ["simulation.duration=10", "simulation.step=1e-3"]
     results = erls.simulate_many(ROBOT, [["simulation.duration=0.01"], long, long], workers=1)
     assert isinstance(results[0], ChainRun)
