@@ -129,7 +129,7 @@ def main() -> None:
     exu.config.printToConsole = False
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "arm.toml").write_text((ROOT / "data/robot/links/arm.toml").read_text(encoding="utf-8"))
+        (folder / "arm.toml").write_bytes((ROOT / "data/robot/links/arm.toml").read_bytes())
         (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
         file = folder / "arm.hdf5"
         if command(["export", str(folder / "arm.toml"), "-o", str(file)]):

@@ -125,7 +125,13 @@ def _compiled(sources: Path, stem: Path, tell: Message) -> Path | None:
     binary = stem.with_suffix(_SHARED[platform.system()][0])
     files = sorted(str(each) for each in sources.glob("*.c"))
     options = ["-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-shared"]
-    done = subprocess.run([compiler, *options, "-o", str(binary), *files], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [compiler, *options, "-o", str(binary), *files],
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
+    )
     if done.returncode:
         tell(f"{compiler} could not compile the unit, which holds its sources alone: {done.stderr.strip()[:200]}")
         return None

@@ -34,7 +34,7 @@ from erls.sensitivity.parameters import parameters_of
 from erls.sensitivity.sensitivities import sensitivities
 from erls.simulation.simulate import simulate
 from erls.studies.overlay import Matched, matched
-from erls.studies.sweep.quantities import history
+from erls.studies.sweep.quantities import histories
 from fe_import.errors import ReportedError
 
 LEVEL = 0.95
@@ -236,7 +236,8 @@ class _Problem:
 
     def of(self, run: ChainRun) -> dict[str, Array]:
         """(k,) columns of a run."""
-        return {head: history(run, name, self.held.times) for head, name in self.names.items()}
+        found = histories(run, list(self.names.values()), self.held.times)
+        return dict(zip(self.names, found, strict=True))
 
     def columns(self, shares: Array) -> dict[str, Array]:
         """(k,) columns with these values."""
@@ -258,12 +259,12 @@ class _Problem:
         run = self.run(shares)
         assert run is not None
         self.steps += 1
-        times = self.held.times
-        outputs = {head: (lambda run, name=name: history(run, name, times)) for head, name in self.names.items()}
+        names, weights = list(self.names.values()), np.array([self.weights[head] for head in self.names])
+        outputs = {"columns": lambda run: histories(run, names, self.held.times)}  # together: they share their table
         sizes = dict(zip(self.keys, np.abs(self.start).tolist(), strict=True))
-        found = sensitivities(run, outputs, sizes)
+        found = sensitivities(run, outputs, sizes).derivatives["columns"]
         columns = [
-            np.concatenate([found.derivatives[head][key] / self.weights[head] for head in self.names]) * start
+            (np.asarray(found[key]) / weights[:, None]).ravel() * start
             for key, start in zip(self.keys, self.start.tolist(), strict=True)
         ]
         return np.stack(columns, axis=1)

@@ -126,6 +126,8 @@ def _beyond(system: ConstrainedSystem, runs: list[ConstrainedSolution], options:
     if any(run.failure is not None for run in runs):
         return 0.0
     bands = [_distance(system, fine, coarse, options.spectral_radius) for fine, coarse in pairwise(runs[:4])]
+    if np.isfinite([parted_at(found) for found in bands]).any():  # disturbances grow: their size foretells nothing
+        return 0.0
     apart = [float(found.slow.max(initial=0.0)) for found in bands]
     pairs = zip(pairwise(bands), apart[1:], strict=True)
     foretold = [size * (1 - near.ratio**-2) / (far.ratio**2 - 1) for (near, far), size in pairs]

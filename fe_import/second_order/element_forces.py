@@ -25,6 +25,8 @@ def solid_work(
 ) -> Array:
     """(p, pairs) ∫ ε(δ) : C : sym(∇φ_aᵀ ∇φ_b) dV for tests δ (d, p) and pairs of fields φ (d, n)."""
     mesh, n, p = solid.mesh, fields.shape[1], tests.shape[1]
+    if not len(first):
+        return np.zeros((p, 0))
     # σ : sym(∇φ_aᵀ ∇φ_b) is h_ab + h_ba with half of the normal stresses in h = Σ_i<=j σ_ij ∂_iφ_a · ∂_jφ_b
     halves = np.where(np.arange(6) < 3, 0.5, 1.0)[:, None]
     half = np.zeros((p, n * n))

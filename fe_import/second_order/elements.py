@@ -74,11 +74,11 @@ def elements_second_order(
     asked[:, :12] = weights
     asked[places, 12:] = moving
     found = _asked(model, work, relative, held or _held(model), reference, (first, second), asked, kept)
-    stored[0] = found[12 + n : 12 + n + 3 * len(nodes)].reshape(len(nodes), 3, -1)
-    stored[1][turned] = found[12 + n + 3 * len(nodes) :].reshape(-1, 3, len(first))
+    stored[0] = found[12 + n : 12 + n + 3 * len(nodes)].reshape(stored[0].shape)
+    stored[1][turned] = found[12 + n + 3 * len(nodes) :].reshape(stored[1][turned].shape)
     for a, b in ((first, second), (second, first)):  # S, then ∫ρ x ⊗ Ψ, then the modes
         linear[:, 6 + a, 6 + b] = found[:3]
-        moment[:, :, 6 + a, 6 + b] = found[3:12].reshape(3, 3, -1)
+        moment[:, :, 6 + a, 6 + b] = found[3:12].reshape(3, 3, len(first))
         modal[:, 6 + a, 6 + b] = found[12 : 12 + n]
     phi = shapes[rows[3:]]
     _add_rigid(model, relative, phi, start, weights, linear, moment)

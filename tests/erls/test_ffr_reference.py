@@ -197,6 +197,8 @@ def test_every_shipped_scene_runs(tmp_path: Path, scene: str, body_frame: str, m
     """
     monkeypatch.setattr("erls.run.file._OUTPUT_TIMES", 5)
     changes = ["simulation.formulation=ffr", f"simulation.body_frame={body_frame}", "simulation.duration=2e-3"]
+    if "[inverse]" in (DATA / scene).read_text(encoding="utf-8"):
+        changes.append("inverse.step=5e-4")
     run = erls.simulate(erls.load_scene(DATA / scene, changes))
     assert run.summary()["body_frame"] == body_frame
     point = run.point_names[-1]

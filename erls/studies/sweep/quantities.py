@@ -155,14 +155,34 @@ def values_of(run: Run, quantities: Sequence[Quantity]) -> list[float]:
     return [each.of(run, seen) for each in quantities]
 
 
-def history(run: Run, name: str, times: ArrayLike) -> Array:
-    """(k,) values of a column at times, without the other columns where that can be.
+def histories(run: Run, names: Sequence[str], times: ArrayLike) -> Array:
+    """(c, k) values of columns at times; the whole table is asked for once, and only where it must be.
 
     Raises
     ------
     SceneError
-        BAD_REFERENCE: there is none of this name.
+        BAD_REFERENCE: there is none of a name.
     """
+    found = [_alone(run, name, times) for name in names]
+    if any(values is None for values in found):
+        heads = _heads(run)
+        for name, values in zip(names, found, strict=True):
+            if values is None and name not in heads:
+                known = [*heads, *(f"{point}.distance" for point in run.point_names)]
+                message, remedy = "the table of the run has no such column", "name one of its columns"
+                raise SceneError(Cause.BAD_REFERENCE, message, where="--get", value=name, limit=known, remedy=remedy)
+        columns = run.columns(np.asarray(times, dtype=float))
+        found = [columns[heads[n][0]] if values is None else values for n, values in zip(names, found, strict=True)]
+    return np.array(found)
+
+
+def history(run: Run, name: str, times: ArrayLike) -> Array:
+    """(k,) values of one of `histories`."""
+    return np.asarray(histories(run, [name], times)[0])
+
+
+def _alone(run: Run, name: str, times: ArrayLike) -> Array | None:
+    """(k,) values of a column that a run gives without the others; None of one that it does not."""
     base, _, part = name.rpartition(".")
     if base in run.point_names and part in ("x", "y", "z", "distance"):
         if part != "distance":
@@ -173,12 +193,7 @@ def history(run: Run, name: str, times: ArrayLike) -> Array:
         values = np.asarray(getattr(run, _JOINT[part])(base, times))
         if values.ndim == 1:
             return values
-    heads = _heads(run)
-    if name not in heads:
-        known = [*heads, *(f"{point}.distance" for point in run.point_names)]
-        message, remedy = "the table of the run has no such column", "name one of its columns"
-        raise SceneError(Cause.BAD_REFERENCE, message, where="--get", value=name, limit=known, remedy=remedy)
-    return run.columns(np.asarray(times, dtype=float))[heads[name][0]]
+    return None
 
 
 def _heads(run: Run) -> dict[str, tuple[str, str]]:
