@@ -13,6 +13,7 @@ from erls.maths.so3 import Array
 
 _WINDOWS = 16  # of a leg, each with steps of its own
 _CROWD = 8  # steps of the other run in a window, on average, at the least
+_AT_ONCE = 1e-3  # of a step: that far apart two switches are at the same time
 
 
 class Stretch(NamedTuple):
@@ -33,14 +34,14 @@ Plan = tuple[Stretch, ...]
 
 def plan_like(t: Array) -> Plan:
     """Equal steps over windows of time as many as a run with knots ``t`` took there, windows that differ by less than
-    half taken together; its legs, at whose ends times stand twice, stay apart, but for those shorter than a step beside
-    them: what lies between two switches at nearly the same time says nothing of steps.
+    half taken together; its legs, at whose ends times stand twice, stay apart, but for those between two switches
+    at nearly the same time, which say nothing of steps.
     """
     found: list[Stretch] = []
     for leg in np.split(t, np.flatnonzero(np.diff(t) == 0) + 1):
         if len(leg) < 2:
             continue
-        if found and leg[-1] - leg[0] < found[-1].size:
+        if found and leg[-1] - leg[0] < _AT_ONCE * found[-1].size:
             found[-1] = found[-1]._replace(end=float(leg[-1]))
         else:
             found += _stretches(leg)
