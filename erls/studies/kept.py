@@ -218,7 +218,7 @@ def _encoded(value: Any) -> Any:
         plain = str, int, float, list, type(None)
         shown = [x if isinstance(x, plain) else str(x) for x in (value.value, value.limit)]
         return kind, str(value.cause), value.message, value.where, shown, value.remedy
-    raise NotImplementedError(f"results of studies hold no {type(value).__name__}")
+    raise TypeError(f"results of studies hold no {type(value).__name__}")
 
 
 def _decoded(kind: Any, told: Any) -> Any:
