@@ -22,6 +22,7 @@ import msgspec
 
 from erls.errors import Cause, SceneError
 from erls.files.output import replacing
+from erls.files.results import MARK
 from erls.fmi.channels import Channels
 from erls.fmi.description import UnitText, build_description, described
 from erls.fmi.serve import RUN
@@ -36,7 +37,6 @@ from fe_import.files.versions import package_version
 
 VERSIONS = (3, 2)
 
-_MARK = "written by erls"
 _COMPILERS = ("cc", "gcc", "clang")
 _SHARED = {"Darwin": (".dylib", "darwin", "darwin64"), "Linux": (".so", "linux", "linux64")}
 _MACHINES = {"AMD64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
@@ -90,7 +90,7 @@ def write_unit(path: Path, scene: Scene, version: int = 3, tell: Message = log) 
         sources = _sources(folder / "sources")
         binary = _compiled(sources, folder / text.identifier, tell)
         with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as package:
-            package.comment = _MARK.encode()
+            package.comment = MARK.encode()
             package.writestr("modelDescription.xml", described(text, version))
             for name in (RUN, "unit.txt"):
                 package.write(folder / name, f"resources/{name}")

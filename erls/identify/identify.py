@@ -28,6 +28,7 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.identify.keys import fitted_keys
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
+from erls.scene.build_joints import led_by_inversion
 from erls.scene.chain import Scene
 from erls.scene.read import load_chain
 from erls.sensitivity.parameters import parameters_of
@@ -159,6 +160,10 @@ def identify(
     """
     begun = time.perf_counter()
     loaded = load_chain(scene, overrides)
+    led = led_by_inversion(loaded.record)
+    if led:
+        message, remedy = "what is fed forward would follow what is fitted", "give its tables of torque and motion"
+        raise SceneError(Cause.BAD_FIELD, message, where=f"{loaded.path}: joint {led[0]}", remedy=remedy)
     keys = fitted_keys(loaded, fit)
     first = simulate(loaded, verdict=False)
     held = matched(first, Path(measured), "--measured")

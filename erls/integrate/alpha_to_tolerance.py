@@ -123,7 +123,7 @@ def _below(rungs: list[_Rung], density: float) -> _Rung:
 
 def _beyond(system: ConstrainedSystem, runs: list[ConstrainedSolution], options: ConstrainedOptions) -> float:
     """What a run and the one before it, first of a list, are more apart than those before foretell [m]; or 0."""
-    if any(run.failure is not None for run in runs):
+    if len(runs) < 4 or any(run.failure is not None for run in runs):  # two proportions tell whether they hold
         return 0.0
     bands = [_distance(system, fine, coarse, options.spectral_radius) for fine, coarse in pairwise(runs[:4])]
     if np.isfinite([parted_at(found) for found in bands]).any():  # disturbances grow: their size foretells nothing

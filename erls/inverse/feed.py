@@ -57,7 +57,7 @@ def fed(scene: Scene, tell: Message = lambda text: None) -> Fed:
 
     def tables(name: str, drive: PDDrive) -> PDDrive:
         motion = MotionTable(times=tuple(found.t.tolist()), values=tuple(found.angles[name].tolist()))
-        profiles = (*drive.profiles, load_table(found.t, found.efforts[name]))
+        profiles = (load_table(found.t, found.efforts[name]),)
         return replace(drive, feed_forward=False, motion=motion, profiles=profiles)
 
     record = with_controllers(scene.record, tables)

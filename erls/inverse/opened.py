@@ -40,9 +40,10 @@ def opened(scene: Scene) -> Scene:
         raise place.error("inverse.drives", message, ", ".join(given), remedy=f"name {', '.join(names)}, or none")
 
     def open_(name: str, drive: PDDrive) -> FreeDrive:
-        if drive.motion is not None:
-            place, message = Place(Path(), f"{scene.path}: {name}.drive"), "feed_forward = 'elastic' finds it"
-            raise place.error("motion", message, remedy="remove it, and say by [[servo]] what shall move how")
+        for field in ("motion", "profiles"):
+            if getattr(drive, field):
+                place, message = Place(Path(), f"{scene.path}: {name}.drive"), "feed_forward = 'elastic' finds it"
+                raise place.error(field, message, remedy="remove it, and say by [[servo]] what shall move how")
         return FreeDrive()
 
     record = with_controllers(scene.record, open_)

@@ -52,6 +52,8 @@ def _page() -> int:
 @cache
 def take_buffers() -> None:
     """Let the linear algebra of NumPy and SciPy take its working memory, as it does at its first large product."""
+    if address_space() is None:
+        return
     import numpy as np
     import scipy.linalg as la
 

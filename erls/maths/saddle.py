@@ -62,6 +62,7 @@ class Saddle:
         self._left = np.concatenate([self.force * d, s])
         self._right = np.concatenate([d, s / self.force])
         self.singular: int | None = None  # unknown at which the factorization broke down
+        self._sparse = None
         whole = _assemble(block, columns, rows, self._left, self._right)
         if not isinstance(whole, np.ndarray):
             from scipy.sparse.linalg import splu
@@ -71,7 +72,6 @@ class Saddle:
             except RuntimeError:
                 self.singular = _emptiest(whole)
         else:
-            self._sparse = None
             self._factors, self._pivots, info = dgetrf(whole)
             if info > 0:
                 self.singular = info - 1

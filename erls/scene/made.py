@@ -17,7 +17,7 @@ import numpy as np
 import tomlkit
 
 from erls.files.output import check_writable, replacing
-from erls.files.results import MARK, claim
+from erls.files.results import MARK, MODAL, claim
 from erls.scene.bodies.schema import ShellSurface
 from erls.scene.build import cache_folder
 from erls.scene.inputs import files_of
@@ -104,18 +104,26 @@ def save_scene(path: Path | str, scene: AnyScene, *, force: bool = False) -> lis
     SceneError
         NOT_WRITABLE; also a file that the scene reads, itself included.
     """
-    claim(Path(path), ".toml", [each for each in files_of(scene) if each.exists()], force)
+    read = [each for each in files_of(scene) if each.exists()]
+    claim(Path(path), ".toml", read, force)
     target = check_writable(path)
-    record, written = _seen_from(scene.record, scene.folder, target.parent), []
-    for link in getattr(record, "links", ()):
-        if link.modal_file and _kept(target.parent / link.modal_file):
-            copy = Path("links") / f"{re.sub(r'[^A-Za-z0-9_-]+', '_', link.name)}.modal.h5"
-            (target.parent / "links").mkdir(exist_ok=True)
-            with replacing(target.parent / copy) as temporary:
-                shutil.copyfile(target.parent / link.modal_file, temporary)
-            own = msgspec.structs.replace(link, modal_file=copy.as_posix())
-            record = msgspec.structs.replace(record, links=[own if each is link else each for each in record.links])
-            written.append(target.parent / copy)
+    record, written = _seen_from(scene.record, scene.folder, target.parent), list[Path]()
+    made = [x for x in getattr(record, "links", ()) if x.modal_file and _kept(target.parent / x.modal_file)]
+    copies = list[Path]()
+    for link in made:
+        name = re.sub(r"[^A-Za-z0-9_-]+", "_", link.name)
+        copy = Path("links") / f"{name}.modal.h5"
+        copies.append(copy if copy not in copies else copy.with_name(f"{name}_{len(copies)}.modal.h5"))
+    if made:
+        (target.parent / "links").mkdir(exist_ok=True)
+        for copy in copies:  # before anything is written
+            claim(target.parent / copy, MODAL, read, force)
+    for link, copy in zip(made, copies, strict=True):
+        with replacing(target.parent / copy) as temporary:
+            shutil.copyfile(target.parent / link.modal_file, temporary)
+        own = msgspec.structs.replace(link, modal_file=copy.as_posix())
+        record = msgspec.structs.replace(record, links=[own if each is link else each for each in record.links])
+        written.append(target.parent / copy)
     with replacing(target) as temporary:
         temporary.write_text(scene_text(record), encoding="utf-8")
     return [*written, target]
@@ -204,6 +212,8 @@ def _seen_from(value: Any, folder: Path, target: Path) -> Any:
     """A record whose relative paths start at ``target`` instead of ``folder``."""
     if isinstance(value, (list, tuple)):
         return type(value)(_seen_from(one, folder, target) for one in value)
+    if isinstance(value, dict):
+        return {key: _seen_from(one, folder, target) for key, one in value.items()}
     if not isinstance(value, msgspec.Struct):
         return value
     files = next((names for kind, names in _PATHS.items() if isinstance(value, kind)), ())

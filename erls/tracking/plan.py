@@ -138,7 +138,9 @@ def plan(
             where=f"{goal.scene.path}: plan.joints",
             remedy="give the effort of a joint",
         )
-    return METHODS[method](_Search(goal, formulation, tell, told, begun))
+    search = _Search(goal, formulation, tell, told, begun)
+    found = METHODS[method](search)
+    return replace(found, passes=search.passes, wall_s=time.perf_counter() - begun)
 
 
 def _silent(text: str) -> None:
@@ -152,7 +154,7 @@ class _Search:
         self, goal: Goal, formulation: str, tell: Message, told: Callable[[Planned], None], begun: float
     ) -> None:
         self.goal, self._formulation, self._tell, self._told, self._begun = goal, formulation, tell, told, begun
-        self._passes = 0
+        self.passes = 0
 
     def bounds(self, failed: int) -> tuple[Array, float]:
         """What is aimed at once as many runs have failed."""
@@ -161,11 +163,11 @@ class _Search:
 
     def run(self, method: str, law: Law) -> Planned:
         """Run a law, and know what it does beyond the model from then on."""
-        tell = _silent if self._passes else self._tell
+        tell = _silent if self.passes else self._tell
         ran, goal = run_law(self.goal, law, self._formulation, tell), self.goal
-        self._passes += 1
+        self.passes += 1
         spent = time.perf_counter() - self._begun
-        planned = Planned(goal, method, law, ran.run, ran.efforts, ran.peaks, ran.swing, self._passes, spent)
+        planned = Planned(goal, method, law, ran.run, ran.efforts, ran.peaks, ran.swing, self.passes, spent)
         self._told(planned)
         self.goal = replace(goal, beyond=_beyond(goal, law, ran))
         return planned
@@ -237,15 +239,16 @@ def driven(goal: Goal, law: Law, formulation: str = "") -> Scene:
         return msgspec.structs.replace(own, drive=drive, initial=JointInitial())
 
     settings = msgspec.structs.replace(
-        record.simulation, duration=float(end), formulation=formulation or record.simulation.formulation
+        record.simulation,
+        duration=float(end),
+        formulation=formulation or record.simulation.formulation,
+        output_step=None,
     )
     initial = record.initial
     if goal.mechanism.gravity.any() or record.loads:  # links rest where these bend them
         initial = msgspec.structs.replace(initial, deformation="static")
     joints = [with_coordinates(joint, change) for joint in record.joints]
-    return Scene(
-        goal.scene.path, msgspec.structs.replace(record, joints=joints, simulation=settings, initial=initial)
-    )
+    return Scene(goal.scene.path, msgspec.structs.replace(record, joints=joints, simulation=settings, initial=initial))
 
 
 class Ran(NamedTuple):

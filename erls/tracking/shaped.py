@@ -51,7 +51,7 @@ def shaped(goal: Goal, efforts: Array, swing: float) -> Law:
 
 
 def _durations(goal: Goal, efforts: Array) -> Array:
-    """Rising, from a tenth of what a rigid mechanism at an average effort and rate takes."""
+    """Rising, from a third of what a rigid mechanism at an average effort and rate takes."""
     unit = polynomial(1.0, _DEGREE, KNOTS)
     still = np.zeros(KNOTS)
     hard = np.abs(goal.rigid(unit.place, still, unit.acceleration) - goal.rigid(unit.place, still, still)).max(axis=0)

@@ -23,8 +23,9 @@ _NEW = 0.01  # of the energy of a field, its root: what is left of smaller ones 
 def training_places(lower: Array, upper: Array) -> Array:
     """(p, n) corners of the box (some of them, where there are many) and centres of its faces."""
     count = len(lower)
-    corners = np.array(list(itertools.islice(itertools.product((-1.0, 1.0), repeat=min(count, 20)), 2**20)))
-    if count > 20 or len(corners) > _MOST_CORNERS:
+    if 2**count <= _MOST_CORNERS:
+        corners = np.array(list(itertools.product((-1.0, 1.0), repeat=count)))
+    else:
         corners = np.random.default_rng(0).choice((-1.0, 1.0), (_MOST_CORNERS, count))
     x = np.concatenate([corners, np.eye(count), -np.eye(count)])
     return np.asarray((lower + upper) / 2 + x * (upper - lower) / 2)

@@ -40,7 +40,7 @@ class Bound:
     flexibility : float
         Static, of the other interfaces.
     places : int
-        At how many that gave nothing to the family they were looked for, besides its corners.
+        At how many that gave nothing to the family they were looked for, besides its corners, or 32 of them.
     """
 
     frequencies: float
@@ -101,7 +101,7 @@ class ParametricModel:
         }
 
     def place(self, values: Mapping[str, float]) -> Array:
-        """(n,) values of the parameters in order; those not named as in the description.
+        """(n,) values of the parameters in order; those not named in the middle of their ranges.
 
         Raises
         ------

@@ -36,7 +36,7 @@ def solid_work(
         derivatives, volume = slopes(element, corners, points)  # ∂_a of shape k
         moduli, volume = solid.moduli_of(some), volume * weights
         modes = motion_of_modes(element, corners, moduli)
-        step = max(1, _CACHED_VALUES // (6 * len(weights) * max(1, n * n)))
+        step = max(1, _CACHED_VALUES // (6 * len(weights) * max(1, n * n, p)))
         for begin in range(0, len(nodes), step):
             part = slice(begin, begin + step)
             rows, there = dof_map[nodes[part], :3], derivatives[part]

@@ -44,9 +44,7 @@ def test_tip_error_falls_as_the_inversion_says(found: Inversion, led: Any) -> No
     joint = led.scene.record.joints[0]
     open_ = replace(joint, drive=replace(joint.drive, proportional_gain=0.0, derivative_gain=0.0))
     elastic = [led, erls.simulate(Scene(LED, replace(led.scene.record, joints=[open_])), verdict=False)]
-    rigid = [
-        erls.simulate(erls.load_scene(LED, [RIGID % gains]), verdict=False) for gains in ((20.0, 2.0), (0.0, 0.0))
-    ]
+    rigid = [erls.simulate(erls.load_scene(LED, [RIGID % gains]), verdict=False) for gains in ((20.0, 2.0), (0.0, 0.0))]
     (own, own_open), (other, other_open) = (
         [missed(found.problem, run)[2].max() for run in runs] for runs in (elastic, rigid)
     )
@@ -79,7 +77,8 @@ def test_starts_elsewhere_are_told() -> None:
         (("inverse.step=-1.0",), "inverse.step"),
         (("joints.0.drive.feed_forward=bending",), "known: True, False, elastic"),
         (("joints.0.drive.feed_forward=true",), "motion: missing"),
-        (("inverse.drives=[]", "loops=[{}]"), "loops"),
+        (('joints.0.drive.profiles=[{shape="step", start=0.1, value=1.0}]',), "hub.drive.profiles"),
+        (('inverse.drives=["other"]',), "inverse.drives"),
     ],
 )
 def test_what_cannot_be_led_is_refused(changes: tuple[str, ...], names: str) -> None:

@@ -176,3 +176,11 @@ def test_the_command_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     for words, arguments in faults.items():
         assert main(arguments) == 2, words
         assert words in capsys.readouterr().err
+
+
+def test_feed_forward_of_what_is_fitted_is_refused(tmp_path: Path) -> None:
+    """A controller that an inversion leads would follow the parameters."""
+    file = tmp_path / "measured.csv"
+    file.write_text("t,hub.angle\n0,0\n1,0\n", encoding="utf-8")
+    with pytest.raises(SceneError, match="would follow what is fitted"):
+        erls.identify(ROOT / "data/inverse/led_arm.toml", file, ["joints.hub.damping"])

@@ -14,6 +14,7 @@ from scenes import ROOT
 import erls
 import fe_import
 from erls.errors import Cause, SceneError
+from fe_import.modal.file import read_modal_file
 
 DATA = ROOT / "data"
 SCENES = ["robot/three_link.toml", "four_bar/flexible.toml", "heavy_top/slow.toml", "statics/roll_up.toml",
@@ -56,6 +57,40 @@ def test_a_table_in_a_file_is_found_from_elsewhere(tmp_path: Path) -> None:
     assert 'file = "in/t.csv"' in (tmp_path / "out.toml").read_text(encoding="utf-8")
     ends = [erls.simulate(s, verdict=False).position("end", 0.02) for s in (scene, tmp_path / "out.toml")]
     assert (ends[0] == ends[1]).all()
+
+
+def test_tables_of_single_coordinates_are_found_too(tmp_path: Path) -> None:
+    """Of a joint with several."""
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in/t.csv").write_text("t,q\n0,0\n1,0.5\n2,1\n3,0\n", encoding="utf-8")
+    drive = {"type": "motion", "motion": {"shape": "table", "file": "t.csv", "column": 1}}
+    joint = {**TABLES["joints"][0], "type": "universal", "coordinates": {"x": {"drive": drive}}}
+    for name in ("initial", "drive", "damping"):
+        joint.pop(name, None)
+    rigid = {"mass": 1.0, "inertia": [0.1] * 3, "points": {"root": [0.0, 0.0, 0.0], "tip": [0.5, 0.0, 0.0]}}
+    links = [{"name": "arm", "rigid": rigid, "mesh_pose": {"frame": "joint"}}]
+    scene = erls.make_scene(folder=tmp_path / "in", **{**TABLES, "joints": [joint], "links": links})
+    erls.save_scene(tmp_path / "out.toml", scene)
+    assert 'file = "in/t.csv"' in (tmp_path / "out.toml").read_text(encoding="utf-8")
+
+
+def test_models_of_others_are_not_replaced(tmp_path: Path) -> None:
+    """Links whose names are files of one name have one each; one that is none of ours stays."""
+    models = [
+        fe_import.reduce_link(fe_import.load_link(DATA / "robot/links/arm.toml", {"elastic_modes": n})) for n in (2, 3)
+    ]
+    hip = TABLES["joints"][0]
+    joints = [hip, {**hip, "name": "knee"}]
+    links = [{**LINK, "name": name, "model": model} for name, model in zip(("a b", "a:b"), models, strict=True)]
+    points = [{"name": "end", "link": "a:b", "node": "tip"}]
+    made = erls.make_scene(folder=tmp_path, **{**TABLES, "joints": joints, "points": points}, links=links)
+    files = erls.save_scene(tmp_path / "arm.toml", made)
+    assert [path.name for path in files] == ["a_b.modal.h5", "a_b_1.modal.h5", "arm.toml"]
+    assert [read_modal_file(path).elastic_modes for path in files[:2]] == [2, 4]
+    files[0].write_bytes(b"of somebody else")
+    with pytest.raises(SceneError, match="a_b"):
+        erls.save_scene(tmp_path / "arm.toml", made)
+    assert files[0].read_bytes() == b"of somebody else"
 
 
 def test_links_may_be_models(tmp_path: Path) -> None:
@@ -103,6 +138,8 @@ def test_functions_of_time_drive(tmp_path: Path) -> None:
         run = erls.simulate(each, verdict=False)
         effort = run.joint_effort("hip", times) + hip["damping"] * run.joint_rate("hip", times)
         np.testing.assert_allclose(effort, 1 + np.exp(-5 * times), rtol=0, atol=1e-8)
+    brief = made({"type": "motion", "motion": lambda t: float(np.exp(-(((t - 0.0803) / 3e-3) ** 2)))})
+    assert max(brief.record.joints[0].drive.motion.values) > 0.99  # over in a thirtieth of the time
     for fault, words in ((lambda t: float(t > 0.1), "not smooth"), (lambda t: None, "no number"),
                          (lambda t: np.nan, "no finite number")):  # fmt: skip
         with pytest.raises(SceneError, match=rf"make_scene: joints\[0\].drive.motion.*{words}"):

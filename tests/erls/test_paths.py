@@ -50,9 +50,9 @@ def test_two_bars_snap_through() -> None:
     assert "limit points" in page
 
 
-def _buckled(folder: Path, elements: int, branch: int) -> BodyPath:
+def _buckled(folder: Path, elements: int, branch: int, load: float = 1.0) -> BodyPath:
     """A hinged column under 1.2 of its load."""
-    scene = _column("hinged", "hinged", type="path", load_steps=6, branch=branch)
+    scene = _column("hinged", "hinged", type="path", load_steps=6, branch=branch, load=load)
     del scene["simulation"]["count"]
     scene["beams"][0]["elements"] = elements
     scene["loads"][0]["force"] = [-1.2 * EULER, 0.0, 0.0]
@@ -83,6 +83,10 @@ def test_a_column_buckles_onto_the_elastica(tmp_path: Path) -> None:
     assert _turned(straight) == pytest.approx(0.0, abs=1e-9)
     assert straight.statics.path[-1].unstable == 1
     assert straight.statics.turns[0].t == pytest.approx(meshes[0].statics.turns[0].t, rel=1e-9)
+    below = straight.statics.turns[0].t * 0.999  # steps reach beyond, where the path has ended
+    short = _buckled(tmp_path, 8, 1, below)
+    assert short.statics.path[-1].t == below
+    assert short.statics.turns == ()
 
 
 def test_a_strip_of_shells_buckles_as_one_of_beams(tmp_path: Path) -> None:

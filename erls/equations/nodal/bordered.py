@@ -165,8 +165,11 @@ def lowest_way(system: NodalSystem, at: Point, measure: Measure) -> tuple[float,
     eigenvector, of length one, by inverse iteration.
     """
     stiffness, rows = stiffness_and_rows(system, at)
-    saddle = Saddle(stiffness, rows.T, rows, Scales(measure.metres, abs(stiffness), rows), 1.0)
-    weights, none = measure.metres**2, np.zeros(rows.shape[0])
+    weights, none, scales = measure.metres**2, np.zeros(rows.shape[0]), Scales(measure.metres, abs(stiffness), rows)
+    saddle = Saddle(stiffness, rows.T, rows, scales, 1.0)
+    if saddle.singular is not None:  # exactly critical: a little beside it
+        beside = stiffness + sp.diags_array(1e-14 * float(abs(stiffness).max()) * weights / weights.max())
+        saddle = Saddle(beside, rows.T, rows, scales, 1.0)
     way = Step(np.sin(1.0 + np.arange(system.size)) / measure.metres, none, 0.0)  # no symmetry hides anything from it
     value = 0.0
     for _ in range(_INVERSE):

@@ -114,7 +114,8 @@ class _Walk:
         self.newton = LoadSteps(system, "full", options.tolerance)
         self.found: list[Equilibrium] = []
         self.turns: list[Turn] = []
-        self.factorizations = self.cuts = self.used = 0
+        self.factorizations = self.cuts = 0
+        self.stays: SimulationError | None = None
         self.arc = self.longest = 0.0
 
     def from_(self, start: Nodes) -> Statics:
@@ -134,18 +135,23 @@ class _Walk:
                     failure = self._failure(here)
                     break
                 continue
-            whole, left = self._turns(here, there, step)
+            length, ended = step, there.point.t >= self.options.end * (1 - 1e-9)
+            if ended:
+                length, there = self._at_end(here, there, step)
+            whole, left = self._turns(here, there, length)
             if not whole and step > RESOLVED * self.longest:
                 step, self.cuts = step / 2, self.cuts + 1
                 continue
+            if self.stays is not None:
+                failure = self.stays
+                break
             if left is not None:
                 here = left
-            elif there.point.t >= self.options.end * (1 - 1e-9):
-                self._end(here, there, step)
-                break
             else:
-                self._keep(there, step)
+                self._keep(there, length)
                 here = there
+                if ended:
+                    break
             step = min(self.longest, step * float(np.clip(np.sqrt(WANTED / max(here.iterations, 1)), 0.5, 2.0)))
         work = self.factorizations + self.newton.factorizations
         return Statics(tuple(self.found), work, self.cuts, failure, tuple(self.turns))
@@ -221,7 +227,17 @@ class _Walk:
             return False, None
         self.turns += [*limits, Turn("bifurcation", at.point.t, self.arc + s, abs(more) - int(turned))]
         number = sum(turn.kind == "bifurcation" for turn in self.turns)
-        return True, self._left(at, way, s, step) if number == abs(self.options.branch) else None
+        if number != abs(self.options.branch):
+            return True, None
+        left = self._left(at, way, s, step)
+        if left is None:
+            self.stays = SimulationError(
+                Cause.NO_EQUILIBRIUM,
+                f"no step onto the branch at load parameter {at.point.t:.6g} converges",
+                where=f"load parameter {at.point.t:.9g}",
+                remedy="more simulation.load_steps, or another simulation.branch",
+            )
+        return True, left
 
     def _located(
         self, here: _Known, step: float, of: Callable[[_Known], float], ends: tuple[float, float]
@@ -271,14 +287,14 @@ class _Walk:
         self._keep(there, step)
         return there
 
-    def _end(self, here: _Known, there: _Known, step: float) -> None:
-        """Keep the equilibrium under the last load parameter."""
+    def _at_end(self, here: _Known, there: _Known, step: float) -> tuple[float, _Known]:
+        """The equilibrium under the last load parameter, and how far along a step it is."""
         end = self.options.end
         ends = here.point.t - end, there.point.t - end
         s, at = (step, there) if ends[1] <= 0 else self._located(here, step, lambda k: k.point.t - end, ends)
         exact = self.newton.balance(end, at.point.q, at.point.multipliers)
         point = at.point if exact is None else Point(end, *exact)
-        self._keep(_Known(point, at.tangent, at.unstable, there.iterations), s)
+        return s, _Known(point, at.tangent, at.unstable, there.iterations)
 
     def _keep(self, known: _Known, step: float) -> None:
         self.arc += step
