@@ -16,6 +16,7 @@ from erls.parallel.workers import IDLE, Answer, Worker
 from fe_import.errors import ReportedError
 
 _AHEAD_S, _MOST_AHEAD = 0.05, 16  # of work, and of calls, that wait in a worker for their turn
+_STILLBORN = 4  # workers that may die before they had a task: what runs here instead could end this process, too
 
 
 class Crew:
@@ -51,6 +52,7 @@ class Crew:
         self._lock = threading.Lock()
         self._ended = False
         self._most_ahead = _MOST_AHEAD
+        self._stillborn = 0
         self.members = 0  # that work, or are about to
 
     @property
@@ -121,7 +123,7 @@ class Crew:
                 self.members -= 1
 
     def _lead_one(self) -> bool:
-        """Whether the worker died over a task."""
+        """Whether another worker shall come: this one died over a task, or before it had one."""
         try:
             worker = IDLE.take()
         except OSError:  # no more processes
@@ -138,6 +140,10 @@ class Crew:
             with self._lock:
                 self._workers.discard(worker)
             IDLE.give_back(worker)
+        if ready is None:  # it was on its way out as it was taken, or died before it had a task
+            with self._lock:
+                self._stillborn += 1
+                return self._stillborn <= _STILLBORN and not self._ended
         return bool(outstanding) and self._lost(list(outstanding))
 
     def _lost(self, numbers: list[int]) -> bool:

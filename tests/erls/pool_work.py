@@ -14,3 +14,8 @@ def square(number: int) -> int:
     if number == 99:
         os._exit(1)
     return number * number
+
+
+def process(number: int) -> int:
+    """Which one does it."""
+    return os.getpid()

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scenes
-from pool_work import square
+from pool_work import process, square
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
 from erls.parallel.crew import Crew, reported
-from erls.parallel.workers import IDLE
+from erls.parallel.workers import IDLE, Idle, Worker
 from erls.run.chain.run import ChainRun
 from erls.simulation.batch import _run, _Task
 from erls.simulation.packed_run import LaterRun, PackedRun, packed
@@ -183,6 +183,23 @@ def test_a_worker_that_dies_loses_one_task() -> None:
     assert [f.result for f in finished] == [4, None, 9, 16, 25]
     assert finished[1].error is not None
     assert finished[1].error.cause == Cause.OUT_OF_MEMORY
+
+
+def test_workers_that_die_before_they_had_a_task_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even then does this process do what could end it."""
+    take, dying = Idle.take, iter([True, True])
+
+    def taken(self: Idle) -> Worker:
+        worker = take(self)
+        if next(dying, False):
+            worker.process.kill()
+        return worker
+
+    monkeypatch.setattr(Idle, "take", taken)
+    finished, complete = run_all(process, [1, 2, 3], workers=2)
+    assert complete
+    assert len(finished) == 3
+    assert os.getpid() not in [f.result for f in finished]
 
 
 def test_workers_stay_until_they_do_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
