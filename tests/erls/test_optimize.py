@@ -367,3 +367,4 @@ def test_summary_is_json() -> None:
         "objective", "mass", "variables", "violation", "analyses", "outer_iterations", "wall_s", "status",
     }  # fmt: skip
     assert Settings().methods == ("esl-system", "integrated")
+
