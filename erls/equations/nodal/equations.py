@@ -95,6 +95,12 @@ class Nodal:
         """The same with so many elements in place of each."""
         return Nodal(self.mechanism, self._elements, self._start, times, self._rules)
 
+    def with_sections(self, mechanism: Mechanism) -> Nodal:
+        """The same of a mechanism whose links have other sections or materials, and nodes and interfaces where they are
+        here: loops begin as they do here.
+        """
+        return Nodal(mechanism, self._elements, self._start, rules=self._rules)
+
     @cached_property
     def _arms(self) -> list[tuple[int, int, Array]]:
         """Link, node and place from its inboard interface of each point that errors are judged at on rigid links."""
