@@ -16,6 +16,7 @@ from erls.inverse.internal import Basis, Internal
 from erls.inverse.inversion import Inversion
 from erls.inverse.marching import march
 from erls.inverse.nature import Nature
+from erls.inverse.opened import in_modes
 from erls.inverse.problem import Problem, followed, problem_of
 from erls.inverse.servoed import States
 from erls.inverse.work import SAME, Found, Work
@@ -78,8 +79,25 @@ def invert(
     True
     """
     choose(method, METHODS, "method", SceneError)
-    begun = time.perf_counter()
     loaded: Scene = load_chain(scene) if isinstance(scene, (Path, str)) else chain_alone(scene)
+    modes = in_modes(loaded)
+    if modes is not loaded and method not in ("auto", "collocation"):
+        message, remedy = "nodal elements are inverted by collocation alone", "leave it out, or use erls or ffr"
+        raise SceneError(Cause.BAD_FIELD, message, where="method", value=method, remedy=remedy)
+    found = _in_modes(modes, method, force, tell, progress)
+    if modes is loaded:
+        return found
+    from erls.inverse.nodal.invert import on_nodes  # here: modes do without its functions
+
+    with announcing(tell), np.errstate(over="ignore", invalid="ignore", divide="ignore"), _singular():
+        return on_nodes(found, loaded, progress)
+
+
+def _in_modes(
+    loaded: Scene, method: str, force: bool, tell: Message, progress: Callable[[int, float], None]
+) -> Inversion:
+    """Of modes, or of rigid links."""
+    begun = time.perf_counter()
     with announcing(tell), np.errstate(over="ignore", invalid="ignore", divide="ignore"), _singular():
         problem = problem_of(loaded, tell)
         rigid = rigid_motion(problem)

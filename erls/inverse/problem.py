@@ -32,7 +32,6 @@ _MOST = 50_000_000
 """Numbers of one matrix at all knots, 400 MB; there are some ten."""
 
 _SYSTEMS = {
-    "nodal": ("formulation", "use erls or ffr; erls invert --confirm nodal runs the drives on nodal elements"),
     "pieces": ("formulation", "leave links in one piece (substructures = 1)"),
     "quasi-static": ("bandwidth", "remove it: fast internal motions follow by inverse.bandwidth"),
     "absolute": ("coordinates", "use coordinates = 'independent'"),
@@ -90,7 +89,7 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     drives = unknown_drives(scene, mechanism)
     conditions = conditions_of(scene, mechanism)
     _refuse_number(scene, conditions, [mechanism.joints[k].name for k in drives.tolist()])
-    free = _with_drives(mechanism, {k: Drive() for k in drives.tolist()})
+    free = with_drives(mechanism, {k: Drive() for k in drives.tolist()})
     flexible = _servoed(scene, free, conditions, drives)
     stiff = _rigid(scene, with_rigid(free, {link.name for link in mechanism.links}), conditions, drives)
     t = _knots(scene, flexible.tree.size)
@@ -106,17 +105,33 @@ def _knots(scene: Scene, size: int) -> Array:
     SceneError
         BAD_FIELD: too few, or more than there is memory for.
     """
-    settings, own = scene.record.simulation, scene.record.inverse.step
-    field, step = ("simulation.step", settings.step) if own is None else ("inverse.step", own)
+    settings, (field, step) = scene.record.simulation, _step_of(scene)
     count, where = round(settings.duration / (step or STEP)), f"{scene.path}: {field}"
     if count < _FEWEST:
         message, remedy = "too few steps for the duration", f"give {settings.duration / _FEWEST:.6g} s or less"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value=step, remedy=remedy)
-    if count * size**2 > _MOST:
-        message = f"too many steps for {size} coordinates"
-        remedy = "give a larger step, a shorter duration, or links with fewer modes (elastic_modes)"
-        raise SceneError(Cause.BAD_FIELD, message, where=where, value=count, limit=_MOST // size**2, remedy=remedy)
+    refuse_many(scene, count, size, "links with fewer modes (elastic_modes)")
     return np.linspace(0.0, settings.duration, count + 1)
+
+
+def _step_of(scene: Scene) -> tuple[str, float | None]:
+    """The field that says the distance of knots, and what it says."""
+    settings, own = scene.record.simulation, scene.record.inverse.step
+    return ("simulation.step", settings.step) if own is None else ("inverse.step", own)
+
+
+def refuse_many(scene: Scene, count: int, size: int, fewer: str) -> None:
+    """Raise where there is no memory for as many steps of as many coordinates.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD
+    """
+    if count * size**2 > _MOST:
+        message, where = f"too many steps for {size} coordinates", f"{scene.path}: {_step_of(scene)[0]}"
+        remedy = f"give a larger step, a shorter duration, or {fewer}"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=count, limit=_MOST // size**2, remedy=remedy)
 
 
 def unknown_drives(scene: Scene, mechanism: Mechanism) -> IntArray:
@@ -130,7 +145,8 @@ def unknown_drives(scene: Scene, mechanism: Mechanism) -> IntArray:
     return np.array(found, dtype=np.int64)
 
 
-def _with_drives(mechanism: Mechanism, drives: dict[int, Drive]) -> Mechanism:
+def with_drives(mechanism: Mechanism, drives: dict[int, Drive]) -> Mechanism:
+    """With other drives of some joints, by their numbers, from where its links are straight."""
     joints = (replace(joint, drive=drives[k]) if k in drives else joint for k, joint in enumerate(mechanism.joints))
     return replace(mechanism, joints=tuple(joints), static_start=False)
 
@@ -152,7 +168,7 @@ def _rigid(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: I
         for k, joint in enumerate(mechanism.joints)
         if not joint.drive.prescribed and k not in moving
     }
-    return _servoed(scene, _with_drives(mechanism, held), conditions, drives)
+    return _servoed(scene, with_drives(mechanism, held), conditions, drives)
 
 
 def _tree(scene: Scene, mechanism: Mechanism, conditions: Conditions) -> SerialFormulation:
