@@ -12,13 +12,13 @@ import numpy as np
 
 from erls.errors import Cause, SceneError, SimulationError
 from erls.inverse.conditions import Condition
-from erls.inverse.internal import Basis, Internal
+from erls.inverse.internal import without_internal
 from erls.inverse.inversion import Inversion
 from erls.inverse.marching import march
 from erls.inverse.nature import Nature
 from erls.inverse.opened import in_modes
-from erls.inverse.problem import Problem, followed, problem_of
-from erls.inverse.servoed import States
+from erls.inverse.problem import Problem, problem_of
+from erls.inverse.servoed import States, followed
 from erls.inverse.work import SAME, Found, Work
 from erls.maths.jit import announcing
 from erls.maths.so3 import Array
@@ -159,13 +159,7 @@ def rigid_motion(problem: Problem) -> States:
     assert not servoed.count
     if servoed.closing is not None:
         servoed.closing.refuse_uncontrolled(demand.t, y, servoed.driven, servoed.metres)
-    internal = Internal(servoed, demand, y, Basis(*(np.zeros((0, 0)),) * 4))
-    every = np.arange(len(problem.t))
-    internal.look(np.zeros((len(every), 0)))
-    internal.learn(every)
-    internal.move(np.zeros((len(every), 0)))
-    internal.look(np.zeros((len(every), 0)))
-    return internal.states
+    return without_internal(servoed, demand, y)
 
 
 def _cut(problem: Problem, nature: Nature) -> tuple[str, ...]:

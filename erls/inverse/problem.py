@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from erls.errors import Cause, SceneError
 from erls.inverse.closing import Closing
 from erls.inverse.conditions import Conditions, conditions_of
 from erls.inverse.frames import with_ends
+from erls.inverse.least_effort import of_least_effort
 from erls.inverse.opened import opened
 from erls.inverse.servoed import Servoed
 from erls.maths.so3 import Array
@@ -88,13 +90,21 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     _refuse(scene, mechanism)
     drives = unknown_drives(scene, mechanism)
     conditions = conditions_of(scene, mechanism)
-    _refuse_number(scene, conditions, [mechanism.joints[k].name for k in drives.tolist()])
+    _refuse_number(scene, mechanism, conditions, [mechanism.joints[k].name for k in drives.tolist()])
     free = with_drives(mechanism, {k: Drive() for k in drives.tolist()})
+    bare = with_rigid(free, {link.name for link in mechanism.links})
+    warnings = built.warnings
+    if len(drives) > len(conditions.every):
+        tell("finding the motion of least effort")
+        held = conditions
+        conditions = of_least_effort(held, partial(_rigid, scene, bare, drives=drives))
+        spare = ", ".join(each.name for each in conditions.every[len(held.every) :])
+        warnings = (*warnings, f"{spare}: moved for the least effort of rigid links")
     flexible = _servoed(scene, free, conditions, drives)
-    stiff = _rigid(scene, with_rigid(free, {link.name for link in mechanism.links}), conditions, drives)
+    stiff = _rigid(scene, bare, conditions, drives)
     t = _knots(scene, flexible.tree.size)
     names = tuple(mechanism.joints[k].name for k in drives.tolist())
-    return Problem(scene, mechanism, conditions, names, flexible, stiff, t, built.warnings)
+    return Problem(scene, mechanism, conditions, names, flexible, stiff, t, warnings)
 
 
 def _knots(scene: Scene, size: int) -> Array:
@@ -178,9 +188,9 @@ def _tree(scene: Scene, mechanism: Mechanism, conditions: Conditions) -> SerialF
     return tree
 
 
-def _refuse_number(scene: Scene, conditions: Conditions, drives: list[str]) -> None:
+def _refuse_number(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: list[str]) -> None:
     wanted, given = len(conditions.every), len(drives)
-    if wanted == given:
+    if wanted == given or (wanted < given and not mechanism.loops):
         return
     where, names = f"{scene.path}: servo", ", ".join(each.name for each in conditions.every)
     if wanted > given:
@@ -194,7 +204,7 @@ def _refuse_number(scene: Scene, conditions: Conditions, drives: list[str]) -> N
         )
     raise SceneError(
         Cause.BAD_FIELD,
-        f"more drives ({', '.join(drives)}) than conditions ({names})",
+        f"more drives ({', '.join(drives)}) than conditions ({names}) on closed loops",
         where=where,
         value=given,
         limit=wanted,
@@ -232,25 +242,3 @@ def _refuse(scene: Scene, mechanism: Mechanism) -> None:
             raise refused("", f"joint {name!r} with stops or with friction that sticks", "remove them")
     if mechanism.contacts:
         raise refused("", "a scene with contacts", "remove [[contacts]]")
-
-
-def followed(servoed: Servoed, conditions: Conditions, t: Array) -> Array:
-    """(k, n) places at which the conditions hold at times (k,), each next to the one before; the first one next to the
-    start of the scene.
-
-    Raises
-    ------
-    SimulationError
-        OUT_OF_REACH, SINGULAR_SERVO: says when.
-    """
-    demand = conditions.demand(t)
-    y = servoed.beginning[None]
-    result = np.empty((len(t), y.shape[1]))
-    for k in range(len(t)):
-        one = demand.part(slice(k, k + 1))
-        y = servoed.settled(one, y)
-        result[k] = y[0]
-        if k + 1 < len(t):
-            rates = servoed.at(one, y, np.zeros((1, servoed.count)), np.zeros_like(y), np.zeros((1, 0))).v
-            y = y + (t[k + 1] - t[k]) * rates
-    return result
