@@ -146,6 +146,10 @@ class Nodal:
         first = self._kept + self.system.size
         return y[self._kept : first], y[first : first + self.system.constraints]
 
+    def multipliers(self, y: Array) -> Array:
+        """(m,) of a state that an integrator found."""
+        return self._found(y)[1]
+
     def _rubbing(self, y: Array) -> Array:
         """(m,) friction of joints that may stick."""
         if self.locked is None or not len(self.dry.places):
