@@ -34,8 +34,8 @@ from shell_meshes import ShellGrid
 
 import erls
 from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.scenes.shell_mesh import corner_frames
 from erls.equations.nodal.shell import Shell, Shells
+from erls.equations.nodal.surfaces import corner_frames
 from erls.errors import SimulationError
 from erls.run.bodies.rest import BodyRest, work
 from fe_import.elements.laminates import Laminate

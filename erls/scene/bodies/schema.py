@@ -110,7 +110,8 @@ class ShellSurface(Record, frozen=True):
     elements : (2,) int
         Of a patch, along I and J.
     mesh : str
-        Instead of corners: a file of quadrangles, in metres; named nodes that lie on one of its nodes are the same.
+        Instead of corners: a file of quadrangles and triangles, in metres; named nodes that lie on one of its nodes are
+        the same.
     places, cells, sets : lists
         Instead of a file what it holds: positions [m], four of these around each quadrangle, sets of these by name.
     material : str
