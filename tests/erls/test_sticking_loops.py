@@ -27,7 +27,7 @@ OMEGA = math.sqrt(STIFFNESS / (BLOCKS[0] + 2 * BLOCKS[1]))  # the second block g
 
 
 def _body(mass: float) -> dict[str, Any]:
-    return {"mass": mass, "inertia": [0.01, 0.02, 0.03], "points": {"root": [0.0] * 3, "tip": [0.0] * 3}}
+    return {"mass": mass, "inertia": [0.01, 0.02, 0.03], "points": {"root": [0.0] * 3, "tip": [0.2, 0.0, 0.0]}}
 
 
 def run_scene(folder: Path, data: dict[str, Any], verdict: bool = True) -> ChainRun:

@@ -25,10 +25,10 @@ from erls.equations.loops.records import (
     read_loop_state,
     read_loops,
 )
+from erls.equations.loops.rubbing import grip_force, grip_gains
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import read_joint
 from erls.equations.switches.still import still_forces, still_matrix
-from erls.maths.contact_law import grip_force, grip_gains
 from erls.maths.dense import dot
 from erls.maths.jit import kernel, part
 

@@ -25,12 +25,12 @@ from erls.equations.loops.records import (
     read_loop_state,
     read_loops,
 )
+from erls.equations.loops.rubbing import grip_force
 from erls.equations.serial.joints import effort
 from erls.equations.serial.records import read_joint, read_joint_state
 from erls.equations.serial.time_curves import curve
 from erls.equations.switches.still import still_frames
 from erls.maths.coefficients import angle_of
-from erls.maths.contact_law import grip_force
 from erls.maths.jit import kernel, part
 from erls.maths.products import clear, copy
 from erls.maths.screws import off_thread, turn_gradient, turn_gradient_change

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from erls.equations.formulation import ContactSeries
 from erls.equations.loops import actuated
+from erls.equations.loops.rubbing import grip_force
 from erls.equations.serial.state_series import ReactionSeries
 from erls.equations.switches.gripped import grips_in, held_joints, lent
 from erls.equations.switches.grips import NO_GRIPS, Grips
-from erls.maths.contact_law import grip_force
 from erls.maths.contact_places import MODE, STICKS
 from erls.maths.jit import plain
 from erls.maths.so3 import Array

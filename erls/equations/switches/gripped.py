@@ -30,10 +30,9 @@ def held_joints(mechanism: Mechanism) -> list[Hold]:
         return []
     tree = [(j.name, j.forces) for j in mechanism.joints if j.forces.sticks and not j.drive.prescribed]
     closing = [(x.name, x.freedom.forces) for x in mechanism.loops if x.freedom is not None and x.sticks]
-    return [
-        Hold(name, forces.static / forces.friction, f"friction of joint {name!r} switches between sticking and sliding")
-        for name, forces in [*tree, *closing]
-    ]
+    told = "friction of joint {!r} switches between sticking and sliding"
+    shares = [(name, forces.static / forces.friction) for name, forces in [*tree, *closing]]
+    return [Hold(name, share, told.format(name), closely=True) for name, share in shares]
 
 
 def _laws(mechanism: Mechanism, system: CompiledSystem) -> list[Array]:

@@ -43,11 +43,15 @@ class Hold(NamedTuple):
         What holds it, of what acts while it slides.
     told : str
         What switches, for messages.
+    closely : bool
+        Whether what holds it is always found from accelerations, since mechanisms of points have no size to speak of,
+        and interpolated places say nothing of springs that give way by a billionth of it.
     """
 
     name: str
     most: float
     told: str
+    closely: bool = False
 
 
 def held_point(contact: PointContact) -> Hold:
@@ -98,6 +102,7 @@ class Grips:
         self.names, self.told = tuple(hold.name for hold in holds), tuple(hold.told for hold in holds)
         self.laws, self.look = list(laws), look
         self._most = np.array([hold.most for hold in holds])
+        self._closely = np.array([hold.closely for hold in holds], dtype=bool)
         self._loose: list[int] = []  # those that have come to rest, whose force is still to be found
 
     @property
@@ -196,7 +201,7 @@ class Grips:
             if law[MODE] == STICKS:
                 room = self._most[k] - np.linalg.norm(self._pushed(k, touch.place[:, k], slip), axis=1)
                 result[:, k] = np.where(presses[:, k], room, -1.0)
-                near |= presses[:, k] & (room < _NEAR * self._most[k])
+                near |= presses[:, k] & ((room < _NEAR * self._most[k]) | self._closely[k])
             else:
                 ahead = slip @ law[AHEAD : AHEAD + 2] - _TURNED * np.linalg.norm(slip, axis=1)
                 result[presses[:, k], k] = ahead[presses[:, k]]
