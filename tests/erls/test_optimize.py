@@ -264,6 +264,18 @@ def test_interrupted_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         erls.optimize(CANTILEVER, resume=True, **given)
 
 
+def test_pictures_are_true_to_scale() -> None:
+    """Heights and width of the sections, and the sag."""
+    problem = load_problem(CANTILEVER, [BRIEF])
+    (arm,) = simulated(problem, np.array([0.03, 0.02]), lambda text: None).shapes
+    near, far = (arm.rest[0][np.isclose(arm.rest[0, :, 0], x)] for x in (0.0, 1.0))
+    assert np.ptp(near, axis=0) == pytest.approx([0, 0.005, 0.03], abs=1e-12)
+    assert np.ptp(far, axis=0) == pytest.approx([0, 0.005, 0.02], abs=1e-12)
+    sag = 10 * 0.5**3 / (3 * 2e11 * 0.005 / 12) * (7 / 0.03**3 + 1 / 0.02**3)
+    assert arm.moved[0, :, 2].min() == pytest.approx(-sag, rel=1e-3)
+    assert len(arm.triangles) == 2 * (2 * 4 + 2 * 2)  # two prisms of four sides
+
+
 def test_a_copy_elsewhere_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By the name of the option that asked for it."""
     assert main(["optimize", str(CANTILEVER), "--scene", str(tmp_path / "best.toml")]) == 2
@@ -283,6 +295,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "further starts" in text
     assert "Simulated again, all steps" in text
     assert "sag" in page.read_text()
+    assert page.read_text().count('class="view"') == 2  # the start, and the optimum
     assert -run.position("tip", 0.0)[2] == pytest.approx(5e-3, rel=1e-4)
     mass = run.formulation.mechanism.links[0].model.mass_properties.mass
     assert mass == pytest.approx(exact_cantilever()[2], rel=1e-4)
