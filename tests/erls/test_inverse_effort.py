@@ -70,6 +70,6 @@ def test_no_motion_beside_it_takes_less() -> None:
 
 
 def test_loops_with_more_drives_are_refused() -> None:
+    motion = '{shape="polynomial", from_deg=78.0, to_deg=80.0, start=0.2, duration=0.3}'
     with pytest.raises(SceneError, match=r"more drives \(motor_1, motor_2, motor_3\) than conditions"):
-        motion = '{shape="polynomial", from_deg=78.0, to_deg=80.0, start=0.2, duration=0.3}'
         erls.invert(erls.load_scene(LEGS, [f"servo=[{{joints={{motor_1=1.0}}, motion={motion}}}]"]))
