@@ -54,7 +54,7 @@ def figures() -> None:
 
 SHOT: dict[str, tuple[str, ...]] = {
     "passive_arm": (),
-    "arm": ("simulation.step=0.002", "inverse.bandwidth=60.0"),
+    "arm": ("simulation.step=0.002",),
     "three_legs": ("simulation.step=0.004",),
 }
 

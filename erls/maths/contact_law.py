@@ -126,6 +126,13 @@ def friction_force(law: Array, push: Any, along: Any, across: Any, first: Any, s
 
 
 @part
+def grip_force(law: Array, place: Any, rate: Any) -> Any:
+    """The same along a coordinate, where the numbers hold a force in place of a coefficient."""
+    none = 0.0 * rate
+    return friction_force(law, 1.0, rate, none, place, none)[0]
+
+
+@part
 def friction_gains(law: Array, push: Any, along: Any, across: Any) -> tuple[Any, Any, Any]:
     """Friction per velocity along the motion, and across it; per displacement, whatever its direction."""
     strength, slide = law[COEFFICIENT] * push, along * along + across * across
@@ -140,6 +147,13 @@ def friction_gains(law: Array, push: Any, along: Any, across: Any) -> tuple[Any,
     rate = law[RATE]
     factor, slope = friction_factor(slide / (rate * rate))
     return strength / rate * (factor + slope * slide / (rate * rate)), strength / rate * factor, none
+
+
+@part
+def grip_gains(law: Array, rate: Any) -> tuple[Any, Any]:
+    """-∂/∂place and -∂/∂rate of `grip_force`."""
+    _, damping, stiffness = friction_gains(law, 1.0, rate, 0.0 * rate)
+    return stiffness, damping
 
 
 @part

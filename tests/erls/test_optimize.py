@@ -367,3 +367,38 @@ def test_summary_is_json() -> None:
         "objective", "mass", "variables", "violation", "analyses", "outer_iterations", "wall_s", "status",
     }  # fmt: skip
     assert Settings().methods == ("esl-system", "integrated")
+
+
+
+def test_energy_of_drives() -> None:
+    """∫ |τ θ'| dt of a run that is added up by itself, and its slope in some direction against differences."""
+    constraints = 'constraints=[{type="power", name="drives", samples=41}]'
+    wanted = 'objective=[{quantity="energy", of="drives"}, {quantity="mass", weight=0.1}]'
+    short = 'set=["simulation.duration=0.02"]'
+    problem = load_problem(DATA / "slide_robot.toml", [short, constraints, wanted])
+    dynamics = Dynamics(problem, Memory(problem))
+    found = dynamics.differentiate(dynamics.evaluate(X))
+    run = running.run_of(dynamics.designs.at(X))
+    times = np.linspace(0, 0.02, 41)
+    power = sum(np.abs(run.joint_effort(j, times) * run.joint_rate(j, times)) for j in ("shoulder", "elbow"))
+    energy = float(np.trapezoid(power, times))
+    assert found.objective == pytest.approx(energy + 0.1 * dynamics.rules.objective.mass(X), rel=1e-12)
+    rules = dynamics.rules
+    _, slopes = rules.objective.timed(found.components, rules.measures)
+    way = X * np.array([1.0, -0.5, 0.7, 0.3])
+    exact = float(np.einsum("nq,nqv,v->", slopes[0], found.jacobians[0], way))
+    above, below = (
+        rules.objective.timed(dynamics.evaluate(X + sign * 1e-4 * way).components, rules.measures)[0]
+        for sign in (1, -1)
+    )
+    assert exact == pytest.approx((above - below) / 2e-4, rel=1e-4)
+
+
+def test_starts_far_beyond_their_limits() -> None:
+    """Loads of the run bring them near first, where derivatives of the motion creep."""
+    changes = ["variables.0.start=0.006", "variables.1.start=0.005", 'settings.methods=["integrated"]', BRIEF]
+    (outcome,) = erls.optimize(CANTILEVER, changes=changes, confirm=False).outcomes
+    assert outcome.history[0].violation > 20
+    assert outcome.history[0].inner > 0
+    assert outcome.status == "converged"
+    assert outcome.mass == pytest.approx(exact_cantilever()[2], rel=5e-5)

@@ -30,6 +30,7 @@ from erls.equations.serial.records import read_joint, read_joint_state
 from erls.equations.serial.time_curves import curve
 from erls.equations.switches.still import still_frames
 from erls.maths.coefficients import angle_of
+from erls.maths.contact_law import grip_force
 from erls.maths.jit import kernel, part
 from erls.maths.products import clear, copy
 from erls.maths.screws import off_thread, turn_gradient, turn_gradient_change
@@ -211,6 +212,8 @@ def _act(
         forces = read_joint(reals, integers, joint.joint)
         feed = fed(scratch, integers, joint, value)
         found[PUSH] = effort(forces, reals, integers, t, found[COORDINATE], found[RATE], feed)
+        if len(joint.grip) > 0:
+            found[PUSH] += grip_force(joint.grip, found[COORDINATE], found[RATE])
 
 
 @part

@@ -95,6 +95,12 @@ class Nodal:
         """The same with so many elements in place of each."""
         return Nodal(self.mechanism, self._elements, self._start, times, self._rules)
 
+    def with_sections(self, mechanism: Mechanism) -> Nodal:
+        """The same of a mechanism whose links have other sections or materials, and nodes and interfaces where they are
+        here: loops begin as they do here.
+        """
+        return Nodal(mechanism, self._elements, self._start, rules=self._rules)
+
     @cached_property
     def _arms(self) -> list[tuple[int, int, Array]]:
         """Link, node and place from its inboard interface of each point that errors are judged at on rigid links."""
@@ -139,6 +145,10 @@ class Nodal:
         """Rates of twists and multipliers."""
         first = self._kept + self.system.size
         return y[self._kept : first], y[first : first + self.system.constraints]
+
+    def multipliers(self, y: Array) -> Array:
+        """(m,) of a state that an integrator found."""
+        return self._found(y)[1]
 
     def _rubbing(self, y: Array) -> Array:
         """(m,) friction of joints that may stick."""
