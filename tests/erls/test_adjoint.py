@@ -130,7 +130,7 @@ def test_times_that_share_no_component() -> None:
         )
     )
     assert one.evaluations == many.evaluations == mean.evaluations // 7 == 4 * run.formulation.size  # type: ignore[attr-defined]
-    assert (one.parts, len(many.groups), len(mean.groups)) == ([0], 1, 7)
+    assert (list(one.parts), len(many.groups), len(mean.groups)) == ([0], 1, 7)
 
 
 def test_choice() -> None:
