@@ -170,10 +170,10 @@ class Asking:
         groups: list[list[int]] = []
         taken: list[Array] = []
         for time in np.flatnonzero(self.depends.any(axis=1)).tolist():
-            for group, own in zip(groups, taken, strict=True):
-                if not (own & self.depends[time]).any():
+            for group, used in zip(groups, taken, strict=True):
+                if not (used & self.depends[time]).any():
                     group.append(time)
-                    own[self.depends[time]] = True
+                    used[self.depends[time]] = True
                     break
             else:
                 groups.append([time])

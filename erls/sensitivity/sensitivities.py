@@ -337,6 +337,9 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
     if kind == "nodal" and mechanism.touches:
         remedy = "use formulation erls or ffr, which differentiate through them"
         raise _refusal("nodal runs with contacts or stops", f"{where}.formulation", remedy)
+    if kind == "nodal" and any(link.shells is not None and link.elastic_modes for link in mechanism.links):
+        remedy = "use formulation erls or ffr"
+        raise _refusal("nodal runs of links made of shells", f"{where}.formulation", remedy)
     if kind == "loops" and settings.integrator == FIXED_STEP:
         remedy = "use integrator auto or lobatto, whose equations hold the forces of loops"
         raise _refusal("generalized-alpha with loops", f"{where}.integrator", remedy)
