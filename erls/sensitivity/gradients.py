@@ -121,7 +121,7 @@ class Asking:
                 moved = partial(self._moved_together, group=group, part=part)
                 whole = slopes(moved, np.eye(n)[:, moving], self.steps[moving])
                 for time in group:
-                    own: Any = self.depends[time]
+                    own = self.depends[time]
                     if self._weights is None:
                         found[time, part][np.ix_(moving, own)] = whole.T[:, own]
                     else:
@@ -161,7 +161,7 @@ class Asking:
                 return some
             return np.concatenate([acting(part, half) for half in np.array_split(some, 2)])
 
-        parts = {part: own for part in (0, 1) if len(own := acting(part, np.arange(n)))}
+        parts = {part: moving for part in (0, 1) if len(moving := acting(part, np.arange(n)))}
         self.depends = np.zeros((count, base.size), dtype=bool)
         for time in range(count if parts else 0):
             moved = np.zeros((count, 2, n))
