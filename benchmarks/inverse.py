@@ -1,7 +1,7 @@
 """Figures of inverse dynamics: what forward runs miss, order of the step, and cost over steps and modes.
 
-``python benchmarks/inverse.py [figures] [cost] [shooting] [zeros]``; processor time, so that other work on the machine
-counts less.
+``python benchmarks/inverse.py [figures] [cost] [shooting] [zeros] [nodal]``; processor time, so that other work on the
+machine counts less.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def figures() -> None:
 
 SHOT: dict[str, tuple[str, ...]] = {
     "passive_arm": (),
-    "arm": ("simulation.step=0.002", "inverse.bandwidth=60.0"),
+    "arm": ("simulation.step=0.002",),
     "three_legs": ("simulation.step=0.004",),
 }
 
@@ -83,6 +83,48 @@ def zeros() -> None:
         print(f"{', '.join(changes)}: {np.abs(model.zeros()).min() / (2 * np.pi):.3f} Hz", flush=True)
 
 
+NODAL: dict[str, tuple[Path, tuple[str, ...]]] = {
+    "arm": (ARM, ("simulation.step=0.004", "simulation.elements_per_member=8")),
+    "planar robot": (PLANAR, ("simulation.step=0.008", "simulation.elements_per_member=4")),
+    "parallel robot": (DATA / "inverse" / "three_legs.toml", ("simulation.step=0.004",)),
+}
+
+
+def nodal() -> None:
+    """Print what nodal runs miss with drives found in modes and on nodes, and how far models are apart that both run
+    with the former (`erls compare`): that is what inversions differ by.
+    """
+    from tempfile import TemporaryDirectory
+
+    from erls.files.csv_table import write_columns
+    from erls.studies.compare import compare
+    from erls.tracking.files import columns
+
+    for name, (path, changes) in NODAL.items():
+        begun = time.process_time()
+        modal, own = (erls.invert(erls.load_scene(path, (*changes, f"simulation.formulation={f}"))) for f in RUNS)
+        work = time.process_time() - begun
+        missed = [1e3 * confirmed(x, x.efforts, x.start, "nodal").error for x in (modal, own)]
+        with TemporaryDirectory() as folder:
+            table = Path(folder) / "drives.csv"
+            write_columns(table, {title: x.tolist() for title, x in columns(modal).items()})
+            numbers = {joint.name: k for k, joint in enumerate(modal.problem.mechanism.joints)}
+            drives = [
+                f'joints.{numbers[drive]}.drive={{type="torque", profiles=[{{shape="table", file="{table}", '
+                f'column={k + 1}, interpolation="cubic"}}]}}'
+                for k, drive in enumerate(modal.efforts)
+            ]
+            start = [f"joints.{numbers[joint]}.initial={{position={x!r}}}" for joint, x in modal.start.items()]
+            fine = f"simulation.step={modal.problem.step / 4!r}"
+            found = compare(path, RUNS, overrides=(*changes, *drives, *start, fine), workers=1).pairs[0]
+        apart = 1e3 * max(found.points[point.name].largest for point in modal.problem.conditions.points)
+        what = f"{name}: modes {missed[0]:.4f}, nodes {missed[1]:.4f}, models apart {apart:.4f} mm"
+        print(f"{what} (as expected: {found.as_expected}); {work:.0f} s", flush=True)
+
+
+RUNS = ("erls", "nodal")
+
+
 def spent(*changes: str) -> tuple[float, int]:
     """Processor time of an iteration [s], and coordinates; the second of two inversions."""
     for _ in range(2):
@@ -105,6 +147,6 @@ def cost() -> None:
 
 
 if __name__ == "__main__":
-    chosen = sys.argv[1:] or ["figures", "cost", "shooting", "zeros"]
+    chosen = sys.argv[1:] or ["figures", "cost", "shooting", "zeros", "nodal"]
     for part in chosen:
-        {"figures": figures, "cost": cost, "shooting": shooting, "zeros": zeros}[part]()
+        {"figures": figures, "cost": cost, "shooting": shooting, "zeros": zeros, "nodal": nodal}[part]()

@@ -76,9 +76,12 @@ def invert(
         raise bad("corrections need a forward run", "--confirm", confirm, "leave it out, or name a formulation")
     if confirm:
         choose(confirm, (*FORMULATIONS, _NONE), "--confirm", SceneError)
+    loaded = load_chain(scene, set_ or [])
+    if correct and loaded.record.simulation.formulation == "nodal":
+        raise bad("an inversion on nodal elements is on the model of the forward run", "--correct", "", "leave it out")
     with Progress("inverting") as advance:
         found = inverted(
-            load_chain(scene, set_ or []),
+            loaded,
             method=method,
             force=force,
             tell=tell,

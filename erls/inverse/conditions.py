@@ -115,7 +115,7 @@ class Together:
         """See `Measure`."""
         value, rate, bias = (x @ self.factors for x in (joints.angles, joints.rates, joints.accelerations))
         count = len(joints.angles)
-        rows = np.broadcast_to(self.factors @ joints.rows, (count, joints.rows.shape[1]))
+        rows = np.broadcast_to(self.factors @ joints.rows, (count, joints.rows.shape[-1]))
         return Measured(value, rate, bias, rows, np.zeros(count))
 
 

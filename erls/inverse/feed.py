@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from erls.inverse.inversion import Inversion
 from erls.inverse.invert import invert
-from erls.inverse.opened import with_controllers
+from erls.inverse.opened import in_modes, with_controllers
 from erls.maths.so3 import Array
 from erls.mechanism.drives import PDDrive
 from erls.mechanism.motions import MotionTable
@@ -53,7 +53,7 @@ def fed(scene: Scene, tell: Message = lambda text: None) -> Fed:
     if not names:
         return Fed(scene, ())
     tell(f"finding what the mechanism needs along {', '.join(names)}")
-    found = invert(_in_modes(scene), tell=tell)
+    found = invert(in_modes(scene), tell=tell)
 
     def tables(name: str, drive: PDDrive) -> PDDrive:
         motion = MotionTable(times=tuple(found.t.tolist()), values=tuple(found.angles[name].tolist()))
@@ -62,14 +62,6 @@ def fed(scene: Scene, tell: Message = lambda text: None) -> Fed:
 
     record = with_controllers(scene.record, tables)
     return Fed(Scene(scene.path, record), (*found.warnings, *_apart(found, names)))
-
-
-def _in_modes(scene: Scene) -> Scene:
-    """In a formulation that can be inverted."""
-    settings = scene.record.simulation
-    if settings.formulation != "nodal":
-        return scene
-    return Scene(scene.path, replace(scene.record, simulation=replace(settings, formulation="erls")))
 
 
 def _apart(found: Inversion, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -211,3 +211,13 @@ def second_difference(t: Array, values: Array) -> Array:
     slopes = np.diff(values, axis=0) / np.diff(t)[:, None]
     found = 2 * np.diff(slopes, axis=0) / (before + after)
     return np.concatenate([found[:1], found, found[-1:]])
+
+
+def without_internal(servoed: Servoed, demand: Demand, y: Array) -> States:
+    """Accelerations and efforts at places (k, n) where nothing moves inside, conditions held."""
+    internal, still = Internal(servoed, demand, y, Basis(*(np.zeros((0, 0)),) * 4)), np.zeros((len(y), 0))
+    internal.look(still)
+    internal.learn(np.arange(len(y)))
+    internal.move(still)
+    internal.look(still)
+    return internal.states

@@ -12,12 +12,13 @@ import numpy as np
 
 from erls.errors import Cause, SceneError, SimulationError
 from erls.inverse.conditions import Condition
-from erls.inverse.internal import Basis, Internal
+from erls.inverse.internal import without_internal
 from erls.inverse.inversion import Inversion
 from erls.inverse.marching import march
 from erls.inverse.nature import Nature
-from erls.inverse.problem import Problem, followed, problem_of
-from erls.inverse.servoed import States
+from erls.inverse.opened import in_modes
+from erls.inverse.problem import Problem, problem_of
+from erls.inverse.servoed import States, followed
 from erls.inverse.work import SAME, Found, Work
 from erls.maths.jit import announcing
 from erls.maths.so3 import Array
@@ -78,8 +79,25 @@ def invert(
     True
     """
     choose(method, METHODS, "method", SceneError)
-    begun = time.perf_counter()
     loaded: Scene = load_chain(scene) if isinstance(scene, (Path, str)) else chain_alone(scene)
+    modes = in_modes(loaded)
+    if modes is not loaded and method not in ("auto", "collocation"):
+        message, remedy = "nodal elements are inverted by collocation alone", "leave it out, or use erls or ffr"
+        raise SceneError(Cause.BAD_FIELD, message, where="method", value=method, remedy=remedy)
+    found = _in_modes(modes, method, force, tell, progress)
+    if modes is loaded:
+        return found
+    from erls.inverse.nodal.invert import on_nodes  # here: modes do without its functions
+
+    with announcing(tell), np.errstate(over="ignore", invalid="ignore", divide="ignore"), _singular():
+        return on_nodes(found, loaded, progress)
+
+
+def _in_modes(
+    loaded: Scene, method: str, force: bool, tell: Message, progress: Callable[[int, float], None]
+) -> Inversion:
+    """Of modes, or of rigid links."""
+    begun = time.perf_counter()
     with announcing(tell), np.errstate(over="ignore", invalid="ignore", divide="ignore"), _singular():
         problem = problem_of(loaded, tell)
         rigid = rigid_motion(problem)
@@ -141,13 +159,7 @@ def rigid_motion(problem: Problem) -> States:
     assert not servoed.count
     if servoed.closing is not None:
         servoed.closing.refuse_uncontrolled(demand.t, y, servoed.driven, servoed.metres)
-    internal = Internal(servoed, demand, y, Basis(*(np.zeros((0, 0)),) * 4))
-    every = np.arange(len(problem.t))
-    internal.look(np.zeros((len(every), 0)))
-    internal.learn(every)
-    internal.move(np.zeros((len(every), 0)))
-    internal.look(np.zeros((len(every), 0)))
-    return internal.states
+    return without_internal(servoed, demand, y)
 
 
 def _cut(problem: Problem, nature: Nature) -> tuple[str, ...]:

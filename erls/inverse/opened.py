@@ -48,3 +48,11 @@ def opened(scene: Scene) -> Scene:
 
     record = with_controllers(scene.record, open_)
     return Scene(scene.path, replace(record, inverse=replace(record.inverse, drives=names)))
+
+
+def in_modes(scene: Scene) -> Scene:
+    """In a formulation whose coordinates are independent."""
+    settings = scene.record.simulation
+    if settings.formulation != "nodal":
+        return scene
+    return Scene(scene.path, replace(scene.record, simulation=replace(settings, formulation="erls")))

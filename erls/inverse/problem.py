@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from erls.errors import Cause, SceneError
 from erls.inverse.closing import Closing
 from erls.inverse.conditions import Conditions, conditions_of
 from erls.inverse.frames import with_ends
+from erls.inverse.least_effort import of_least_effort
 from erls.inverse.opened import opened
 from erls.inverse.servoed import Servoed
 from erls.maths.so3 import Array
@@ -32,7 +34,6 @@ _MOST = 50_000_000
 """Numbers of one matrix at all knots, 400 MB; there are some ten."""
 
 _SYSTEMS = {
-    "nodal": ("formulation", "use erls or ffr; erls invert --confirm nodal runs the drives on nodal elements"),
     "pieces": ("formulation", "leave links in one piece (substructures = 1)"),
     "quasi-static": ("bandwidth", "remove it: fast internal motions follow by inverse.bandwidth"),
     "absolute": ("coordinates", "use coordinates = 'independent'"),
@@ -89,13 +90,21 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     _refuse(scene, mechanism)
     drives = unknown_drives(scene, mechanism)
     conditions = conditions_of(scene, mechanism)
-    _refuse_number(scene, conditions, [mechanism.joints[k].name for k in drives.tolist()])
-    free = _with_drives(mechanism, {k: Drive() for k in drives.tolist()})
+    _refuse_number(scene, mechanism, conditions, [mechanism.joints[k].name for k in drives.tolist()])
+    free = with_drives(mechanism, {k: Drive() for k in drives.tolist()})
+    bare = with_rigid(free, {link.name for link in mechanism.links})
+    warnings = built.warnings
+    if len(drives) > len(conditions.every):
+        tell("finding the motion of least effort")
+        held = conditions
+        conditions = of_least_effort(held, partial(_rigid, scene, bare, drives=drives))
+        spare = ", ".join(each.name for each in conditions.every[len(held.every) :])
+        warnings = (*warnings, f"{spare}: moved for the least effort of rigid links")
     flexible = _servoed(scene, free, conditions, drives)
-    stiff = _rigid(scene, with_rigid(free, {link.name for link in mechanism.links}), conditions, drives)
+    stiff = _rigid(scene, bare, conditions, drives)
     t = _knots(scene, flexible.tree.size)
     names = tuple(mechanism.joints[k].name for k in drives.tolist())
-    return Problem(scene, mechanism, conditions, names, flexible, stiff, t, built.warnings)
+    return Problem(scene, mechanism, conditions, names, flexible, stiff, t, warnings)
 
 
 def _knots(scene: Scene, size: int) -> Array:
@@ -106,17 +115,33 @@ def _knots(scene: Scene, size: int) -> Array:
     SceneError
         BAD_FIELD: too few, or more than there is memory for.
     """
-    settings, own = scene.record.simulation, scene.record.inverse.step
-    field, step = ("simulation.step", settings.step) if own is None else ("inverse.step", own)
+    settings, (field, step) = scene.record.simulation, _step_of(scene)
     count, where = round(settings.duration / (step or STEP)), f"{scene.path}: {field}"
     if count < _FEWEST:
         message, remedy = "too few steps for the duration", f"give {settings.duration / _FEWEST:.6g} s or less"
         raise SceneError(Cause.BAD_FIELD, message, where=where, value=step, remedy=remedy)
-    if count * size**2 > _MOST:
-        message = f"too many steps for {size} coordinates"
-        remedy = "give a larger step, a shorter duration, or links with fewer modes (elastic_modes)"
-        raise SceneError(Cause.BAD_FIELD, message, where=where, value=count, limit=_MOST // size**2, remedy=remedy)
+    refuse_many(scene, count, size, "links with fewer modes (elastic_modes)")
     return np.linspace(0.0, settings.duration, count + 1)
+
+
+def _step_of(scene: Scene) -> tuple[str, float | None]:
+    """The field that says the distance of knots, and what it says."""
+    settings, own = scene.record.simulation, scene.record.inverse.step
+    return ("simulation.step", settings.step) if own is None else ("inverse.step", own)
+
+
+def refuse_many(scene: Scene, count: int, size: int, fewer: str) -> None:
+    """Raise where there is no memory for as many steps of as many coordinates.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD
+    """
+    if count * size**2 > _MOST:
+        message, where = f"too many steps for {size} coordinates", f"{scene.path}: {_step_of(scene)[0]}"
+        remedy = f"give a larger step, a shorter duration, or {fewer}"
+        raise SceneError(Cause.BAD_FIELD, message, where=where, value=count, limit=_MOST // size**2, remedy=remedy)
 
 
 def unknown_drives(scene: Scene, mechanism: Mechanism) -> IntArray:
@@ -130,7 +155,8 @@ def unknown_drives(scene: Scene, mechanism: Mechanism) -> IntArray:
     return np.array(found, dtype=np.int64)
 
 
-def _with_drives(mechanism: Mechanism, drives: dict[int, Drive]) -> Mechanism:
+def with_drives(mechanism: Mechanism, drives: dict[int, Drive]) -> Mechanism:
+    """With other drives of some joints, by their numbers, from where its links are straight."""
     joints = (replace(joint, drive=drives[k]) if k in drives else joint for k, joint in enumerate(mechanism.joints))
     return replace(mechanism, joints=tuple(joints), static_start=False)
 
@@ -152,7 +178,7 @@ def _rigid(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: I
         for k, joint in enumerate(mechanism.joints)
         if not joint.drive.prescribed and k not in moving
     }
-    return _servoed(scene, _with_drives(mechanism, held), conditions, drives)
+    return _servoed(scene, with_drives(mechanism, held), conditions, drives)
 
 
 def _tree(scene: Scene, mechanism: Mechanism, conditions: Conditions) -> SerialFormulation:
@@ -162,9 +188,9 @@ def _tree(scene: Scene, mechanism: Mechanism, conditions: Conditions) -> SerialF
     return tree
 
 
-def _refuse_number(scene: Scene, conditions: Conditions, drives: list[str]) -> None:
+def _refuse_number(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: list[str]) -> None:
     wanted, given = len(conditions.every), len(drives)
-    if wanted == given:
+    if wanted == given or (wanted < given and not mechanism.loops):
         return
     where, names = f"{scene.path}: servo", ", ".join(each.name for each in conditions.every)
     if wanted > given:
@@ -178,7 +204,7 @@ def _refuse_number(scene: Scene, conditions: Conditions, drives: list[str]) -> N
         )
     raise SceneError(
         Cause.BAD_FIELD,
-        f"more drives ({', '.join(drives)}) than conditions ({names})",
+        f"more drives ({', '.join(drives)}) than conditions ({names}) on closed loops",
         where=where,
         value=given,
         limit=wanted,
@@ -216,25 +242,3 @@ def _refuse(scene: Scene, mechanism: Mechanism) -> None:
             raise refused("", f"joint {name!r} with stops or with friction that sticks", "remove them")
     if mechanism.contacts:
         raise refused("", "a scene with contacts", "remove [[contacts]]")
-
-
-def followed(servoed: Servoed, conditions: Conditions, t: Array) -> Array:
-    """(k, n) places at which the conditions hold at times (k,), each next to the one before; the first one next to the
-    start of the scene.
-
-    Raises
-    ------
-    SimulationError
-        OUT_OF_REACH, SINGULAR_SERVO: says when.
-    """
-    demand = conditions.demand(t)
-    y = servoed.beginning[None]
-    result = np.empty((len(t), y.shape[1]))
-    for k in range(len(t)):
-        one = demand.part(slice(k, k + 1))
-        y = servoed.settled(one, y)
-        result[k] = y[0]
-        if k + 1 < len(t):
-            rates = servoed.at(one, y, np.zeros((1, servoed.count)), np.zeros_like(y), np.zeros((1, 0))).v
-            y = y + (t[k + 1] - t[k]) * rates
-    return result

@@ -325,3 +325,25 @@ class Servoed:
 
         by_place, by_rate = slope(lambda x: look(y + x, v)), slope(lambda x: look(y, v + x))
         return by_place[0], by_place[1], by_rate[1]
+
+
+def followed(servoed: Servoed, conditions: Conditions, t: Array) -> Array:
+    """(k, n) places at which the conditions hold at times (k,), each next to the one before; the first one next to the
+    start of the scene.
+
+    Raises
+    ------
+    SimulationError
+        OUT_OF_REACH, SINGULAR_SERVO: says when.
+    """
+    demand = conditions.demand(t)
+    y = servoed.beginning[None]
+    result = np.empty((len(t), y.shape[1]))
+    for k in range(len(t)):
+        one = demand.part(slice(k, k + 1))
+        y = servoed.settled(one, y)
+        result[k] = y[0]
+        if k + 1 < len(t):
+            rates = servoed.at(one, y, np.zeros((1, servoed.count)), np.zeros_like(y), np.zeros((1, 0))).v
+            y = y + (t[k + 1] - t[k]) * rates
+    return result

@@ -103,16 +103,27 @@ def ends_of(first: Array, last: Array, scales: Array) -> Ends:
         UNSTABLE_INVERSE: not as much grows at the end as at the start.
     """
     decaying, growing = _left_rows(first, scales, False), _left_rows(last, scales, True)
-    if len(decaying) + len(growing) != len(first):
+    refuse_change(len(growing), len(first) - len(decaying))
+    return Ends(decaying, growing)
+
+
+def refuse_change(at_end: int, at_start: int) -> None:
+    """Raise where not as much grows at the end as at the start.
+
+    Raises
+    ------
+    SimulationError
+        UNSTABLE_INVERSE.
+    """
+    if at_end != at_start:
         raise SimulationError(
             Cause.UNSTABLE_INVERSE,
             "internal motions change on the way between growing and decaying",
             where="from the start to the end",
-            value=f"{len(growing)} that grow at the end",
-            limit=f"{len(first) - len(decaying)} at the start",
+            value=f"{at_end} that grow at the end",
+            limit=f"{at_start} at the start",
             remedy="split the motion where they change, or demand other points",
         )
-    return Ends(decaying, growing)
 
 
 def _left_rows(tangent: Array, scales: Array, growing: bool) -> Array:

@@ -21,7 +21,7 @@ from erls.inverse.two_point import Ends, Solved, collocate, ends_of
 from erls.maths.so3 import Array
 
 _TOLERANCE = 1e-11  # m: change that ends iterations
-_ROUGH = 1e-4  # m: the same of those that give others a start
+_ROUGH = (1e-4, 1e-6, 1e-8)  # m: the same of those that give others a start, nearer each time that it was too far
 _PASSES = 3  # of fast ways, at most
 _FAST = 20.0  # times the slowest frequency of a demanded motion: internal motions that follow
 _EXCITED = 6.0  # times the same: undamped internal motions that what is demanded makes
@@ -157,8 +157,23 @@ class Work:
         return Found(iterations, left)
 
     def _solved(self, method: str, x: Array, progress: Callable[[int, float], None]) -> Solved:
-        """From a guess; of shooting, whose stretches are lost from far away, after a rough collocation."""
+        """From a guess; of shooting, whose stretches are lost from far away, after a rough collocation: in steps in
+        which something grows many times over, only what is very near them meets.
+        """
+        end = self._ends, self.scales
         if method != "shooting":
-            return collocate(self.solved, self.problem.t, x, self._ends, self.scales, _TOLERANCE, progress)[0]
-        rough = collocate(self.solved, self.problem.t, x, self._ends, self.scales, _ROUGH, progress)[0]
-        return shoot(self.solved, self.problem.t, rough.x, self._ends, self.scales, _TOLERANCE, progress)[0]
+            return collocate(self.solved, self.problem.t, x, *end, _TOLERANCE, progress)[0]
+        for rough in _ROUGH:
+            x = collocate(self.solved, self.problem.t, x, *end, rough, progress)[0].x
+            try:
+                return shoot(self.solved, self.problem.t, x, *end, _TOLERANCE, progress)[0]
+            except SimulationError as problem:
+                if rough == _ROUGH[-1] or problem.cause is not Cause.NEWTON_FAILED:
+                    raise
+                self.solved.begin(self._at(x))
+        raise AssertionError
+
+    def _at(self, x: Array) -> States:
+        """The mechanism at states (k, d), with what belongs to knots as it is."""
+        self.solved.look(x)
+        return self.solved.states

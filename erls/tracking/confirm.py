@@ -17,11 +17,11 @@ from erls.maths.so3 import Array
 from erls.mechanism.drives import TorqueDrive
 from erls.run.chain.run import ChainRun
 from erls.scene.build import Message
-from erls.scene.build_joints import with_coordinates
 from erls.scene.chain import Scene
 from erls.scene.integrators import FIXED_STEP
-from erls.scene.joints import Acting, Joint, JointInitial
+from erls.scene.joints import Acting, JointInitial
 from erls.simulation.simulate import Progress, simulate
+from erls.tracking.forward import forward_scene
 
 FINER = 4
 """Steps of a forward run between two knots."""
@@ -96,23 +96,9 @@ def driven_scene(
     """The scene with efforts as tables in place of the unknown drives, steps of a quarter of the distance of knots, at
     rest where the inversion starts.
     """
-    record = problem.scene.record
-    joints = [_driven(joint, t, efforts, start) for joint in record.joints]
-    own = record.simulation
-    steps = {"step": problem.step / FINER, "integrator": FIXED_STEP, "output_step": None}
-    settings = msgspec.structs.replace(own, formulation=formulation or own.formulation, **steps)
-    initial = record.initial
-    if problem.mechanism.gravity.any() or record.loads:  # links rest where these bend them
-        initial = msgspec.structs.replace(initial, deformation="static")
-    return Scene(
-        problem.scene.path, msgspec.structs.replace(record, joints=joints, simulation=settings, initial=initial)
-    )
-
-
-def _driven(joint: Joint, t: Array, efforts: Mapping[str, Array], start: Mapping[str, float]) -> Joint:
-    """A joint with efforts over time and initial coordinates, along each of its coordinates."""
 
     def driven(name: str, own: Acting) -> Acting:
+        """With efforts over time and an initial coordinate."""
         changes: dict[str, object] = {}
         if name in efforts:
             changes["drive"] = TorqueDrive(profiles=(load_table(t, efforts[name]),))
@@ -120,7 +106,8 @@ def _driven(joint: Joint, t: Array, efforts: Mapping[str, Array], start: Mapping
             changes["initial"] = JointInitial(position=start[name])
         return msgspec.structs.replace(own, **changes)
 
-    return with_coordinates(joint, driven)
+    steps = {"step": problem.step / FINER, "integrator": FIXED_STEP}
+    return forward_scene(problem.scene, problem.mechanism, driven, formulation, **steps)
 
 
 def missed(problem: Problem, run: ChainRun) -> tuple[Array, Array, Array]:

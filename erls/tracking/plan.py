@@ -19,11 +19,11 @@ from erls.mechanism.drives import MotionDrive
 from erls.mechanism.motions import MotionTable
 from erls.run.chain.run import ChainRun
 from erls.scene.build import Message
-from erls.scene.build_joints import with_coordinates
 from erls.scene.chain import Scene
 from erls.scene.joints import Acting, JointInitial
 from erls.scene.read import AnyScene, chain_alone, load_chain
 from erls.simulation.simulate import simulate
+from erls.tracking.forward import forward_scene
 from erls.tracking.goal import Beyond, Goal, goal_of
 from erls.tracking.laws import Law
 from erls.tracking.optimal import least
@@ -225,7 +225,7 @@ METHODS: dict[str, Callable[[_Search], Planned]] = {"shaped": _by_polynomials, "
 
 def driven(goal: Goal, law: Law, formulation: str = "") -> Scene:
     """The scene with a law as motions of its joints, up to some periods after their end."""
-    record, start = goal.scene.record, goal.scene.record.plan.start
+    start = goal.scene.record.plan.start
     slowest = min((mode.omega for mode in goal.modes), default=np.inf)
     end = start + law.duration + max(_AFTER * 2 * np.pi / slowest, _SHORTEST)
     times = tuple((start + law.t).tolist())
@@ -238,17 +238,7 @@ def driven(goal: Goal, law: Law, formulation: str = "") -> Scene:
         drive = MotionDrive(motion=MotionTable(times=times, values=tuple(values.tolist())))
         return msgspec.structs.replace(own, drive=drive, initial=JointInitial())
 
-    settings = msgspec.structs.replace(
-        record.simulation,
-        duration=float(end),
-        formulation=formulation or record.simulation.formulation,
-        output_step=None,
-    )
-    initial = record.initial
-    if goal.mechanism.gravity.any() or record.loads:  # links rest where these bend them
-        initial = msgspec.structs.replace(initial, deformation="static")
-    joints = [with_coordinates(joint, change) for joint in record.joints]
-    return Scene(goal.scene.path, msgspec.structs.replace(record, joints=joints, simulation=settings, initial=initial))
+    return forward_scene(goal.scene, goal.mechanism, change, formulation, duration=float(end))
 
 
 class Ran(NamedTuple):
