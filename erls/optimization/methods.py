@@ -27,7 +27,7 @@ OPTIMIZERS: dict[str, Optimizer] = {
     "trust-constr": scipy_method("trust-constr"),
 }
 _INNER = 200  # static analyses of one set of loads
-_FAR, _LOADED = 0.5, 8  # of a limit: starts beyond go on by loads first; so many runs at most
+_FAR, _LOADED = 2.0, 8  # of a limit: starts beyond go on by loads first; so many runs at most
 _WORSE, _DAMPED = 0.9, 0.5  # designs that go to and fro: less than this nearer, and what is left of a step then
 
 Told = Callable[[str, int, Analysis], None]
