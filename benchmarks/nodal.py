@@ -7,12 +7,17 @@ The heavy top (Lie-group generalized-α, ρ∞ = 0.8, 2 s) and the L pendulum of
 1 ms; exudyn with modified Newton and its tolerance of 1e-6, its best setting). Times are the least processor times of
 several runs, all preparation from a built system on included, compilation not. Acceptance: at least as fast as exudyn
 at equal error; aim: three times; cost linear in the number of elements.
+
+With `--shells` instead strips and square plates on a hinge, links of shells, 50 steps of 1 ms beside beams along the
+strip: velocities, cost per step and velocity, the width of the band and its numbers, which are those of its factors,
+beside what SuperLU fills for the same matrix, and the times of derivatives and of one factorization of each.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
@@ -20,15 +25,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fe_import"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "erls"))
 
 import heavy_top  # the systems of the tests
 import test_nodal_dynamics as l_shape
+import test_shell_chains as shell_chains
+from link_files import write_toml
+from shell_meshes import shell_grid
 
+from erls.equations.nodal.blocks import blocks
+from erls.equations.nodal.equations import Nodal
+from erls.equations.nodal.matrix import factor
+from erls.equations.nodal.nodes import numbers_of
 from erls.integrate.base import hermite
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.scene.build import build_mechanism
+from erls.scene.read import load_chain
 
 
 def least(repeat: int, run: Callable[[], tuple[Any, float]]) -> tuple[Any, float]:
@@ -110,6 +127,64 @@ def pendulums(elements: list[int], repeat: int, exudyn: Any) -> None:
         )
 
 
+def shells(repeat: int) -> None:
+    """Cost of links of shells and of beams, and what a band of their matrices takes beside sparse factors."""
+    heads = f"{'velocities':>11}{'ms/step':>9}{'µs/step/vel.':>14}{'factored/step':>15}{'derivatives ms':>16}"
+    print(f"{'link':<22}{heads}{'band':>6}{'MB':>8}{'SuperLU MB':>12}{'band ms':>9}{'SuperLU ms':>12}")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for elements in (16, 64):
+            section = {"shape": "rectangular", "width": 0.06, "height": 0.003}
+            frame = {"nodes": {"root": [0, 0, 0], "tip": [0.6, 0, 0]},
+                     "members": [{"from": "root", "to": "tip", "section": "s", "material": "m", "elements": elements}]}
+            ends = [{"name": end, "node": end} for end in ("root", "tip")]
+            write_toml(folder / "link.toml", {"materials": {"m": shell_chains.ALU}, "sections": {"s": section},
+                                              "frame": frame, "interfaces": ends})  # fmt: skip
+            _cost(f"{elements} beams", folder, repeat)
+        for across, *counts in ((0.06, (8, 2), (16, 4), (32, 8)), (0.6, (8, 8), (16, 16), (24, 24))):
+            for nx, ny in counts:
+                place = partial(_place, across)
+                shell_chains.described(folder, shell_grid(nx, ny, place, "quad4"))
+                _cost(f"{'strip' if across < 0.1 else 'plate'}, {nx} x {ny}", folder, repeat)
+
+
+def _place(across: float, a: float, b: float) -> tuple[float, float, float]:
+    return 0.6 * a, across * (b - 0.5), 0.0
+
+
+def _cost(name: str, folder: Path, repeat: int) -> None:
+    """A row of `shells`."""
+    scene = load_chain(shell_chains.arm(folder, "nodal"))
+    formulation = Nodal(build_mechanism(scene).mechanism)
+    system, rest, step = formulation.system, np.zeros(formulation.system.size), 1e-3
+    options = ConstrainedOptions(step=step)
+    found, spent = least(repeat, partial(timed, partial(lie_generalized_alpha, system, (0, 0.05), system.start, rest,
+                                                        options)))  # fmt: skip
+    mass = system.mass_matrix(0.0, system.start)
+    multipliers = np.zeros(system.constraints)
+    stiffness, _ = system.stiffness_and_damping(0.0, system.start, rest, rest, multipliers)
+    rows = sp.coo_array(system.constraint_matrix(0.0, system.start))
+    whole = sp.block_array([[mass + 0.3 * step**2 * stiffness, rows.T], [rows, None]]).tocoo()
+    factors, memory = np.zeros(system.flat.factors), (system.flat.reals, system.flat.integers, system.flat.scratch)
+    system.residual(0.0, system.start, rest, rest)
+    start, times = numbers_of(system.start), np.zeros((repeat + 1, 2))
+    for row in times:
+        begun = time.process_time()
+        blocks(*memory, 0)
+        row[0] = time.process_time() - begun
+        factor(*memory, 0.0, start, rest, 0.0, 0.3 * step**2, factors)
+        row[1] = time.process_time() - begun - 2 * row[0]
+    derivatives, banded = 1e3 * times.min(axis=0)
+    begun = time.process_time()
+    settings = {"SymmetricMode": True, "DiagPivotThresh": 0.01}
+    sparse = sla.splu(whole.tocsc(), permc_spec="MMD_AT_PLUS_A", options=settings)
+    sparse_ms, filled = 1e3 * (time.process_time() - begun), (sparse.L.nnz + sparse.U.nnz) * 12 / 1e6
+    cost = 1e3 * spent / found.work.steps
+    counts = f"{system.size:11d}{cost:9.3f}{1e3 * cost / system.size:14.2f}{found.work.factorizations / 50:15.2f}"
+    stored = factors.nbytes / 1e6
+    print(f"{name:<22}{counts}{derivatives:16.1f}{system.width:6d}{stored:8.1f}{filled:12.1f}{banded:9.1f}{sparse_ms:12.1f}")
+
+
 def _tip_distance(rows: np.ndarray) -> float:
     text = l_shape.DATA.read_text(encoding="utf-8")
     names = [x for x in text.splitlines() if x.startswith("#")][-1].lstrip("# ").split(",")
@@ -126,7 +201,11 @@ def main() -> None:
     parser.add_argument("--elements", type=int, nargs="+", default=[8, 16, 32], help="of each leg of the L")
     parser.add_argument("--steps", type=float, nargs="+", default=[1e-3, 5e-4, 2.5e-4], help="of the heavy top [s]")
     parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--shells", action="store_true", help="cost of links of shells, and their bands")
     given = parser.parse_args()
+    if given.shells:
+        shells(given.repeat)
+        return
     try:
         import exudyn_beams as exudyn
     except ImportError:

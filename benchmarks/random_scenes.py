@@ -162,13 +162,21 @@ def rows_of(file: Path) -> dict[int, dict[str, Any]]:
 
 
 def write_references(rows: dict[int, dict[str, Any]]) -> None:
-    """Actual errors by seed: of each part at each tenth of the run, and what its reference is in doubt by."""
+    """Actual errors by seed: of each part at each tenth of the run, and what its reference is in doubt by.
+
+    What the file holds of other seeds stays.
+    """
     from random_statements import REFERENCE_COLUMNS, reference_row
 
+    stored: dict[int, dict[str, Any]] = {}
+    if STORED.exists():
+        with STORED.open(encoding="utf-8", newline="") as stream:
+            stored = {int(row["seed"]): row for row in csv.DictReader(stream)}
+    stored |= {seed: reference_row(row) for seed, row in rows.items()}
     with STORED.open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, REFERENCE_COLUMNS, lineterminator="\n")
         table.writeheader()
-        table.writerows(reference_row(rows[seed]) for seed in sorted(rows))
+        table.writerows(stored[seed] for seed in sorted(stored))
 
 
 def command_cost(seed: int) -> float | None:

@@ -1,6 +1,6 @@
 """Shells beside published figures, and a bracket beside solids and CalculiX.
 
-    python benchmarks/shells.py [--scenes | --roll-up] [--json FILE]
+    python benchmarks/shells.py [--scenes | --roll-up | --right-angle | --chain] [--json FILE]
 
 The standard set on three meshes, quadrangles and triangles of links and geometrically exact shells (`exact`, of small
 displacements), and the pre-twisted cantilever, thick and thin, with the drilling factors stated: ours / published.
@@ -9,7 +9,9 @@ width): shells of two meshes, hexahedra of 20 nodes about the same middle surfac
 shells where `ccx` is there.
 
 With `--scenes` instead the shipped scenes of large displacements, paths included (minutes); with `--roll-up` the three
-numerical models of the slides for the strip rolled up by 360 degrees, and what else the tangents take there.
+numerical models of the slides for the strip rolled up by 360 degrees, and what else the tangents take there; with
+`--right-angle` what iteration matrices take for the right-angle cantilever over 30 s; with `--chain` a strip on a hinge
+as ERLS, FFR and nodal shells on three meshes.
 """
 
 from __future__ import annotations
@@ -26,17 +28,20 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "erls"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fe_import"))
 import shell_meshes
 from shell_benchmarks import PUBLISHED, TWISTED, twisted
 from shell_brackets import calculix_bracket, shell_bracket, solid_bracket
 from shell_meshes import ShellGrid
+from test_shell_chains import arm, described, strip
 
 import erls
 from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.scenes.shell_mesh import corner_frames
 from erls.equations.nodal.shell import Shell, Shells
+from erls.equations.nodal.surfaces import corner_frames
 from erls.errors import SimulationError
+from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest, work
 from fe_import.elements.laminates import Laminate
 
@@ -124,6 +129,57 @@ def roll_up() -> dict[str, Any]:
     return found
 
 
+def right_angle() -> dict[str, Any]:
+    """Work of iteration matrices on three steps, over 30 s, on both groups."""
+    found: dict[str, Any] = {}
+    heads = f"{'iterations':>11}{'factored':>10}{'halved':>8}{'time [s]':>10}{'of update':>11}"
+    print(f"{'right-angle cantilever':<28}{heads}")
+    for group in ("SE(3)", "R3xSO(3)"):
+        for step in (0.1, 0.05, 0.025):
+            first = 0.0
+            for matrix in ("update", "auto", "frozen"):
+                name = f"{group}, {step:g} s, {matrix}"
+                changes = [f"simulation.{k}={v}" for k, v in
+                           {"group": group, "step": step, "iteration_matrix": matrix}.items()]  # fmt: skip
+                try:
+                    scene = erls.load_scene(DATA / "shells/right_angle.toml", changes)
+                    runs = [erls.simulate(scene, verdict=False) for _ in range(3)]
+                except SimulationError as problem:
+                    found[name] = str(problem)
+                    print(f"{name:<28}  {problem}", flush=True)
+                    continue
+                run = runs[-1]
+                assert isinstance(run, BodyMotion)
+                work, halved, wall = run.solution.work, run.solution.halved, min(r.wall_s for r in runs)
+                first = first or wall
+                own = work.newton_iterations / halved.given, work.factorizations / halved.given
+                found[name] = {"iterations": own[0], "factored": own[1], "halved": halved.steps, "wall_s": wall}
+                counts = f"{own[0]:11.2f}{own[1]:10.2f}{halved.steps:8d}"
+                print(f"{name:<28}{counts}{wall:10.2f}{wall / first:11.2f}", flush=True)
+    return found
+
+
+def chain() -> dict[str, Any]:
+    """Tips, over 0.1 s, of a strip of 600 by 60 by 3 mm that a hinge turns by 60 degrees in 0.2 s, under its weight."""
+    found: dict[str, Any] = {}
+    times = np.linspace(0.0, 0.1, 101)
+    print(f"{'strip':<8}{'deflects [m]':>14}{'ERLS-FFR [m]':>14}{'ERLS-nodal [m]':>16}{'nodal, ms a step':>18}")
+    for nx, ny in ((8, 2), (16, 4), (32, 8)):
+        with tempfile.TemporaryDirectory() as folder:
+            described(Path(folder), strip(nx, ny))
+            link = [{"name": "strip", "model": "link.toml"}]
+            rigid = erls.simulate(erls.load_scene(arm(Path(folder), "erls", links=[link[0] | {"flexible": False}])))
+            runs = {name: erls.simulate(erls.load_scene(arm(Path(folder), name)), verdict=False)
+                    for name in ("erls", "ffr", "nodal")}  # fmt: skip
+        at = {name: run.position("tip", times) for name, run in runs.items()}
+        bent = float(np.abs(at["erls"] - rigid.position("tip", times)).max())
+        off = [float(np.abs(at["erls"] - at[other]).max()) for other in ("ffr", "nodal")]
+        cost = 1e3 * runs["nodal"].wall_s / runs["nodal"].solution.work.steps
+        found[f"{nx} x {ny}"] = {"deflection_m": bent, "ffr_m": off[0], "nodal_m": off[1], "ms_per_step": cost}
+        print(f"{f'{nx} x {ny}':<8}{bent:14.4e}{off[0]:14.1e}{off[1]:16.1e}{cost:18.2f}", flush=True)
+    return found
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -131,10 +187,13 @@ def main() -> None:
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("--scenes", action="store_true", help="shipped scenes of large displacements")
     kinds.add_argument("--roll-up", action="store_true", help="tangents of the strip rolled up by 360 degrees")
+    kinds.add_argument("--right-angle", action="store_true", help="iteration matrices of the right-angle cantilever")
+    kinds.add_argument("--chain", action="store_true", help="a link of shells as ERLS, FFR and nodal shells")
     asked = parser.parse_args()
-    if asked.scenes or asked.roll_up:
-        _write(asked.json, scenes() if asked.scenes else roll_up())
-        return
+    for name, table in (("scenes", scenes), ("roll_up", roll_up), ("right_angle", right_angle), ("chain", chain)):
+        if getattr(asked, name):
+            _write(asked.json, table())
+            return
     shell_meshes.EXACT.append(exact_stiffness)
     found: dict[str, Any] = {}
     print(f"{'standard set':<34}" + "".join(f"{f'{n} x {n}':>10}" for n in MESHES["standard"]))

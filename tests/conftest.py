@@ -24,7 +24,7 @@ os.environ.setdefault("ERLS_CACHE", os.path.join(tempfile.gettempdir(), f"erls-t
 os.environ.setdefault("ERLS_KERNELS", os.environ["ERLS_CACHE"])
 
 
-_COMPILED = re.compile(r"^@kernel\(|= lane_kernels\(", re.MULTILINE)
+_COMPILED = re.compile(r"^@kernel\(|= lane_kernel\(", re.MULTILINE)
 
 
 def pytest_configure(config: pytest.Config) -> None:

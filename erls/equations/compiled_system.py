@@ -138,6 +138,17 @@ class CompiledSystem:
             handed(own and own.solve_complex, SOLVE_COMPLEX),
         )
 
+    @property
+    def gripped_places(self) -> IntArray:
+        """(q, 2) places in the working memory where forces leave rate and coordinate of each joint that may stick
+        (`erls.equations.switches.gripped`).
+        """
+        return np.zeros((0, 2), dtype=np.int64)
+
+    def gripped_laws(self, reals: Array) -> list[Array]:
+        """Views (9,) of the friction of these joints among constants."""
+        return []
+
     @cached_property
     def acceleration(self) -> Callable[..., int]:
         """Compiled when it is asked for: implicit integrators do without."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ if ENABLED:
     from erls.equations.compiled_system import INTEGERS, MATRIX, REALS
 
     _RESIDUALS = _t.void(_t.int64, REALS, INTEGERS, REALS, REALS, MATRIX, MATRIX, MATRIX, MATRIX)
-    _LEAVING = _t.void(_t.int64, REALS, INTEGERS, REALS, REALS, MATRIX, MATRIX, INTEGERS, REALS, MATRIX)
+    _LEAVING = _t.void(_t.int64, REALS, INTEGERS, REALS, REALS, MATRIX, MATRIX, MATRIX, INTEGERS, REALS, MATRIX)
     _MASSES = _t.void(_t.int64, REALS, INTEGERS, REALS, REALS, MATRIX, _t.float64[:, :, ::1])
 else:
     _RESIDUALS = _MASSES = _LEAVING = None
@@ -56,13 +57,14 @@ def leavings(
     t: Array,
     y: Array,
     v: Array,
+    a: Array,
     places: IntArray,
     spare: Array,
     out: Array,
 ) -> None:
-    """Rows of ``out``: what residuals at accelerations of zero, which go into ``spare`` (n,), leave in some places."""
+    """Rows of ``out``: what residuals, which go into ``spare`` (n,), leave in some places."""
     for k in range(len(t)):
-        call_residual(function, reals, integers, scratch, t[k], y[k], v[k], y[k, :0], spare)
+        call_residual(function, reals, integers, scratch, t[k], y[k], v[k], a[k], spare)
         for i in range(len(places)):
             out[k, i] = scratch[places[i]]
 
@@ -98,17 +100,32 @@ def residual_series(system: CompiledSystem, t: Array, y: Array, v: Array, a: Arr
 
 def residuals_leaving(
     residual: Any, reals: Array, integers: IntArray, scratch: Array, t: Array, y: Array, v: Array,
-    places: IntArray,
+    places: IntArray, a: Array | None = None,
 ) -> Array:  # fmt: skip
-    """(k, p) what a residual at states (k, n) and accelerations of zero leaves in p places of its working memory.
+    """(k, p) what a residual at states (k, n) leaves in p places of its working memory.
 
-    ``residual`` is a function, or its address.
+    ``residual`` is a function, or its address; accelerations (k, n) are zero unless given.
     """
     out = np.empty((len(t), len(places)))
-    t, y, v = (np.ascontiguousarray(x, dtype=float) for x in (t, y, v))
+    a = y[:, :0] if a is None else a
+    t, y, v, a = (np.ascontiguousarray(x, dtype=float) for x in (t, y, v, a))
     address = handed(residual, RESIDUAL)
-    leavings(address, reals, integers, scratch, t, y, v, places, np.empty(y.shape[1]), out)
+    leavings(address, reals, integers, scratch, t, y, v, a, places, np.empty(y.shape[1]), out)
     return out
+
+
+def places_within(memory: Array, views: Sequence[Array]) -> IntArray | None:
+    """(p,) places in flat memory of all numbers of some views, one after the other; None where one lies elsewhere."""
+    numbers = np.arange(memory.size)
+    found = []
+    for view in views:
+        first = (view.__array_interface__["data"][0] - memory.__array_interface__["data"][0]) // memory.itemsize
+        last = first + sum((n - 1) * step for n, step in zip(view.shape, view.strides, strict=True)) // memory.itemsize
+        if view.dtype != memory.dtype or not 0 <= first <= last < memory.size:
+            return None
+        steps = [step // memory.itemsize * numbers.itemsize for step in view.strides]
+        found.append(np.lib.stride_tricks.as_strided(numbers[first:], view.shape, steps).ravel())
+    return np.concatenate(found) if found else numbers[:0]
 
 
 def mass_series(system: CompiledSystem, t: Array, y: Array) -> Array:

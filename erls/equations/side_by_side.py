@@ -1,5 +1,4 @@
-"""Forces, mass matrices and tangents at many states by eightfold numbers (`erls.maths.lanes`): eight states, or seven
-directions, for about what one takes.
+"""Forces at many states by eightfold numbers (`erls.maths.lanes`): eight states for about what two take.
 
 Compiling that takes some ten seconds, once on a machine; for few states `erls.equations.series` is the way.
 """
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
-from erls.equations.series import mass_series, residual_series
+from erls.equations.series import residual_series
 from erls.maths.jit import ENABLED
 from erls.maths.so3 import Array
 
@@ -30,7 +29,7 @@ single numbers."""
 
 
 def eightfold_kernels(system: CompiledSystem, evaluations: int) -> Any:
-    """What `eightfold_forces` and `eightfold_tangents` take: the module of kernels of a system.
+    """What `eightfold_forces` takes: the module of kernels of a system.
 
     None where it has none, or where they are not worth it for so many evaluations of its forces.
     """
@@ -41,11 +40,6 @@ def eightfold_kernels(system: CompiledSystem, evaluations: int) -> Any:
 def eightfold_forces(kernels: Any, system: CompiledSystem, t: Array, y: Array, v: Array, a: Array) -> Array:
     """(k, n) forces out of balance at states, as `erls.equations.series.residual_series`."""
     return _in_eights(kernels.forces, residual_series, system, (system.size,), t, y, v, a)
-
-
-def eightfold_masses(kernels: Any, system: CompiledSystem, t: Array, y: Array) -> Array:
-    """(k, n, n) mass matrices at places, as `erls.equations.series.mass_series`."""
-    return _in_eights(kernels.masses, mass_series, system, (system.size, system.size), t, y)
 
 
 def _in_eights(
@@ -77,20 +71,6 @@ def _in_eights(
         some = np.flatnonzero(np.isin(np.arange(number) // WIDTH, apart))
         result[some] = one_by_one(system, *(x[some] for x in states))
     return np.asarray(result)
-
-
-def eightfold_tangents(
-    kernels: Any, system: CompiledSystem, t: Array, y: Array, v: Array, a: Array
-) -> tuple[Array, Array]:
-    """(k, n, n) ∂R/∂v and ∂R/∂y of the forces out of balance, exact."""
-    from erls.maths.lanes import eightfold
-
-    n = system.size
-    damping, stiffness = np.empty((2, len(t), n, n))
-    t, y, v, a = (np.ascontiguousarray(x, dtype=float) for x in (t, y, v, a))
-    own = eightfold(4, n), eightfold(1)
-    kernels.tangents(system.reals, system.integers, _scratch(system, 1), *own, t, y, v, a, stiffness, damping)
-    return damping, stiffness
 
 
 def _scratch(system: CompiledSystem, states: int) -> Array:

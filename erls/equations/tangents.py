@@ -1,10 +1,9 @@
 """Exact tangents of the equations of motion along a run: ∂R/∂a, ∂R/∂v and ∂R/∂y of R = M a - f at its knots.
 
 The iteration matrices of implicit methods leave out what only costs iterations (gyroscopic, centrifugal, geometric
-terms); derivatives of a run need all of it. Where a run is long enough to be worth their compilation, numbers that
-carry their derivatives along seven directions give it to rounding (`erls.equations.side_by_side`); otherwise R is
-evaluated at many states in one call (`erls.equations.series.residual_series`) and differenced as in
-`erls.equations.linearization`, there with its accuracy.
+terms); derivatives of a run need all of it. Where a run is long enough to be worth the second that it takes, a program
+made of R itself gives it to rounding (`erls.equations.taped`); otherwise R is evaluated at many states in one call
+(`erls.equations.series.residual_series`) and differenced as in `erls.equations.linearization`, there with its accuracy.
 """
 
 from __future__ import annotations
@@ -17,7 +16,8 @@ import numpy as np
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.linearization import difference_steps
 from erls.equations.series import mass_series, residual_series
-from erls.equations.side_by_side import eightfold_forces, eightfold_kernels, eightfold_masses, eightfold_tangents
+from erls.equations.side_by_side import eightfold_forces, eightfold_kernels
+from erls.equations.taped import taped_tangents
 from erls.maths.so3 import Array
 
 _ROUGHER = 5.0
@@ -50,7 +50,7 @@ class Evaluation:
     steps : (n,) array
         Of differences, `steps_of`.
     kernels : module or None
-        Of eightfold numbers.
+        Of eightfold numbers; None where these and tapes are not worth it.
     """
 
     steps: Array
@@ -70,9 +70,10 @@ class Evaluation:
     def tangents(self, system: CompiledSystem, knots: Knots) -> Tangents:
         """At all knots."""
         t, y, v, a = knots
-        if self.kernels is not None:
-            mass = eightfold_masses(self.kernels, system, t, y)
-            return Tangents(mass, *eightfold_tangents(self.kernels, system, *knots))
+        found = taped_tangents(system, *knots) if self.kernels is not None else None
+        if found is not None:
+            stiffness, damping, mass = (np.ascontiguousarray(x) for x in np.split(found, 3, axis=2))
+            return Tangents(mass, damping, stiffness)
         mass = mass_series(system, t, y)
         n = y.shape[1]
         damping, stiffness = np.empty((2, len(t), n, n))

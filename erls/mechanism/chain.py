@@ -128,8 +128,13 @@ class Mechanism:
 
     @property
     def sticks(self) -> bool:
-        """Whether friction holds any joint of the tree where it rests."""
-        return any(joint.forces.sticks for joint in self.joints)
+        """Whether friction holds any joint where it rests, of the tree or one that closes it."""
+        return any(joint.forces.sticks for joint in self.joints) or self.gripped
+
+    @property
+    def gripped(self) -> bool:
+        """Whether friction holds a joint that closes a loop: then it holds all by `erls.equations.switches.grips`."""
+        return any(loop.sticks for loop in self.loops)
 
     @property
     def limited(self) -> bool:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from erls.maths.contact_places import RATE, SLIDES
 from erls.maths.so3 import Array
 
 _FAR = 1e300
-_GIVE = 1e-9  # of the size of a mechanism: how far a point that sticks is moved by all that friction holds
+_GIVE = 1e-9  # of the size of a mechanism, or rad: how far what sticks is moved by all that friction holds
 _SETTLING = 1e-4  # s, in which it comes to rest there
 
 
@@ -45,6 +46,19 @@ class ContactLaw:
     def numbers(self) -> Array:
         """(4,) as in `erls.maths.contact_law`."""
         return np.array([self.stiffness, self.exponent, self.loss, self.transition_rate])
+
+
+def holding_friction(sliding: float, size: float) -> Array:
+    """(9,) friction of what may stick, as in `erls.maths.contact_law`, with a coefficient, or force, while it slides;
+    ``size`` is that of the mechanism [m], or 1 rad. Smooth at rates that count as rest until modes are set.
+    """
+    give = _GIVE * size
+    return np.array([sliding, give / _SETTLING, 0.0, 1.0, 0.0, 0.0, 0.0, give, _SETTLING])
+
+
+def constant_friction(force: float) -> Array:
+    """(9,) friction that stays as it is."""
+    return np.array([abs(force), 1.0, SLIDES, -np.copysign(1.0, force), 0.0, 0.0, 0.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -126,9 +140,10 @@ class PointContact:
         """(9,) friction as in `erls.maths.contact_law`, of a mechanism of that size [m]; until modes are set
         smooth at speeds that count as rest, where the point may stick.
         """
-        give = _GIVE * reach
-        rate = give / _SETTLING if self.sticks else self.friction_rate
-        return np.array([self.friction, rate, 0.0, 1.0, 0.0, 0.0, 0.0, give, _SETTLING])
+        result = holding_friction(self.friction, reach)
+        if not self.sticks:
+            result[RATE] = self.friction_rate
+        return result
 
     @property
     def axes(self) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from erls.maths.se3 import twist_transform
 from erls.maths.so3 import Array
-from erls.mechanism.contacts import Stops
+from erls.mechanism.contacts import Stops, holding_friction
 from erls.mechanism.drives import Drive
 from erls.mechanism.joint_types import Freedom
 from fe_import.model import InterfaceNode
@@ -62,6 +62,10 @@ class JointForces:
         if self.law == "smooth":
             return self.friction, self.transition_rate
         return self.friction if prescribed else 0.0, _SUDDEN
+
+    def grip(self, freedom: Freedom, size: float) -> Array:
+        """(9,) friction that may stick, as in `erls.maths.contact_law`, in a mechanism of that size [m]."""
+        return holding_friction(self.friction, 1.0 if freedom.turns else size)
 
     def force(self, angle: float, rate: float) -> float:
         """Force on the joint coordinate."""

@@ -14,6 +14,7 @@ from erls.maths.se3 import pose, twist_transform
 from erls.maths.so3 import Array, skew
 from erls.mechanism.second_order import LinkSecondOrder, link_second_order
 from fe_import.description.records import LinkDescription
+from fe_import.elements.link_shells import LinkShells
 from fe_import.modal.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.modal.model import FixedInterfaceModes, ModalModel
 from fe_import.model import InterfaceNode
@@ -56,6 +57,8 @@ class Link:
         Already within ``invariants``.
     description : LinkDescription or None
         Of a link made of beams, for formulations with elements of their own.
+    shells : LinkShells or None
+        Likewise of one made of shells.
     pieces : tuple of Link
         Substructures that a modal formulation solves for instead, without payloads; empty for a link in one piece.
     intermediate : bool
@@ -70,6 +73,7 @@ class Link:
     damping: Array
     payloads: tuple[Payload, ...] = ()
     description: LinkDescription | None = None
+    shells: LinkShells | None = None
     pieces: tuple[Link, ...] = ()
     intermediate: bool = False
 

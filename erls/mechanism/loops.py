@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from erls.maths.so3 import Array
 from erls.mechanism.drives import Drive
 from erls.mechanism.joint_types import Freedom, JointType
@@ -57,6 +59,15 @@ class LoopFreedom:
         return self.forces.active or bool(self.rotor_inertia) or self.drive.kind not in ("free", "motion")
 
     @property
+    def sticks(self) -> bool:
+        """Whether friction holds it where it rests."""
+        return self.forces.sticks and not self.drive.prescribed
+
+    def grip(self, size: float) -> Array:
+        """(9,) friction that may stick, see `JointForces.grip`; empty where it does not."""
+        return self.forces.grip(self.freedom, size) if self.sticks else np.zeros(0)
+
+    @property
     def counts_turns(self) -> bool:
         """Whether forces depend on how often it has turned, and how far it has advanced does not tell."""
         return self.freedom.turns and not self.freedom.pitch and bool(
@@ -76,6 +87,11 @@ class Loop:
     inner: LoopEnd
     outer: LoopEnd
     freedom: LoopFreedom | None = None
+
+    @property
+    def sticks(self) -> bool:
+        """Whether friction holds it where it rests."""
+        return self.freedom is not None and self.freedom.sticks
 
     @property
     def prescribed(self) -> bool:

@@ -28,6 +28,7 @@ def same_link(new: Link, old: Link) -> bool:
     loads = zip(new.payloads, old.payloads, strict=True)
     return (
         new.description is old.description
+        and new.shells is old.shells
         and all(map(np.array_equal, one, other))
         and all(_same_payload(*both) for both in loads)
     )

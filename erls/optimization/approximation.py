@@ -3,14 +3,21 @@
 With ω = (x / x₀)^p, flexibilities of sections are linear in ω, and masses, which load them, in μ = (x / x₀)^q: near a
 design the problem
 
-    min f(x(ω)) + ρ f₀ s   so that   measure(c₀ + J_s δω + J_m δμ) ≤ limit (1 + s),  s ≥ 0
+    min f(x(ω)) + ½ δx B δx + ρ f₀ s   so that   measure(c₀ + J_s δω + J_m δμ) ≤ limit (1 + s),  s ≥ 0
 
 hardly differs from the true one (p = -4, q = 2 for diameters). The slack s keeps it solvable; where it does not vanish,
-no design within reach holds the constraints.
+no design within reach holds the constraints. B takes back what the last step has shown these approximations to curve
+too much along it, so that steps along flat directions do not come short of their end again and again. With H d, the
+change of the slope of the Lagrange function that a step d was to bring, and y what came beyond it,
+
+    B = τ H d dᵀH / (dᵀH d),   τ = dᵀy / (dᵀH d), between -0.8 and 0:
+
+at -1 there would be no curvature left along d; elsewhere H + B stays convex as H is.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,6 +34,8 @@ _MET = 1e-8
 _ACTIVE = 2e-3  # of the limit: rows that may hold a design
 _BOUND = 1e-6  # of the distance of the bounds
 _LEAST = 1e-9  # of the objective's slope: multipliers that are rounding
+_SOFTEST = -0.8  # τ
+_SEEN = 1e-8  # of slopes and steps: differences that tell nothing
 
 
 class Powers:
@@ -93,10 +102,20 @@ class Step:
 
 
 class Approximation:
-    """About a differentiated design."""
+    """About a differentiated design.
 
-    def __init__(self, rules: Rules, base: Evaluation) -> None:
+    Parameters
+    ----------
+    rules : Rules
+    base : Evaluation
+        Differentiated.
+    bent : (v, v) array, optional
+        B.
+    """
+
+    def __init__(self, rules: Rules, base: Evaluation, bent: Array | None = None) -> None:
         self.rules, self.base, self.powers = rules, base, Powers(rules, base.x)
+        self.bent = np.zeros((len(base.x),) * 2) if bent is None else bent
         self._ones = np.ones(len(base.x))
         rate = self.powers.rate(self._ones)
         self._flexible = [jacobian * rate for jacobian in base.flexible]
@@ -118,11 +137,12 @@ class Approximation:
         assert quadratic is not None
         change = self.powers.back(omega) - self.base.x
         timed, slopes = self.rules.objective.timed(self.components(omega), self.rules.measures)
-        slope = quadratic.slope(change) * self.powers.rate(omega)
+        value = quadratic.value(change) + float(change @ self.bent @ change) / 2
+        slope = (quadratic.slope(change) + self.bent @ change) * self.powers.rate(omega)
         for k, own in enumerate(slopes):
             if own.any():
                 slope = slope + np.einsum("nq,nqv->v", own, self._linear(omega, k, slice(None))[1])
-        return quadratic.value(change) + timed, slope
+        return value + timed, slope
 
     def rows(self, omega: Array, k: int, rows: IntArray) -> tuple[Array, Array]:
         """Shares (n,) of the limit of some rows of constraint k, with slopes (n, v); of each place where aggregated."""
@@ -186,6 +206,35 @@ class Approximation:
         found = [one._replace(multiplier=float(m / s)) for one, m, s in zip(known, multipliers, scales, strict=True)]
         kept = [one for one, m in zip(found, multipliers, strict=True) if m > _LEAST * size]
         return kept, float(left) / size
+
+    def slope(self, omega: Array, held: Sequence[Held]) -> Array:
+        """(v,) of the Lagrange function by the variables, at multipliers."""
+        result = self.objective(omega)[1]
+        for k in range(len(self.rules.limits)):
+            own = [h for h in held if h.row >= 0 and h.number == k]
+            if not own:
+                continue
+            at = np.array([h.row for h in own])
+            if self.rules.aggregated[k]:
+                places = self.rules.groups[k][at]
+                slopes = self.rows(omega, k, np.arange(len(self.rules.groups[k])))[1][places]
+            else:
+                slopes = self.rows(omega, k, at)[1]
+            result = result + np.array([h.multiplier for h in own]) @ slopes
+        return np.asarray(result / self.powers.rate(omega))
+
+    def next(self, found: Evaluation) -> Approximation:
+        """About the differentiated design that a step from this one led to, with what the step tells of curvature."""
+        there, plain = Approximation(self.rules, found), Approximation(self.rules, self.base)
+        omega, gone, held = self.powers.to(found.x), found.x - self.base.x, self.held(self.powers.to(found.x))[0]
+        foreseen = plain.slope(omega, held)
+        own = foreseen - plain.slope(self._ones, held)
+        curvature = float(own @ gone)
+        if curvature <= _SEEN * float(np.linalg.norm(own) * np.linalg.norm(gone)):
+            return there
+        beyond = float((there.slope(self._ones, held) - foreseen) @ gone)
+        share = min(max(beyond / curvature, _SOFTEST), 0.0)
+        return Approximation(self.rules, found, share / curvature * np.outer(own, own))
 
     def _shares(self, omega: Array, k: int) -> Array:
         return self.rules.shares(self.components(omega))[k]

@@ -85,11 +85,14 @@ class Outlines(NamedTuple):
         Whether its section is round.
     links : (e,) array
         Number of its link.
+    half : (e, 2) array
+        Half the height and half the width [m].
     """
 
     factors: Array
     rounds: Array
     links: Array
+    half: Array
 
 
 def outlines_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, x: Array) -> Outlines:
@@ -104,12 +107,13 @@ def outlines_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, 
         links.kept("outlines", k, x, partial(_outlines, number, description, settings))
         for k, number, description in _described(mechanism, links, x)
     ]
-    return Outlines(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    none = Outlines(np.zeros((0, 3)), np.zeros(0, dtype=bool), np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
+    return Outlines(*(np.concatenate(parts) for parts in zip(none, *found, strict=True)))
 
 
 def _outlines(number: int, description: LinkDescription, settings: Simulation) -> Outlines:
     """Of the elements of a link."""
-    frame, factors, rounds = description.frame, [], []
+    frame, factors, rounds, half = description.frame, [], [], []
     assert frame is not None
     mesh = frame_parts(description, frame, description.name, elements_of(settings)).mesh
     metre = unit_factors(description, description.name)[0]
@@ -121,7 +125,9 @@ def _outlines(number: int, description: LinkDescription, settings: Simulation) -
             own = mesh.elements[e].section
             factors.append((1 / own.area, height / own.inertia_y, width / own.inertia_z))
             rounds.append(isinstance(section, (Circular, Tubular)))
-    return Outlines(np.array(factors), np.array(rounds, dtype=bool), np.full(len(rounds), number))
+            half.append((height, width))
+    count = len(rounds)
+    return Outlines(np.array(factors), np.array(rounds, dtype=bool), np.full(count, number), np.array(half))
 
 
 def _half_sizes(section: Section, where: str) -> tuple[float, float]:

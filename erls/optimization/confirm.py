@@ -13,6 +13,7 @@ from erls.optimization.design import scene_at
 from erls.optimization.dynamics import Dynamics
 from erls.optimization.equivalent_loads import flexible
 from erls.optimization.memory import Memory
+from erls.optimization.pictures import drawn
 from erls.optimization.problem import Problem
 from erls.optimization.result import Confirmed
 from erls.simulation.simulate import simulate
@@ -83,6 +84,8 @@ def _looked(
         values[limit.name], at[limit.name] = float(curves[limit.name][worst]), float(times[worst])
         if limit.limit is not None:
             violation = max(violation, float(rows[worst]) / limit.limit - 1)
-    return Confirmed(name, values, at, violation, instants=times, curves=curves)
+    settings = scene.record.simulation
+    shapes = () if changes else drawn(motion, settings, looking.numbers, x)
+    return Confirmed(name, values, at, violation, instants=times, curves=curves, shapes=shapes)
 
 

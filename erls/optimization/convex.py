@@ -92,9 +92,10 @@ def sequential_convex(
 
     moves = np.full(len(x), settings.move_limit)
     earlier = before = np.zeros(len(x))
+    near: Approximation | None = None
     while True:
         current = evaluator.differentiate(current) if current.quadratic is None else current
-        near = Approximation(rules, current)
+        near = Approximation(rules, current) if near is None else near.next(current)
         while True:
             reach = moves * np.maximum(np.abs(current.x), 1e-3 * span)
             step = near.solved(np.maximum(rules.lower, current.x - reach), np.minimum(rules.upper, current.x + reach))

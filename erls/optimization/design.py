@@ -16,13 +16,13 @@ from erls.scene.build import build_mechanism, link_description, link_model
 from erls.scene.chain import Scene
 from erls.scene.overrides import apply_override
 from erls.scene.read import checked
+from erls.sensitivity.parameters import leaves_nodes
 from fe_import.description.numbers import tables_of
 from fe_import.description.records import LinkDescription
 from fe_import.modal.model import ModalModel
 
 Message = Callable[[str], None]
 
-_OF_SECTIONS = ("sections", "materials", "masses", "damping", "temperature_change")
 _OF_FORCES = (
     "stiffness", "damping", "friction", "motor", "proportional_gain", "derivative_gain", "torque_limit", "profiles",
 )  # fmt: skip
@@ -72,7 +72,7 @@ def moving(problem: Problem) -> list[str]:
 
 def _stays(key: str, within: str) -> bool:
     if within:
-        return within.split(".")[0] in _OF_SECTIONS
+        return leaves_nodes(within)
     table, *fields = key.split(".")
     return table in ("payloads", "gravity", "loads") or (
         table in ("joints", "loops") and not {*fields}.isdisjoint(_OF_FORCES)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.equations.nodal.equations import Nodal
+from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.optimization.design import Design, Designs, Message, run_of, scene_at
@@ -20,7 +21,7 @@ from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.memory import Memory
 from erls.optimization.objective import Objective
 from erls.optimization.problem import Problem
-from erls.optimization.records import FrequencyLimit
+from erls.optimization.records import FrequencyLimit, VibrationLimit
 from erls.run.chain.run import ChainRun
 
 _STEP = 1e-4  # of variables: what they change of a measure by themselves
@@ -34,6 +35,16 @@ class Place:
     mechanism: Mechanism
     nodal: Nodal
     frozen: Frozen
+
+
+def _no_way_along(constraint: VibrationLimit, variable: str) -> SceneError:
+    """The mechanism would vibrate at other places, by which there is no derivative."""
+    return SceneError(
+        Cause.BAD_FIELD,
+        f"frequencies of the mechanism have no derivative by variable {variable}, which changes lengths or drives",
+        where=f"constraints.{constraint.name}",
+        remedy="take one of them out, or limit frequencies of links",
+    )
 
 
 class Dynamics:
@@ -69,8 +80,12 @@ class Dynamics:
         self.times = np.unique(np.concatenate([*samples, [0.0]]))
         self.at = [np.searchsorted(self.times, own) for own in samples]
         self._weighs = any(p.key.split(".")[0] in ("payloads", "joints") for p in problem.parameters) and any(
-            isinstance(c, FrequencyLimit) for c in record.constraints
+            isinstance(c, (FrequencyLimit, VibrationLimit)) for c in record.constraints
         )  # payloads and motors on links
+        if self.designs.moving:
+            for constraint in record.constraints:
+                if isinstance(constraint, VibrationLimit):
+                    raise _no_way_along(constraint, self.designs.moving[0])
         self._places: list[Place] = []
         self._ran: ChainRun | None = None
         self.start = self.designs.at(problem.start)
@@ -115,9 +130,10 @@ class Dynamics:
         return self._beside(self.start, x)
 
     def _limits(self, mechanism: Mechanism, x: Array) -> list[Limit]:
-        nodal = self.place(mechanism).nodal
+        place = self.place(mechanism)
         given = zip(self.problem.record.constraints, self.at, strict=True)
-        return [limit_of(c, at, self.problem, mechanism, nodal, self.numbers, x) for c, at in given]
+        about = self.problem, mechanism, place.nodal, place.frozen, self.numbers
+        return [limit_of(c, at, *about, x) for c, at in given]
 
     def motion_of(self, run: ChainRun) -> Motion:
         """A run at all times."""

@@ -10,6 +10,7 @@ components are told in modes of a design, ``basis`` gives these, for whoever com
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -26,17 +27,20 @@ from erls.optimization.beams import elements_by_link, outlines_of, sections_of
 from erls.optimization.eigenvalues import MODES, Basis, HeldLink, LargestEigenvalue, basis_of, components, held_link
 from erls.optimization.frozen import Frozen, of_beams
 from erls.optimization.link_numbers import LinkNumbers
-from erls.optimization.measures import EdgedSection, Length, Measure, RoundSection
-from erls.optimization.problem import Problem, links_of, terms_of
+from erls.optimization.measures import AbsoluteSum, Length, Measure, RoundSection
+from erls.optimization.problem import Problem, driven_joints, links_of, terms_of
 from erls.optimization.records import (
     AnyConstraint,
     BucklingLimit,
     DeflectionLimit,
     EffortLimit,
     FrequencyLimit,
+    PowerLimit,
     StressLimit,
     Term,
+    VibrationLimit,
 )
+from erls.optimization.vibrations import held_mechanism
 from erls.run.chain.instants import Instants
 from erls.run.chain.run import ChainRun
 from fe_import.files.toml import choose
@@ -200,7 +204,7 @@ class Stress(Limit):
         self._factors = outlines.factors[wanted]
         self._stiffness = sections_of(mechanism, settings, numbers, x)[wanted]
         rounds = outlines.rounds[wanted]
-        self.measure: Measure = RoundSection() if rounds.all() else EdgedSection()  # which is never below it
+        self.measure: Measure = RoundSection() if rounds.all() else AbsoluteSum()  # which is never below it
 
     def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
         """(k e 2, 3)"""
@@ -241,29 +245,51 @@ class Effort(Limit):
         return np.zeros((len(self.at), 1))
 
 
+class Power(Limit):
+    """Of drives, one component for each joint."""
+
+    measure: Measure = AbsoluteSum()
+    of_shape, of_sections = False, False
+
+    def __init__(self, record: PowerLimit, at: IntArray, joints: Sequence[str]) -> None:
+        self.name, self.limit, self.at, self._joints = record.name, record.limit, at, joints
+        self.groups = np.zeros(len(at), dtype=np.int64)
+
+    def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
+        """(k, joints)"""
+        run, times = motion.run, motion.frozen.times[self.at]
+        assert run is not None
+        return np.stack([run.joint_effort(one, times) * run.joint_rate(one, times) for one in self._joints], axis=1)
+
+    def increments(self, frozen: Frozen, r: Array, w: Array, basis: Bases | None = None) -> Array:
+        """(k, joints) loads that are held change nothing."""
+        return np.zeros((len(self.at), len(self._joints)))
+
+
 class Frequency(Limit):
-    """(f₀/f)² of links, one row for each."""
+    """(f₀/f)² of links, one row for each; or of the whole mechanism, one row for each time."""
 
     measure: Measure = LargestEigenvalue()
     of_shape, of_sections = True, True
 
-    def __init__(self, record: FrequencyLimit, at: IntArray, held: list[HeldLink]) -> None:
+    def __init__(self, record: FrequencyLimit | VibrationLimit, at: IntArray, held: list[HeldLink]) -> None:
         self.name, self.at, self._asked, self._held = record.name, at, record.limit or 1.0, held
         self.limit = None if record.limit is None else 1.0
-        self.groups = np.arange(len(held))
+        whole = isinstance(record, VibrationLimit)
+        self.groups = np.zeros(len(held), dtype=np.int64) if whole else np.arange(len(held))
 
     def basis(self, motion: Motion, r: Array | None = None, w: Array | None = None) -> Bases:
-        """Modes of each link."""
+        """Modes of each."""
         return [basis_of(link.stiffness, [link.mass]) for link in self._held]
 
     def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
-        """(links, q²)"""
+        """(n, q²)"""
         pairs = zip(self._held, basis or self.basis(motion), strict=True)
         found = [components(link.stiffness, [link.mass], own) for link, own in pairs]
         return (2 * np.pi * self._asked) ** 2 * np.concatenate(found)
 
     def increments(self, frozen: Frozen, r: Array, w: Array, basis: Bases | None = None) -> Array:
-        """(links, q²) displacements change nothing."""
+        """(n, q²) displacements change nothing."""
         return np.zeros((len(self._held), MODES**2))
 
     def told(self, values: Array) -> Array:
@@ -343,6 +369,7 @@ def limit_of(
     problem: Problem,
     mechanism: Mechanism,
     nodal: Nodal,
+    frozen: Frozen,
     numbers: LinkNumbers,
     x: Array,
 ) -> Limit:
@@ -353,6 +380,10 @@ def limit_of(
         return Stress(record, at, mechanism, problem, numbers, x)
     if isinstance(record, EffortLimit):
         return Effort(record, at)
+    if isinstance(record, PowerLimit):
+        return Power(record, at, driven_joints(record, problem.scene))
+    if isinstance(record, VibrationLimit):
+        return Frequency(record, at, held_mechanism(mechanism, nodal, frozen, numbers, x, at))
     held = [held_link(problem, mechanism, numbers, x, k, record.ends) for k in links_of(record, problem.scene)]
     if isinstance(record, FrequencyLimit):
         return Frequency(record, at, held)

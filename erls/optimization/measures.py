@@ -62,13 +62,13 @@ class RoundSection:
         return np.concatenate([np.sign(components[:, :1]), bending], axis=1)
 
 
-class EdgedSection:
-    """|N| + |My| + |Mz|: that of a rectangular one."""
+class AbsoluteSum:
+    """Σ |c|: of powers; of |N| + |My| + |Mz| it is the largest normal stress of a rectangular section."""
 
     def value(self, components: Array) -> Array:
         """(n,)"""
         return np.asarray(np.abs(components).sum(axis=1))
 
     def slope(self, components: Array) -> Array:
-        """(n, 3)"""
+        """(n, q)"""
         return np.sign(components)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from erls.errors import SceneError
 from erls.maths.so3 import Array
 from erls.optimization import equivalent_loads
 from erls.optimization.aggregates import Aggregates
@@ -26,6 +27,7 @@ OPTIMIZERS: dict[str, Optimizer] = {
     "trust-constr": scipy_method("trust-constr"),
 }
 _INNER = 200  # static analyses of one set of loads
+_FAR, _LOADED = 0.5, 8  # of a limit: starts beyond go on by loads first; so many runs at most
 _WORSE, _DAMPED = 0.9, 0.5  # designs that go to and fro: less than this nearer, and what is left of a step then
 
 Told = Callable[[str, int, Analysis], None]
@@ -59,6 +61,30 @@ class Way:
     excess: tuple[float, ...] = ()
 
 
+def _nearer(dynamics: Dynamics, x: Array, way: Way, told: Callable[[Analysis], None]) -> Array:
+    """A start that is far beyond its limits, brought nearer by equivalent static loads where these apply.
+
+    Soft designs vibrate so much that derivatives of their motion tell little of designs further on.
+    """
+    try:
+        equivalent_loads.refuse(dynamics, "esl-system")
+    except SceneError:
+        return x
+    settings, span, change = dynamics.problem.record.settings, dynamics.rules.upper - dynamics.rules.lower, np.inf
+    for _ in range(min(_LOADED, settings.most_analyses - 1)):
+        found, motion = dynamics.analysed(x)
+        if found.violation <= _FAR:
+            break
+        way.history.append(Analysis(x, found.objective, found.violation, change))
+        told(way.history[-1])
+        loads = FrozenLoads(dynamics, x, motion, True)
+        inner = OPTIMIZERS[settings.optimizer](loads, x, settings, _INNER)
+        way.inner += loads.evaluations
+        way.history[-1] = replace(way.history[-1], inner=loads.evaluations)
+        change, x = relative_change(x, inner.next, span), inner.next
+    return x
+
+
 def integrated(dynamics: Dynamics, x: Array, way: Way, told: Callable[[Analysis], None]) -> None:
     """The optimizer sees runs and their derivatives."""
     settings = dynamics.problem.record.settings
@@ -68,7 +94,8 @@ def integrated(dynamics: Dynamics, x: Array, way: Way, told: Callable[[Analysis]
         told(way.history[-1])
 
     seen = Aggregates(dynamics) if settings.derivatives == "aggregates" else dynamics
-    found = OPTIMIZERS[settings.optimizer](seen, x, settings, settings.most_analyses, tell)
+    x = _nearer(dynamics, x, way, told)
+    found = OPTIMIZERS[settings.optimizer](seen, x, settings, settings.most_analyses - len(way.history), tell)
     way.status, way.last, way.x, way.rules = found.status, found.best, found.best.x, seen.rules
     if isinstance(seen, Aggregates):
         way.excess = tuple(seen.excess(found.best.x))

@@ -90,6 +90,7 @@ class Objective:
                 chosen = [not goal.links or name in goal.links for name in links]
                 self._weights += goal.weight * np.array(chosen, dtype=float)
         self._over_time = [goal for goal in self.goals if goal.quantity != "mass"]
+        self._spans = {c.name: _spans(problem.times(c)) for c in problem.record.constraints}
 
     def mass(self, x: Array) -> float:
         """Of all links [kg]."""
@@ -121,6 +122,11 @@ class Objective:
         for goal in self._over_time:
             k = self._names.index(goal.of)
             values = measures[k].value(components[k])
+            if goal.quantity == "energy":
+                span = self._spans[goal.of]
+                total += goal.weight * float(span @ values)
+                slopes[k] += goal.weight * span[:, None] * measures[k].slope(components[k])
+                continue
             power = 2.0 if goal.over_time == "rms" else _SHARP
             largest = max(float(values.max(initial=0.0)), 1e-300)
             mean = float(np.mean((values / largest) ** power))
@@ -130,3 +136,7 @@ class Objective:
         return total, slopes
 
 
+def _spans(times: Array) -> Array:
+    """(k,) time that each sample stands for in an integral [s]: half of what lies between it and its neighbours."""
+    apart = np.diff(times)
+    return np.asarray((np.append(apart, 0.0) + np.append(0.0, apart)) / 2)

@@ -11,6 +11,7 @@ import numpy as np
 
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
+from erls.mechanism.drives import FreeDrive
 from erls.optimization.records import (
     DERIVATIVES,
     ENDS,
@@ -27,16 +28,19 @@ from erls.optimization.records import (
     EffortLimit,
     FrequencyLimit,
     Goal,
+    PowerLimit,
     ProblemRecord,
     StressLimit,
     Term,
     Variable,
+    VibrationLimit,
 )
 from erls.run.file import self_contained
 from erls.scene.build import link_description
 from erls.scene.chain import Scene
 from erls.scene.checks import bad, check_names, positive
 from erls.scene.integrators import FIXED_STEP
+from erls.scene.links import Link
 from erls.scene.overrides import apply_override, in_scene
 from erls.scene.read import load_chain
 from erls.sensitivity.parameters import Parameter, parameters_of
@@ -269,7 +273,7 @@ def _check_constraint(constraint: AnyConstraint, scene: Scene, place: str) -> No
             choose(name, names, f"{place}.links[{k}]", SceneError)
         for k in links_of(constraint, scene):
             link = record.links[k]
-            frame = bool(link.model) and link_description(scene, link).description.frame is not None
+            frame = bool(link.model) and _framed(scene, link)
             if isinstance(constraint, FrequencyLimit) and constraint.ends == "cantilever" and link.model:
                 continue
             if not frame:
@@ -277,8 +281,28 @@ def _check_constraint(constraint: AnyConstraint, scene: Scene, place: str) -> No
                 raise bad(f"{place}.links", message, link.name, remedy)
         if not links_of(constraint, scene):
             raise bad(f"{place}.links", "no link deforms", None, "name links that are made of beams")
-    else:
+    elif isinstance(constraint, VibrationLimit):
+        for link in record.links:
+            if link.flexible and not link.rigid and not (link.model and _framed(scene, link)):
+                message, remedy = "frequencies of the mechanism are those of beams", "use the frequency of each link"
+                raise bad(f"{place}.type", message, link.name, remedy)
+    elif isinstance(constraint, PowerLimit):
+        for k, name in enumerate(constraint.joints):
+            choose(name, [joint.name for joint in record.joints], f"{place}.joints[{k}]", SceneError)
+        if not driven_joints(constraint, scene):
+            raise bad(f"{place}.joints", "no joint has a drive", None, "name joints that have one")
+    elif isinstance(constraint, EffortLimit):
         choose(constraint.joint, [joint.name for joint in record.joints], f"{place}.joint", SceneError)
+
+
+def driven_joints(constraint: PowerLimit, scene: Scene) -> list[str]:
+    """Names of the joints whose power counts."""
+    return constraint.joints or [j.name for j in scene.record.joints if not isinstance(j.drive, FreeDrive)]
+
+
+def _framed(scene: Scene, link: Link) -> bool:
+    """Whether the description of a link is one of beams."""
+    return link_description(scene, link).description.frame is not None
 
 
 def terms_of(constraint: DeflectionLimit) -> list[Term]:
@@ -305,7 +329,7 @@ def _check_goal(goal: Goal, record: ProblemRecord, scene: Scene, place: str) -> 
         if goal.of:
             raise bad(f"{place}.of", "mass is that of links", goal.of, "remove it")
         return
-    kinds = {"deflection": DeflectionLimit, "effort": EffortLimit, "stress": StressLimit}
+    kinds = {"deflection": DeflectionLimit, "effort": EffortLimit, "stress": StressLimit, "energy": PowerLimit}
     known = [c.name for c in record.constraints if isinstance(c, kinds[goal.quantity])]
     choose(goal.of, known, f"{place}.of", SceneError)
 

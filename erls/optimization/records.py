@@ -6,7 +6,7 @@ from erls.scene.records import Record
 
 METHODS = ("integrated", "esl-system", "esl-component")
 OPTIMIZERS = ("scp", "slsqp", "trust-constr")
-QUANTITIES, OVER_TIME = ("mass", "deflection", "effort", "stress"), ("peak", "rms")
+QUANTITIES, OVER_TIME = ("mass", "deflection", "effort", "stress", "energy"), ("peak", "rms")
 TIMES = ("all", "active", "aggregate")
 DERIVATIVES = ("components", "aggregates")
 EVERY_STEP = "every-step"
@@ -50,11 +50,12 @@ class Goal(Record, frozen=True):
     ----------
     quantity : str
         ``mass`` of links [kg], without payloads; ``deflection`` [m], ``effort`` [N m or N] or ``stress`` [Pa] of the
-        constraint of this name, which then needs no limit.
+        constraint of this name, which then needs no limit; ``energy`` [J]: what drives give and take, the integral of a
+        constraint on ``power`` over its samples.
     of : str
-        With deflection, effort and stress: the name of that constraint.
+        With all but mass: the name of that constraint.
     over_time : str
-        Of these: ``peak``, its largest value, or ``rms``.
+        Of deflection, effort and stress: ``peak``, the largest value, or ``rms``.
     links : list of str
         Of ``mass``: those that count; all unless given.
     weight : float
@@ -151,6 +152,18 @@ class EffortLimit(Constraint, frozen=True, kw_only=True, tag="effort"):
     joint: str
 
 
+class PowerLimit(Constraint, frozen=True, kw_only=True, tag="power"):
+    """Power of drives, given or taken, all joints added up [W]: effort times rate.
+
+    Attributes
+    ----------
+    joints : list of str
+        Names of those that count; all with a drive unless given.
+    """
+
+    joints: list[str] = []
+
+
 class FrequencyLimit(Constraint, frozen=True, kw_only=True, tag="frequency"):
     """Lowest natural frequency of each link [Hz], held at its ends, payloads on it included: beams, solids and shells.
 
@@ -187,7 +200,15 @@ class BucklingLimit(Constraint, frozen=True, kw_only=True, tag="buckling"):
     ends: str = "cantilever"
 
 
-AnyConstraint = DeflectionLimit | StressLimit | EffortLimit | FrequencyLimit | BucklingLimit
+class VibrationLimit(Constraint, frozen=True, kw_only=True, tag="vibration"):
+    """Lowest natural frequency of the whole mechanism [Hz], at its samples: links of beams about their rigid motion,
+    not bent and without loads, joints held by their motions, springs and controllers.
+    """
+
+
+AnyConstraint = (
+    DeflectionLimit | StressLimit | EffortLimit | PowerLimit | FrequencyLimit | BucklingLimit | VibrationLimit
+)
 
 
 class Published(Record, frozen=True):

@@ -9,6 +9,7 @@ import numpy as np
 
 from erls.maths.so3 import Array
 from erls.optimization.optimality import Active
+from erls.optimization.pictures import Drawn
 from erls.optimization.problem import Problem
 
 CONVERGED, INFEASIBLE, STALLED, BUDGET, INTERRUPTED = "converged", "infeasible", "stalled", "budget", "interrupted"
@@ -64,6 +65,8 @@ class Confirmed:
     instants : (k,) array
     curves : dict of str to (k,) array
         Largest value of each constraint at these times.
+    shapes : tuple of Drawn
+        What the links look like at some of these times; nothing where that was not asked for.
     """
 
     formulation: str
@@ -73,6 +76,7 @@ class Confirmed:
     failure: str = ""
     instants: Array = field(default_factory=lambda: np.zeros(0))
     curves: dict[str, Array] = field(default_factory=dict)
+    shapes: tuple[Drawn, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from erls.optimization.pictures import frames_among
 from erls.optimization.result import REASONS, Analysis, Confirmed, Optimization, Outcome
-from erls.report.html import Curve, Plot, figure, heading, page, paragraph
+from erls.report.html import Curve, Plot, Shape, figure, heading, page, paragraph, view
 from erls.report.html import table as html_table
 from erls.report.tables import table
 
@@ -38,6 +39,7 @@ def optimum_page(found: Optimization) -> str:
     parts += [heading("Designs"), html_table(_header(found), _rows(found))]
     parts += [heading(_AGAIN), html_table(_confirmed_header(found), _confirmed_rows(found))]
     parts += [figure(plot) for plot in _motions(found)]
+    parts += [heading("Start and optimum"), *_pictures(found)]
     for o in found.outcomes:
         parts += [heading(f"{o.method}: what holds the design"), html_table(_ACTIVE, _active_rows(found, o))]
         if o.further:
@@ -163,6 +165,16 @@ def _motions(found: Optimization) -> list[Plot]:
         if curves:
             plots.append(Plot(f"{c.name} during the motion", "t [s]", c.name, curves, limit=c.limit))
     return plots
+
+
+def _pictures(found: Optimization) -> Iterator[str]:
+    """The mechanism at the start and at each optimum, with true sections."""
+    shown = [("start", found.begun)] + [(o.method, o.confirmed[0]) for o in found.outcomes if o.confirmed]
+    for label, one in shown:
+        if one is not None and one.shapes:
+            times = one.instants[frames_among(len(one.instants))]
+            shapes = [Shape(s.name, s.lines, s.triangles, s.rest, s.moved) for s in one.shapes]
+            yield view(f"{label}: turn it by dragging; colours show how far links bend", "t", "s", times, shapes)
 
 
 def _curve(label: str, found: Confirmed, name: str, dashed: bool) -> list[Curve]:

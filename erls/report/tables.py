@@ -135,7 +135,7 @@ def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
     s = run.summary(times or [run.end])
     drift = s["energy"]["max_drift"]
     if "nodes" in s:
-        model = f"{s['elements']} beam elements, {s['nodes']} nodes, {s['formulation']}"
+        model = f"{s['elements']} elements, {s['nodes']} nodes, {s['formulation']}"
     else:
         variant = next(f"{name.replace('_', ' ')} {s[name]}" for name in ("gauge", "body_frame") if name in s)
         model = f"{s['elastic_coordinates']} elastic coordinates "

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import platformdirs
@@ -32,6 +32,7 @@ from erls.scene.links import Link as LinkRecord
 from fe_import.cache import reduce_cached
 from fe_import.description.link import LinkFile, load_link
 from fe_import.description.records import LinkDescription
+from fe_import.elements.link_shells import LinkShells
 from fe_import.errors import FEImportError, ReportedError
 from fe_import.files.toml import choose
 from fe_import.modal.damping import damping_ratios
@@ -42,6 +43,8 @@ from fe_import.model import InterfaceNode
 from fe_import.models.inertia import inertia_matrix
 
 Message = Callable[[str], None]
+Elements: TypeAlias = LinkDescription | LinkShells | None
+"""What a link is made of, as far as formulations with elements of their own ask for it."""
 T = TypeVar("T")
 
 
@@ -65,7 +68,7 @@ def build_mechanism(
     scene: Scene,
     tell: Message = lambda text: None,
     models: Sequence[ModalModel] | None = None,
-    descriptions: Sequence[LinkDescription | None] = (),
+    descriptions: Sequence[Elements] = (),
     pieces: Sequence[Sequence[ModalModel]] = (),
 ) -> Built:
     """Read or reduce the links and put the mechanism together.
@@ -77,8 +80,9 @@ def build_mechanism(
         Told about each step that takes time.
     models : sequence of ModalModel, optional
         Modal models of the links, instead of the ones that the scene names (a run file holds its own).
-    descriptions : sequence of LinkDescription or None
-        With ``models``: descriptions of the links that are made of beams, as far as they are known.
+    descriptions : sequence of LinkDescription, LinkShells or None
+        With ``models``: descriptions of the links that are made of beams, and shells of others, as far as they are
+        known.
     pieces : sequence of sequences of ModalModel
         With ``models``: those of the substructures of each link; empty for a link in one piece.
 
@@ -90,11 +94,11 @@ def build_mechanism(
     record, file = scene.record, str(scene.path)
     rows = build_joints(scene)  # first: a faulty one is found before time goes into reductions
     if models is None:
-        models, descriptions = link_models(scene, tell), _beam_descriptions(scene)
+        models, descriptions = link_models(scene, tell), _elements(scene)
         pieces = _pieces(scene, models, tell)
     links = [
-        replace(_link(link, model, k, file), description=description)
-        for k, (link, model, description) in enumerate(
+        _with_elements(_link(link, model, k, file), known)
+        for k, (link, model, known) in enumerate(
             zip(record.links, models, descriptions or [None] * len(models), strict=True)
         )
     ]
@@ -161,13 +165,27 @@ def _pieces(scene: Scene, models: Sequence[ModalModel], tell: Message) -> list[t
     return result
 
 
-def _beam_descriptions(scene: Scene) -> list[LinkDescription | None]:
-    """Descriptions of the links that are made of beams."""
-    found = [
-        load_link(scene.folder / link.model, changes=link.changes).description if link.model else None
-        for link in scene.record.links
-    ]
-    return [d if d is not None and d.frame is not None else None for d in found]
+def _elements(scene: Scene) -> list[Elements]:
+    """Descriptions of the links that are made of beams, and, for nodal elements, shells of those made of them."""
+    nodal, found = scene.record.simulation.formulation == "nodal", list[Elements]()
+    for link in scene.record.links:
+        given = load_link(scene.folder / link.model, changes=link.changes) if link.model else None
+        if given is None or given.description.frame is not None:
+            found.append(None if given is None else given.description)
+        elif nodal and link.flexible and given.description.shell is not None and given.description.solid is None:
+            from fe_import.models.link_shells import link_shells  # here: it reads meshes
+
+            found.append(link_shells(given))
+        else:
+            found.append(None)
+    return found
+
+
+def _with_elements(link: Link, known: Elements) -> Link:
+    """A link that knows what it is made of."""
+    if isinstance(known, LinkShells):
+        return replace(link, shells=known)
+    return replace(link, description=known)
 
 
 def link_description(scene: Scene, link: LinkRecord) -> LinkFile:

@@ -9,16 +9,26 @@ from collections.abc import Sequence
 from erls.errors import SceneError
 from erls.scene.chain import SceneRecord
 from erls.scene.checks import bad
-from erls.scene.joints import Acting, Joint, Loop
+from erls.scene.joints import Acting, Friction, Joint, Loop
 
 
-def _sticking(kind: str, joints: Sequence[Joint] | Sequence[Loop]) -> list[str]:
-    """Paths of the joints and coordinates of this law."""
+def _sticking(kind: str, joints: Sequence[Joint] | Sequence[Loop]) -> list[tuple[str, Friction]]:
+    """Joints and coordinates of this law, by their paths."""
     given: list[tuple[str, Acting]] = []
     for k, joint in enumerate(joints):
         given.append((f"{kind}[{k}]", joint))
         given += [(f"{kind}[{k}].coordinates.{name}", c) for name, c in getattr(joint, "coordinates", {}).items()]
-    return [place for place, acting in given if acting.friction is not None and acting.friction.law == "stick"]
+    found = [(place, acting.friction) for place, acting in given if acting.friction is not None]
+    return [(place, friction) for place, friction in found if friction.law == "stick"]
+
+
+def _refuse_frictionless(scene: SceneRecord, file: str) -> None:
+    """Joints that are held where closing joints are need a force while they slide, of which what holds them is told."""
+    for place, friction in [*_sticking("joints", scene.joints), *_sticking("loops", scene.loops)]:
+        if friction.force == 0.0 and friction.static_force:
+            message = "where joints of [[loops]] stick, one that sticks rubs while it slides, too"
+            remedy = "give a force > 0, or use simulation.formulation = 'nodal'"
+            raise bad(f"{file}: {place}.friction.force", message, friction.force, remedy)
 
 
 def check_sticking(scene: SceneRecord, file: str) -> None:
@@ -34,12 +44,11 @@ def check_sticking(scene: SceneRecord, file: str) -> None:
         message = f"exact sticking does not go with {what}"
         return bad(f"{file}: {place}.friction.law", message, "stick", remedy)
 
+    touching = [f"contacts[{k}]" for k, x in enumerate(scene.contacts) if x.friction and x.friction.law == "stick"]
     closing = _sticking("loops", scene.loops)
     if closing and scene.simulation.formulation != "nodal":
-        remedy = "close the loop by another joint, and list this one under [[joints]]; or use law = 'smooth'"
-        raise refused(closing[0], "a joint of [[loops]] but in simulation.formulation = 'nodal'", remedy)
-    touching = [f"contacts[{k}]" for k, x in enumerate(scene.contacts) if x.friction and x.friction.law == "stick"]
-    places, s = [*_sticking("joints", scene.joints), *touching], scene.simulation
+        _refuse_frictionless(scene, file)
+    places, s = [*(place for place, _ in [*_sticking("joints", scene.joints), *closing]), *touching], scene.simulation
     for found, what in (
         (s.coordinates == "absolute", "simulation.coordinates = 'absolute'"),
         (s.gauge == "minimum-norm", "simulation.gauge = 'minimum-norm'"),

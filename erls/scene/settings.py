@@ -14,7 +14,7 @@ class Simulation(Stepping, frozen=True):
         [s]
     formulation : str
         ``erls``; ``ffr``: floating frames of reference; or ``nodal``: finite elements with a frame per node, for links
-        made of beams.
+        made of beams or of shells.
     gauge : str
         Of ``erls``: ``joint-angle`` (θ is the joint angle) or ``minimum-norm`` (five rows per joint, as in the paper).
     body_frame : str

@@ -16,14 +16,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from erls.equations.linearization import WIDE, difference_steps, slopes
+from erls.equations.registry import system_of
 from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
 from erls.integrate.base import hermite, knots_after
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
+from erls.sensitivity.nodal_motion import metres_of
 from erls.sensitivity.outputs import EVALUATIONS, Output, value_of
+from fe_import.model import IntArray
 
+_MANY = 100  # coordinates, as nodes have: most outputs depend on some of these, and modes have fewer
+_AGREES_NODES = 1e-7  # the same of nodes: what solves their equations beside a motion is no derivative along it
 _AGREES = 1e-5  # of a derivative along a motion that is made up: what an output asks of a run by other ways is more
 
 
@@ -73,11 +78,8 @@ class Asking:
     def __init__(self, output: Output, name: str, run: ChainRun, weights: Array | None = None) -> None:
         self.output, self.name, self.run, self._weights = output, name, run, weights
         self._own = {f.name: getattr(run, f.name) for f in fields(ChainRun)}
-        formulation: Any = run.formulation
-        tree: Any = getattr(formulation, "bare", formulation)  # under the loops
         n = run.solution.y.shape[1]
-        stiffness, _ = elastic_on_diagonal(tree)
-        self.steps = difference_steps(metre_scales(formulation), size_of(formulation.mechanism), stiffness, WIDE)
+        self.steps = _steps(run)
         noted: list[Array] = []
         self.value = self._asked(np.zeros(0), np.zeros((0, 2, n)), noted)
         self.times = np.unique(np.concatenate([np.zeros(0), *noted]))
@@ -86,7 +88,7 @@ class Asking:
     @property
     def evaluations(self) -> int:
         """Of the output, that `by_knots` takes."""
-        return EVALUATIONS * len(self.groups) * len(self.parts) * len(self.steps)
+        return EVALUATIONS * len(self.groups) * sum(len(own) for own in self.parts.values())
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -115,14 +117,15 @@ class Asking:
         found = np.zeros((len(self.times), 2, n, self.count))
         result: dict[int, Array] = {}
         for group in self.groups:
-            for part in self.parts:
-                whole = slopes(partial(self._moved_together, group=group, part=part), np.eye(n), self.steps)
+            for part, moving in self.parts.items():
+                moved = partial(self._moved_together, group=group, part=part)
+                whole = slopes(moved, np.eye(n)[:, moving], self.steps[moving])
                 for time in group:
-                    own = self.depends[time]
+                    own: Any = self.depends[time]
                     if self._weights is None:
-                        found[time, part][:, own] = whole.T[:, own]
+                        found[time, part][np.ix_(moving, own)] = whole.T[:, own]
                     else:
-                        found[time, part] = whole.T[:, own] @ self._weights.T[own]
+                        found[time, part, moving] = whole.T[:, own] @ self._weights.T[own]
         for time, by_state in enumerate(found):
             right = int(knots_after(s.t, self.times[time : time + 1])[0])
             knots = np.array([right - 1, right])
@@ -142,17 +145,23 @@ class Asking:
             values.append(self._asked(self.times, moved, []).ravel())
         return np.array(values)
 
-    def _structure(self, n: int) -> tuple[list[int], list[list[int]]]:
-        """Whether it depends on coordinates (0), on rates (1), and groups of times that share no component."""
+    def _structure(self, n: int) -> tuple[dict[int, IntArray], list[list[int]]]:
+        """On which coordinates (0) and rates (1) it may depend, and groups of times that share no component."""
         way = self.steps * np.random.default_rng(0).choice([-1.0, 1.0], n)
         count = len(self.times)
         base = self.value.ravel()
-        parts = []
-        for part in (0, 1):
+
+        def acting(part: int, some: IntArray) -> IntArray:
+            """Those of some coordinates, halved as long as they may be many."""
             moved = np.zeros((count, 2, n))
-            moved[:, part] = way
-            if n and (self._asked(self.times, moved, []).ravel() != base).any():
-                parts.append(part)
+            moved[:, part, some] = way[some]
+            if not len(some) or (self._asked(self.times, moved, []).ravel() == base).all():
+                return some[:0]
+            if n <= _MANY or len(some) == 1:
+                return some
+            return np.concatenate([acting(part, half) for half in np.array_split(some, 2)])
+
+        parts = {part: own for part in (0, 1) if len(own := acting(part, np.arange(n)))}
         self.depends = np.zeros((count, base.size), dtype=bool)
         for time in range(count if parts else 0):
             moved = np.zeros((count, 2, n))
@@ -161,10 +170,10 @@ class Asking:
         groups: list[list[int]] = []
         taken: list[Array] = []
         for time in np.flatnonzero(self.depends.any(axis=1)).tolist():
-            for group, own in zip(groups, taken, strict=True):
-                if not (own & self.depends[time]).any():
+            for group, used in zip(groups, taken, strict=True):
+                if not (used & self.depends[time]).any():
                     group.append(time)
-                    own[self.depends[time]] = True
+                    used[self.depends[time]] = True
                     break
             else:
                 groups.append([time])
@@ -197,7 +206,8 @@ class Asking:
         rounding = 1e-12 * np.abs(self.value).max(initial=0.0)
         if self._weights is not None:
             rounding = rounding * np.abs(self._weights).sum(axis=1)
-        if (np.abs(found - expected) > _AGREES * np.maximum(largest, np.abs(found)) + rounding).any():
+        agrees = _AGREES if n <= _MANY else _AGREES_NODES
+        if (np.abs(found - expected) > agrees * np.maximum(largest, np.abs(found)) + rounding).any():
             raise SceneError(
                 Cause.BAD_FIELD,
                 "it knows the motion by other ways than what the run says at fixed times",
@@ -208,6 +218,19 @@ class Asking:
     def _as_whole(self, y: Array, v: Array, a: Array) -> Array:
         moved = replace(self.run, solution=replace(self.run.solution, y=y, v=v, a=a))
         return self.summed(value_of(self.output, moved, self.name)).ravel()
+
+
+def _steps(run: ChainRun) -> Array:
+    """(n,) of differences along what a run keeps."""
+    formulation: Any = run.formulation
+    if system_of(formulation.mechanism, run.scene.record.simulation) == "nodal":
+        metres = metres_of(formulation)
+        largest = 1 + np.abs(run.solution.y).max(axis=0)  # outputs are linear in accelerations and multipliers
+        reach = WIDE * float(formulation.mechanism.reach)
+        return np.asarray(np.where(metres > 0, reach / np.where(metres > 0, metres, 1.0), WIDE * largest))
+    tree: Any = getattr(formulation, "bare", formulation)  # under the loops
+    stiffness, _ = elastic_on_diagonal(tree)
+    return difference_steps(metre_scales(formulation), size_of(formulation.mechanism), stiffness, WIDE)
 
 
 def _weights(ends: Array, t: float) -> Array:

@@ -68,7 +68,7 @@ if ENABLED:
 
 
 @part
-def _evaluate(
+def evaluate(
     reals: Array, integers: IntArray, scratch: Array, samples: Array, q: Array, v: Array, a: Array, out: Array
 ) -> None:
     """Forces out of balance of a knot, near its own configuration; working memory holds it."""
@@ -115,7 +115,7 @@ def residuals(
 ) -> None:
     """(k, n + m + 2) what `erls.equations.nodal.step.residual` says of knots."""
     for row in range(len(q)):
-        _evaluate(reals, integers, scratch, samples[row], q[row], v[row], a[row], out[row])
+        evaluate(reals, integers, scratch, samples[row], q[row], v[row], a[row], out[row])
 
 
 @kernel(_STORED, counted=False)
@@ -284,7 +284,7 @@ def walk(
     for row in range(len(q)):
         h = sizes[row]
         to_v, to_a = rule[GAMMA] / (h * rule[BETA]), 1.0 / (h * h * rule[BETA] * rule[SHARE])
-        _evaluate(reals, integers, scratch, samples[row], q[row], v[row], a[row], right)
+        evaluate(reals, integers, scratch, samples[row], q[row], v[row], a[row], right)
         exact_blocks(exact, reals, integers, scratch, poses, motion)
         for i in range(n):
             work.increment[i] = increments[row, i]

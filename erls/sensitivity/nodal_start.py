@@ -86,6 +86,35 @@ class LegStart:
         gap = total(self._base, difference, self._bias, (self._q, self._v), (place, rate))
         return -self._masses.solved(force, gap)
 
+    def explicit(self, difference: Difference) -> Array:
+        """(n + m,) what a parameter changes of forces and of conditions, places and twists held."""
+        gap = difference.of(lambda variant: self._bias(variant.formulation, self._q, self._v))
+        return np.concatenate([difference.of(self._balance), gap])
+
+    def transposed(self, by: Array) -> tuple[Array, Array, Array]:
+        """Of derivatives (n + m, c) by accelerations and multipliers: multipliers (n + m, c) of what `explicit` gives,
+        and derivatives by places and twists (n, c).
+        """
+        stiffness, damping = self._tangents
+        n = len(self._v)
+        found = -np.stack([self._masses.solved(*np.split(one, [n])) for one in by.T], axis=1)  # symmetric
+        of_place, of_rate = self._bias_slopes
+        gap = found[n:]
+        return found, stiffness.T @ found[:n] + of_place.T @ gap, damping.T @ found[:n] + of_rate.T @ gap
+
+    @cached_property
+    def _bias_slopes(self) -> tuple[Array, Array]:
+        """(m, n) derivatives of the bias of conditions by places and by twists: those of nodes in joints."""
+        system: NodalSystem = self._base.system
+        n, nodes = system.size, np.unique(system.model.joint_nodes)
+        found = np.zeros((2, system.constraints, n))
+        for k in (6 * nodes[nodes >= 0][:, None] + np.arange(6)).ravel() if system.constraints else ():
+            unit = np.zeros(n)
+            unit[k] = 1.0
+            for which, change in enumerate(((unit, 0 * unit), (0 * unit, unit))):
+                found[which, :, k] = along(self._base, self._bias, (self._q, self._v), change)
+        return found[0], found[1]
+
     def _balance(self, variant: Variant) -> Array:
         formulation: Any = variant.formulation
         system: NodalSystem = formulation.system
@@ -180,15 +209,17 @@ def total(
     change : (n,) and (n,) arrays
         Of places and of twists.
     """
-    (q, v), (place, rate) = state, change
+    q, v = state
     found = difference.of(lambda variant: what(variant.formulation, q, v))
-    if not place.any() and not rate.any():
-        return found
+    return found + along(base, what, state, change) if change[0].any() or change[1].any() else found
+
+
+def along(base: Any, what: What, state: tuple[Nodes, Array], change: tuple[Array, Array]) -> Array:
+    """The same along a change of places and twists alone."""
+    (q, v), (place, rate) = state, change
     (step,) = shares_of(base.system, place[None], (v[None], rate[None]))
-    for at, weight in ALONG:
-        there = base.system.compose(q, at * step * place)
-        found = found + weight / step * what(base, there, v + at * step * rate)
-    return np.asarray(found)
+    moved = [(weight, base.system.compose(q, at * step * place), v + at * step * rate) for at, weight in ALONG]
+    return np.asarray(sum(weight / step * what(base, there, rates) for weight, there, rates in moved))
 
 
 def shares_of(system: NodalSystem, places: Array, *others: tuple[Array, Array]) -> Array:

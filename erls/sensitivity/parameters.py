@@ -26,6 +26,7 @@ _NOT_SMOOTH = {
     "name": "it is a name",
 }
 _DESCRIBED = "model"
+_OF_SECTIONS = ("sections", "materials", "masses", "damping", "temperature_change")
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,11 @@ class Parameter:
     size: float
     link: int | None = None
     within: str = ""
+
+
+def leaves_nodes(within: str) -> bool:
+    """Whether a number of a description, by its key there, changes nothing of where nodes and interfaces are."""
+    return within.split(".")[0] in _OF_SECTIONS
 
 
 def parameters_of(scene: Scene, given: Sequence[str] | Mapping[str, float]) -> list[Parameter]:

@@ -25,6 +25,7 @@ from erls.scene.read import AnyScene, chain_alone, load_chain
 from erls.sensitivity import forward
 from erls.sensitivity.adjoint import gradients
 from erls.sensitivity.gradients import Asking
+from erls.sensitivity.nodal_motion import metres_of
 from erls.sensitivity.outputs import EVALUATIONS, Output, derivative_of, own_derivative, value_of
 from erls.sensitivity.parameters import Parameter, parameters_of
 from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
@@ -149,10 +150,7 @@ def sensitivities(
     with announcing(tell):
         sums = _sums(weights or {}, values)
         askings = _askings(run, outputs, values, sums, len(keys), method)
-        if askings is None:
-            derivatives = _forward(run, outputs, values, sums, keys)
-        else:
-            derivatives = _adjoint(askings, keys, scheme_of(run))
+        derivatives = _forward(run, outputs, values, sums, keys) if askings is None else _adjoint(askings, keys)
     at = {one.key: one.value for one in keys}
     return Sensitivities(run, at, values, derivatives, "forward" if askings is None else "adjoint")
 
@@ -186,10 +184,10 @@ def _askings(
     if method == "forward":
         return None
     chosen = method == "adjoint"
-    if _of_nodes(run) or _eventful(run):
+    if _eventful(run):
         if chosen:
-            what = "nodal runs" if _of_nodes(run) else "runs with contacts, stops or joints that stick"
-            raise _refusal(f"{what} by the adjoint method", "method", "take 'auto' or 'forward'")
+            what = "runs with contacts, stops or joints that stick by the adjoint method"
+            raise _refusal(what, "method", "take 'auto' or 'forward'")
         return None
     sizes = [len(sums[name]) if name in sums else value.size for name, value in values.items()]
     few = sum(sizes) < parameters and parameters > _FEW
@@ -228,7 +226,7 @@ def _forward(
 
 
 def _adjoint(
-    askings: Sequence[tuple[Asking, dict[int, Array]]], keys: Sequence[Parameter], scheme: Scheme
+    askings: Sequence[tuple[Asking, dict[int, Array]]], keys: Sequence[Parameter]
 ) -> dict[str, dict[str, Array]]:
     derivatives: dict[str, dict[str, Array]] = {asking.name: {} for asking, _ in askings}
     run = askings[0][0].run
@@ -240,7 +238,12 @@ def _adjoint(
         for knot, seed in by_knots.items():
             seeds.setdefault(knot, np.zeros((3, n, ends[-1])))[..., own] += seed
     found = differences(run, keys)
-    through = gradients(run, found, scheme, seeds, ends[-1])
+    if _of_nodes(run):
+        from erls.sensitivity import nodal_adjoint  # here: most runs need none of it
+
+        through = nodal_adjoint.gradients(run, found, seeds, ends[-1])
+    else:
+        through = gradients(run, found, scheme_of(run), seeds, ends[-1])
     for one, row in zip(found, through, strict=True):
         for (asking, _), own in zip(askings, columns, strict=True):
             held = own_derivative(asking.output, asking.name, run, one, asking.value)
@@ -262,7 +265,7 @@ def _motion(run: ChainRun, differences: Sequence[Difference]) -> tuple[Array, Ar
     if _of_nodes(run):
         from erls.sensitivity import nodal_forward  # here: most runs need none of it
 
-        return nodal_forward.differentiated(run, differences), nodal_forward.metres_of(formulation)
+        return nodal_forward.differentiated(run, differences), metres_of(formulation)
     metres = metre_scales(formulation)
     if _eventful(run):
         from erls.sensitivity import eventful  # here: most runs need none of it
@@ -334,6 +337,9 @@ def refuse(scene: Scene, mechanism: Mechanism) -> None:
     if kind == "nodal" and mechanism.touches:
         remedy = "use formulation erls or ffr, which differentiate through them"
         raise _refusal("nodal runs with contacts or stops", f"{where}.formulation", remedy)
+    if kind == "nodal" and any(link.shells is not None and link.elastic_modes for link in mechanism.links):
+        remedy = "use formulation erls or ffr"
+        raise _refusal("nodal runs of links made of shells", f"{where}.formulation", remedy)
     if kind == "loops" and settings.integrator == FIXED_STEP:
         remedy = "use integrator auto or lobatto, whose equations hold the forces of loops"
         raise _refusal("generalized-alpha with loops", f"{where}.integrator", remedy)

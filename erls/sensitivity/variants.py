@@ -23,7 +23,7 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.shared_links import sharing_links
 from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism, link_model
-from erls.sensitivity.parameters import Parameter, description_with, scene_with
+from erls.sensitivity.parameters import Parameter, description_with, leaves_nodes, scene_with
 from erls.simulation.chains import models_of
 from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
@@ -149,9 +149,11 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, 
     """At the values of a stencil, or some of them."""
     base: Any = run.formulation
     step = STEP * parameter.size
-    mechanisms = [_mechanism(run, parameter, parameter.value + at * step) for at, _ in stencil]
-    turns: list[Array | None] = [None] * len(stencil)
     nodal = system_of(base.mechanism, run.scene.record.simulation) == "nodal"
+    sections = nodal and _of_sections(run, parameter)
+    make = _with_sections if sections else _mechanism
+    mechanisms = [make(run, parameter, parameter.value + at * step) for at, _ in stencil]
+    turns: list[Array | None] = [None] * len(stencil)
     if parameter.within and parameter.link is not None and not nodal:
         number = base.mechanism.bodies[parameter.link]
         models = [mechanism.links[number].model for mechanism in mechanisms]
@@ -159,7 +161,8 @@ def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, 
         turns = [_of_all(base, number, turn[6:, 6:]) for turn in found]
     result = []
     for (at, weight), mechanism, turn in zip(stencil, mechanisms, turns, strict=True):
-        formulation: Any = formulate(mechanism, run.scene.record.simulation)
+        settings = run.scene.record.simulation
+        formulation: Any = base.with_sections(mechanism) if sections else formulate(mechanism, settings)
         if nodal:
             _refuse_others(formulation, base, parameter)
         elif mechanism.loops:
@@ -192,6 +195,28 @@ def _refuse_others(formulation: Any, base: Any, parameter: Parameter) -> None:
         return
     where, remedy = f"parameter {parameter.key}", "name another field, or give it a value off such a place"
     raise SceneError(Cause.BAD_FIELD, message, where=where, value=parameter.value, remedy=remedy)
+
+
+def _of_sections(run: ChainRun, parameter: Parameter) -> bool:
+    """Whether it says of beams what they are made of: nodal equations take that from descriptions, and nothing but
+    nodes and interfaces from modal models; feed-forward takes masses from these.
+    """
+    leads = any(getattr(joint.drive, "feed_forward", False) for joint in run.scene.record.joints)
+    if leads or parameter.link is None or not leaves_nodes(parameter.within):
+        return False
+    mechanism = run.formulation.mechanism
+    link = mechanism.links[mechanism.bodies[parameter.link]]
+    return bool(link.elastic_modes) and link.description is not None and link.description.frame is not None
+
+
+def _with_sections(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
+    """The mechanism of the run with another number of a link's beams."""
+    mechanism = run.formulation.mechanism
+    assert parameter.link is not None
+    number, described = mechanism.bodies[parameter.link], description_with(run.scene, parameter, value)
+    links = list(mechanism.links)
+    links[number] = replace(links[number], description=described.description)
+    return replace(mechanism, links=tuple(links))
 
 
 def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:

@@ -21,13 +21,12 @@ from erls.run.chain.run import ChainRun
 from erls.run.file import self_contained
 from erls.run.watches.base import Begun, Plan
 from erls.run.watches.watching import Warnings, Watching
-from erls.scene.build import Built, build_mechanism
+from erls.scene.build import Built, Elements, build_mechanism
 from erls.scene.build_joints import led_by_inversion
 from erls.scene.chain import Scene
 from erls.simulation.asked import Asked
 from erls.simulation.kept import kept_to
 from erls.simulation.statements import with_statement
-from fe_import.description.records import LinkDescription
 from fe_import.files.toml import choose
 from fe_import.modal.model import ModalModel
 
@@ -86,12 +85,12 @@ def _mechanism(scene: Scene, run: ChainRun, tell: Callable[[str], None]) -> Mech
     return build_mechanism(scene, tell).mechanism
 
 
-def models_of(run: ChainRun) -> tuple[list[ModalModel], list[LinkDescription | None], list[list[ModalModel]]]:
-    """Modal models of the links of a run, descriptions, and modal models of their pieces, for `build_mechanism`."""
+def models_of(run: ChainRun) -> tuple[list[ModalModel], list[Elements], list[list[ModalModel]]]:
+    """Modal models of a run's links, what these are made of, and models of their pieces, for `build_mechanism`."""
     mechanism = run.formulation.mechanism
     links = [mechanism.links[k] for k in mechanism.bodies]
     pieces = [[piece.model for piece in link.pieces] for link in links]
-    return [link.model for link in links], [link.description for link in links], pieces
+    return [link.model for link in links], [link.description or link.shells for link in links], pieces
 
 
 def build_like(scene: Scene, like: ChainRun, tell: Callable[[str], None] = lambda text: None) -> Built:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sqlite3
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,7 +15,7 @@ from erls.files.output import not_writable
 from erls.files.results import MARK
 
 
-class Database:
+class Database(ABC):
     """An open file; without a path it is in memory.
 
     Parameters
@@ -26,13 +27,14 @@ class Database:
     tables : dict of str
         What makes each table, ``about`` among them.
     version : int
-    kind : str
-        What the file is, for messages.
+    kind, content : str
+        What the file is, and what it holds, for messages.
     """
 
     tables: ClassVar[Mapping[str, str]]
     version: ClassVar[int]
     kind: ClassVar[str]
+    content: ClassVar[str]
     about_table: ClassVar[str] = "CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID"
 
     def __init__(self, path: Path | None) -> None:
@@ -81,6 +83,27 @@ class Database:
                 raise sqlite3.DatabaseError("another version")
             return found
 
+    @abstractmethod
+    def held(self) -> int:
+        """How many finished things it holds."""
+
+    @classmethod
+    def make_room(cls, path: Path, force: bool) -> None:
+        """Take a file away that was there, unless it holds what may have taken long.
+
+        Raises
+        ------
+        SceneError
+            NOT_WRITABLE: it does, and ``force`` is not given. RUN_FILE: it is no such file.
+        """
+        if path.exists() and not force:
+            with contextlib.closing(cls(path)) as base:
+                held = 0 if base.empty else base.held()
+            if held:
+                remedy = "go on with it (--resume), name another, or replace it (--force)"
+                raise not_writable(path, f"it holds {held} {cls.content}", remedy)
+        path.unlink(missing_ok=True)
+
     def close(self) -> None:
         """Done with it."""
         self._base.close()
@@ -108,16 +131,3 @@ class Database:
         locked = "locked" in str(problem)
         remedy = "wait for the other process that is at it" if locked else "free disk space, or name another file"
         return SceneError(Cause.NOT_WRITABLE, f"cannot be written: {problem}", where=self.where, remedy=remedy)
-
-
-def refuse_finished(target: Path, held: int) -> None:
-    """Refuse to replace what may have taken long.
-
-    Raises
-    ------
-    SceneError
-        NOT_WRITABLE.
-    """
-    if held:
-        remedy = "go on with it (--resume), name another, or replace it (--force)"
-        raise not_writable(target, f"it holds {held} finished points", remedy)

@@ -19,7 +19,7 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.files.results import claim
 from erls.scene.inputs import files_of
 from erls.scene.read import load_scene
-from erls.studies.database import Database, refuse_finished
+from erls.studies.database import Database
 from erls.studies.pool import Finished
 from fe_import.errors import Cause as FECause
 from fe_import.errors import FEImportError, ReportedError
@@ -43,7 +43,7 @@ _TABLES = {
 class _Results(Database):
     """The file."""
 
-    tables, version, kind = _TABLES, 1, "file of a study"
+    tables, version, kind, content = _TABLES, 1, "file of a study", "finished runs"
 
     def get(self, key: bytes) -> bytes | None:
         """What is kept."""
@@ -56,7 +56,8 @@ class _Results(Database):
         with self._saving():
             self._base.execute("INSERT OR REPLACE INTO results VALUES (?, ?)", (key, value))
 
-    def __len__(self) -> int:
+    def held(self) -> int:
+        """Results."""
         with self._reading():
             return int(self._base.execute("SELECT COUNT(*) FROM results").fetchone()[0])
 
@@ -188,11 +189,8 @@ def keeping(state: State | None, scene: Path, overrides: Sequence[str]) -> Itera
         return
     path, loaded = state.path, load_scene(scene, overrides)
     claim(path, SUFFIX, files_of(loaded), state.force and not state.resume)
-    if path.exists() and not state.resume:
-        if not state.force:
-            with closing(_Results(path)) as base:
-                refuse_finished(path, 0 if base.empty else len(base))
-        path.unlink()
+    if not state.resume:
+        _Results.make_room(path, state.force)
     with closing(_Results(path)) as base:
         if base.empty:
             base.begin({})

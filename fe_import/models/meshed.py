@@ -39,6 +39,17 @@ def meshed_model(link: LinkFile) -> FEModel:
     FEImportError
         A faulty mesh, set, material or interface.
     """
+    return mesh_model(mesh_of(link), link.description, str(link.path))
+
+
+def mesh_of(link: LinkFile) -> SolidMesh:
+    """The checked mesh that a description names.
+
+    Raises
+    ------
+    FEImportError
+        A faulty mesh, or none.
+    """
     description, where = link.description, str(link.path)
     solid, shell = description.solid, description.shell
     table, name = ("solid", solid.mesh) if solid is not None else ("shell", "" if shell is None else shell.mesh)
@@ -53,7 +64,7 @@ def meshed_model(link: LinkFile) -> FEModel:
         )
     sets = () if shell is None else tuple(region.set for region in shell.regions)
     wanted = Wanted(solid is not None, shell is not None, sets if solid is not None else ())
-    return mesh_model(read_mesh(path, (solid or shell or Shell()).ignore, wanted), description, where)
+    return read_mesh(path, (solid or shell or Shell()).ignore, wanted)
 
 
 def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEModel:

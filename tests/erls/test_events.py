@@ -97,7 +97,7 @@ def test_other_formulations_and_loops() -> None:
     """A flexible L, nodal, and a closed loop stop at a height of a point."""
     event = '[{name="low", point="%s", coordinate="%s", value=%s, stop=true}]'
     for scene, change, point, axis, value in (
-        (scenes.ROOT / "data/l_shape/steel_flat.toml", "simulation.formulation=nodal", "tip", "z", -0.01),
+        (scenes.ROOT / "data/l_shape/steel_flat.toml", "simulation.formulation=nodal", "tip", "z", -0.002),
         (scenes.ROOT / "data/l_shape/steel_flat.toml", "simulation.formulation=erls", "tip", "z", -0.01),
         (FOUR_BAR, "simulation.duration=0.2", "", "", 0.0),
     ):

@@ -6,7 +6,7 @@ import pytest
 from fuzz_scene_readers import GROUPS
 from fuzzing import check_reports, fuzz_group
 
-CASES = {"run files": 100, "scenes": 150, "tables": 200}
+CASES = {"run files": 60, "scenes": 150, "tables": 200}
 
 
 @pytest.mark.parametrize("group", GROUPS)

@@ -15,7 +15,7 @@ from test_sticking_loops import LENGTHS, MASSES, on_spring, parallelogram, run_s
 
 from erls.accuracy.energy_balance import energy_balance
 from erls.accuracy.looked_at import LookedAt
-from erls.equations.switches.grips import Grips, Touch
+from erls.equations.switches.grips import Grips, Touch, held_point
 from erls.maths.contact_places import MODE, SLIDES, SMOOTH, STICKS
 from erls.maths.so3 import Array
 from erls.mechanism.contacts import ContactLaw, PointContact
@@ -145,7 +145,7 @@ def test_points_share_a_load() -> None:
             total -= 0.5 * (moved if own[MODE] == STICKS else own[3:5] if own[MODE] == SLIDES else 0.0)
         return total
 
-    grips, still = Grips(contacts, laws, look), np.zeros(2)
+    grips, still = Grips([held_point(contact) for contact in contacts], laws, look), np.zeros(2)
     for push[0], mode in ((0.8, STICKS), (3.0, SLIDES)):
         with grips.settled(0.0, still, still, accelerate):
             assert [own[MODE] for own in laws] == [mode, mode]

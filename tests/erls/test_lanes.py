@@ -12,14 +12,8 @@ import erls
 from erls.equations import side_by_side
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
-from erls.equations.series import mass_series, residual_series
-from erls.equations.side_by_side import (
-    WORTH,
-    eightfold_forces,
-    eightfold_kernels,
-    eightfold_masses,
-    eightfold_tangents,
-)
+from erls.equations.series import residual_series
+from erls.equations.side_by_side import WORTH, eightfold_forces, eightfold_kernels
 from erls.equations.system import metre_scales
 from erls.equations.tangents import Evaluation, Knots, steps_of
 from erls.maths.jit import ENABLED
@@ -43,10 +37,10 @@ compiled_only = pytest.mark.skipif(not ENABLED, reason="eightfold numbers are fo
 
 
 def _functions() -> tuple[Any, Any]:
-    """A function of three numbers with every operation, in duals and in lanes, of memory (3, 8) into (1, 8)."""
+    """A function of three numbers with every operation, in lanes, of memory (3, 8) into (1, 8), and of any numbers."""
     from numba import njit
 
-    from erls.maths.lanes import as_duals, as_lanes
+    from erls.maths.lanes import as_lanes
 
     def formula(z, r):  # type: ignore[no-untyped-def]
         x, y, c = z[0], z[1], z[2]
@@ -60,37 +54,22 @@ def _functions() -> tuple[Any, Any]:
     compiled = njit(formula, error_model="numpy")
 
     @njit(error_model="numpy")
-    def in_duals(x, r, out):  # type: ignore[no-untyped-def]
-        as_duals(out)[0] = compiled(as_duals(x), r)
-
-    @njit(error_model="numpy")
     def in_lanes(x, r, out):  # type: ignore[no-untyped-def]
         as_lanes(out)[0] = compiled(as_lanes(x), r)
 
-    def single(z: np.ndarray, r: float) -> complex:
-        x, y, c = z
-        q = x * y / c + np.cos(x) * np.sqrt(y) - 2 * c**2 + 3 / y - np.tanh(x) / 4
-        q -= np.exp(-x) * np.log(y) + np.sin(c) * np.tan(x) - np.cosh(x) / np.sinh(y) + np.arctan(r * c)
-        return 1.5 - (q if q.real > 0 else -q)
-
-    return (in_duals, in_lanes), single
+    return in_lanes, formula
 
 
 @compiled_only
 def test_arithmetic() -> None:
-    """Derivatives against complex steps, states against single ones; states that go different ways are told."""
-    from erls.maths.lanes import WAYS, WIDTH, Apart, eightfold
+    """States against single ones; those that go different ways are told."""
+    from erls.maths.lanes import WIDTH, Apart, eightfold
 
-    (in_duals, in_lanes), single = _functions()
-    rng, out = np.random.default_rng(2), eightfold(1)
-    x = eightfold(3)
-    x[:, 0], x[:, 1:] = [0.3, 0.8, 1.7], rng.normal(size=(3, WAYS))
-    in_duals(x, 0.7, out)
-    expected = [single(x[:, 0] + 1e-30j * way, 0.7).imag / 1e-30 for way in x[:, 1:].T]
-    np.testing.assert_allclose(out[0], [single(x[:, 0], 0.7).real, *expected], rtol=1e-14, atol=1e-14)  # terms up to 8
-    x[:] = x[:, :1] + 0.1 * rng.uniform(size=(3, WIDTH))
+    in_lanes, formula = _functions()
+    rng, out, x = np.random.default_rng(2), eightfold(1), eightfold(3)
+    x[:] = np.array([[0.3], [0.8], [1.7]]) + 0.1 * rng.uniform(size=(3, WIDTH))
     in_lanes(x, 0.7, out)
-    np.testing.assert_allclose(out[0], [single(one, 0.7) for one in x.T], rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(out[0], [formula(one, 0.7) for one in x.T], rtol=1e-14, atol=1e-14)  # terms up to 8
     x[1, 3] = x[0, 3] / 2
     with pytest.raises(Apart):
         in_lanes(x, 0.7, out)
@@ -113,21 +92,20 @@ def _steps(chain: Any) -> np.ndarray:
 @compiled_only
 @pytest.mark.parametrize("form", FORMS)
 def test_equations(form: str) -> None:
-    """Forces and masses to rounding, tangents to what differences leave: 1e-10 of the largest, and of forces over their
-    steps.
-    """
+    """Forces to rounding, tangents to what differences leave: 1e-10 of the largest, and of forces over their steps."""
     chain, system, knots = _case(form)
-    kernels = eightfold_kernels(system, WORTH)
     expected = residual_series(system, *knots)
+    kernels = eightfold_kernels(system, WORTH)
     forces = eightfold_forces(kernels, system, *knots)
     assert np.abs(forces - expected).max() <= 1e-13 * np.abs(expected).max()
-    masses, alone = eightfold_masses(kernels, system, *knots[:2]), mass_series(system, *knots[:2])
-    assert np.abs(masses - alone).max() <= 1e-13 * np.abs(alone).max()
     steps = _steps(chain)
-    differences = Evaluation(steps).tangents(system, knots)
     rounding = 1e-15 * np.abs(expected).max() / steps
-    for found, of in zip(eightfold_tangents(kernels, system, *knots), differences[1:], strict=True):
+    taped = Evaluation(steps, kernels).tangents(system, knots)
+    differences = Evaluation(steps).tangents(system, knots)
+    assert np.abs(taped.mass - differences.mass).max() <= 1e-13 * np.abs(taped.mass).max()
+    for found, of in zip(taped[1:], differences[1:], strict=True):
         assert (np.abs(found - of) <= 1e-10 * np.abs(of).max() + rounding).all()
+        assert not np.array_equal(found, of)  # it is the tape that was asked
 
 
 @compiled_only

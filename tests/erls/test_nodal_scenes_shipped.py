@@ -107,3 +107,25 @@ def test_twisted_beam(axis: int, expected: float) -> None:
     """The published displacements along the load within 1 %."""
     found = _rest("twisted_beam", f"loads.0.force={np.eye(3)[axis].tolist()}")
     assert found.position("tip", 1.0)[axis] == pytest.approx(expected, rel=0.01)
+
+
+def test_right_angle_cantilever() -> None:
+    """In steps of 0.1 s: a frozen matrix does not do, `auto` ends where `update` does and takes at most 1.5 times its
+    work, a factorization counting as the six iterations it is taken for (it is more), and halved steps are told.
+    """
+    runs = {}
+    for matrix, group in (("update", "SE(3)"), ("auto", "SE(3)"), ("auto", "R3xSO(3)")):
+        changes = [f"simulation.{x}" for x in ("step=0.1", f"iteration_matrix={matrix}", f"group={group}")]
+        run = simulate(load_scene(DATA / "shells" / "right_angle.toml", changes), verdict=False)
+        assert isinstance(run, BodyMotion)
+        runs[matrix, group] = run
+    ends = [run.position("elbow", [30.0])[0] for run in runs.values()]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)
+    one, other = (runs[matrix, "SE(3)"].solution.work for matrix in ("update", "auto"))
+    spent, most = (work.newton_iterations + 6 * work.factorizations for work in (other, one))
+    assert spent < 1.5 * most
+    halved = runs["auto", "R3xSO(3)"]
+    assert halved.solution.halved.steps > 0
+    assert any("were halved" in text for text in halved.warnings)
+    with pytest.raises(SimulationError, match="iteration_matrix be auto"):
+        simulate(load_scene(DATA / "shells/right_angle.toml", ["simulation.iteration_matrix=frozen"]), verdict=False)

@@ -264,6 +264,18 @@ def test_interrupted_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         erls.optimize(CANTILEVER, resume=True, **given)
 
 
+def test_pictures_are_true_to_scale() -> None:
+    """Heights and width of the sections, and the sag."""
+    problem = load_problem(CANTILEVER, [BRIEF])
+    (arm,) = simulated(problem, np.array([0.03, 0.02]), lambda text: None).shapes
+    near, far = (arm.rest[0][np.isclose(arm.rest[0, :, 0], x)] for x in (0.0, 1.0))
+    assert np.ptp(near, axis=0) == pytest.approx([0, 0.005, 0.03], abs=1e-12)
+    assert np.ptp(far, axis=0) == pytest.approx([0, 0.005, 0.02], abs=1e-12)
+    sag = 10 * 0.5**3 / (3 * 2e11 * 0.005 / 12) * (7 / 0.03**3 + 1 / 0.02**3)
+    assert arm.moved[0, :, 2].min() == pytest.approx(-sag, rel=1e-3)
+    assert len(arm.triangles) == 2 * (2 * 4 + 2 * 2)  # two prisms of four sides
+
+
 def test_a_copy_elsewhere_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By the name of the option that asked for it."""
     assert main(["optimize", str(CANTILEVER), "--scene", str(tmp_path / "best.toml")]) == 2
@@ -283,6 +295,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "further starts" in text
     assert "Simulated again, all steps" in text
     assert "sag" in page.read_text()
+    assert page.read_text().count('class="view"') == 2  # the start, and the optimum
     assert -run.position("tip", 0.0)[2] == pytest.approx(5e-3, rel=1e-4)
     mass = run.formulation.mechanism.links[0].model.mass_properties.mass
     assert mass == pytest.approx(exact_cantilever()[2], rel=1e-4)
@@ -367,3 +380,38 @@ def test_summary_is_json() -> None:
         "objective", "mass", "variables", "violation", "analyses", "outer_iterations", "wall_s", "status",
     }  # fmt: skip
     assert Settings().methods == ("esl-system", "integrated")
+
+
+
+def test_energy_of_drives() -> None:
+    """∫ |τ θ'| dt of a run that is added up by itself, and its slope in some direction against differences."""
+    constraints = 'constraints=[{type="power", name="drives", samples=41}]'
+    wanted = 'objective=[{quantity="energy", of="drives"}, {quantity="mass", weight=0.1}]'
+    short = 'set=["simulation.duration=0.02"]'
+    problem = load_problem(DATA / "slide_robot.toml", [short, constraints, wanted])
+    dynamics = Dynamics(problem, Memory(problem))
+    found = dynamics.differentiate(dynamics.evaluate(X))
+    run = running.run_of(dynamics.designs.at(X))
+    times = np.linspace(0, 0.02, 41)
+    power = sum(np.abs(run.joint_effort(j, times) * run.joint_rate(j, times)) for j in ("shoulder", "elbow"))
+    energy = float(np.trapezoid(power, times))
+    assert found.objective == pytest.approx(energy + 0.1 * dynamics.rules.objective.mass(X), rel=1e-12)
+    rules = dynamics.rules
+    _, slopes = rules.objective.timed(found.components, rules.measures)
+    way = X * np.array([1.0, -0.5, 0.7, 0.3])
+    exact = float(np.einsum("nq,nqv,v->", slopes[0], found.jacobians[0], way))
+    above, below = (
+        rules.objective.timed(dynamics.evaluate(X + sign * 1e-4 * way).components, rules.measures)[0]
+        for sign in (1, -1)
+    )
+    assert exact == pytest.approx((above - below) / 2e-4, rel=1e-4)
+
+
+def test_starts_far_beyond_their_limits() -> None:
+    """Loads of the run bring them near first, where derivatives of the motion creep."""
+    changes = ["variables.0.start=0.006", "variables.1.start=0.005", 'settings.methods=["integrated"]', BRIEF]
+    (outcome,) = erls.optimize(CANTILEVER, changes=changes, confirm=False).outcomes
+    assert outcome.history[0].violation > 20
+    assert outcome.history[0].inner > 0
+    assert outcome.status == "converged"
+    assert outcome.mass == pytest.approx(exact_cantilever()[2], rel=5e-5)

@@ -266,3 +266,44 @@ def test_what_solids_do_not_have(constraint: str) -> None:
     with pytest.raises(SceneError, match="that of beams") as refusal:
         load_problem(SOLID, [f'constraints=[{{type="{constraint}", name="a", limit=1.0}}]'])
     assert refusal.value.cause is Cause.BAD_FIELD
+
+
+def test_vibrations_of_the_mechanism() -> None:
+    """A beam that a controller holds, as the linear model of the scene has it; a height, the gain and a payload by
+    differences.
+    """
+    variables = (
+        f'variables=[{{name="h", keys=["{NEAR}"], lower=0.01, upper=0.06}},'
+        '{name="gain", keys=["joints.clamp.drive.proportional_gain"], lower=10.0, upper=1e4},'
+        '{name="load", keys=["payloads.0.mass"], lower=0.1, upper=3.0}]'
+    )
+    still = 'motion={shape="polynomial", from=0.0, to=0.0, duration=0.01}'
+    held = f'joints.clamp.drive={{type="pd", proportional_gain=300.0, derivative_gain=0.0, {still}}}'
+    changes = [variables, scene(held, 'payloads=[{point="tip", mass=0.5}]', "loads=[]", 'initial.deformation="zero"')]
+    changes.append('constraints=[{type="vibration", name="f", limit=2.0, samples=2}]')
+    problem = load_problem(CANTILEVER, changes)
+    dynamics = Dynamics(problem, Memory(problem))
+    found = dynamics.differentiate(dynamics.evaluate(problem.start))
+    measure = dynamics.rules.measures[0]
+    (limit,) = dynamics.limits(dynamics.start)
+    told = limit.told(measure.value(found.components[0]))
+    assert told == pytest.approx(np.abs(erls.linearize(problem.scene).poles).min() / (2 * np.pi), rel=1e-6)
+    slopes = np.einsum("nq,nqv->nv", measure.slope(found.components[0]), found.jacobians[0])
+    for v, way in enumerate(np.diag(problem.start)):
+        above, below = (
+            measure.value(dynamics.evaluate(problem.start + sign * 1e-4 * way).components[0]) for sign in (1, -1)
+        )
+        expected = (above - below) / (2e-4 * problem.start[v])
+        assert slopes[:, v] == pytest.approx(expected, rel=1e-5)
+
+
+def test_vibrations_have_no_derivative_by_lengths() -> None:
+    changes = [
+        'variables=[{name="x", keys=["links.arm.model.frame.nodes.tip.0"], lower=0.8, upper=1.2}]',
+        'constraints=[{type="vibration", name="f", limit=2.0, samples=2}]',
+        scene(),
+    ]
+    with pytest.raises(SceneError, match="no derivative by variable x"):
+        erls.optimize(CANTILEVER, changes=changes, confirm=False)
+    with pytest.raises(SceneError, match="those of beams"):
+        load_problem(SOLID, ['constraints=[{type="vibration", name="f", limit=2.0}]'])

@@ -10,7 +10,8 @@ import scenes
 from erls.equations.formulation import TreeFormulation
 from erls.equations.loops.tied import Tied
 from erls.equations.registry import TREES
-from erls.equations.series import mass_series, residual_series
+from erls.equations.serial.formulation import residual
+from erls.equations.series import mass_series, places_within, residual_series
 from erls.scene.build import build_mechanism
 from erls.scene.read import load_chain
 
@@ -39,6 +40,27 @@ def test_trees_one_by_one(tmp_path: Path) -> None:
         assert np.array_equal(still, expected)
         masses = mass_series(system.compiled, TIMES, y)
         assert np.array_equal(masses, [system.mass_matrix(t, q) for t, q in zip(TIMES, y, strict=True)])
+
+
+def test_what_residuals_leave_one_by_one(tmp_path: Path) -> None:
+    """Links' wrenches and efforts read at places of flat memory are those that stand there after each residual."""
+    for formulation in TREES:
+        system = tree_of(scenes.three_links(tmp_path), formulation)
+        y, v, a = states(system.size)
+        views = [view for views in system.borne() for view in views]
+        found = system.left_by_residuals(views, TIMES, y, v, a)
+        for i, (t, *at) in enumerate(zip(TIMES.tolist(), y, v, a, strict=True)):
+            residual(system.complete, t, *at)
+            assert all(np.array_equal(of[i], view) for of, view in zip(found, views, strict=True))
+
+
+def test_places_of_views() -> None:
+    memory, other = np.arange(12.0), np.arange(3.0)
+    views = [memory[3:5], memory[:8].reshape(2, 4)[:, 1:3], memory[11:]]
+    places = places_within(memory, views)
+    assert places is not None
+    assert places.tolist() == [3, 4, 1, 2, 5, 6, 11]
+    assert places_within(memory, [memory[3:5], other]) is None
 
 
 def test_loops_one_by_one() -> None:

@@ -27,7 +27,7 @@ OMEGA = math.sqrt(STIFFNESS / (BLOCKS[0] + 2 * BLOCKS[1]))  # the second block g
 
 
 def _body(mass: float) -> dict[str, Any]:
-    return {"mass": mass, "inertia": [0.01, 0.02, 0.03], "points": {"root": [0.0] * 3, "tip": [0.0] * 3}}
+    return {"mass": mass, "inertia": [0.01, 0.02, 0.03], "points": {"root": [0.0] * 3, "tip": [0.2, 0.0, 0.0]}}
 
 
 def run_scene(folder: Path, data: dict[str, Any], verdict: bool = True) -> ChainRun:
@@ -39,13 +39,18 @@ def stick(force: float, static: float | None = None) -> dict[str, Any]:
     return {"law": "stick", "force": force} | ({} if static is None else {"static_force": static})
 
 
-def _guided(folder: Path, forces: tuple[float, float], pull: dict[str, Any] | None = None, **settings: Any) -> ChainRun:
-    """A block on a slide, with another one across it, whom a guide at 45° holds: one coordinate, two joints."""
+def _guided(
+    folder: Path, forces: tuple[float, float, float], pull: dict[str, Any] | None = None, **settings: Any
+) -> ChainRun:
+    """A block on a slide, with another one across it, whom a guide at 45° holds: one coordinate, two joints, and the
+    guide, all of which may rub.
+    """
     first = {"name": "up", "type": "prismatic", "dh": {"convention": "standard", "alpha_deg": 90.0}}
     second = {"name": "across", "type": "prismatic", "dh": {"convention": "standard"}}
     joints: list[dict[str, Any]] = [first | (pull or {"stiffness": STIFFNESS, "initial": {"position": START}}), second]
     joints[1]["initial"] = joints[0].get("initial", {})
-    for joint, force in zip(joints, forces, strict=True):
+    guide = {"name": "guide", "link": "b", "node": "root", "type": "prismatic", "axis": [0.0, -1.0, 1.0]}
+    for joint, force in zip([*joints, guide], forces, strict=True):
         if force:
             joint["friction"] = stick(force, force if pull is None else 5 / 3 * force)
     data = {
@@ -53,7 +58,7 @@ def _guided(folder: Path, forces: tuple[float, float], pull: dict[str, Any] | No
         "simulation": {"duration": 1.1, **settings},
         "joints": joints,
         "links": [{"name": name, "rigid": _body(mass)} for name, mass in zip("ab", BLOCKS, strict=True)],
-        "loops": [{"name": "guide", "link": "b", "node": "root", "type": "prismatic", "axis": [0.0, -1.0, 1.0]}],
+        "loops": [guide],
         "points": [{"name": "block", "link": "b", "node": "root"}],
     }
     return run_scene(folder, data)
@@ -79,7 +84,7 @@ def on_spring(t: float, start: float, shift: float, omega: float) -> float:
 def test_blocks_on_a_spring_between_guides(formulation: str, integrator: str, tmp_path: Path) -> None:
     """One joint rests because the other does: both rub, both rest, and share what the spring pulls."""
     forces = 2.0, 1.0
-    run = _guided(tmp_path, forces, integrator=integrator, formulation=formulation, **TIGHT[integrator])
+    run = _guided(tmp_path, (*forces, 0.0), integrator=integrator, formulation=formulation, **TIGHT[integrator])
     times = np.linspace(0.0, run.end, 151)
     exact = np.array([on_spring(t, START, FORCE / STIFFNESS, OMEGA) for t in times.tolist()])
     off = float(np.abs(run.position("block", times)[:, 2] - exact).max())
@@ -98,12 +103,13 @@ def test_blocks_on_a_spring_between_guides(formulation: str, integrator: str, tm
     assert up / forces[0] == pytest.approx(across / forces[1], rel=1e-9)  # in like shares
 
 
-def test_blocks_behind_a_spring_that_is_pulled(tmp_path: Path) -> None:
-    """Both joints hold what they can together, and break away at once."""
+@pytest.mark.parametrize("forces", [(2.0, 1.0, 0.0), (0.0, 0.0, FORCE / math.sqrt(2))])
+def test_blocks_behind_a_spring_that_is_pulled(forces: tuple[float, float, float], tmp_path: Path) -> None:
+    """Both joints hold what they can together, and break away at once; the guide, which goes as far as both, alone."""
     force, static, pull = 3.0, 5.0, 0.05
     motion = {"shape": "spin_up", "rate": pull, "duration": 0.02}
     drive = {"type": "pd", "proportional_gain": STIFFNESS, "derivative_gain": 0.0, "motion": motion}
-    run = _guided(tmp_path, (2.0, 1.0), {"drive": drive}, duration=2.0, integrator="lobatto", tolerance=1e-6)
+    run = _guided(tmp_path, forces, {"drive": drive}, duration=2.0, integrator="lobatto", tolerance=1e-6)
     first = static / (STIFFNESS * pull) + 0.01
     slides = (2 * math.pi - 2 * math.atan((static - force) * OMEGA / (STIFFNESS * pull))) / OMEGA
     rests = 2 * (static - force) / (STIFFNESS * pull)
@@ -111,8 +117,10 @@ def test_blocks_behind_a_spring_that_is_pulled(tmp_path: Path) -> None:
     found = [t for t in switches(run) if t > 0.03]
     assert found == pytest.approx(expected[expected < run.end], abs=1e-6)
     assert len(found) > 3
-    assert not run.joint_rate("across", np.array([0.1, expected[1] + rests / 2])).any()
+    assert np.abs(run.joint_rate("across", np.array([0.1, expected[1] + rests / 2]))).max() < SEEN
 
+
+SEEN = 1e-9  # m, rad or per second: of joints that are held by stiff springs, where closing joints stick
 
 LENGTHS = 0.4, 0.7  # m, of cranks and of the coupler
 
@@ -156,15 +164,18 @@ def pin(q: Array) -> Array:
     return LENGTHS[0] * np.column_stack([np.cos(q), np.sin(q), 0 * q])
 
 
-@pytest.mark.parametrize(("formulation", "rub"), [("erls", (0.5, 0.0)), ("ffr", (0.2, 0.15))])
-def test_four_bar_comes_to_rest(formulation: str, rub: tuple[float, float], tmp_path: Path) -> None:
-    """A sticking joint, and three of them, of a linkage with one coordinate."""
-    spring, force = 40.0, rub[0] + 2 * rub[1]
+@pytest.mark.parametrize(
+    ("formulation", "rub"),
+    [("erls", (0.5, 0.0, 0.0)), ("ffr", (0.2, 0.15, 0.0)), ("ffr", (0.0, 0.0, 0.5)), ("erls", (0.2, 0.05, 0.2))],
+)
+def test_four_bar_comes_to_rest(formulation: str, rub: tuple[float, float, float], tmp_path: Path) -> None:
+    """A sticking joint, three of them, the one that closes the loop, and all four, of a linkage with one coordinate."""
+    spring, force = 40.0, rub[0] + 2 * rub[1] + rub[2]
     start = LEVEL + 0.07
-    others = {"friction": stick(rub[1])} if rub[1] else {}
-    crank = {"stiffness": spring, "rest": LEVEL, "friction": stick(rub[0])}
+    others, closing = ({"friction": stick(size)} if size else {} for size in rub[1:])
+    crank = {"stiffness": spring, "rest": LEVEL, **({"friction": stick(rub[0])} if rub[0] else {})}
     settings = {"duration": 1.5, "formulation": formulation, "integrator": "lobatto", "tolerance": 1e-6}
-    run = run_scene(tmp_path, {**parallelogram(crank, others, {}, start), "simulation": settings})
+    run = run_scene(tmp_path, {**parallelogram(crank, others, closing, start), "simulation": settings})
     omega = math.sqrt(spring / INERTIA)
     times = np.linspace(0.0, run.end, 101)
     exact = LEVEL + np.array([on_spring(t, 0.07, force / spring, omega) for t in times.tolist()])
@@ -176,10 +187,21 @@ def test_four_bar_comes_to_rest(formulation: str, rub: tuple[float, float], tmp_
     found = switches(run)
     assert found == pytest.approx([math.pi / omega * (k + 1) for k in range(len(found))], abs=1e-6)
     assert len(found) >= 2
-    assert not np.ptp(run.position("pin", np.linspace(found[-1], run.end, 5)), axis=0).any()
+    crept = np.ptp(run.position("pin", np.linspace(found[-1], run.end, 5)), axis=0).max()
+    assert crept <= (SEEN if rub[2] else 0.0)
+    held = np.array([run.joint_effort("j0", run.end), *([run.loop_effort("close", run.end)] if rub[2] else [])])
+    assert not rub[2] or _shared(held, float(run.joint_coordinate("j0", run.end)), spring, rub)
     balance = energy_balance(LookedAt(run))
     assert balance is not None
     assert abs(balance.off) < 1e-6 * balance.exchanged
+
+
+def _shared(efforts: Array, angle: float, spring: float, rub: tuple[float, float, float]) -> bool:
+    """Whether joints share what the spring asks as the squares of their friction, and the spring itself is told."""
+    pulled, squares = spring * (angle - LEVEL), rub[0] ** 2 + 2 * rub[1] ** 2 + rub[2] ** 2
+    expected = pulled * np.array([rub[0] ** 2 / squares - 1.0, rub[2] ** 2 / squares])
+    # forces are what springs of 1e-9 rad hold, of a coordinate known to rounding
+    return bool(np.allclose(np.abs(efforts), np.abs(expected), atol=1e-6))
 
 
 def flexible_linkage(folder: Path, **settings: Any) -> ChainRun:
@@ -269,19 +291,20 @@ def test_law_of_joints_in_loops(seed: int) -> None:
     assert both[len(both) // 2 :] == pytest.approx(largest, rel=1e-7)
 
 
-def test_closing_joint_that_sticks_is_refused(tmp_path: Path) -> None:
-    data = parallelogram({}, {}, {"friction": stick(1.0)}, LEVEL)
-    with pytest.raises(SceneError, match=r"a joint of \[\[loops\]\]") as caught:
+def test_closing_joint_that_sticks_and_does_not_rub_is_refused(tmp_path: Path) -> None:
+    data = parallelogram({}, {}, {"friction": stick(0.0, 1.0)}, LEVEL)
+    with pytest.raises(SceneError, match=r"rubs while it slides") as caught:
         run_scene(tmp_path, {**data, "simulation": {"duration": 0.1}})
-    assert caught.value.where.endswith("loops[0].friction.law")
+    assert caught.value.where.endswith("loops[0].friction.force")
     assert caught.value.exit_code == 2
 
 
-def test_static_start_that_friction_holds(tmp_path: Path) -> None:
+@pytest.mark.parametrize("closing", [{}, {"friction": stick(5.0)}])
+def test_static_start_that_friction_holds(closing: dict[str, Any], tmp_path: Path) -> None:
     """A linkage of flexible links that would fall: it stays where it is put, and joints bear what that takes."""
     efforts = {}
     for name, settings in {"erls": {}, "nodal": {"integrator": "generalized_alpha", "step": 5e-3}}.items():
-        data = parallelogram({"friction": stick(5.0)}, {"friction": stick(5.0)}, {}, LEVEL)
+        data = parallelogram({"friction": stick(5.0)}, {"friction": stick(5.0)}, closing, LEVEL)
         data |= {"gravity": [0.0, -9.81, 0.0], "initial": {"deformation": "static"}}
         data["simulation"] = {"duration": 0.05, "formulation": name, **settings}
         for link, length in zip(data["links"], (LENGTHS[0], LENGTHS[1], LENGTHS[0]), strict=True):
@@ -290,7 +313,8 @@ def test_static_start_that_friction_holds(tmp_path: Path) -> None:
             link.pop("rigid")
             link["model"] = f"{link['name']}.toml"
         run = run_scene(tmp_path, data, False)
-        assert not any(float(run.joint_rate(f"j{k}", 0.05)) for k in range(3))
+        moves = max(abs(float(run.joint_rate(f"j{k}", 0.05))) for k in range(3))
+        assert moves <= (SEEN if closing and name != "nodal" else 0.0)
         assert run.stability is not None
         assert run.stability.root is not None
         assert run.stability.root.real <= 1e-6  # what friction holds does not grow

@@ -103,7 +103,7 @@ def test_other_settings_and_other_files_are_other_runs(tmp_path: Path) -> None:
         pass
     with keeping(State(state.path, force=True), scene, []) as kept:
         assert kept.results is not None
-        assert len(kept.results) == 0
+        assert kept.results.held() == 0
 
 
 @pytest.mark.parametrize(

@@ -10,19 +10,24 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from shell_meshes import dofs, held, plate, shell_grid
+from shell_meshes import ShellGrid, dofs, held, plate, shell_grid
 
 TWISTED = {0.32: (5.424e-3, 1.754e-3), 0.0032: (5.256e-3, 1.294e-3)}  # by thickness: in plane, out of plane
 
 
-def twisted(nx: int, ny: int, thickness: float, kind: str, drilling: float = 0.01) -> list[float]:
-    """Tip of the pre-twisted cantilever under unit loads in plane and out of plane (1e-6 where it is thin)."""
+def twisted_grid(nx: int, ny: int, kind: str) -> ShellGrid:
+    """The pre-twisted cantilever."""
 
     def place(a: float, b: float) -> tuple[float, float, float]:
         angle, y = np.pi / 2 * a, (b - 0.5) * 1.1
         return 12 * a, y * np.cos(angle), y * np.sin(angle)
 
-    grid = shell_grid(nx, ny, place, kind)
+    return shell_grid(nx, ny, place, kind)
+
+
+def twisted(nx: int, ny: int, thickness: float, kind: str, drilling: float = 0.01) -> list[float]:
+    """Its tip under unit loads in plane and out of plane (1e-6 where it is thin)."""
+    grid = twisted_grid(nx, ny, kind)
     _, stiffness = grid.matrices(plate(29e6, 0.22, thickness), drilling)
     share = np.ones(ny + 1)
     share[[0, -1]] = 0.5

@@ -12,7 +12,7 @@ from fuzzing import Facts, Reader, check_reports, fuzz, fuzz_group
 
 from fe_import.errors import Cause, FEImportError
 
-CASES = {"modal files": 100, "descriptions": 150}
+CASES = {"modal files": 60, "descriptions": 150}
 
 
 @pytest.mark.parametrize("group", GROUPS)

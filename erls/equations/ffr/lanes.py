@@ -1,9 +1,8 @@
-"""Forces and tangents of chains in floating frames, in eightfold numbers."""
+"""Forces of chains in floating frames, in eightfold numbers."""
 
 from __future__ import annotations
 
-from erls.equations.ffr.mass import mass_matrix
 from erls.equations.ffr.residual import residual
-from erls.equations.lane_kernels import lane_kernels
+from erls.equations.lane_kernels import lane_kernel
 
-forces, tangents, masses = lane_kernels(__name__, residual, mass_matrix)
+forces = lane_kernel(__name__, residual)

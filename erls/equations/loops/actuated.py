@@ -8,6 +8,7 @@ from erls.equations.loops.closure import fed
 from erls.equations.loops.records import (
     CLOSING_JOINT,
     COORDINATE,
+    GRIPPED_JOINT,
     LOOP_STATE,
     PUSH,
     RATE,
@@ -19,10 +20,12 @@ from erls.equations.loops.records import (
     call_residual,
     call_stiffness_and_damping,
     read_closing_joint,
+    read_gripped_joint,
     read_loop_room,
     read_loop_state,
     read_loops,
 )
+from erls.equations.loops.rubbing import grip_force, grip_gains
 from erls.equations.serial.joints import gains
 from erls.equations.serial.records import read_joint
 from erls.equations.switches.still import still_forces, still_matrix
@@ -46,6 +49,17 @@ def _push_closing(loops: Loops, reals: Array, integers: IntArray, scratch: Array
                 out[i] += row[i] * push
 
 
+@part
+def _rub(loops: Loops, reals: Array, integers: IntArray, scratch: Array, y: Array, v: Array, out: Array) -> None:
+    """Add friction of joints of the tree that may stick."""
+    room = read_loop_room(scratch, integers, loops.room)
+    for number in range(loops.gripped):
+        joint = read_gripped_joint(reals, integers, loops.grips + number * GRIPPED_JOINT)
+        at = joint.place
+        room.gripped[number, 0], room.gripped[number, 1] = v[at], y[at]
+        out[at] -= grip_force(joint.grip, y[at], v[at])
+
+
 @kernel(contract.RESIDUAL, counted=False)
 def forces(
     reals: Array, integers: IntArray, scratch: Array, t: float, y: Array, v: Array, a: Array, out: Array
@@ -56,6 +70,7 @@ def forces(
     call_residual(loops.residual, reals, integers, scratch, t, y, v, a, out)
     if loops.active:
         _push_closing(loops, reals, integers, scratch, a, out)
+    _rub(loops, reals, integers, scratch, y, v, out)
     still_forces(read_loop_room(scratch, integers, loops.room).held, a, out)
 
 
@@ -99,6 +114,9 @@ def _add_gains(
             acting = read_joint(reals, integers, joint.joint)
             feed = fed(scratch, integers, joint, found[RATE])
             stiffness, damping = gains(acting, reals, integers, t, found[COORDINATE], found[RATE], feed)
+            if len(joint.grip) > 0:
+                held, damped = grip_gains(joint.grip, found[RATE])
+                stiffness, damping = stiffness + held, damping + damped
             add_outer(row, stiffness, k)
             add_outer(row, damping, c)
 
@@ -114,5 +132,10 @@ def matrices(
     call_stiffness_and_damping(loops.stiffness_and_damping, reals, integers, scratch, t, y, v, k, c)
     if loops.active:
         _add_gains(loops, reals, integers, scratch, t, len(v), k, c)
+    for number in range(loops.gripped):
+        joint = read_gripped_joint(reals, integers, loops.grips + number * GRIPPED_JOINT)
+        held, damped = grip_gains(joint.grip, v[joint.place])
+        k[joint.place, joint.place] += held
+        c[joint.place, joint.place] += damped
     still_matrix(room.held, 0.0, k)
     still_matrix(room.held, 0.0, c)

@@ -21,7 +21,7 @@ from erls.equations.formulation import ContactSeries, Energy, LoopForce, Reactio
 from erls.equations.linearization import Linearization
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.friction import forced, freely
-from erls.equations.loops.gripped import by_states, gripped, loop_grips
+from erls.equations.loops.gripped import by_states, gripped, held_friction, loop_grips, resting, rubbed
 from erls.equations.loops.neighbours import LoopNeighbours
 from erls.equations.loops.rows import Closure, applied
 from erls.equations.loops.start import ASSEMBLED, Start, find_start, start_velocity, stays_open
@@ -277,9 +277,15 @@ class ClosedChain(Tied):
 
     def neighbours(self, t: float, y: Array, v: Array) -> LoopNeighbours:
         """States beside a closed one, with the forces of the loops as they are there."""
-        a, multipliers, _ = forced(self, t, y, v)
+        a, multipliers, rows = forced(self, t, y, v)
         stuck = () if self.dry is None else self.dry.places[settled(self, t, y, v).held].tolist()
-        return LoopNeighbours(self, TreeNeighbours(self.bare, t, y, v, a, tuple(stuck)), multipliers.copy(), self.kept)
+        tree, reactions = TreeNeighbours(self.bare, t, y, v, a, tuple(stuck)), multipliers.copy()
+        if not self.mechanism.gripped:
+            return LoopNeighbours(self, tree, reactions, self.kept)
+        conditions = rows.copy()
+        found = rubbed(self, t, y, v)
+        held = resting(self, found, conditions)
+        return LoopNeighbours(self, tree, reactions, self.kept, found, tuple(held))
 
     def linearized(self, t: float, y: Array, v: Array) -> Linearization:
         """Small motions about a closed state on the ways that the loops leave."""
@@ -355,17 +361,17 @@ class ClosedChain(Tied):
         """What every closing joint does to its link."""
         y, v = self.closed(t, y, v)
         a, multipliers, found = self.accelerations(t, y, v)
-        wrenches = self._wrenches(a, multipliers, found)
+        wrenches = self._wrenches(a, multipliers, found, held_friction(self, t, y, v)[1])
         return [applied(outer, wrench) for outer, wrench in zip(found.outer, wrenches, strict=True)]
 
-    def _wrenches(self, a: Array, multipliers: Array, found: Closure) -> list[Array]:
+    def _wrenches(self, a: Array, multipliers: Array, found: Closure, friction: Array) -> list[Array]:
         """(6,) what every closing joint does to its link, in the axes of the outer frame: reactions, drives, rotors."""
         result = self.rows.wrenches(found, multipliers)
         for k, (loop, effort) in enumerate(zip(self.mechanism.loops, found.efforts, strict=True)):
             if (free := loop.freedom) is not None:
                 along = free.freedom.row
                 turning = float(found.moves[k][along, self.bare.free] @ a) + effort.turning
-                result[k][along] += effort.force - free.rotor_inertia * turning
+                result[k][along] += effort.force + friction[k] - free.rotor_inertia * turning
         return result
 
     def loop_motion(self, t: float, y: Array, v: Array, loop: int) -> tuple[float, float]:
@@ -378,7 +384,7 @@ class ClosedChain(Tied):
         y, v = self.closed(t, y, v)
         free = self.mechanism.loops[loop].freedom
         if free is None or not self.mechanism.loops[loop].prescribed:
-            return self.closure(t, y, v).efforts[loop].force
+            return self.closure(t, y, v).efforts[loop].force + float(held_friction(self, t, y, v)[1][loop])
         _, multipliers, found = self.accelerations(t, y, v)
         return float(free.freedom.screw @ self.rows.wrenches(found, multipliers)[loop])
 
@@ -391,10 +397,12 @@ class ClosedChain(Tied):
         y, v = self._closed_at(t, y, v)
         loops, links = self.mechanism.loops, self.mechanism.links
         found, loads = np.empty((len(t), self.size)), np.empty((len(t), len(links)))
+        rubbed = np.empty((len(t), len(links)))
         given: list[list[LoopForce]] = []
         for i, at in enumerate(t.tolist()):
             found[i], multipliers, closure = self.accelerations(at, y[i], v[i])
-            wrenches = self._wrenches(found[i], multipliers, closure)
+            rubbed[i], friction = held_friction(self, at, y[i], v[i])
+            wrenches = self._wrenches(found[i], multipliers, closure, friction)
             given.append([applied(outer, wrench) for outer, wrench in zip(closure.outer, wrenches, strict=True)])
             loads[i] = -(np.concatenate(closure.moves).T @ np.concatenate(wrenches))[: len(links)]
         result = by_states(self, partial(reaction_series, self.bare), t, y, v, found)
@@ -413,6 +421,7 @@ class ClosedChain(Tied):
         for k, joint in enumerate(self.mechanism.joints):
             if joint.drive.prescribed:
                 result.effort[:, k] += loads[:, k]
+        result.effort[:] += rubbed
         if self.dry is not None:  # those that stick bear loads, too
             joints = self.bare.free_joints[self.dry.places]
             result.effort[:, joints] += np.where(v[:, self.dry.places] == 0.0, loads[:, joints], 0.0)

@@ -25,6 +25,7 @@ from erls.equations.loops.records import (
     read_loop_state,
     read_loops,
 )
+from erls.equations.loops.rubbing import grip_force
 from erls.equations.serial.joints import effort
 from erls.equations.serial.records import read_joint, read_joint_state
 from erls.equations.serial.time_curves import curve
@@ -211,6 +212,8 @@ def _act(
         forces = read_joint(reals, integers, joint.joint)
         feed = fed(scratch, integers, joint, value)
         found[PUSH] = effort(forces, reals, integers, t, found[COORDINATE], found[RATE], feed)
+        if len(joint.grip) > 0:
+            found[PUSH] += grip_force(joint.grip, found[COORDINATE], found[RATE])
 
 
 @part

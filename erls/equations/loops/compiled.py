@@ -26,7 +26,7 @@ from erls.mechanism.loops import Loop, loop_ends
 from fe_import.model import IntArray
 
 _see_room, _see_state = python_reader(own.LoopRoom), python_reader(own.LoopState)
-_see_closing = python_reader(own.ClosingJoint)
+_see_closing, _see_gripped = python_reader(own.ClosingJoint), python_reader(own.GrippedJoint)
 
 
 class Carrier(Protocol):
@@ -95,6 +95,8 @@ class Given:
     feeding : tuple of int
         Places of the `erls.equations.serial.records.JointState` whose feed-forward acts in each closing joint, where
         any does.
+    grips : tuple of (int, (9,) array)
+        Place of the coordinate, and friction, of each joint of the tree that may stick as closing joints do.
     """
 
     tree: Carrier
@@ -107,6 +109,7 @@ class Given:
     open: float
     turns: Turns
     feeding: tuple[int, ...] = ()
+    grips: tuple[tuple[int, Array], ...] = ()
 
     @property
     def active(self) -> bool:
@@ -174,12 +177,38 @@ class CompiledLoops(CompiledSystem):
         joints: list[int] = []
         efforts: list[int] = []
         for k in range(len(self.given.rows.loops)):
-            joint = _see_closing(self.reals, self.integers, self._places.first + k * own.CLOSING_JOINT).joint
+            joint = self._closing(k).joint
             if joint >= 0:
                 joints.append(int(joint))
                 state = self._places.states + k * own.LOOP_STATE
                 efforts.append(place_of(own.LoopState, "effort", self.integers, state) + own.PUSH)
         return Acting(np.array(joints, dtype=np.int64), np.array(efforts, dtype=np.int64))
+
+    def _closing(self, number: int) -> own.ClosingJoint:
+        return _see_closing(self.reals, self.integers, self._places.first + number * own.CLOSING_JOINT)
+
+    @property
+    def sticking(self) -> list[int]:
+        """Loops whose closing joints may stick, by their numbers."""
+        return [k for k, loop in enumerate(self.given.rows.loops) if loop.sticks]
+
+    def gripped_laws(self, reals: Array) -> list[Array]:
+        """See `CompiledSystem`: of joints of the tree, then of those that close it."""
+        whole, closing = self._places, self.sticking
+        tree = [whole.grips + k * own.GRIPPED_JOINT for k in range(whole.gripped)]
+        found = [_see_gripped(reals, self.integers, place).grip for place in tree]
+        places = [whole.first + k * own.CLOSING_JOINT for k in closing]
+        return [*found, *(_see_closing(reals, self.integers, place).grip for place in places)]
+
+    @property
+    def gripped_places(self) -> IntArray:
+        """See `CompiledSystem`."""
+        room = place_of(own.LoopRoom, "gripped", self.integers, self._places.room)
+        tree = room + np.arange(2 * self._places.gripped).reshape(-1, 2)
+        states = (self._places.states + k * own.LOOP_STATE for k in self.sticking)
+        efforts = [place_of(own.LoopState, "effort", self.integers, state) for state in states]
+        closing = np.array([[at + own.RATE, at + own.COORDINATE] for at in efforts], dtype=np.int64)
+        return np.concatenate([tree, closing.reshape(-1, 2)])
 
     def closure(self, t: float, y: Array, v: Array) -> Closure:
         """Conditions of the loops, and what acts along them, at a state."""
@@ -284,11 +313,13 @@ def compile_loops(given: Given) -> CompiledLoops:
         loops=len(loops),
         conditions=m,
         kept=r,
+        gripped=len(given.grips),
+        grips=put_all(constants, [own.GrippedJoint(*grip) for grip in given.grips]) if given.grips else -1,
         active=int(given.active),
         rotors=int(any(loop.freedom is not None and loop.freedom.rotor_inertia for loop in loops)),
         first=put_all(constants, [_joint(constants, given, k, loop) for k, loop in enumerate(loops)]),
         states=put_all(scratch, [own.loop_state(columns, len(found)) for found in rows.conditions]),
-        room=scratch.put(own.room(len(ends), columns, n, m, r)),
+        room=scratch.put(own.room(len(ends), columns, n, m, r, len(given.grips))),
         frames=address_of(tree.frames, contract.FRAMES),
         residual=address_of(tree.residual, contract.RESIDUAL),
         mass_matrix=address_of(tree.mass_matrix, contract.MASS_MATRIX),
@@ -348,4 +379,5 @@ def _joint(memory: Memory, given: Given, number: int, loop: Loop) -> own.Closing
         lines=np.array([row.line for row in found]),
         entries=np.array([row.entries for row in found]),
         pitches=np.array([row.pitch for row in found]),
+        grip=np.zeros(0) if free is None else free.grip(given.reach),
     )

@@ -13,10 +13,12 @@ from erls.equations.loops.tied import Tied
 from erls.equations.neighbours import States
 from erls.equations.serial.neighbours import TreeNeighbours, fastest
 from erls.maths.so3 import Array
+from erls.mechanism.contacts import constant_friction
 from fe_import.model import IntArray
 
 if TYPE_CHECKING:
-    from erls.equations.loops.compiled import CompiledLoops  # it imports the compiler
+    from erls.equations.loops.compiled import CompiledLoops  # they import the compiler
+    from erls.equations.loops.gripped import Rubbed
 
 
 @dataclass(frozen=True)
@@ -27,17 +29,38 @@ class LoopNeighbours:
     ----------
     tree : TreeNeighbours
         Of its tree.
+    rubbed : Rubbed, optional
+        Joints that may stick, where closing joints do; friction stays as it is.
+    held : tuple of int
+        Of these, by their numbers, what rests by itself.
     """
 
     chain: Tied
     tree: TreeNeighbours
     reactions: Array
     kept: IntArray
+    rubbed: Rubbed | None = None
+    held: tuple[int, ...] = ()
 
     @cached_property
     def loops(self) -> CompiledLoops:
         """Of the conditions that count, whose violations do not decay."""
-        return self.chain.packed(self.kept, 0.0)
+        result = self.chain.packed(self.kept, 0.0)
+        if self.rubbed is not None:
+            for law, force in zip(result.gripped_laws(result.reals), self.rubbed.forces.tolist(), strict=True):
+                law[:] = constant_friction(force)
+        return result
+
+    @cached_property
+    def _fixed(self) -> tuple[list[int], list[tuple[int, int, float]]]:
+        """Coordinates that are held; closing joints, components of their twists and where they are held."""
+        if self.rubbed is None:
+            return [], []
+        places, closing = [at for at, _ in self.loops.given.grips], self.loops.sticking
+        number = len(places)
+        along = [(k, loop.freedom.freedom.row) for k in closing if (loop := self.chain.mechanism.loops[k]).freedom]
+        ends = [(*along[k - number], float(self.rubbed.coordinates[k])) for k in self.held if k >= number]
+        return [places[k] for k in self.held if k < number], ends
 
     @property
     def time(self) -> float:
@@ -90,7 +113,7 @@ class LoopNeighbours:
     @property
     def multipliers(self) -> Array:
         """Those of the conditions, and none of joints that stick."""
-        return np.concatenate([self.reactions, self.tree.multipliers])
+        return np.concatenate([self.reactions, self.tree.multipliers, np.zeros(len(self.held))])
 
     def forces(self, x: Array, w: Array, b: Array) -> Array:
         """See `Neighbours`."""
@@ -103,12 +126,17 @@ class LoopNeighbours:
     def rows(self) -> Array:
         """See `Neighbours`."""
         found = self.chain.closure(self.tree.time, self.tree.y, self.tree.v)
-        return np.concatenate([found.rows[self.kept][:, self.chain.bare.free], self.tree.rows()])
+        free, (places, ends) = self.chain.bare.free, self._fixed
+        closing = np.array([found.moves[k][along, free] for k, along, _ in ends]).reshape(-1, len(free))
+        tree = np.concatenate([self.tree.rows(), np.eye(len(free))[places]])
+        return np.concatenate([found.rows[self.kept][:, free], tree, closing])
 
     def violation(self) -> Array:
         """See `Neighbours`."""
-        found = self.chain.closure(self.tree.time, self.tree.y, self.tree.v).violation[self.kept]
-        return np.concatenate([found, self.tree.violation()])
+        found, (places, ends) = self.chain.closure(self.tree.time, self.tree.y, self.tree.v), self._fixed
+        opened = [found.efforts[k].coordinate - held for k, _, held in ends]
+        tree = np.concatenate([self.tree.violation(), np.zeros(len(places))])
+        return np.concatenate([found.violation[self.kept], tree, opened])
 
     def states(self, x: Array, w: Array, b: Array) -> States:
         """See `Neighbours`."""

@@ -40,6 +40,8 @@ class Loops(NamedTuple):
     ----------
     loops, conditions, kept : int
         How many; m; r.
+    gripped, grips : int
+        Joints of the tree that may stick, where closing joints do; place of the first `GrippedJoint`, or -1.
     active, rotors : int
         Whether forces or rotors, and whether rotors act along closing joints.
     first, states, room : int
@@ -65,6 +67,8 @@ class Loops(NamedTuple):
     loops: int
     conditions: int
     kept: int
+    gripped: int
+    grips: int
     active: int
     rotors: int
     first: int
@@ -118,6 +122,8 @@ class ClosingJoint(NamedTuple):
     lines, entries, pitches : (c, 3), (c, 3, 3), (c,) arrays
         Conditions c · p + ⟨C, Q⟩ - h ψ(Q) = 0 on place p and rotation Q of the outer frame in the inner one, less what
         is prescribed.
+    grip : (9,) array
+        Friction along it that may stick, as in `erls.maths.contact_law`; empty without.
     """
 
     outer: int
@@ -135,6 +141,22 @@ class ClosingJoint(NamedTuple):
     lines: Matrix
     entries: Stack
     pitches: Vector
+    grip: Vector
+
+
+class GrippedJoint(NamedTuple):
+    """A joint of the tree that may stick.
+
+    Attributes
+    ----------
+    place : int
+        Of its coordinate.
+    grip : (9,) array
+        Friction along it, as of `ClosingJoint`.
+    """
+
+    place: int
+    grip: Vector
 
 
 class LoopState(NamedTuple):
@@ -190,6 +212,8 @@ class LoopRoom(NamedTuple):
         Room.
     held : (n,) array
         1 of coordinates that do not move (`erls.equations.switches`), 0 of others: set from outside.
+    gripped : (g, 2) array
+        Rate and coordinate of every `GrippedJoint`.
     """
 
     frames: Matrix
@@ -208,6 +232,7 @@ class LoopRoom(NamedTuple):
     multipliers: Vector
     wrong: Vector
     held: Vector
+    gripped: Matrix
 
 
 def loop_state(columns: int, conditions: int) -> LoopState:
@@ -218,7 +243,7 @@ def loop_state(columns: int, conditions: int) -> LoopState:
     return LoopState(pose, six[0], six[1], left, six[2], six[3], moves, gradients, np.zeros(4), six[4])
 
 
-def room(ends: int, columns: int, n: int, m: int, r: int) -> LoopRoom:
+def room(ends: int, columns: int, n: int, m: int, r: int, gripped: int) -> LoopRoom:
     """Memory for all."""
 
     def square() -> Array:
@@ -244,10 +269,13 @@ def room(ends: int, columns: int, n: int, m: int, r: int) -> LoopRoom:
         multipliers=np.zeros(r),
         wrong=np.zeros(r),
         held=np.zeros(n),
+        gripped=np.zeros((gripped, 2)),
     )
 
 
 read_loops, read_loop_room = reader(Loops), reader(LoopRoom)
 read_closing_joint, read_loop_state = reader(ClosingJoint), reader(LoopState)
+read_gripped_joint = reader(GrippedJoint)
 see_loops = python_reader(Loops)
 CLOSING_JOINT, LOOP_STATE = table_size(ClosingJoint), table_size(LoopState)
+GRIPPED_JOINT = table_size(GrippedJoint)

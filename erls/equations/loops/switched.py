@@ -1,7 +1,8 @@
 """A chain with loops some of whose joints stick, or whose motors come to their limits (`erls.equations.switches.base`).
 
 Joints that stick are coordinates that do not move in the equations of the chain; of those that rest because others do,
-the conditions of the loops see to that.
+the conditions of the loops see to that. Where closing joints may stick, too, joints are held as points of contacts are
+(`erls.equations.loops.gripped`), and no coordinate is.
 """
 
 from __future__ import annotations

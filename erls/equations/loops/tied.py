@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from erls.equations.formulation import Modular, TreeFormulation
 from erls.equations.loops.rows import Closure, LoopRows
 from erls.equations.system import metre_scales
 from erls.maths.beside import compiling_beside
+from erls.maths.contact_places import COEFFICIENT
 from erls.maths.so3 import Array
 from erls.mechanism.loop_turns import turning_signs
 from fe_import.model import IntArray
@@ -68,12 +70,20 @@ class Tied:
             [None if k in free else joint.drive.motion for k, joint in enumerate(joints)],
         )
         numbers = self.reach, decay, OPEN * self.reach
-        return compile_loops(Given(self.bare, self.rows, kept, self.metres, self.row_metres, *numbers, turns))
+        given = Given(self.bare, self.rows, kept, self.metres, self.row_metres, *numbers, turns)
+        held = [(at, joints[k]) for at, k in enumerate(free) if self.mechanism.gripped and joints[k].forces.sticks]
+        grips = tuple((at, joint.forces.grip(joint.freedom, self.reach)) for at, joint in held)
+        return compile_loops(replace(given, grips=grips))
 
     @cached_property
     def whole(self) -> CompiledLoops:
-        """With all rows, to look at; who solves needs those that are independent."""
-        return self.packed(np.arange(len(self.rows.names)), 0.0)
+        """With all rows, to look at; who solves needs those that are independent. Without friction that sticks, which
+        is not known of a state by itself.
+        """
+        result = self.packed(np.arange(len(self.rows.names)), 0.0)
+        for law in result.gripped_laws(result.reals):
+            law[COEFFICIENT] = 0.0
+        return result
 
     def closure(self, t: float, y: Array, v: Array) -> Closure:
         """Conditions of the loops at a state; the last one is remembered, since integrators ask in several ways."""

@@ -24,6 +24,7 @@ from erls.equations.nodal.parts import LinkParts, node_at
 from erls.equations.nodal.redundant import without_redundant
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.equations.nodal.seat import Seat
+from erls.equations.nodal.shell import Shells
 from erls.maths.rotation_maps import exp
 from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
@@ -87,6 +88,7 @@ class Chain:
     left_out : tuple of str
         Names of these.
     beams : Beams or None
+    shells : Shells or None
     nodes : tuple of slice
         Of each link.
     elements : tuple of int
@@ -99,10 +101,17 @@ class Chain:
     full: ChainSystem
     left_out: tuple[str, ...]
     beams: Beams | None
+    shells: Shells | None
     nodes: tuple[slice, ...]
     elements: tuple[int, ...]
     seats: tuple[Seat, ...]
     closing: tuple[Seat, ...]
+
+    @property
+    def elastic(self) -> list[Elements]:
+        """Beams and shells without weight, which resist nothing but to be bent."""
+        found: list[Elements] = [] if self.beams is None else [self.beams.without_weight()]
+        return found if self.shells is None else [*found, self.shells]
 
     def resting(self, held: Mapping[int, float]) -> NodalSystem:
         """The same with some joints, by their numbers, held at a coordinate."""
@@ -142,6 +151,11 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
         for frame, part, first in zip(frames, links, ends[:-1], strict=True)
         for b in part.beams
     ]
+    plates = [
+        replace(x, nodes=tuple(first + n for n in x.nodes), frames=frame @ x.frames)
+        for frame, part, first in zip(frames, links, ends[:-1], strict=True)
+        for x in part.shells
+    ]
     bodies = [
         replace(b, node=first + b.node) for part, first in zip(links, ends[:-1], strict=True) for b in part.bodies
     ]
@@ -149,6 +163,9 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
     elastic = Beams(beams, poses, mechanism.gravity) if beams else None
     if elastic is not None:
         passive.append(elastic)
+    surfaces = Shells(plates, poses) if plates else None
+    if surfaces is not None:
+        passive.append(surfaces)
     if bodies:
         passive.append(RigidBodies(bodies, mechanism.gravity))
     if mechanism.loads:
@@ -168,12 +185,10 @@ def build_chain(mechanism: Mechanism, links: Sequence[LinkParts], start: ClosedS
         joints, left_out = without_redundant(full)
         system = ChainSystem(poses, passive, actuators, joints) if left_out else full
     firsts = np.cumsum([0, *(len(part.beams) for part in links)])[:-1].tolist()
-    return Chain(system, full, left_out, elastic, nodes, tuple(firsts), seats, closing)
+    return Chain(system, full, left_out, elastic, surfaces, nodes, tuple(firsts), seats, closing)
 
 
-def _loads(
-    mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int], load: PointLoad
-) -> list[NodalLoad]:
+def _loads(mechanism: Mechanism, links: Sequence[LinkParts], firsts: Sequence[int], load: PointLoad) -> list[NodalLoad]:
     """A load on the node that carries its node; that on a link's mass on all of its nodes, half of each beam's at its
     ends.
     """

@@ -1,4 +1,4 @@
-"""The nodal formulation: geometrically exact beams and rigid bodies on SE(3), tied by joints with multipliers.
+"""The nodal formulation: geometrically exact beams, shells and rigid bodies on SE(3), tied by joints with multipliers.
 
 V. Sonneville, A. Cardona, O. Brüls, Comput. Methods Appl. Mech. Eng. 268 (2014) 451–474. It holds for any deflection
 and knows nothing of modes. y holds position and rotation matrix of every node and the joint coordinates, then what the
@@ -62,7 +62,7 @@ class Nodal:
     Raises
     ------
     SceneError
-        A link that is neither rigid nor made of beams; it is named.
+        A link that is neither rigid nor made of beams or shells; it is named.
     """
 
     def __init__(
@@ -94,6 +94,12 @@ class Nodal:
     def refined(self, times: int) -> Nodal:
         """The same with so many elements in place of each."""
         return Nodal(self.mechanism, self._elements, self._start, times, self._rules)
+
+    def with_sections(self, mechanism: Mechanism) -> Nodal:
+        """The same of a mechanism whose links have other sections or materials, and nodes and interfaces where they are
+        here: loops begin as they do here.
+        """
+        return Nodal(mechanism, self._elements, self._start, rules=self._rules)
 
     @cached_property
     def _arms(self) -> list[tuple[int, int, Array]]:
@@ -237,9 +243,7 @@ class Nodal:
         y, v = self.initial_state()
         near = self.neighbours(0.0, y, v)
         motions = small_motions(near) if self.system.size - self.system.constraints <= LARGEST else None
-        return stability_of(
-            self._resting.bearing, motions, near.acceleration, near.metres, size_of(self.mechanism)
-        )
+        return stability_of(self._resting.bearing, motions, near.acceleration, near.metres, size_of(self.mechanism))
 
     def state(self, t: float, y: Array, v: Array) -> State:
         """Positions of all nodes; link frames at the inboard nodes, modal coordinates as near as modes come."""
@@ -371,7 +375,7 @@ class Nodal:
 
     def describe(self) -> dict[str, Any]:
         """Names and sizes for reports."""
-        beams = self.chain.beams
+        beams, shells = self.chain.beams, self.chain.shells
         own = {loop.name: f"joint {loop.name!r}: " for loop in self.mechanism.loops}
         loops = [
             {"name": name, "redundant": [x.removeprefix(start) for x in self.chain.left_out if x.startswith(start)]}
@@ -380,7 +384,7 @@ class Nodal:
         return {
             "formulation": "nodal",
             "joints": len(self.mechanism.joints),
-            "elements": 0 if beams is None else len(beams.nodes),
+            "elements": (0 if beams is None else len(beams.nodes)) + (0 if shells is None else len(shells.corners)),
             "nodes": self.system.count,
             "velocities": self.system.size,
             "conditions": self.system.constraints,

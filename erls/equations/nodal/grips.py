@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from erls.equations.switches.grips import NO_GRIPS, Grips, Touch
+from erls.equations.switches.grips import NO_GRIPS, Grips, Touch, held_point
 from erls.maths.so3 import Array
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def nodal_grips(system: ChainSystem) -> Grips:
         return Touch.of(np.array(found)[..., [_GAP, *range(_SLIP, _SLIP + 4)]])
 
     laws = [system.model.contacts[k, _FRICTION:] for k in numbers]
-    return Grips([contacts[k] for k in numbers], laws, look)
+    return Grips([held_point(contacts[k]) for k in numbers], laws, look)
 
 
 @contextmanager

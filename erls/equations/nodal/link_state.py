@@ -45,6 +45,8 @@ class LinkView:
         inboard = node_at(parts, link.inboard.node, f"link {link.name!r}")
         self._inboard, self._back = nodes.start + inboard, pose(position=-parts.nodes[inboard])
         self._elements, self._fractions = first + parts.elements, parts.fractions
+        self._carriers = nodes.start + parts.carriers
+        self._arms = model.nodes - parts.nodes[parts.carriers] if len(parts.carriers) else None
         self._axes = np.array([b.frames[0, :3, :3] for b in parts.beams])[parts.elements] if parts.beams else None
         reach = float(np.linalg.norm(np.ptp(model.nodes, axis=0))) or 1.0
         self._reach = reach
@@ -56,15 +58,25 @@ class LinkView:
         frame = poses[..., self._inboard, :, :] @ self._back
         turn, place = frame[..., :3, :3], frame[..., None, :3, 3]
         model = self._model
-        if self._axes is None or beams is None:
+        found = self._nodes_at(poses, beams, bent)
+        if found is None:
             turns = np.repeat(turn[..., None, :, :], len(model.nodes), axis=-3)
             nodes = model.nodes @ np.swapaxes(turn, -2, -1) + place
             return LinkState(frame, nodes, turns, np.zeros((*frame.shape[:-2], model.modes)))
-        sections = beams.sections_at(poses, bent, self._elements, self._fractions)
-        nodes = sections[..., :3, 3]
+        nodes, turns = found
         moved = (nodes - place) @ turn - model.nodes
-        turns = sections[..., :3, :3] @ np.swapaxes(self._axes, 1, 2)
         back = np.swapaxes(turn, -2, -1)[..., None, :, :]
         turned = self._reach * rotations.log(back @ turns[..., model.rotation_nodes, :, :])
         shape = np.concatenate([moved, turned], axis=-2).reshape(*frame.shape[:-2], self._nearest.shape[1])
         return LinkState(frame, nodes, turns, shape @ self._nearest.T)
+
+    def _nodes_at(self, poses: Array, beams: Beams | None, bent: Array) -> tuple[Array, Array] | None:
+        """Places (..., n, 3) and turns (..., n, 3, 3) of the model's nodes; None of a rigid link."""
+        if self._arms is not None:
+            carrying = poses[..., self._carriers, :, :]
+            turns = carrying[..., :3, :3]
+            return carrying[..., :3, 3] + np.einsum("...nij,nj->...ni", turns, self._arms), turns
+        if self._axes is None or beams is None:
+            return None
+        sections = beams.sections_at(poses, bent, self._elements, self._fractions)
+        return sections[..., :3, 3], sections[..., :3, :3] @ np.swapaxes(self._axes, 1, 2)

@@ -1,4 +1,4 @@
-"""One link as nodes, beam elements and rigid bodies, in its mesh frame.
+"""One link as nodes, beam or shell elements and rigid bodies, in its mesh frame.
 
 Elements with consistent mass interpolate motion as they do strains; lumped ones are massless between rigid bodies at
 their nodes. Euler-Bernoulli members get `STIFF_SHEAR` times their shear stiffness.
@@ -6,7 +6,7 @@ their nodes. Euler-Bernoulli members get `STIFF_SHEAR` times their shear stiffne
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from erls.equations.nodal.beam import Beam, lumped
 from erls.equations.nodal.rigid_body import RigidBody
 from erls.equations.nodal.scatter import IntArray
 from erls.equations.nodal.section import BeamSection, beam_section
+from erls.equations.nodal.shell import Shell
 from erls.errors import Cause, SceneError
 from erls.maths import motion_maps as motions
 from erls.maths.se3 import pose
@@ -42,14 +43,20 @@ class LinkParts:
         Sections in the mesh frame.
     bodies : list of RigidBody
     elements, fractions : (n,) arrays
-        Where the nodes of the modal model lie: element, and share of its length. Empty for a rigid link.
+        Where the nodes of the modal model lie: beam, and share of its length. Empty for other links.
+    shells : list of Shell
+        Corners in the mesh frame.
+    carriers : (n,) int array
+        Of a link of shells the node that each node of the modal model goes with.
     """
 
     nodes: Array
-    beams: list[Beam]
-    bodies: list[RigidBody]
-    elements: IntArray
-    fractions: Array
+    beams: list[Beam] = field(default_factory=list)
+    bodies: list[RigidBody] = field(default_factory=list)
+    elements: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    fractions: Array = field(default_factory=lambda: np.zeros(0))
+    shells: list[Shell] = field(default_factory=list)
+    carriers: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 class BeamRules(NamedTuple):
@@ -69,39 +76,39 @@ class BeamRules(NamedTuple):
 
 
 def link_parts(link: Link, elements: int | None, times: int, rules: BeamRules = BeamRules()) -> LinkParts:  # noqa: B008
-    """Parts of a link, with ``elements`` in each member unless it is left to the description; ``times`` as many.
+    """Parts of a link, with ``elements`` in each member of beams, or as the description says; ``times`` as many.
 
     Raises
     ------
     SceneError
-        The link is not made of beams, has modal damping, or a payload between nodes.
+        The link is not made of beams or of shells, has modal damping, or a payload between nodes.
     """
     where = f"link {link.name!r}"
     if link.elastic_modes == 0:
         body = link_mass_properties(link)
         rigid = RigidBody(0, body.mass, _symmetric(body.inertia), body.centre_of_mass - link.inboard.position)
-        return LinkParts(link.inboard.position[None], [], [rigid], np.zeros(0, dtype=np.int64), np.zeros(0))
-    if link.description is None or link.description.frame is None:
-        raise SceneError(
-            Cause.BAD_FIELD,
-            "the nodal formulation needs links made of beams, or rigid ones",
-            where=where,
-            value="solid, exported or reduced elsewhere",
-            remedy="give 'model' with a table [frame], 'flexible = false', or use another formulation",
-        )
+        return LinkParts(link.inboard.position[None], bodies=[rigid])
     if link.damping.any():
-        raise SceneError(
-            Cause.BAD_FIELD,
-            "the nodal formulation has no modes that could be damped",
-            where=where,
-            value="modal damping",
-            remedy="set damping = { ratio = 0.0 } for the link, or use another formulation",
-        )
+        remedy = "set damping = { ratio = 0.0 } for the link, or use another formulation"
+        raise refused("modes, which could be damped", where, "modal damping", remedy)
+    if link.shells is not None:
+        from erls.equations.nodal.shell_parts import shell_link_parts  # here: most links have none
+
+        return shell_link_parts(link, link.shells, times)
+    if link.description is None or link.description.frame is None:
+        remedy = "give 'model' with a table [frame] or [shell], 'flexible = false', or use another formulation"
+        what = "links that are neither beams, nor shells, nor rigid"
+        raise refused(what, where, "solid, or reduced elsewhere", remedy)
     frame = link.description.frame
     parts = frame_parts(link.description, frame, where, elements, times)
     own = frame_parts(link.description, frame, where).mesh
     places = _places(own, parts.mesh)
     return LinkParts(parts.mesh.nodes, *_beams_and_bodies(link, parts, places, rules), *places)
+
+
+def refused(what: str, where: str, value: str, remedy: str) -> SceneError:
+    """Why a link has no nodal elements."""
+    return SceneError(Cause.BAD_FIELD, f"the nodal formulation has no {what}", where=where, value=value, remedy=remedy)
 
 
 def _places(own: FrameMesh, mesh: FrameMesh) -> tuple[IntArray, Array]:
@@ -123,6 +130,8 @@ def node_at(parts: LinkParts, number: int, where: str) -> int:
     SceneError
         There is none.
     """
+    if len(parts.carriers):
+        return int(parts.carriers[number])
     if not parts.beams:
         return 0
     end = round(float(parts.fractions[number]))

@@ -1,6 +1,6 @@
 """Static starts of nodal scenes: the equilibrium that grows with the loads, what it leaves of the links' stiffness.
 
-With E the forces of beams alone and R those of everything, at rest with the joints held,
+With E the forces of beams and shells alone and R those of everything, at rest with the joints held,
 
     s R(q) + (1 - s) E(q) + Bᵀ λ = 0,    Φ(q) = 0
 
@@ -46,7 +46,7 @@ class PartlyLoaded(NodalSystem):
     whole : NodalSystem
         Under all loads; no prescribed motion but the one at time 0.
     bare : NodalSystem
-        The same nodes and joints with beams alone, without weight.
+        The same nodes and joints with beams and shells alone, without weight.
     """
 
     def __init__(self, whole: NodalSystem, bare: NodalSystem) -> None:
@@ -103,9 +103,9 @@ def resting(whole: NodalSystem, chain: Chain, mechanism: Mechanism) -> Resting:
         NO_EQUILIBRIUM, where none is found.
     """
     found = _directly(whole)
-    if chain.beams is None:
+    if not chain.elastic:
         return Resting(_reached(found), Bearing(1.0, ""))
-    bare = NodalSystem(whole.start.poses, [chain.beams.without_weight()], whole.rows.joints)
+    bare = NodalSystem(whole.start.poses, chain.elastic, whole.rows.joints)
     stiffness = _Stiffness(whole, bare, chain, mechanism)
     direct = None
     if found.failure is None:
@@ -181,7 +181,7 @@ def _near(newton: LoadSteps, t: float, q: Nodes, multipliers: Array) -> tuple[No
 
 @dataclass(frozen=True)
 class _Stiffness:
-    """What tells how much of the stiffness of beams loads leave."""
+    """What tells how much of the stiffness of beams and shells loads leave."""
 
     whole: NodalSystem
     bare: NodalSystem

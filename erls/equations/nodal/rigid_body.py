@@ -75,3 +75,22 @@ class RigidBodies:
         self.nodes: IntArray = np.array([[b.node] for b in bodies], dtype=np.int64).reshape(-1, 1)
         self.matrices = np.array([b.matrix for b in bodies]).reshape(-1, 6, 6)
         self.gravity = np.asarray(gravity, dtype=float)
+
+
+def joined(bodies: Sequence[RigidBody]) -> list[RigidBody]:
+    """One body at each node, of all that sit there."""
+    whole: dict[int, Array] = {}
+    for body in bodies:
+        whole[body.node] = whole.get(body.node, np.zeros((6, 6))) + body.matrix
+    found = []
+    for node, matrix in sorted(whole.items()):
+        mass = float(matrix[0, 0])
+        turning = matrix[3:, 3:]
+        if not mass:
+            found.append(RigidBody(node, 0.0, (turning + turning.T) / 2))
+            continue
+        arm = matrix[3:, :3] / mass  # skew of the place of the centre of mass
+        centre = np.array([arm[2, 1], arm[0, 2], arm[1, 0]])
+        own = turning + mass * arm @ arm
+        found.append(RigidBody(node, mass, (own + own.T) / 2, centre))
+    return found

@@ -2,7 +2,7 @@
 
 Frames of the surface at the corners are fixed to the node frames, so that surfaces may meet at a node under any angle;
 strains are those from the slopes of the surface as built. Forces are in `erls.equations.nodal.shell_forces`. Mass is
-lumped: a quarter of an element is a rigid body at each corner, `lumped_shells`.
+lumped, `lumped_shells`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from erls.equations.nodal.rigid_body import RigidBody
+from erls.equations.nodal.rigid_body import RigidBody, joined
 from erls.equations.nodal.scatter import IntArray
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
@@ -107,16 +107,23 @@ def slopes(frames: Array) -> Array:
 
 
 def lumped_shells(shells: Sequence[Shell], poses: Array) -> list[RigidBody]:
-    """Quarters of the mass of each shell as rigid bodies at its nodes, with the inertia of the thickness."""
+    """Mass of all shells, with the inertia of the thickness, as one rigid body at each of their nodes.
+
+    Elements give the shares of linear shape functions, which leave flat ones their centre of mass.
+    """
+    if not shells:
+        return []
+    r, s = np.repeat(POINTS, len(POINTS)), np.tile(POINTS, len(POINTS))
+    shapes = np.stack([(1 - r) * (1 - s), r * (1 - s), r * s, (1 - r) * s])
+    shares = Shells(shells, poses).areas @ shapes.T
     bodies = []
-    for shell in shells:
-        area = float(Shells([shell], poses).areas.sum())
-        mass, first, second = (float(m) * area / 4 for m in shell.moments)
+    for shell, areas in zip(shells, shares.tolist(), strict=True):
+        mass, first, second = shell.moments.tolist()
         if not mass > 0:
             continue
-        for node, frame in zip(shell.nodes, shell.frames, strict=True):
+        inertia = (second - first**2 / mass) * np.eye(3)
+        for node, frame, area in zip(shell.nodes, shell.frames, areas, strict=True):
             local = motions.inverse(poses[node]) @ frame
             centre = local[:3, 3] + local[:3, 2] * (first / mass)
-            inertia = (second - first**2 / mass) * np.eye(3)
-            bodies.append(RigidBody(node, mass, inertia, centre))
-    return bodies
+            bodies.append(RigidBody(node, area * mass, area * inertia, centre))
+    return joined(bodies)

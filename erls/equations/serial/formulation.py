@@ -26,7 +26,7 @@ from erls.equations.serial.neighbours import TreeNeighbours
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.singular import singular_mass
 from erls.equations.serial.state_series import ReactionSeries, inboard_place, state_series
-from erls.equations.series import mass_series, residual_series
+from erls.equations.series import mass_series, places_within, residual_series, residuals_leaving
 from erls.equations.stability import Bearing, Stability, stability_of, tumbling
 from erls.equations.switches.gripped import grips_in, lent
 from erls.equations.switches.grips import NO_GRIPS, Grips
@@ -307,6 +307,12 @@ class SerialFormulation(TreeFormulation):
 
     def left_by_residuals(self, views: Sequence[Array], t: Array, y: Array, v: Array, a: Array) -> list[Array]:
         """(k, ...) what residuals of `complete` at times (k,) leave in each of some views of its working memory."""
+        places = None if self.grips.names else places_within(self.complete.scratch, views)
+        if places is not None:
+            memory = self.complete.reals, self.complete.integers, self.complete.scratch
+            left = residuals_leaving(self.complete.residual, *memory, t, y, v, places, a)
+            parts = np.split(left, np.cumsum([view.size for view in views])[:-1], axis=1)
+            return [part.reshape(len(t), *view.shape) for part, view in zip(parts, views, strict=True)]
         result = [np.empty((len(t), *view.shape)) for view in views]
         for i, at in enumerate(t.tolist()):
             with self.gripped(at, y[i], v[i]), lent(self.grips, self.mechanism, self.complete):

@@ -70,8 +70,7 @@ class Switches:
         """What switches, for messages."""
         rub = (f"friction of joint {name!r} switches between sticking and sliding" for name in self.rubbing.names)
         limits = (f"the motor of joint {name!r} comes to its limit and leaves it" for name in self.motors.names)
-        grips = (f"the point of contact {name!r} comes to rest and slides" for name in self.grips.names)
-        return (*rub, *limits, *grips)
+        return (*rub, *limits, *self.grips.told)
 
     @property
     def count(self) -> int:

@@ -1,10 +1,13 @@
 """Modes of the friction of contacts: whether a point slides along its plane, and which way, or is held where it rests.
 
-They stand among the constants of a system (`erls.maths.contact_law`). While a point slides its mode ends where it comes
-to rest, or where it has turned by more than 60° from the way that it began with; another one begins there. A point that
-sticks is held by a spring and a damper so stiff that nothing is seen of them, whose force is that which leaves it at
-rest, as far as µ F can: hence forces that hold several points are one, also where rigid bodies would leave a choice.
-Its mode ends where that takes more, or where the point leaves the plane.
+Joints that close loops, whose coordinates are none of the equations', have the same modes, and so have the other joints
+there, which may rest since those do: a joint is a point that always presses, and moves along the first axis only. Modes
+stand among the constants of a system (`erls.maths.contact_law`). While a point slides its mode ends where it comes to
+rest, or where it has turned by more than 60° from the way that it began with; another one begins there. Those that come
+to rest together are looked at together. A point that sticks is held by a spring and a damper so stiff that nothing is
+seen of them, whose force is that which leaves it at rest, as far as µ F can: hence forces that hold several points are
+one, also where rigid bodies would leave a choice. Its mode ends where that takes more, or where the point leaves the
+plane.
 """
 
 from __future__ import annotations
@@ -28,6 +31,33 @@ _NEAR = 0.5  # of what holds a point, that is left where it is looked at more cl
 _APART = 1e-6  # s, of states whose difference is an acceleration
 
 Accelerate = Callable[[float, Array, Array], Array]
+
+
+class Hold(NamedTuple):
+    """What may stick.
+
+    Attributes
+    ----------
+    name : str
+    most : float
+        What holds it, of what acts while it slides.
+    told : str
+        What switches, for messages.
+    closely : bool
+        Whether what holds it is always found from accelerations, since mechanisms of points have no size to speak of,
+        and interpolated places say nothing of springs that give way by a billionth of it.
+    """
+
+    name: str
+    most: float
+    told: str
+    closely: bool = False
+
+
+def held_point(contact: PointContact) -> Hold:
+    """A point of a contact."""
+    most = contact.static_friction / max(contact.friction, 1e-300)
+    return Hold(contact.name, most, f"the point of contact {contact.name!r} comes to rest and slides")
 
 
 class Touch(NamedTuple):
@@ -56,7 +86,7 @@ class Grips:
 
     Parameters
     ----------
-    contacts : sequence of PointContact
+    holds : sequence of Hold
     laws : list of (9,) arrays
         Views of their friction among the constants of a system, see `erls.maths.contact_law`.
     look : callable
@@ -65,14 +95,14 @@ class Grips:
 
     def __init__(
         self,
-        contacts: Sequence[PointContact],
+        holds: Sequence[Hold],
         laws: Sequence[Array],
         look: Callable[[Array, Array, Array], Touch],
     ) -> None:
-        self.names = tuple(contact.name for contact in contacts)
+        self.names, self.told = tuple(hold.name for hold in holds), tuple(hold.told for hold in holds)
         self.laws, self.look = list(laws), look
-        # of what acts while they slide
-        self._most = np.array([contact.static_friction / max(contact.friction, 1e-300) for contact in contacts])
+        self._most = np.array([hold.most for hold in holds])
+        self._closely = np.array([hold.closely for hold in holds], dtype=bool)
         self._loose: list[int] = []  # those that have come to rest, whose force is still to be found
 
     @property
@@ -148,7 +178,10 @@ class Grips:
                 pushed = self._holding(t, y, v, accelerate)[self.sticking == k][0]
             law[MODE], law[AHEAD : AHEAD + 2] = SLIDES, pushed / np.linalg.norm(pushed)
             return
-        self._decide(k, touch)
+        slow = self.held(touch)
+        for other in range(len(self.laws)):  # those that come to rest together hold together
+            if other == k or (slow[k] and slow[other] and self.laws[other][MODE] == SLIDES):
+                self._decide(other, touch)
 
     def _pushed(self, k: int, place: Array, slip: Array) -> Array:
         """(..., 2) how far a point is pushed that sticks, of what acts while it slides."""
@@ -168,7 +201,7 @@ class Grips:
             if law[MODE] == STICKS:
                 room = self._most[k] - np.linalg.norm(self._pushed(k, touch.place[:, k], slip), axis=1)
                 result[:, k] = np.where(presses[:, k], room, -1.0)
-                near |= presses[:, k] & (room < _NEAR * self._most[k])
+                near |= presses[:, k] & ((room < _NEAR * self._most[k]) | self._closely[k])
             else:
                 ahead = slip @ law[AHEAD : AHEAD + 2] - _TURNED * np.linalg.norm(slip, axis=1)
                 result[presses[:, k], k] = ahead[presses[:, k]]

@@ -65,10 +65,12 @@ class DryFriction(NamedTuple):
 
 
 def dry_friction(mechanism: Mechanism, free_joints: IntArray) -> DryFriction | None:
-    """Of the joints of a tree whose coordinates, of the free ones, come first; None where none sticks."""
+    """Of the joints of a tree whose coordinates, of the free ones, come first; None where none sticks, or where they
+    have other modes, since joints that close loops stick as well.
+    """
     joints = [mechanism.joints[k] for k in free_joints]
     places = [place for place, joint in enumerate(joints) if joint.forces.sticks]
-    if not places:
+    if not places or mechanism.gripped:
         return None
     forces = [joints[place].forces for place in places]
     return DryFriction(

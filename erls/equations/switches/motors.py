@@ -17,6 +17,7 @@ from erls.equations.compiled_system import RESIDUAL, CompiledSystem
 from erls.equations.serial.records import JOINT, JOINT_STATE, Joint, JointState, Serial
 from erls.equations.series import residuals_leaving
 from erls.maths.calls import handed
+from erls.maths.contact_places import COEFFICIENT
 from erls.maths.records import place_of, python_reader
 from erls.maths.so3 import Array
 from erls.mechanism.drives import Drive
@@ -122,6 +123,8 @@ class Asked:
             stops = _see_joint(self._reals, system.integers, at).stops
             if len(stops):
                 stops[_STOP_STIFFNESS] = 0.0
+        for law in system.gripped_laws(self._reals):
+            law[COEFFICIENT] = 0.0
 
     def __call__(self, t: Array, y: Array, v: Array) -> Array:
         """(k, c) at states (k, n) at times (k,)."""

@@ -15,8 +15,9 @@ from erls.equations.registry import FORMULATIONS, formulate
 from erls.errors import Cause, SceneError
 from erls.mechanism.effects import Certificate
 from erls.run.chain.run import ChainRun
+from erls.run.chain.shells_file import read_shells, write_shells
 from erls.run.knots import End, read_solution, write_solution
-from erls.scene.build import build_mechanism
+from erls.scene.build import Elements, build_mechanism
 from erls.scene.chain import Scene, SceneRecord
 from fe_import.description.records import MOST_PIECES, LinkDescription
 from fe_import.errors import ReportedError
@@ -60,6 +61,9 @@ def write_chain(group: h5py.Group, run: ChainRun) -> None:
     if run.scene.record.simulation.formulation == "nodal":
         texts = [link.description and msgspec.json.encode(link.description).decode() for link in links]
         write_strings(group, "descriptions", tuple(t or "" for t in texts), "links made of beams as JSON, or empty")
+        for k, link in enumerate(links):
+            if link.shells is not None:
+                write_shells(group.create_group(f"shells/{k + 1:04d}"), link.shells)
 
 
 def read_chain(file: Reader, scene: Scene, end: End) -> ChainRun:
@@ -82,11 +86,18 @@ def read_chain(file: Reader, scene: Scene, end: End) -> ChainRun:
     }
     ends = np.cumsum([0, *counts])
     pieces = [[read[int(n)] for n in others[a:b]] for a, b in pairwise(ends.tolist())]
-    descriptions: list[LinkDescription | None] = []
+    whole = [read[int(n)] for n in numbers]
+    descriptions: list[Elements] = []
     if record.simulation.formulation == "nodal":
         descriptions = [_description(text, f"{path}: /descriptions") for text in file.names("descriptions", count)]
+        if "shells" in file.names_inside():
+            shells = file.subgroup("shells")
+            for name in shells.names_inside():
+                if not name.isdecimal() or not 1 <= int(name) <= count:
+                    raise shells.fail(name, "no such link", name, count)
+                k = int(name) - 1
+                descriptions[k] = read_shells(shells.subgroup(name), len(whole[k].nodes))
     try:
-        whole = [read[int(n)] for n in numbers]
         built = build_mechanism(scene, models=whole, descriptions=descriptions, pieces=pieces)
         formulation = formulate(built.mechanism, record.simulation)
     except ReportedError as problem:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from erls.errors import SceneError
 from erls.mechanism.joint_types import DRIVEN_TYPES, HOLDING_TYPES, JOINT_TYPES
 from erls.scene.bodies.analyses import GROUPS, TANGENTS, Analysis, Buckling, Continuation, Dynamics, Frequencies
@@ -159,6 +161,9 @@ def _check_beam(beam: Beam, scene: BodySceneRecord, nodes: list[str], place: str
         raise bad(f"{place}.elements", message, beam.elements, f"give 1 to {MOST_ELEMENTS}")
     if beam.local_z is not None and not any(beam.local_z):
         raise bad(f"{place}.local_z", "a direction is needed", beam.local_z, "give a direction across the beam")
+    if beam.rotary_inertia is not None and not all(0 <= x < math.inf for x in beam.rotary_inertia):
+        message = "no beam has this"
+        raise bad(f"{place}.rotary_inertia", message, beam.rotary_inertia, "give two finite numbers, not negative")
 
 
 def _check_shell(shell: ShellSurface, scene: BodySceneRecord, nodes: list[str], place: str) -> None:

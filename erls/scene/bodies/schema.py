@@ -81,6 +81,9 @@ class Beam(Record, frozen=True):
         How far the section turns about the beam from start to end [deg].
     temperature_change : float
         From that of its shape without stress [K]; its material needs a ``thermal_expansion``.
+    rotary_inertia : (2,) floats, optional
+        Per length, about the section's y and z [kg m], about its axis their sum; that of material and section unless
+        given.
     """
 
     name: str
@@ -94,6 +97,7 @@ class Beam(Record, frozen=True):
     local_z: Vector | None = None
     twist_deg: float = 0.0
     temperature_change: float = 0.0
+    rotary_inertia: tuple[float, float] | None = None
 
 
 class ShellSurface(Record, frozen=True):
@@ -110,7 +114,8 @@ class ShellSurface(Record, frozen=True):
     elements : (2,) int
         Of a patch, along I and J.
     mesh : str
-        Instead of corners: a file of quadrangles, in metres; named nodes that lie on one of its nodes are the same.
+        Instead of corners: a file of quadrangles and triangles, in metres; named nodes that lie on one of its nodes are
+        the same.
     places, cells, sets : lists
         Instead of a file what it holds: positions [m], four of these around each quadrangle, sets of these by name.
     material : str

@@ -12,6 +12,8 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +23,8 @@ from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.run.tables import HEAD
+
+_Of = Callable[[ArrayLike], Array]
 
 TIMES = 1001
 """Even times over which functions are taken, ends included."""
@@ -163,16 +167,17 @@ def histories(run: Run, names: Sequence[str], times: ArrayLike) -> Array:
     SceneError
         BAD_REFERENCE: there is none of a name.
     """
-    found = [_alone(run, name, times) for name in names]
-    if any(values is None for values in found):
-        heads = _heads(run)
-        for name, values in zip(names, found, strict=True):
-            if values is None and name not in heads:
-                known = [*heads, *(f"{point}.distance" for point in run.point_names)]
-                message, remedy = "the table of the run has no such column", "name one of its columns"
-                raise SceneError(Cause.BAD_REFERENCE, message, where="--get", value=name, limit=known, remedy=remedy)
-        columns = run.columns(np.asarray(times, dtype=float))
-        found = [columns[heads[n][0]] if values is None else values for n, values in zip(names, found, strict=True)]
+    alone = [_alone(run, name) for name in names]
+    if all(alone):
+        return np.array([of(times) for of in alone if of])
+    heads = _heads(run)
+    for name, of in zip(names, alone, strict=True):
+        if of is None and name not in heads:
+            known = [*heads, *(f"{point}.distance" for point in run.point_names)]
+            message, remedy = "the table of the run has no such column", "name one of its columns"
+            raise SceneError(Cause.BAD_REFERENCE, message, where="--get", value=name, limit=known, remedy=remedy)
+    columns = run.columns(np.asarray(times, dtype=float))  # what stands there is not asked for again
+    found = [columns[heads[n][0]] if n in heads else cast(_Of, of)(times) for n, of in zip(names, alone, strict=True)]
     return np.array(found)
 
 
@@ -181,19 +186,25 @@ def history(run: Run, name: str, times: ArrayLike) -> Array:
     return np.asarray(histories(run, [name], times)[0])
 
 
-def _alone(run: Run, name: str, times: ArrayLike) -> Array | None:
-    """(k,) values of a column that a run gives without the others; None of one that it does not."""
+def _alone(run: Run, name: str) -> _Of | None:
+    """What gives the values (k,) of a column at times (k,) without the others; None of one that a run does not give so.
+    """
     base, _, part = name.rpartition(".")
     if base in run.point_names and part in ("x", "y", "z", "distance"):
-        if part != "distance":
-            return np.asarray(run.position(base, times)[..., "xyz".index(part)])
-        places = run.position(base, [run.start, *np.asarray(times, dtype=float).tolist()])
-        return np.asarray(np.linalg.norm(places[1:] - places[0], axis=-1))
+        return partial(_distance, run, base) if part == "distance" else partial(_place, run, base, "xyz".index(part))
     if isinstance(run, ChainRun) and base in run.joint_names and part in _JOINT:
-        values = np.asarray(getattr(run, _JOINT[part])(base, times))
-        if values.ndim == 1:
-            return values
+        of = partial(getattr(run, _JOINT[part]), base)
+        return of if np.ndim(of([run.start])) == 1 else None
     return None
+
+
+def _place(run: Run, point: str, axis: int, times: ArrayLike) -> Array:
+    return np.asarray(run.position(point, times)[..., axis])
+
+
+def _distance(run: Run, point: str, times: ArrayLike) -> Array:
+    places = run.position(point, [run.start, *np.asarray(times, dtype=float).tolist()])
+    return np.asarray(np.linalg.norm(places[1:] - places[0], axis=-1))
 
 
 def _heads(run: Run) -> dict[str, tuple[str, str]]:

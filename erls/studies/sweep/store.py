@@ -61,7 +61,7 @@ class Store(Database):
     path : Path or None
     """
 
-    tables, version, kind = _TABLES, VERSION, "store of a sweep"
+    tables, version, kind, content = _TABLES, VERSION, "store of a sweep", "finished points"
 
     def add(self, rows: Iterable[Row]) -> None:
         """Keep rows, all or none."""
@@ -73,6 +73,10 @@ class Store(Database):
         where = "" if failed else " WHERE numbers IS NOT NULL"
         with self._reading():
             yield from (number for (number,) in self._base.execute(f"SELECT number FROM points{where} ORDER BY number"))
+
+    def held(self) -> int:
+        """Finished points."""
+        return sum(1 for _ in self.finished())
 
     def rows(self) -> Iterator[Row]:
         """All that are there, by number; a page of them in memory at a time."""

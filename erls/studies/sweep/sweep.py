@@ -20,7 +20,6 @@ from erls.maths.so3 import Array
 from erls.run.record import Run
 from erls.scene.inputs import files_of
 from erls.scene.read import load_scene
-from erls.studies.database import refuse_finished
 from erls.studies.kept import content_of
 from erls.studies.pool import each
 from erls.studies.sweep.evaluate import (
@@ -211,7 +210,7 @@ def sweep(
     if target is not None:
         claim(target, SUFFIX, files_of(load_scene(task.scene, task.overrides)), force and not resume)
         if not resume:
-            _make_room(target, force)
+            Store.make_room(target, force)
     with closing(Store(target)) as base:
         if base.empty:
             base.begin(about)
@@ -235,14 +234,6 @@ def sweep(
         interrupted=interrupted,
         bending_every=1 if verdict else BENDING_EVERY,
     )
-
-
-def _make_room(target: Path, force: bool) -> None:
-    """Take away a store that was there, unless it holds what may have taken long."""
-    if target.exists() and not force:
-        with closing(Store(target)) as base:
-            refuse_finished(target, 0 if base.empty else len(list(base.finished())))
-    target.unlink(missing_ok=True)
 
 
 def _about(task: Task, points: Points) -> dict[str, Any]:

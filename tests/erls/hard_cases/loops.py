@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import loop_scenes
@@ -121,21 +122,24 @@ _BENT: dict[str, Any] = {
 }
 _PIVOT = {"name": "pivot", "type": "spherical", "link": "beam", "node": "tip", "position": [_SPAN + _GAP, 0.0, 0.0]}
 _SPRING, _RUB, _FAR, _AT = 20.0, 0.1, 0.1, 60.0  # N m/rad, N m in each joint of the tree, rad, degrees
+_CLOSING = 0.2  # N m in the joint that closes it
 
 
-def _rubbing() -> dict[str, Any]:
-    """A parallelogram on a spring, displaced; three joints rub, and rest together."""
+def _rubbing(closing: float = 0.0) -> dict[str, Any]:
+    """A parallelogram on a spring, displaced; three joints rub, and the one that closes it, and rest together."""
     data = _parallelogram(_AT, tolerance=1e-6)
     for joint in data["joints"]:
         joint["friction"] = {"law": "stick", "force": _RUB}
+    if closing:
+        data["loops"][0]["friction"] = {"law": "stick", "force": closing}
     data["joints"][0] |= {"stiffness": _SPRING, "rest": float(np.radians(_AT) - _FAR)}
     return {**data, "gravity": [0.0, 0.0, 0.0]}
 
 
-def _comes_to_rest(t: Array) -> Array:
+def _comes_to_rest(t: Array, closing: float = 0.0) -> Array:
     """Half cycles about places where spring and friction balance."""
     rate = np.sqrt(_SPRING / (_LENGTH**2 * (2 * _LINK / 3 + _BAR)))
-    balance = 3 * _RUB / _SPRING
+    balance = (3 * _RUB + closing) / _SPRING
     angle, x, begun = np.zeros_like(t), _FAR, 0.0
     while abs(x) > balance:
         middle = np.copysign(balance, x)
@@ -190,6 +194,12 @@ CASES = of_subject(
             _rubbing(),
             closed(_comes_to_rest, "closed form", 1e-9),
             fast=("erls", "ffr"),
+        ),
+        Case(
+            "parallelogram whose joints stick, the closing one too",
+            _rubbing(_CLOSING),
+            closed(partial(_comes_to_rest, closing=_CLOSING), "closed form", 1e-9),
+            fast=("erls",),
         ),
         _swung("parallelogram with a third leg", -60.0, 1e-4, legs=3),
         _swung("parallelogram through its change point, adaptive", 60.0, 1e-6, simulation={"tolerance": 1e-6}),

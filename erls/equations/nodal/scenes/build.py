@@ -231,13 +231,14 @@ def _section(record: BodySceneRecord, beam: BeamRecord, file: str) -> BeamSectio
     s = section_constants(record.sections[beam.section], material.poissons_ratio, "saint-venant", place)
     e, density = material.youngs_modulus, material.density
     shear = e / (2 * (1 + material.poissons_ratio))
+    rotary = beam.rotary_inertia or (density * s.inertia_y, density * s.inertia_z)
     return beam_section(
         e * s.area,
         (s.shear_factor_y * shear * s.area, s.shear_factor_z * shear * s.area),
         shear * s.torsion_constant,
         (e * s.inertia_y, e * s.inertia_z),
         density * s.area,
-        (density * s.inertia_y, density * s.inertia_z),
+        rotary,
     )
 
 

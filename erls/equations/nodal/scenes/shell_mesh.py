@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from erls.equations.nodal.shell import Shell
+from erls.equations.nodal.surfaces import corner_frames
 from erls.errors import Cause, SceneError
-from erls.maths.motion_maps import poses as as_poses
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
 from erls.scene.bodies.check import EDGES
 from erls.scene.bodies.schema import BodySceneRecord, ShellSurface
 from fe_import.elements.laminates import Lamina, Laminate, plane_stress
-from fe_import.elements.shell_elements import middle_axis
+from fe_import.elements.link_shells import four_cornered
 from fe_import.model import IntArray
 
 _SAME = 1e-6  # of the size of a mesh: a named node that lies on one of it
@@ -51,7 +50,7 @@ def surface(
     Raises
     ------
     SceneError, FEImportError
-        A mesh that cannot be read, or holds anything but quadrangles; a corner that turns back.
+        A mesh that cannot be read; a corner that turns back.
     """
     if shell.corners is None:
         places, cells, sets = mesh_of(shell, folder, place)
@@ -91,7 +90,7 @@ def _patch(
 
 
 def mesh_of(shell: ShellSurface, folder: Path, place: str) -> tuple[Array, IntArray, dict[str, IntArray]]:
-    """Positions, quadrangles and sets of a shell that comes from a mesh.
+    """Positions, elements and sets of a shell that comes from a mesh; the last corner of a triangle stands twice.
 
     Raises
     ------
@@ -110,11 +109,7 @@ def mesh_of(shell: ShellSurface, folder: Path, place: str) -> tuple[Array, IntAr
             Cause.FILE_NOT_FOUND, "no such mesh file", where=f"{place}.mesh", value=shell.mesh, remedy=remedy
         )
     mesh = read_mesh(path, (), Wanted(solids=False, shells=True))
-    if [cells.type for cells in mesh.shells] != ["quad4"]:
-        kinds = ", ".join(f"{len(cells)} {cells.type}" for cells in mesh.shells)
-        message, remedy = "only quadrangles bend by large angles", "mesh the surface with quadrangles alone"
-        raise SceneError(Cause.BAD_FIELD, message, where=f"{place}.mesh", value=kinds, remedy=remedy)
-    return mesh.nodes, mesh.shells[0].elements, mesh.node_sets
+    return mesh.nodes, np.concatenate([four_cornered(cells.elements) for cells in mesh.shells]), mesh.node_sets
 
 
 def _numbered(
@@ -136,6 +131,7 @@ def _numbered(
 def _shares(places: Array, cells: IntArray, sets: dict[str, IntArray]) -> dict[str, tuple[IntArray, Array]]:
     """Nodes of each set with their shares of the length of the edges between them; equal ones where there are none."""
     edges = np.unique(np.sort(np.concatenate([cells[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1), axis=0)
+    edges = edges[edges[:, 0] != edges[:, 1]]  # a corner of a triangle stands twice
     lengths = np.linalg.norm(places[edges[:, 0]] - places[edges[:, 1]], axis=1)
     result = {}
     for name, nodes in sets.items():
@@ -145,37 +141,6 @@ def _shares(places: Array, cells: IntArray, sets: dict[str, IntArray]) -> dict[s
         own = share[nodes] if inside.any() else np.ones(len(nodes))
         result[name] = nodes, own / own.sum()
     return result
-
-
-def corner_frames(places: Array, cells: IntArray, fold_deg: float, where: str) -> Array:
-    """(e, 4, 4, 4) frames at the corners: z the mean normal of the elements there that meet at no fold."""
-    corners = places[cells]
-    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    normals = np.cross(ahead, back)
-    lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
-    turned = np.einsum("ekc,ec->ek", normals, normals.sum(axis=1)) <= 0
-    if turned.any() or not lengths.all():
-        bad = int(turned.any(axis=1).argmax())
-        raise SceneError(
-            Cause.BAD_FIELD, "a quadrangle without area, or with a corner that turns back", where=where,
-            value=f"about {np.round(corners[bad].mean(axis=0), 6).tolist()}", remedy="mend the mesh there",
-        )  # fmt: skip
-    normals /= lengths
-    means, least = normals.copy(), np.cos(np.radians(fold_deg))
-    flat, owner = normals.reshape(-1, 3), cells.ravel()
-    order = np.argsort(owner, kind="stable")
-    starts = np.searchsorted(owner[order], np.arange(len(places) + 1))
-    for first, end in itertools.pairwise(starts):
-        meeting = order[first:end]
-        near = flat[meeting] @ flat[meeting].T >= least
-        means.reshape(-1, 3)[meeting] = near @ flat[meeting]
-    means /= np.linalg.norm(means, axis=-1, keepdims=True)
-    one = corners[:, 1] + corners[:, 2] - corners[:, 0] - corners[:, 3]
-    two = corners[:, 2] + corners[:, 3] - corners[:, 0] - corners[:, 1]
-    middle = middle_axis((one, two))
-    x = middle[:, None] - np.einsum("ekc,ec->ek", means, middle)[..., None] * means
-    x /= np.linalg.norm(x, axis=-1, keepdims=True)
-    return as_poses(np.stack([x, np.cross(means, x), means], axis=-1), corners)
 
 
 def _laminate(record: BodySceneRecord, shell: ShellSurface) -> Laminate:
