@@ -84,8 +84,8 @@ def zeros() -> None:
 
 
 NODAL: dict[str, tuple[Path, tuple[str, ...]]] = {
-    "arm": (ARM, ("simulation.step=0.004", "simulation.elements_per_member=8")),
-    "planar robot": (PLANAR, ("simulation.step=0.008", "simulation.elements_per_member=4")),
+    "arm": (ARM, ("simulation.step=0.008", "simulation.elements_per_member=8", "inverse.bandwidth=60.0")),
+    "planar robot": (PLANAR, ("simulation.step=0.008", "simulation.elements_per_member=4", "inverse.bandwidth=60.0")),
     "parallel robot": (DATA / "inverse" / "three_legs.toml", ("simulation.step=0.004",)),
 }
 
