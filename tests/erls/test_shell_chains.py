@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -91,17 +93,24 @@ def nodal_frequencies(link: Link, times: int) -> Array:
     return frequencies(stiffness, system.mass_matrix(0.0, system.start))
 
 
+@functools.cache
+def _judges() -> list[Array]:
+    """Frequencies of the folded strip of linear shells, on two meshes."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for n in (16, 32):
+            fine = load_link(described(Path(folder), folded(n, n // 4, "quad4")))
+            found.append(frequencies(*build_model(fine).reduced_matrices()[::-1], 4))
+    return found
+
+
 @pytest.mark.parametrize("kind", ["quad4", "tri3"])
 def test_frequencies_beside_those_of_linear_shells(tmp_path: Path, kind: str) -> None:
     """Two discretizations, of a folded strip, meet as the mesh is cut: at most 1/1.8 of the largest distance is left
     each time, then 0.5 % in bending and 2 % in torsion, from linear shells extrapolated with second order.
     """
-    link = link_of(described(tmp_path, folded(8, 2, kind)))
-    judges = []
-    for n in (16, 32):
-        fine = load_link(described(tmp_path, folded(n, n // 4, "quad4")))
-        judges.append(frequencies(*build_model(fine).reduced_matrices()[::-1], 4))
-    exact = (4 * judges[1] - judges[0]) / 3
+    link, (coarse, fine) = link_of(described(tmp_path, folded(8, 2, kind))), _judges()
+    exact = (4 * fine - coarse) / 3
     off = [np.abs(nodal_frequencies(link, times)[:4] / exact - 1) for times in (1, 2, 4)]
     assert off[1].max() < off[0].max() / 1.8
     assert off[2].max() < off[1].max() / 1.8
@@ -169,21 +178,21 @@ def run_of(path: Path, verdict: bool = False) -> ChainRun:
 
 
 def test_a_shell_link_judges_the_others(tmp_path: Path) -> None:
-    """ERLS and FFR within 2 % of the deflection, which is what 16 elements along the strip leave in frequency; the file
-    of the run holds its shells, so that it is read without their mesh.
+    """ERLS and FFR within 3 % of the deflection: 8 elements along the strip leave 2.6 %, twice as many half of it
+    (`benchmarks/shells.py --chain`). The file of the run holds its shells, so that it is read without their mesh.
     """
-    described(tmp_path, strip(16, 2))
+    described(tmp_path, strip(8, 2))
     runs = {name: run_of(arm(tmp_path, name)) for name in ("erls", "ffr", "nodal")}
     times = np.linspace(0.0, 0.1, 41)
     places = {name: run.position("tip", times) for name, run in runs.items()}
     still = run_of(arm(tmp_path, "erls", links=[{"name": "strip", "model": "link.toml", "flexible": False}]))
     deflection = np.abs(places["erls"] - still.position("tip", times)).max()
     assert deflection > 1e-3
-    assert np.abs(places["erls"] - places["nodal"]).max() < 0.02 * deflection
-    assert np.abs(places["ffr"] - places["nodal"]).max() < 0.02 * deflection
+    assert np.abs(places["erls"] - places["nodal"]).max() < 0.03 * deflection
+    assert np.abs(places["ffr"] - places["nodal"]).max() < 0.03 * deflection
     nodal = runs["nodal"]
     assert isinstance(nodal.formulation, Nodal)
-    assert nodal.formulation.describe()["elements"] == 32
+    assert nodal.formulation.describe()["elements"] == 16
     modes = [run.series(times).modal[0] for run in (runs["erls"], nodal)]
     assert np.abs(modes[0] - modes[1]).max() < 0.05 * np.abs(modes[0]).max()
     save_run(tmp_path / "run.h5", nodal)
