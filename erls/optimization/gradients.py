@@ -22,7 +22,7 @@ Asked = Callable[[ChainRun], Array]
 
 _ALL = "constraints"
 _FORWARD: tuple[Method, ...] = ("forward",)
-_BACKWARD: tuple[Method, ...] = ("adjoint", "forward")  # nodal runs have no way back yet
+_BACKWARD: tuple[Method, ...] = ("adjoint", "forward")  # runs with contacts, stops or what sticks have no way back
 _LARGE = 0.25  # of a field: modes of slender links turn with the fourth power of a diameter
 _STEP = 2e-5  # of a variable: vibrations that fall out of step make large third derivatives
 
@@ -43,8 +43,8 @@ def derivatives(
     sums = None if weights is None else {_ALL: weights}
     refused: SceneError | None = None
     for method in _FORWARD if weights is None else _BACKWARD:
-        try:
-            found = sensitivities(run, {_ALL: asked}, keys, method, weights=sums)
+        try:  # constraints ask a run for its motion and what moves it; masses are counted from descriptions
+            found = sensitivities(run, {_ALL: asked}, keys, method, weights=sums, models=False)
         except SceneError as refusal:
             if refusal.cause != Cause.NO_DERIVATIVE:
                 raise

@@ -97,6 +97,7 @@ def changes_of(run: ChainRun, differences: Sequence[Difference], motion: Motion 
 
 
 def singular(t: float) -> SimulationError:
+    """Why a step has no derivative."""
     return SimulationError(
         Cause.NEWTON_FAILED,
         f"a step has no derivative: {SINGULAR}",

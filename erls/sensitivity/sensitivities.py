@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -33,6 +34,8 @@ from erls.sensitivity.variants import Difference, differences
 from erls.simulation.simulate import simulate
 from fe_import.files.log import log
 from fe_import.files.toml import choose
+
+_Differ = Callable[[Sequence[Parameter]], list[Difference]]
 
 _ROOM = 50_000_000
 """Numbers of derivatives of a motion that are held at a time, 400 MB: more parameters go one group after the other."""
@@ -81,6 +84,7 @@ def sensitivities(
     method: Method = "auto",
     *,
     weights: Mapping[str, Array] | None = None,
+    models: bool = True,
     tell: Callable[[str], None] = log,
 ) -> Sensitivities:
     """Differentiate what a run gives by numbers of its scene.
@@ -105,6 +109,9 @@ def sensitivities(
     weights : mapping of str to (m, size) array, optional
         By name of an output: factors of its components, one after the other. Derivatives are then those of the m sums,
         which cost the adjoint method what m numbers cost, however many components go into them.
+    models : bool, optional
+        Whether outputs of a nodal run may ask for numbers of modal models, such as masses of links. Without that a link
+        of another section needs no reduction: nodal elements take nothing but nodes and interfaces from models.
     tell : callable, optional
         Told about each preparation that takes time.
 
@@ -150,9 +157,13 @@ def sensitivities(
     with announcing(tell):
         sums = _sums(weights or {}, values)
         askings = _askings(run, outputs, values, sums, len(keys), method)
-        derivatives = _forward(run, outputs, values, sums, keys) if askings is None else _adjoint(askings, keys)
+        differ = partial(differences, run, models=models)
+        if askings is None:
+            made = _forward(run, outputs, values, sums, keys, differ)
+        else:
+            made = _adjoint(askings, keys, differ)
     at = {one.key: one.value for one in keys}
-    return Sensitivities(run, at, values, derivatives, "forward" if askings is None else "adjoint")
+    return Sensitivities(run, at, values, made, "forward" if askings is None else "adjoint")
 
 
 def _sums(weights: Mapping[str, Array], values: Mapping[str, Array]) -> dict[str, Array]:
@@ -210,11 +221,12 @@ def _forward(
     values: Mapping[str, Array],
     sums: Mapping[str, Array],
     keys: Sequence[Parameter],
+    differ: _Differ,
 ) -> dict[str, dict[str, Array]]:
     derivatives: dict[str, dict[str, Array]] = {name: {} for name in outputs}
     some = max(1, _ROOM // max(1, 3 * run.solution.y.size))
     for first in range(0, len(keys), some):
-        found = differences(run, keys[first : first + some])
+        found = differ(keys[first : first + some])
         motion, metres = _motion(run, found)
         for k, one in enumerate(found):
             for name, output in outputs.items():
@@ -226,7 +238,7 @@ def _forward(
 
 
 def _adjoint(
-    askings: Sequence[tuple[Asking, dict[int, Array]]], keys: Sequence[Parameter]
+    askings: Sequence[tuple[Asking, dict[int, Array]]], keys: Sequence[Parameter], differ: _Differ
 ) -> dict[str, dict[str, Array]]:
     derivatives: dict[str, dict[str, Array]] = {asking.name: {} for asking, _ in askings}
     run = askings[0][0].run
@@ -237,7 +249,7 @@ def _adjoint(
     for (_, by_knots), own in zip(askings, columns, strict=True):
         for knot, seed in by_knots.items():
             seeds.setdefault(knot, np.zeros((3, n, ends[-1])))[..., own] += seed
-    found = differences(run, keys)
+    found = differ(keys)
     if _of_nodes(run):
         from erls.sensitivity import nodal_adjoint  # here: most runs need none of it
 

@@ -73,6 +73,8 @@ class Difference:
     parameter : Parameter
     stencil : Stencil
         Where, and with which weights.
+    models : bool, optional
+        Whether modal models of links in nodal scenes are those of the variant.
 
     Raises
     ------
@@ -80,9 +82,9 @@ class Difference:
         The first two that are made will not do; others are refused when they are asked for.
     """
 
-    def __init__(self, run: ChainRun, parameter: Parameter, stencil: Stencil) -> None:
+    def __init__(self, run: ChainRun, parameter: Parameter, stencil: Stencil, models: bool = True) -> None:
         self.parameter = parameter
-        self._run, self._stencil = run, stencil
+        self._run, self._stencil, self._models = run, stencil, models
         self._made: dict[int, Variant] = {}
         if parameter.within:  # shapes of all are held together
             self._get(tuple(range(len(stencil))))
@@ -102,7 +104,7 @@ class Difference:
     def _get(self, numbers: tuple[int, ...]) -> tuple[Variant, ...]:
         missing = [k for k in numbers if k not in self._made]
         if missing:
-            made = _variants(self._run, self.parameter, [self._stencil[k] for k in missing])
+            made = _variants(self._run, self.parameter, [self._stencil[k] for k in missing], self._models)
             self._made |= dict(zip(missing, made, strict=True))
         return tuple(self._made[k] for k in numbers)
 
@@ -123,8 +125,8 @@ def _alike(one: CompiledSystem, other: CompiledSystem) -> bool:
     return np.array_equal(one.integers, other.integers) and np.array_equal(one.reals, other.reals, equal_nan=True)
 
 
-def differences(run: ChainRun, parameters: Sequence[Parameter]) -> list[Difference]:
-    """By each parameter.
+def differences(run: ChainRun, parameters: Sequence[Parameter], models: bool = True) -> list[Difference]:
+    """By each parameter; ``models`` as in `Difference`.
 
     Raises
     ------
@@ -132,32 +134,34 @@ def differences(run: ChainRun, parameters: Sequence[Parameter]) -> list[Differen
         No value beside that of a parameter will do; a link would have another number of modes; times at which forces
         jump depend on a parameter.
     """
-    return [_difference(run, parameter) for parameter in parameters]
+    return [_difference(run, parameter, models) for parameter in parameters]
 
 
-def _difference(run: ChainRun, parameter: Parameter) -> Difference:
+def _difference(run: ChainRun, parameter: Parameter, models: bool) -> Difference:
     problems = []
     for stencil in STENCILS:
         try:
-            return Difference(run, parameter, stencil)
+            return Difference(run, parameter, stencil, models)
         except ReportedError as problem:
             problems.append(problem)
     raise problems[0]
 
 
-def _variants(run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, float]]) -> list[Variant]:
+def _variants(
+    run: ChainRun, parameter: Parameter, stencil: Sequence[tuple[int, float]], models: bool
+) -> list[Variant]:
     """At the values of a stencil, or some of them."""
     base: Any = run.formulation
     step = STEP * parameter.size
     nodal = system_of(base.mechanism, run.scene.record.simulation) == "nodal"
-    sections = nodal and _of_sections(run, parameter)
+    sections = nodal and not models and _of_sections(run, parameter)
     make = _with_sections if sections else _mechanism
     mechanisms = [make(run, parameter, parameter.value + at * step) for at, _ in stencil]
     turns: list[Array | None] = [None] * len(stencil)
     if parameter.within and parameter.link is not None and not nodal:
         number = base.mechanism.bodies[parameter.link]
-        models = [mechanism.links[number].model for mechanism in mechanisms]
-        found = held(models, base.mechanism.links[number].model, f"parameter {parameter.key}")
+        shapes = [mechanism.links[number].model for mechanism in mechanisms]
+        found = held(shapes, base.mechanism.links[number].model, f"parameter {parameter.key}")
         turns = [_of_all(base, number, turn[6:, 6:]) for turn in found]
     result = []
     for (at, weight), mechanism, turn in zip(stencil, mechanisms, turns, strict=True):

@@ -15,7 +15,6 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from erls.equations.formulation import ContactSeries
-from erls.equations.loops import actuated
 from erls.equations.loops.rubbing import grip_force
 from erls.equations.serial.state_series import ReactionSeries
 from erls.equations.switches.gripped import grips_in, held_joints, lent
@@ -37,6 +36,8 @@ def loop_grips(chain: ClosedChain, system: CompiledLoops) -> Grips:
     tree, joints = chain.bare.compiled, held_joints(chain.mechanism)
     if tree is None or not (chain.mechanism.grips or joints):
         return NO_GRIPS
+    from erls.equations.loops import actuated  # here: kernels of loops are for loops alone
+
     return grips_in(chain.mechanism, system, actuated.forces if joints else tree.residual, joints)
 
 
